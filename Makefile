@@ -1,0 +1,68 @@
+# Each target does all the set-up it needs; see CONTRIBUTING.md.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
+
+.PHONY: help check setup build demo test slow lint format bench docs clean
+
+help:
+	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
+	@echo "make test   all tests but the slow ones     make slow   the slow ones"
+	@echo "make lint   format, lint, types, stubs      make bench  ratios against peers, to benchmarks/results/"
+	@echo "make docs   the documentation, without warnings"
+
+check:
+	@command -v $(PYTHON) >/dev/null || { echo "taxel needs Python 3.11 or later: install it, or say make PYTHON=/path/to/python3"; exit 1; }
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "taxel needs Python 3.11 or later, this is $$($(PYTHON) -V): say make PYTHON=/path/to/python3.11"; exit 1; }
+	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { echo "taxel needs Python's venv: on Debian, apt install python3-venv"; exit 1; }
+	@command -v cargo >/dev/null || { echo "taxel needs cargo 1.89 or later: install it from https://rustup.rs"; exit 1; }
+	@command -v cc >/dev/null || { echo "taxel needs a C compiler: on Debian, apt install build-essential"; exit 1; }
+
+$(VENV)/.installed: pyproject.toml | check
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.16,<2"
+	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]; print("\n".join(p["dependencies"] + e["test"] + e["lint"] + e["docs"] + e["bench"]))' > $(VENV)/wanted.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/wanted.txt
+	@touch $@
+
+$(VENV)/.built: $(VENV)/.installed $(SOURCES)
+	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --quiet
+	@touch $@
+
+setup: $(VENV)/.installed
+build: $(VENV)/.built
+
+demo: build
+	$(BIN)/taxel demo
+
+test: build
+	cargo test --workspace --quiet
+	$(BIN)/python -m pytest -q -m "not slow"
+
+slow: build
+	cargo test --workspace --quiet -- --ignored
+	$(BIN)/python -m pytest -q -m slow
+
+lint: build
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest taxel._core --allowlist tests/stubtest-allowed.txt
+
+format:
+	cargo fmt --all
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+bench: build
+	$(BIN)/taxel bench all
+
+docs: build
+	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
+
+clean:
+	rm -rf target $(VENV) docs/_build

@@ -1,0 +1,1 @@
+//! The emulated board, as a state machine.

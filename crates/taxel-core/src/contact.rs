@@ -1,0 +1,1 @@
+//! Fast contact for scenes.

@@ -1,0 +1,1 @@
+//! Spikes to detections, and their score.

@@ -1,0 +1,86 @@
+//! What changed, when.
+
+use crate::{Array, Result, problem};
+
+/// The intensity words that belong to events.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Intensities {
+    /// Ticks of the converter's counter (1/300 us), one an event; 0 where none is present.
+    pub ticks: Vec<u16>,
+    /// Whether the event came with an intensity.
+    pub present: Vec<bool>,
+}
+
+/// Start or stop of a recording, as the board marked it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Marker {
+    /// us, unwrapped.
+    pub t: i64,
+    /// Start (true) or stop.
+    pub start: bool,
+}
+
+/// Changes at taxels, in the order in which they came; one column a field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Events {
+    /// The sensor.
+    pub array: Array,
+    /// us, unwrapped.
+    pub t: Vec<i64>,
+    /// Column.
+    pub x: Vec<u16>,
+    /// Row.
+    pub y: Vec<u16>,
+    /// More pressure (true) or less.
+    pub p: Vec<bool>,
+    /// The held values that came with the changes, or none at all.
+    pub intensity: Option<Intensities>,
+    /// Starts and stops, by time.
+    pub markers: Vec<Marker>,
+}
+
+impl Events {
+    /// No event yet.
+    #[must_use]
+    pub fn empty(array: Array) -> Self {
+        Self { array, t: vec![], x: vec![], y: vec![], p: vec![], intensity: None, markers: vec![] }
+    }
+
+    /// How many events.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Whether there is no event.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
+    /// Checks that columns are equally long and that every event lies on the array.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the column or the event.
+    pub fn check(&self) -> Result<()> {
+        let n = self.t.len();
+        for (name, len) in [("x", self.x.len()), ("y", self.y.len()), ("p", self.p.len())] {
+            if len != n {
+                return Err(problem!("events: {name} has {len} entries, t has {n}: they must be equal"));
+            }
+        }
+        if let Some(i) = &self.intensity
+            && (i.ticks.len() != n || i.present.len() != n)
+        {
+            return Err(problem!("events: intensity has {} entries, t has {n}: they must be equal", i.ticks.len()));
+        }
+        let (columns, rows) = (self.array.columns, self.array.rows);
+        for (k, (&x, &y)) in self.x.iter().zip(&self.y).enumerate() {
+            if x >= columns || y >= rows {
+                return Err(problem!("event {k}: taxel x={x}, y={y} lies outside {rows} rows x {columns} columns"));
+            }
+        }
+        Ok(())
+    }
+}

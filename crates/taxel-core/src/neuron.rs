@@ -1,0 +1,1 @@
+//! Spikes to spikes: the SRM0 neuron.

@@ -1,0 +1,164 @@
+//! Times by train.
+
+use crate::{Result, problem};
+
+/// One spike on its way, as encoders hand them on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spike {
+    /// ms.
+    pub t: f64,
+    /// Which train it belongs to.
+    pub train: u32,
+    /// Signed value: polarity or bits; 1 where the encoder has none.
+    pub value: f32,
+}
+
+/// Spike times by train, in one array with offsets; ms.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpikeTrains {
+    /// All times, train after train, ascending in each; ms.
+    pub times: Vec<f64>,
+    /// Where each train begins, and at last where all end: trains + 1 entries.
+    pub offsets: Vec<usize>,
+    /// A signed value a spike, where the encoder has one.
+    pub values: Option<Vec<f32>>,
+    /// The window that was listened to; ms.
+    pub start: f64,
+    /// Its end; ms.
+    pub stop: f64,
+}
+
+impl SpikeTrains {
+    /// Sorts spikes into `trains` trains; equal times keep their order.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where a spike names a train that is not there, or lies outside the window.
+    pub fn from_spikes(spikes: &[Spike], trains: usize, signed: bool, start: f64, stop: f64) -> Result<Self> {
+        let mut offsets = vec![0_usize; trains + 1];
+        for s in spikes {
+            let n = s.train as usize;
+            if n >= trains {
+                return Err(problem!("spike at {} ms: train {n} of {trains}", s.t));
+            }
+            if !(start <= s.t && s.t <= stop) {
+                return Err(problem!("train {n}: spike at {} ms lies outside the window {start} to {stop} ms", s.t));
+            }
+            offsets[n + 1] += 1;
+        }
+        for n in 0..trains {
+            offsets[n + 1] += offsets[n];
+        }
+        let mut next = offsets.clone();
+        let mut sorted: Vec<(f64, f32)> = vec![(0.0, 0.0); spikes.len()];
+        for s in spikes {
+            let place = &mut next[s.train as usize];
+            sorted[*place] = (s.t, s.value);
+            *place += 1;
+        }
+        for n in 0..trains {
+            let train = &mut sorted[offsets[n]..offsets[n + 1]];
+            if !train.is_sorted_by(|a, b| a.0 <= b.0) {
+                train.sort_by(|a, b| a.0.total_cmp(&b.0));
+            }
+        }
+        Ok(Self {
+            times: sorted.iter().map(|s| s.0).collect(),
+            values: signed.then(|| sorted.iter().map(|s| s.1).collect()),
+            offsets,
+            start,
+            stop,
+        })
+    }
+
+    /// How many trains.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+
+    /// Whether there is no train at all.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The times of train `n`, ms.
+    #[must_use]
+    pub fn train(&self, n: usize) -> &[f64] {
+        &self.times[self.offsets[n]..self.offsets[n + 1]]
+    }
+
+    /// All spikes by time; at equal times the lower train first.
+    #[must_use]
+    pub fn by_time(&self) -> Vec<Spike> {
+        let mut all: Vec<Spike> = (0..self.len())
+            .flat_map(|n| {
+                (self.offsets[n]..self.offsets[n + 1]).map(move |k| Spike {
+                    t: self.times[k],
+                    train: u32::try_from(n).unwrap_or(u32::MAX),
+                    value: self.values.as_ref().map_or(1.0, |v| v[k]),
+                })
+            })
+            .collect();
+        all.sort_by(|a, b| a.t.total_cmp(&b.t));
+        all
+    }
+
+    /// Signed trains as twice as many unsigned ones: first all ON (value above 0), then all OFF.
+    #[must_use]
+    pub fn split_by_sign(&self) -> Self {
+        let Some(values) = &self.values else { return self.clone() };
+        let (mut times, mut offsets) = (Vec::with_capacity(self.times.len()), vec![0]);
+        for on in [true, false] {
+            for n in 0..self.len() {
+                let range = self.offsets[n]..self.offsets[n + 1];
+                times.extend(range.filter(|&k| (values[k] > 0.0) == on).map(|k| self.times[k]));
+                offsets.push(times.len());
+            }
+        }
+        Self { times, offsets, values: None, start: self.start, stop: self.stop }
+    }
+
+    /// Checks offsets, order, finiteness and window.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming train and spike.
+    pub fn check(&self) -> Result<()> {
+        if !(self.start.is_finite() && self.stop.is_finite() && self.start <= self.stop) {
+            return Err(problem!("window {} to {} ms: start must not lie after stop", self.start, self.stop));
+        }
+        let sound = self.offsets.first() == Some(&0)
+            && self.offsets.last() == Some(&self.times.len())
+            && self.offsets.is_sorted();
+        if !sound {
+            return Err(problem!("offsets must ascend from 0 to the number of spikes, {}", self.times.len()));
+        }
+        if self.values.as_ref().is_some_and(|v| v.len() != self.times.len()) {
+            return Err(problem!("values: must be one a spike, {}", self.times.len()));
+        }
+        for n in 0..self.len() {
+            let train = self.train(n);
+            for (k, &t) in train.iter().enumerate() {
+                if !t.is_finite() {
+                    return Err(problem!("train {n}, spike {k}: time is {t}, must be finite"));
+                }
+                if k > 0 && t < train[k - 1] {
+                    return Err(problem!(
+                        "train {n}, spike {k}: {t} ms comes after {} ms, times must ascend",
+                        train[k - 1]
+                    ));
+                }
+                if t < self.start || t > self.stop {
+                    return Err(problem!(
+                        "train {n}, spike {k}: {t} ms lies outside the window {} to {} ms",
+                        self.start,
+                        self.stop
+                    ));
+                }
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,1 @@
+//! UDP datagrams in, counted.

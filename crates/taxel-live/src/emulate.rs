@@ -1,0 +1,1 @@
+//! The emulated board as a process of its own.

@@ -1,0 +1,43 @@
+//! What can go wrong out there.
+
+use std::path::{Path, PathBuf};
+
+/// An error of the core, or one of files and sockets with the place where it came from.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// What the core found.
+    #[error(transparent)]
+    Core(#[from] taxel_core::Error),
+    /// A file that could not be read or written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// Which.
+        path: PathBuf,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+    /// A socket that could not be opened or used.
+    #[error("{place}: {source}")]
+    Socket {
+        /// Which address.
+        place: String,
+        /// What the operating system said.
+        source: std::io::Error,
+    },
+}
+
+/// The result of everything in this crate that can fail.
+pub type Result<T> = std::result::Result<T, Error>;
+
+impl Error {
+    /// Names the file in an error of the operating system.
+    pub fn file(path: &Path) -> impl FnOnce(std::io::Error) -> Self + '_ {
+        move |source| Self::File { path: path.to_owned(), source }
+    }
+
+    /// Names the address in an error of the operating system.
+    pub fn socket(place: impl ToString) -> impl FnOnce(std::io::Error) -> Self {
+        let place = place.to_string();
+        move |source| Self::Socket { place, source }
+    }
+}

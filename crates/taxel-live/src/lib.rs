@@ -1,0 +1,10 @@
+//! Where the world comes in: sockets, files and threads around `taxel-core`.
+
+pub mod error;
+
+pub mod capture;
+pub mod emulate;
+pub mod pipeline;
+pub mod recording;
+
+pub use error::{Error, Result};

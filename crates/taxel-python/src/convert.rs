@@ -1,0 +1,117 @@
+//! NumPy in and out: type, shape and order checked once.
+//!
+//! Contiguous arrays of the right type are read in place, under a borrow that is held for the whole call; the Python
+//! side makes them so (`numpy.ascontiguousarray`) before it calls.
+
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use taxel_core::{Array, Events, Intensities, Marker, SpikeTrains};
+
+use crate::errors::ProblemError;
+
+/// The entries of a one-dimensional array, in place.
+pub(crate) fn slice<'a, T: Element>(name: &str, array: &'a PyReadonlyArray1<'_, T>) -> PyResult<&'a [T]> {
+    array.as_slice().map_err(|_| ProblemError::new_err(format!("{name}: must be contiguous")))
+}
+
+/// A new array of the entries, without a copy.
+pub(crate) fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyArray1<T>> {
+    values.into_pyarray(py)
+}
+
+/// An array's geometry as Python hands it over: rows, columns, pitch in mm, name, which exist.
+pub(crate) type ArrayParts = (u16, u16, f64, String, Option<Vec<bool>>);
+
+pub(crate) fn to_array((rows, columns, pitch_mm, name, exists): ArrayParts) -> PyResult<Array> {
+    let mut array = Array::new(rows, columns, pitch_mm, &name).map_err(crate::errors::core)?;
+    if let Some(exists) = exists {
+        if exists.len() != array.len() {
+            let text = format!("exists has {} entries: must be {rows} x {columns}", exists.len());
+            return Err(ProblemError::new_err(text));
+        }
+        array.exists = Some(exists);
+    }
+    Ok(array)
+}
+
+pub(crate) fn from_array(array: &Array) -> ArrayParts {
+    (array.rows, array.columns, array.pitch_mm, array.name.clone(), array.exists.clone())
+}
+
+/// Events as Python hands them over: array, t, x, y, p, intensity, present, markers as (t, start).
+pub(crate) type EventsIn<'py> = (
+    ArrayParts,
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray1<'py, u16>,
+    PyReadonlyArray1<'py, u16>,
+    PyReadonlyArray1<'py, bool>,
+    Option<(PyReadonlyArray1<'py, u16>, PyReadonlyArray1<'py, bool>)>,
+    Vec<(i64, bool)>,
+);
+
+pub(crate) fn to_events((parts, t, x, y, p, intensity, markers): EventsIn<'_>) -> PyResult<Events> {
+    let events = Events {
+        array: to_array(parts)?,
+        t: slice("t", &t)?.to_vec(),
+        x: slice("x", &x)?.to_vec(),
+        y: slice("y", &y)?.to_vec(),
+        p: slice("p", &p)?.to_vec(),
+        intensity: match intensity {
+            None => None,
+            Some((ticks, present)) => Some(Intensities {
+                ticks: slice("intensity", &ticks)?.to_vec(),
+                present: slice("present", &present)?.to_vec(),
+            }),
+        },
+        markers: markers.into_iter().map(|(t, start)| Marker { t, start }).collect(),
+    };
+    events.check().map_err(crate::errors::core)?;
+    Ok(events)
+}
+
+/// Events as Python gets them: the same parts, as new arrays.
+pub(crate) type EventsOut<'py> = (
+    ArrayParts,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<u16>>,
+    Bound<'py, PyArray1<u16>>,
+    Bound<'py, PyArray1<bool>>,
+    Option<(Bound<'py, PyArray1<u16>>, Bound<'py, PyArray1<bool>>)>,
+    Vec<(i64, bool)>,
+);
+
+pub(crate) fn from_events(py: Python<'_>, events: Events) -> EventsOut<'_> {
+    (
+        from_array(&events.array),
+        array(py, events.t),
+        array(py, events.x),
+        array(py, events.y),
+        array(py, events.p),
+        events.intensity.map(|i| (array(py, i.ticks), array(py, i.present))),
+        events.markers.iter().map(|m| (m.t, m.start)).collect(),
+    )
+}
+
+/// Spike trains as Python hands them over: times, offsets, values, start, stop; ms.
+pub(crate) type SpikesIn<'py> =
+    (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, Option<PyReadonlyArray1<'py, f32>>, f64, f64);
+
+pub(crate) fn to_spikes((times, offsets, values, start, stop): SpikesIn<'_>) -> PyResult<SpikeTrains> {
+    let offsets = slice("offsets", &offsets)?
+        .iter()
+        .map(|&o| usize::try_from(o).map_err(|_| ProblemError::new_err(format!("offsets: {o} is below 0"))))
+        .collect::<PyResult<_>>()?;
+    let values = values.map(|v| slice("values", &v).map(<[f32]>::to_vec)).transpose()?;
+    let trains = SpikeTrains { times: slice("times", &times)?.to_vec(), offsets, values, start, stop };
+    trains.check().map_err(crate::errors::core)?;
+    Ok(trains)
+}
+
+/// Spike trains as Python gets them: the same parts, as new arrays.
+pub(crate) type SpikesOut<'py> =
+    (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<i64>>, Option<Bound<'py, PyArray1<f32>>>, f64, f64);
+
+pub(crate) fn from_spikes(py: Python<'_>, trains: SpikeTrains) -> SpikesOut<'_> {
+    let offsets = trains.offsets.iter().map(|&o| i64::try_from(o).unwrap_or(i64::MAX)).collect();
+    (array(py, trains.times), array(py, offsets), trains.values.map(|v| array(py, v)), trains.start, trains.stop)
+}

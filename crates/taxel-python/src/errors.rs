@@ -1,0 +1,77 @@
+//! The one place where an error gets its Python class.
+
+use pyo3::exceptions::{PyException, PyKeyboardInterrupt, PyOSError};
+use pyo3::prelude::*;
+use taxel_core::Error as CoreError;
+use taxel_live::Error as LiveError;
+
+pyo3::create_exception!(taxel, Error, PyException, "Anything that taxel refuses; its kinds are its subclasses.");
+pyo3::create_exception!(taxel, FormatError, Error, "Bytes or files that do not hold what they should.");
+pyo3::create_exception!(
+    taxel,
+    ProblemError,
+    Error,
+    "Arguments, spike trains or a learning problem that make no sense."
+);
+pyo3::create_exception!(taxel, DeviceError, Error, "The board, its registers or its commands.");
+pyo3::create_exception!(taxel, SceneError, Error, "A simulated scene that cannot be played.");
+
+pub(crate) fn core(error: CoreError) -> PyErr {
+    // No wildcard arm: a new kind does not compile until it has a class.
+    match error {
+        CoreError::Format(text) => FormatError::new_err(text),
+        CoreError::Problem(text) => ProblemError::new_err(text),
+        CoreError::Device(text) => DeviceError::new_err(text),
+        CoreError::Scene(text) => SceneError::new_err(text),
+        CoreError::Interrupted => PyKeyboardInterrupt::new_err(()),
+    }
+}
+
+pub(crate) fn live(error: LiveError) -> PyErr {
+    match error {
+        LiveError::Core(error) => core(error),
+        // OSError picks its own subclass by errno: FileNotFoundError, PermissionError ...
+        LiveError::File { path, source } => os_error(source, path.display().to_string()),
+        LiveError::Socket { place, source } => os_error(source, place),
+    }
+}
+
+fn os_error(source: std::io::Error, place: String) -> PyErr {
+    match source.raw_os_error() {
+        Some(code) => {
+            let said = source.to_string();
+            let text = said.split(" (os error").next().unwrap_or(&said).to_owned();
+            PyOSError::new_err((code, text, place))
+        }
+        None if source.kind() == std::io::ErrorKind::AlreadyExists => {
+            pyo3::exceptions::PyFileExistsError::new_err(format!("{place}: {source}"))
+        }
+        None => PyOSError::new_err(format!("{place}: {source}")),
+    }
+}
+
+/// Both crates' errors, so that one door serves both.
+pub(crate) trait IntoPyErr {
+    fn into_py_err(self) -> PyErr;
+}
+
+impl IntoPyErr for CoreError {
+    fn into_py_err(self) -> PyErr {
+        core(self)
+    }
+}
+
+impl IntoPyErr for LiveError {
+    fn into_py_err(self) -> PyErr {
+        live(self)
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("Error", py.get_type::<Error>())?;
+    module.add("FormatError", py.get_type::<FormatError>())?;
+    module.add("ProblemError", py.get_type::<ProblemError>())?;
+    module.add("DeviceError", py.get_type::<DeviceError>())?;
+    module.add("SceneError", py.get_type::<SceneError>())
+}

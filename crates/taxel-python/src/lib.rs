@@ -1,0 +1,17 @@
+//! Python bindings of taxel: conversion, releasing the GIL, errors, and nothing else.
+
+mod convert;
+mod enter;
+mod errors;
+
+mod nouns;
+
+use pyo3::prelude::*;
+
+/// The compiled part of taxel; import `taxel` instead.
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    errors::register(module)?;
+    nouns::register(module)?;
+    Ok(())
+}

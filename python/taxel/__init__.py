@@ -1,0 +1,21 @@
+"""Touch as events: from the bytes of a tactile array to decisions that say when."""
+
+from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.spikes import SpikeTrains
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Array",
+    "DeviceError",
+    "Error",
+    "Events",
+    "FormatError",
+    "Frames",
+    "ProblemError",
+    "SceneError",
+    "SpikeTrains",
+]

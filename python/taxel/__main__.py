@@ -1,0 +1,5 @@
+"""Run the command line with ``python -m taxel``."""
+
+from taxel.cli import main
+
+main()

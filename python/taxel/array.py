@@ -1,0 +1,116 @@
+"""The geometry of a sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import ProblemError
+
+__all__ = ["Array"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Array:
+    """Describe a sensor: rows, columns, the pitch of its taxels, and which of them exist.
+
+    A taxel's index is ``row * columns + column``; x is the column, y the row.
+
+    Parameters
+    ----------
+    rows, columns : int, 1 or more
+    pitch_mm : float, above 0
+        Distance between the centres of neighbouring taxels.
+    exists : bool, shape (rows, columns), optional
+        Which taxels exist; all where it is left out.
+    name : str
+
+    Raises
+    ------
+    ProblemError : no row or column, a pitch that is not above 0, or `exists` of another shape
+
+    Examples
+    --------
+    >>> Array(64, 64, pitch_mm=2.67, name="thesis")
+    Array(thesis: 64 rows x 64 columns, 4096 taxels, 2.67 mm apart)
+    """
+
+    rows: int
+    columns: int
+    pitch_mm: float = 1.0
+    exists: NDArray[np.bool_] | None = None
+    name: str = "array"
+
+    def __post_init__(self) -> None:
+        for field in ("rows", "columns"):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= 65_535:
+                raise ProblemError(f"{field} is {value!r}: must be a whole number from 1 to 65535")
+            object.__setattr__(self, field, int(value))
+        try:
+            pitch = float(self.pitch_mm)
+        except (TypeError, ValueError):
+            pitch = float("nan")
+        if not (np.isfinite(pitch) and pitch > 0):
+            raise ProblemError(f"pitch_mm is {self.pitch_mm!r}: must be above 0 and finite")
+        object.__setattr__(self, "pitch_mm", pitch)
+        if not isinstance(self.name, str):
+            raise ProblemError(f"name is {self.name!r}: must be a text")
+        if self.exists is not None:
+            exists = np.array(self.exists, dtype=bool)
+            if exists.shape != self.shape:
+                raise ProblemError(f"exists has shape {exists.shape}: must be {self.shape}")
+            exists.setflags(write=False)
+            object.__setattr__(self, "exists", exists)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns."""
+        return self.rows, self.columns
+
+    @property
+    def taxels(self) -> int:
+        """How many taxels exist."""
+        return self.rows * self.columns if self.exists is None else int(np.count_nonzero(self.exists))
+
+    def index(self, x: Iterable[int] | int, y: Iterable[int] | int) -> NDArray[np.int64]:
+        """Return the index ``row * columns + column`` of taxels.
+
+        Parameters
+        ----------
+        x, y : int or int arrays
+            Column and row.
+
+        Returns
+        -------
+        int64, the shape of `x`
+        """
+        return np.asarray(np.asarray(y, np.int64) * self.columns + np.asarray(x, np.int64))
+
+    def _parts(self) -> tuple[int, int, float, str, list[bool] | None]:
+        """Return what the compiled part wants."""
+        exists = None if self.exists is None else [bool(e) for e in self.exists.ravel()]
+        return self.rows, self.columns, self.pitch_mm, self.name, exists
+
+    @classmethod
+    def _from_parts(cls, parts: tuple[int, int, float, str, list[bool] | None]) -> Array:
+        rows, columns, pitch_mm, name, exists = parts
+        grid = None if exists is None else np.array(exists).reshape(rows, columns)
+        return cls(rows, columns, pitch_mm, grid, name)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Array):
+            return NotImplemented
+        return self._parts() == other._parts()
+
+    def __hash__(self) -> int:
+        return hash((self.rows, self.columns, self.pitch_mm, self.name))
+
+    def __repr__(self) -> str:
+        return (
+            f"Array({self.name}: {self.rows} rows x {self.columns} columns, {self.taxels} taxels, "
+            f"{self.pitch_mm:g} mm apart)"
+        )

@@ -1,0 +1,268 @@
+"""What changed, when."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._core import ProblemError
+from taxel.array import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from taxel.frames import Frames
+
+__all__ = ["Events"]
+
+
+class Events:
+    """Hold changes at taxels, in the order in which they came.
+
+    Parameters
+    ----------
+    t : int64, shape (events,), us
+        Unwrapped time.
+    x, y : uint16, shape (events,)
+        Column and row.
+    p : bool, shape (events,)
+        Polarity: more pressure (true) or less.
+    array : Array
+        The sensor; every event must lie on it.
+    intensity : uint16, shape (events,), ticks, optional
+        The held value that came with each change (1/300 us of the board's counter).
+    present : bool, shape (events,), optional
+        Which events came with an intensity; all where it is left out.
+    markers : sequence of (t us, start), optional
+        Starts (true) and stops (false) of a recording, as the board marked them.
+
+    Raises
+    ------
+    ProblemError : columns of unequal length, or an event outside the array (names the event)
+
+    Examples
+    --------
+    >>> events = Events([0, 192], [3, 4], [5, 5], [True, False], array=Array(8, 8))
+    >>> events
+    Events(2 events, 0 to 192 us, 8 x 8 taxels, no intensities)
+    >>> len(events.between(0, 100))
+    1
+    """
+
+    def __init__(
+        self,
+        t: ArrayLike,
+        x: ArrayLike,
+        y: ArrayLike,
+        p: ArrayLike,
+        *,
+        array: Array,
+        intensity: ArrayLike | None = None,
+        present: ArrayLike | None = None,
+        markers: Sequence[tuple[int, bool]] = (),
+    ) -> None:
+        if not isinstance(array, Array):
+            raise ProblemError(f"array is {array!r}: must be a taxel.Array")
+        self.array = array
+        self.t: NDArray[np.int64] = _column("t", t, np.int64)
+        self.x: NDArray[np.uint16] = _column("x", x, np.uint16)
+        self.y: NDArray[np.uint16] = _column("y", y, np.uint16)
+        self.p: NDArray[np.bool_] = _column("p", p, np.bool_)
+        self.intensity: NDArray[np.uint16] | None = None
+        self.present: NDArray[np.bool_] | None = None
+        if intensity is not None:
+            self.intensity = _column("intensity", intensity, np.uint16)
+            all_of_them = np.ones(len(self.intensity), np.bool_)
+            self.present = all_of_them if present is None else _column("present", present, np.bool_)
+        elif present is not None:
+            raise ProblemError("present without intensity: give both or neither")
+        self.markers = tuple((int(at), bool(start)) for at, start in markers)
+        _core.check_events(self._parts())
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def duration_us(self) -> int:
+        """From the first event to the last, us; 0 where there is none."""
+        return int(self.t.max() - self.t.min()) if len(self) else 0
+
+    def between(self, start: float, stop: float) -> Events:
+        """Return the events of ``start <= t < stop`` (us), with the markers of that time."""
+        kept = self[(self.t >= start) & (self.t < stop)]
+        kept.markers = tuple(m for m in self.markers if start <= m[0] < stop)
+        return kept
+
+    def region(self, x: slice, y: slice) -> Events:
+        """Return the events of a rectangle of columns `x` and rows `y` (slices without a step); the array stays."""
+        if x.step not in (None, 1) or y.step not in (None, 1):
+            raise ProblemError("region: slices of columns and rows have no step")
+        columns, rows = x.indices(self.array.columns), y.indices(self.array.rows)
+        inside = (self.x >= columns[0]) & (self.x < columns[1]) & (self.y >= rows[0]) & (self.y < rows[1])
+        return self[inside]
+
+    def __getitem__(self, chosen: slice | NDArray[Any]) -> Events:
+        """Return the chosen events (slice, mask or numbers); markers stay."""
+        if not isinstance(chosen, slice):
+            chosen = np.asarray(chosen)
+        return self._unchecked(
+            self.t[chosen],
+            self.x[chosen],
+            self.y[chosen],
+            self.p[chosen],
+            self.array,
+            None if self.intensity is None else self.intensity[chosen],
+            None if self.present is None else self.present[chosen],
+            self.markers,
+        )
+
+    def to_numpy(self) -> NDArray[np.void]:
+        """Return one record an event with the fields ``t x y p``, and ``intensity present`` where there are any."""
+        fields: list[tuple[str, Any]] = [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?")]
+        if self.intensity is not None:
+            fields += [("intensity", "<u2"), ("present", "?")]
+        records = np.empty(len(self), np.dtype(fields))
+        for name, _ in fields:
+            records[name] = getattr(self, name)
+        return records
+
+    @classmethod
+    def from_numpy(cls, records: NDArray[np.void], array: Array) -> Events:
+        """Build events from records with the fields ``t x y p``, and ``intensity``, ``present`` where they are there.
+
+        Raises
+        ------
+        ProblemError : a field is missing (names it)
+        """
+        names = records.dtype.names or ()
+        missing = [name for name in ("t", "x", "y", "p") if name not in names]
+        if missing:
+            raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
+        extra = {name: records[name] for name in ("intensity", "present") if name in names}
+        return cls(records["t"], records["x"], records["y"], records["p"], array=array, **extra)
+
+    def to_tonic(self) -> NDArray[np.void]:
+        """Return tonic's event array: records of ``x y t p`` (int16, int16, int64 us, bool)."""
+        records = np.empty(len(self), np.dtype([("x", "<i2"), ("y", "<i2"), ("t", "<i8"), ("p", "?")]))
+        for name in ("x", "y", "t", "p"):
+            records[name] = getattr(self, name)
+        return records
+
+    @classmethod
+    def from_tonic(cls, records: NDArray[np.void], array: Array) -> Events:
+        """Build events from tonic's event array."""
+        return cls.from_numpy(records, array)
+
+    def to_faery(self) -> NDArray[np.void]:
+        """Return faery's event array: records of ``t x y on`` (uint64 us, uint16, uint16, bool).
+
+        Raises
+        ------
+        ProblemError : an event before time 0, which faery's unsigned time cannot hold
+        """
+        if len(self) and self.t.min() < 0:
+            raise ProblemError(f"event {int(self.t.argmin())}: t is {int(self.t.min())} us, faery's times start at 0")
+        fields = [("t", "<u8"), ("x", "<u2"), ("y", "<u2"), ("on", "?")]
+        records = np.empty(len(self), np.dtype(fields))
+        records["t"], records["x"], records["y"], records["on"] = self.t, self.x, self.y, self.p
+        return records
+
+    @classmethod
+    def from_faery(cls, records: NDArray[np.void], array: Array) -> Events:
+        """Build events from faery's event array."""
+        names = records.dtype.names or ()
+        missing = [name for name in ("t", "x", "y", "on") if name not in names]
+        if missing:
+            raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
+        return cls(records["t"], records["x"], records["y"], records["on"], array=array)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the event picture: at each taxel, more rises than falls in one colour, more falls in another."""
+        from taxel.plot import event_picture  # noqa: PLC0415  matplotlib loads slowly
+
+        return event_picture(self, ax)
+
+    def held(self, period_us: int, start: int | None = None, stop: int | None = None) -> Frames:
+        """Return the held intensities as pictures, every `period_us`.
+
+        A taxel reads 0 until its first event, then the last intensity that came.
+
+        Raises
+        ------
+        ProblemError : events without intensities, or a period below 1 us
+        """
+        from taxel.frames import Frames  # noqa: PLC0415  frames know events
+
+        return Frames.from_events(self, period_us, start, stop)
+
+    @classmethod
+    def _unchecked(
+        cls,
+        t: NDArray[np.int64],
+        x: NDArray[np.uint16],
+        y: NDArray[np.uint16],
+        p: NDArray[np.bool_],
+        array: Array,
+        intensity: NDArray[np.uint16] | None,
+        present: NDArray[np.bool_] | None,
+        markers: tuple[tuple[int, bool], ...],
+    ) -> Events:
+        """Build events from columns that the compiled part or another `Events` has checked already."""
+        events = cls.__new__(cls)
+        events.array, events.t, events.x, events.y, events.p = array, t, x, y, p
+        events.intensity, events.present, events.markers = intensity, present, markers
+        return events
+
+    def _parts(self) -> tuple[Any, ...]:
+        intensity = None
+        if self.intensity is not None:
+            intensity = (np.ascontiguousarray(self.intensity), np.ascontiguousarray(self.present))
+        columns = (np.ascontiguousarray(c) for c in (self.t, self.x, self.y, self.p))
+        return self.array._parts(), *columns, intensity, list(self.markers)
+
+    @classmethod
+    def _from_parts(cls, parts: tuple[Any, ...], array: Array | None = None) -> Events:
+        geometry, t, x, y, p, intensity, markers = parts
+        ticks, present = intensity if intensity is not None else (None, None)
+        return cls._unchecked(t, x, y, p, array or Array._from_parts(geometry), ticks, present, tuple(markers))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Events):
+            return NotImplemented
+        if self.array != other.array or self.markers != other.markers:
+            return False
+        if (self.intensity is None) != (other.intensity is None):
+            return False
+        names = ["t", "x", "y", "p"] + ([] if self.intensity is None else ["intensity", "present"])
+        return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        time = f"{int(self.t.min())} to {int(self.t.max())} us" if len(self) else "no time"
+        said = "no intensities" if self.present is None else f"{int(self.present.sum())} intensities"
+        marks = f", {len(self.markers)} markers" if self.markers else ""
+        return f"Events({len(self)} events, {time}, {self.array.rows} x {self.array.columns} taxels, {said}{marks})"
+
+
+def _column(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
+    """Return a contiguous column; refuses what would change its value on the way."""
+    try:
+        given = np.asarray(values)
+        if given.size == 0:
+            given = given.astype(dtype)
+        column = np.ascontiguousarray(given, dtype)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ProblemError(f"{name}: {error}") from None
+    if column.ndim != 1:
+        raise ProblemError(f"{name} has {column.ndim} dimensions: must have one")
+    if given.dtype != column.dtype:
+        wrong = np.flatnonzero(~(given == column))
+        if len(wrong):
+            k = int(wrong[0])
+            raise ProblemError(f"{name}[{k}] is {given[k]}: must fit {np.dtype(dtype).name}")
+    return column

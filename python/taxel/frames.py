@@ -1,0 +1,159 @@
+"""Pictures of the whole array over time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._core import ProblemError
+from taxel.array import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from taxel.events import Events
+
+__all__ = ["Frames"]
+
+
+class Frames:
+    """Hold pictures of the whole array over time.
+
+    Parameters
+    ----------
+    values : float32, shape (n, rows, columns)
+    t : int64, shape (n,), us
+        Ascending.
+    unit : str
+        Of the values: "ticks", "N", "kPa", "counts" ...
+    array : Array, optional
+        The sensor; made from the shape where it is left out.
+
+    Raises
+    ------
+    ProblemError : shapes that do not fit, or times that do not ascend (names the picture)
+
+    Examples
+    --------
+    >>> frames = Frames(np.zeros((3, 8, 8)), [0, 192, 384], unit="ticks")
+    >>> frames
+    Frames(3 pictures of 8 x 8 taxels, 0 to 384 us, ticks)
+    """
+
+    def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
+        try:
+            self.values: NDArray[np.float32] = np.ascontiguousarray(values, np.float32)
+            given = np.asarray(t)
+            self.t: NDArray[np.int64] = np.ascontiguousarray(given, np.int64)
+        except (TypeError, ValueError) as error:
+            raise ProblemError(f"frames: {error}") from None
+        if self.values.ndim != 3:
+            raise ProblemError(f"values have {self.values.ndim} dimensions: must have three (n, rows, columns)")
+        if self.t.ndim != 1 or len(self.t) != len(self.values):
+            raise ProblemError(f"t has shape {self.t.shape}: must be ({len(self.values)},), one time a picture")
+        if not np.array_equal(given, self.t):
+            raise ProblemError("t: times must be whole us")
+        back = np.flatnonzero(np.diff(self.t) <= 0)
+        if len(back):
+            k = int(back[0])
+            raise ProblemError(f"t[{k + 1}] is {self.t[k + 1]} us, not after t[{k}] = {self.t[k]} us")
+        if not isinstance(unit, str) or not unit:
+            raise ProblemError(f"unit is {unit!r}: must be a text")
+        self.unit = unit
+        self.array = Array(*self.values.shape[1:]) if array is None else array
+        if self.array.shape != self.values.shape[1:]:
+            raise ProblemError(f"pictures have shape {self.values.shape[1:]}: the array has {self.array.shape}")
+
+    @classmethod
+    def from_events(cls, events: Events, period_us: int, start: int | None = None, stop: int | None = None) -> Frames:
+        """Return the held intensities as pictures, every `period_us`.
+
+        A picture at time t holds what came up to and at t. A taxel reads 0 until its first event.
+
+        Parameters
+        ----------
+        events : Events
+            With intensities.
+        period_us : int, us, 1 or more
+        start, stop : int, us, optional
+            First picture, and the end (exclusive) of the pictures; the events' own time where they are left out.
+
+        Raises
+        ------
+        ProblemError : events without intensities, or a period below 1 us
+        """
+        if events.intensity is None or events.present is None:
+            raise ProblemError("events without intensities: pictures need the held values")
+        if period_us < 1 or int(period_us) != period_us:
+            raise ProblemError(f"period_us is {period_us}: must be a whole number, 1 or more")
+        array = events.array
+        if start is None:
+            start = int(events.t.min()) if len(events) else 0
+        if stop is None:
+            stop = int(events.t.max()) + 1 if len(events) else start
+        t = np.arange(start, stop, int(period_us), dtype=np.int64)
+        values = np.zeros((len(t), array.rows * array.columns), np.float32)
+        there = np.flatnonzero(events.present)
+        order = there[np.argsort(events.t[there], kind="stable")]
+        index = array.index(events.x[order], events.y[order])
+        place = np.searchsorted(t, events.t[order], side="left")
+        held = np.zeros(array.rows * array.columns, np.float32)
+        bounds = np.searchsorted(place, np.arange(len(t) + 1), side="left")
+        for k in range(len(t)):
+            new = slice(bounds[k], bounds[k + 1])
+            held[index[new]] = events.intensity[order[new]]
+            values[k] = held
+        return cls(values.reshape(len(t), array.rows, array.columns), t, unit="ticks", array=array)
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __getitem__(self, chosen: slice) -> Frames:
+        """Return a run of pictures."""
+        return Frames(self.values[chosen], self.t[chosen], unit=self.unit, array=self.array)
+
+    def between(self, start: float, stop: float) -> Frames:
+        """Return the pictures of ``start <= t < stop`` (us)."""
+        first, last = np.searchsorted(self.t, [start, stop])
+        return self[int(first) : int(last)]
+
+    def region(self, x: slice, y: slice) -> Frames:
+        """Return the pictures of a rectangle of columns `x` and rows `y`, as a smaller array."""
+        values = self.values[:, y, x]
+        exists = None if self.array.exists is None else self.array.exists[y, x]
+        if 0 in values.shape[1:]:
+            raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} lies in it")
+        array = Array(values.shape[1], values.shape[2], self.array.pitch_mm, exists, self.array.name)
+        return Frames(values, self.t, unit=self.unit, array=array)
+
+    @property
+    def total(self) -> NDArray[np.float64]:
+        """The sum over taxels of each picture, in the pictures' unit."""
+        return self.values.sum(axis=(1, 2), dtype=np.float64)
+
+    def to_numpy(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+        """Return values (n, rows, columns) and times (us)."""
+        return self.values.copy(), self.t.copy()
+
+    def plot(self, at: int | None = None, ax: Axes | None = None) -> Axes:
+        """Draw the pressure map at `at` us, or of the picture with the largest sum."""
+        from taxel.plot import pressure_map  # noqa: PLC0415  matplotlib loads slowly
+
+        return pressure_map(self, at, ax)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Frames):
+            return NotImplemented
+        return (
+            (self.array, self.unit) == (other.array, other.unit)
+            and np.array_equal(self.t, other.t)
+            and np.array_equal(self.values, other.values)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        time = f"{self.t[0]} to {self.t[-1]} us" if len(self) else "no time"
+        return f"Frames({len(self)} pictures of {self.array.rows} x {self.array.columns} taxels, {time}, {self.unit})"

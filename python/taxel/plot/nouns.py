@@ -1,0 +1,62 @@
+"""One picture a noun."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+
+from taxel._core import ProblemError
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.spikes import SpikeTrains
+
+__all__ = ["event_picture", "pressure_map", "raster"]
+
+ON, OFF = "#c44e52", "#4c72b0"
+
+
+def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
+    """Draw spike times to the right (ms), trains upwards; ON and OFF in two colours where spikes are signed."""
+    ax = ax or plt.subplots(figsize=(8, 4), layout="constrained")[1]
+    times, train = trains.to_numpy()
+    marks = {"marker": "|", "s": max(4.0, min(200.0, 4000.0 / max(1, len(trains)))), "linewidths": 0.8}
+    if trains.values is None:
+        ax.scatter(times, train, color="black", **marks)
+    else:
+        for on, colour, name in ((True, ON, "ON"), (False, OFF, "OFF")):
+            chosen = (trains.values > 0) == on
+            ax.scatter(times[chosen], train[chosen], color=colour, label=name, **marks)
+        ax.legend(loc="upper right")
+    ax.set(xlabel="time (ms)", ylabel="train", xlim=_wide(trains.start, trains.stop), ylim=(-0.7, len(trains) - 0.3))
+    return ax
+
+
+def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) -> Axes:
+    """Draw one picture: the last at or before `at` us, or the one with the largest sum."""
+    if not len(frames):
+        raise ProblemError("no picture to draw: the frames are empty")
+    ax = ax or plt.subplots(figsize=(5, 4.4), layout="constrained")[1]
+    k = int(frames.total.argmax()) if at is None else max(0, int(np.searchsorted(frames.t, at, side="right")) - 1)
+    values = np.where(frames.array.exists, frames.values[k], np.nan) if frames.array.exists is not None else frames.values[k]
+    image = ax.imshow(values, origin="upper", cmap="magma", interpolation="nearest")
+    ax.figure.colorbar(image, ax=ax, label=frames.unit)
+    ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{frames.t[k] / 1000:.3f} ms")
+    return ax
+
+
+def event_picture(events: Events, ax: Axes | None = None) -> Axes:
+    """Draw, at each taxel, rises less falls."""
+    ax = ax or plt.subplots(figsize=(5, 4.4), layout="constrained")[1]
+    picture = np.zeros(events.array.shape)
+    np.add.at(picture, (events.y, events.x), np.where(events.p, 1, -1))
+    limit = max(1.0, float(np.abs(picture).max()))
+    image = ax.imshow(picture, origin="upper", cmap="RdBu_r", vmin=-limit, vmax=limit, interpolation="nearest")
+    ax.figure.colorbar(image, ax=ax, label="rises less falls")
+    ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{len(events)} events, {events.duration_us / 1000:.1f} ms")
+    return ax
+
+
+def _wide(start: float, stop: float) -> tuple[float, float]:
+    """Return limits that a plot can show even where the window has no length."""
+    return (start, stop) if stop > start else (start - 0.5, stop + 0.5)

@@ -1,0 +1,244 @@
+"""Spike times by train."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._core import ProblemError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["SpikeTrains"]
+
+
+class SpikeTrains:
+    """Hold spike times by train, with the window that was listened to.
+
+    Parameters
+    ----------
+    times : float64, shape (spikes,), ms
+        All times, train after train, ascending in each.
+    offsets : int64, shape (trains + 1,)
+        Where each train begins in `times`, and at last where all end.
+    start, stop : float, ms
+        The window: without it an empty train could not say "silent".
+    values : float32, shape (spikes,), optional
+        A signed value a spike (polarity, bits), where the encoder has one.
+
+    Raises
+    ------
+    ProblemError : times not finite, not ascending or outside the window (names train and spike)
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[1.0, 5.0], [], [3.0]], stop=10.0)
+    >>> trains
+    SpikeTrains(3 trains, 3 spikes, 0 to 10 ms)
+    >>> trains[0]
+    array([1., 5.])
+    """
+
+    def __init__(
+        self,
+        times: ArrayLike,
+        offsets: ArrayLike,
+        start: float,
+        stop: float,
+        values: ArrayLike | None = None,
+    ) -> None:
+        try:
+            self.times: NDArray[np.float64] = np.ascontiguousarray(times, np.float64)
+            self.offsets: NDArray[np.int64] = np.ascontiguousarray(offsets, np.int64)
+            self.values: NDArray[np.float32] | None = (
+                None if values is None else np.ascontiguousarray(values, np.float32)
+            )
+            self.start, self.stop = float(start), float(stop)
+        except (TypeError, ValueError) as error:
+            raise ProblemError(f"spike trains: {error}") from None
+        for name in ("times", "offsets", "values"):
+            array = getattr(self, name)
+            if array is not None and array.ndim != 1:
+                raise ProblemError(f"{name} has {array.ndim} dimensions: must have one")
+        _core.check_spikes(self._parts())
+
+    @classmethod
+    def from_lists(
+        cls,
+        times: Sequence[ArrayLike],
+        start: float = 0.0,
+        stop: float | None = None,
+        values: Sequence[ArrayLike] | None = None,
+    ) -> SpikeTrains:
+        """Build spike trains from one list of times a train.
+
+        Parameters
+        ----------
+        times : sequence of float sequences, ms
+            Ascending in each train; a train may be empty.
+        start : float, ms
+        stop : float, ms, optional
+            The last spike's time where it is left out.
+        values : sequence of float sequences, optional
+            A signed value a spike.
+
+        Returns
+        -------
+        SpikeTrains
+
+        Raises
+        ------
+        ProblemError : times that make no sense (names train and spike)
+        """
+        try:
+            arrays = [np.atleast_1d(np.asarray(train, np.float64)).ravel() for train in times]
+            signed = None if values is None else [np.atleast_1d(np.asarray(v, np.float32)).ravel() for v in values]
+        except (TypeError, ValueError) as error:
+            raise ProblemError(f"spike trains: {error}") from None
+        if signed is not None and [len(v) for v in signed] != [len(a) for a in arrays]:
+            raise ProblemError("values: must have the lengths of the trains, one value a spike")
+        flat = np.concatenate(arrays) if arrays else np.empty(0)
+        offsets = np.concatenate([[0], np.cumsum([len(a) for a in arrays])]).astype(np.int64)
+        if stop is None:
+            stop = max(float(start), float(flat.max())) if flat.size and np.isfinite(flat).all() else float(start)
+        return cls(flat, offsets, start, stop, np.concatenate(signed) if signed else None)
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    def __iter__(self) -> Iterator[NDArray[np.float64]]:
+        return (self[n] for n in range(len(self)))
+
+    def __getitem__(self, train: int) -> NDArray[np.float64]:
+        """Return the times of one train, ms."""
+        n = int(train)
+        if not -len(self) <= n < len(self):
+            raise IndexError(f"train {n} of {len(self)}")
+        n %= len(self)
+        return self.times[self.offsets[n] : self.offsets[n + 1]]
+
+    @property
+    def counts(self) -> NDArray[np.int64]:
+        """Spikes by train."""
+        return np.diff(self.offsets)
+
+    @property
+    def signed(self) -> bool:
+        """Whether spikes carry a signed value."""
+        return self.values is not None
+
+    def split_by_sign(self) -> SpikeTrains:
+        """Return all ON trains (value above 0), then all OFF trains; unsigned trains come back as they are."""
+        return self._from_parts(_core.split_by_sign(self._parts()))
+
+    def between(self, start: float, stop: float) -> SpikeTrains:
+        """Return the spikes of ``start <= t < stop`` (ms), with that window; times stay as they are."""
+        if not (np.isfinite(start) and np.isfinite(stop) and start <= stop):
+            raise ProblemError(f"window {start} to {stop} ms: start must not lie after stop")
+        return self._where((self.times >= start) & (self.times < stop), start, stop)
+
+    def select(self, trains: ArrayLike) -> SpikeTrains:
+        """Return the named trains, in the order given.
+
+        Parameters
+        ----------
+        trains : int or bool array
+            Numbers of trains, or a mask over all of them.
+
+        Raises
+        ------
+        ProblemError : a number outside the trains
+        """
+        chosen = np.asarray(trains)
+        if chosen.dtype == bool:
+            if chosen.shape != (len(self),):
+                raise ProblemError(f"mask has shape {chosen.shape}: must be ({len(self)},)")
+            chosen = np.flatnonzero(chosen)
+        numbers = [int(n) for n in np.atleast_1d(chosen)]
+        outside = [n for n in numbers if not 0 <= n < len(self)]
+        if outside:
+            raise ProblemError(f"train {outside[0]}: there are trains 0 to {len(self) - 1}")
+        values = None
+        if self.values is not None:
+            values = [self.values[self.offsets[n] : self.offsets[n + 1]] for n in numbers]
+        return SpikeTrains.from_lists([self[n] for n in numbers], self.start, self.stop, values)
+
+    def _where(self, keep: NDArray[np.bool_], start: float, stop: float) -> SpikeTrains:
+        offsets = np.concatenate([[0], np.cumsum(keep)])[self.offsets]
+        values = None if self.values is None else self.values[keep]
+        return SpikeTrains(self.times[keep], offsets, start, stop, values)
+
+    def to_numpy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return times (ms) and train numbers of all spikes, by train."""
+        return self.times.copy(), np.repeat(np.arange(len(self)), self.counts)
+
+    def to_neo(self) -> list[Any]:
+        """Return one ``neo.SpikeTrain`` a train; signed values become the array annotation ``value``.
+
+        Raises
+        ------
+        ImportError : neo is not installed (``pip install taxel[neo]``)
+        """
+        from neo import SpikeTrain  # noqa: PLC0415  heavy, and an extra
+
+        trains = []
+        for n in range(len(self)):
+            notes = {}
+            if self.values is not None:
+                notes = {"array_annotations": {"value": self.values[self.offsets[n] : self.offsets[n + 1]]}}
+            trains.append(SpikeTrain(self[n], units="ms", t_start=self.start, t_stop=self.stop, **notes))
+        return trains
+
+    @classmethod
+    def from_neo(cls, trains: Sequence[Any]) -> SpikeTrains:
+        """Build spike trains from ``neo.SpikeTrain`` objects of any time unit.
+
+        The window is the widest of theirs.
+        """
+        if not trains:
+            return cls.from_lists([])
+        times = [np.asarray(t.rescale("ms").magnitude, np.float64) for t in trains]
+        start = min(float(t.t_start.rescale("ms").magnitude) for t in trains)
+        stop = max(float(t.t_stop.rescale("ms").magnitude) for t in trains)
+        values = None
+        if all("value" in t.array_annotations for t in trains):
+            values = [np.asarray(t.array_annotations["value"], np.float32) for t in trains]
+        return cls.from_lists(times, start, stop, values)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw the raster: time (ms) to the right, trains upwards, OFF spikes in another colour."""
+        from taxel.plot import raster  # noqa: PLC0415  matplotlib loads slowly
+
+        return raster(self, ax)
+
+    def _parts(self) -> tuple[Any, ...]:
+        return self.times, self.offsets, self.values, self.start, self.stop
+
+    @classmethod
+    def _from_parts(cls, parts: tuple[Any, ...]) -> SpikeTrains:
+        times, offsets, values, start, stop = parts
+        return cls(times, offsets, start, stop, values)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, SpikeTrains):
+            return NotImplemented
+        values = (self.values is None) == (other.values is None) and (
+            self.values is None or np.array_equal(self.values, other.values)  # type: ignore[arg-type]
+        )
+        return (
+            values
+            and (self.start, self.stop) == (other.start, other.stop)
+            and np.array_equal(self.offsets, other.offsets)
+            and np.array_equal(self.times, other.times)
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        signed = ", signed" if self.signed else ""
+        return f"SpikeTrains({len(self)} trains, {len(self.times)} spikes{signed}, {self.start:g} to {self.stop:g} ms)"
