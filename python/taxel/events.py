@@ -142,8 +142,10 @@ class Events:
         missing = [name for name in ("t", "x", "y", "p") if name not in names]
         if missing:
             raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
-        extra = {name: records[name] for name in ("intensity", "present") if name in names}
-        return cls(records["t"], records["x"], records["y"], records["p"], array=array, **extra)
+        intensity, present = (records[name] if name in names else None for name in ("intensity", "present"))
+        return cls(
+            records["t"], records["x"], records["y"], records["p"], array=array, intensity=intensity, present=present
+        )
 
     def to_tonic(self) -> NDArray[np.void]:
         """Return tonic's event array: records of ``x y t p`` (int16, int16, int64 us, bool)."""

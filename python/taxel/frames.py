@@ -131,7 +131,7 @@ class Frames:
     @property
     def total(self) -> NDArray[np.float64]:
         """The sum over taxels of each picture, in the pictures' unit."""
-        return self.values.sum(axis=(1, 2), dtype=np.float64)
+        return np.asarray(self.values.sum(axis=(1, 2), dtype=np.float64))
 
     def to_numpy(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """Return values (n, rows, columns) and times (us)."""

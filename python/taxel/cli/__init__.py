@@ -1,11 +1,13 @@
-"""The command line: one file a command."""
+"""The command line: one file a command.
+
+Exit codes, for scripts: 0 done, 2 the user's input is wrong, 3 board, socket or disk, 130 stopped by Ctrl-C.
+"""
 
 from __future__ import annotations
 
 import sys
 from typing import NoReturn
 
-import click
 import typer
 
 from taxel._core import DeviceError, Error
@@ -18,17 +20,17 @@ app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-#: Exit codes, for scripts: 0 done, 2 the user's input is wrong, 3 board, socket or disk, 130 stopped by Ctrl-C.
-WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
+WRONG_INPUT, OUTSIDE = 2, 3
 
 
 @app.callback(invoke_without_command=True)
 def _root(version: bool = typer.Option(False, "--version", help="Print the version and end.")) -> None:
     if version:
-        from taxel import __version__  # noqa: PLC0415
+        from taxel import __version__  # noqa: PLC0415  the package imports its compiled part
 
         typer.echo(f"taxel {__version__}")
         raise typer.Exit
@@ -37,32 +39,28 @@ def _root(version: bool = typer.Option(False, "--version", help="Print the versi
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line; what the user got wrong ends in one line on stderr and an exit code."""
     try:
-        code = app(arguments, standalone_mode=False)
-    except click.exceptions.NoArgsIsHelpError as error:
-        click.echo(error.ctx.get_help() if error.ctx else "")
-        code = WRONG_INPUT
-    except click.ClickException as error:
-        error.show()
-        code = WRONG_INPUT
-    except (KeyboardInterrupt, click.Abort):
-        click.echo("taxel: stopped", err=True)
-        code = STOPPED
+        app(arguments)
     except DeviceError as error:
-        click.echo(f"taxel: {error}", err=True)
-        code = OUTSIDE
+        _end(str(error), OUTSIDE)
     except Error as error:
-        click.echo(f"taxel: {error}", err=True)
-        code = WRONG_INPUT
+        _end(str(error), WRONG_INPUT)
     except (FileNotFoundError, FileExistsError, IsADirectoryError, NotADirectoryError) as error:
-        click.echo(f"taxel: {_said(error)}", err=True)
-        code = WRONG_INPUT
+        _end(_said(error), WRONG_INPUT)
     except OSError as error:
-        click.echo(f"taxel: {_said(error)}", err=True)
-        code = OUTSIDE
-    sys.exit(code or 0)
+        _end(_said(error), OUTSIDE)
+    sys.exit(0)
+
+
+def _end(text: str, code: int) -> NoReturn:
+    typer.echo(f"taxel: {text}", err=True)
+    sys.exit(code)
 
 
 def _said(error: OSError) -> str:
     if error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return str(error)
+
+
+# One line a command; they stand at the end because each registers itself with `app`.
+from taxel.cli import bench  # noqa: E402, F401

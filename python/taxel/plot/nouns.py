@@ -20,13 +20,13 @@ def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
     """Draw spike times to the right (ms), trains upwards; ON and OFF in two colours where spikes are signed."""
     ax = ax or plt.subplots(figsize=(8, 4), layout="constrained")[1]
     times, train = trains.to_numpy()
-    marks = {"marker": "|", "s": max(4.0, min(200.0, 4000.0 / max(1, len(trains)))), "linewidths": 0.8}
+    size = float(np.clip(4000 / max(1, len(trains)), 4, 200))
     if trains.values is None:
-        ax.scatter(times, train, color="black", **marks)
+        ax.scatter(times, train, size, "black", marker="|", linewidths=0.8)
     else:
         for on, colour, name in ((True, ON, "ON"), (False, OFF, "OFF")):
             chosen = (trains.values > 0) == on
-            ax.scatter(times[chosen], train[chosen], color=colour, label=name, **marks)
+            ax.scatter(times[chosen], train[chosen], size, colour, marker="|", linewidths=0.8, label=name)
         ax.legend(loc="upper right")
     ax.set(xlabel="time (ms)", ylabel="train", xlim=_wide(trains.start, trains.stop), ylim=(-0.7, len(trains) - 0.3))
     return ax
@@ -38,7 +38,8 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
         raise ProblemError("no picture to draw: the frames are empty")
     ax = ax or plt.subplots(figsize=(5, 4.4), layout="constrained")[1]
     k = int(frames.total.argmax()) if at is None else max(0, int(np.searchsorted(frames.t, at, side="right")) - 1)
-    values = np.where(frames.array.exists, frames.values[k], np.nan) if frames.array.exists is not None else frames.values[k]
+    exists = True if frames.array.exists is None else frames.array.exists
+    values = np.where(exists, frames.values[k], np.nan)
     image = ax.imshow(values, origin="upper", cmap="magma", interpolation="nearest")
     ax.figure.colorbar(image, ax=ax, label=frames.unit)
     ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{frames.t[k] / 1000:.3f} ms")

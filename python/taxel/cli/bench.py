@@ -1,0 +1,68 @@
+"""``taxel bench``: ratios against peers."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from taxel._core import ProblemError
+from taxel.cli import app
+
+__all__ = ["bench"]
+
+
+@app.command()
+def bench(
+    name: Annotated[str, typer.Argument(help="A file of benchmarks/ without its ending, or all.")],
+    folder: Annotated[Path, typer.Option(help="Where the benchmarks lie: a checkout's folder.")] = Path("benchmarks"),
+    quick: Annotated[bool, typer.Option(help="Few rounds: to see that it runs; writes no result.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Measure taxel beside its peers in one run and write the ratios to benchmarks/results/.
+
+    Example: taxel bench wire_decode
+    """
+    files = {path.stem: path for path in sorted(folder.glob("*.py"))}
+    if not files:
+        raise ProblemError(
+            f"{folder}: holds no benchmark; run this in a checkout of taxel, or name its folder by --folder"
+        )
+    if name != "all" and name not in files:
+        raise ProblemError(f"no benchmark {name!r}: there are {', '.join(files)} and all")
+    for stem in files if name == "all" else [name]:
+        result = _load(files[stem]).run(quick=quick)
+        if not quick:
+            place = folder / "results" / f"{stem}.json"
+            place.parent.mkdir(exist_ok=True)
+            part = place.with_suffix(".part")
+            part.write_text(json.dumps(result, indent=1) + "\n")
+            part.replace(place)
+            if not as_json:
+                typer.echo(f"{stem}: written to {place}")
+        if as_json:
+            typer.echo(json.dumps(result))
+        else:
+            typer.echo(_table(stem, result))
+
+
+def _load(path: Path) -> Any:
+    spec = importlib.util.spec_from_file_location(f"taxel_benchmark_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise ProblemError(f"{path}: cannot be loaded as Python")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    if not hasattr(module, "run"):
+        raise ProblemError(f"{path}: defines no run(quick=...)")
+    return module
+
+
+def _table(stem: str, result: dict[str, Any]) -> str:
+    ratios = result.get("ratios", {})
+    rows = [
+        f"  {key}: {value:.3g}" if isinstance(value, float) else f"  {key}: {value}" for key, value in ratios.items()
+    ]
+    return "\n".join([f"{stem}: ratios (ours over the peer's, above 1 is faster)", *rows])
