@@ -37,11 +37,11 @@ demo: build
 	$(BIN)/taxel demo
 
 test: build
-	cargo test --workspace --quiet
+	cargo test --release --workspace --quiet
 	$(BIN)/python -m pytest -q -m "not slow"
 
 slow: build
-	cargo test --workspace --quiet -- --ignored
+	cargo test --release --workspace --quiet -- --ignored
 	$(BIN)/python -m pytest -q -m slow
 
 lint: build

@@ -1,0 +1,19 @@
+import taxel
+
+project = "taxel"
+author = "The taxel developers"
+copyright = "2026, the taxel developers"
+release = taxel.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.autosummary", "sphinx.ext.napoleon", "sphinx.ext.mathjax"]
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+exclude_patterns = ["_build"]
+html_theme = "furo"
+html_title = "taxel"
+autosummary_generate = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_custom_sections = [("Raises", "params_style")]
+myst_enable_extensions = ["dollarmath", "deflist"]
+myst_heading_anchors = 3
