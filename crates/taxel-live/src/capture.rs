@@ -1,1 +1,193 @@
-//! UDP datagrams in, counted.
+//! UDP datagrams in, counted: a thread between the socket and a bounded queue.
+//!
+//! The sums close. At the socket: messages that came = [`Counts::messages`] + [`Counts::dropped_by_kernel`]. Behind it:
+//! [`Counts::datagrams`] = those taken + those waiting + [`Counts::dropped_by_queue`].
+//!
+//! A *message* is what one receive call gives: a datagram, or, with `UDP_GRO`, a train of datagrams that travelled as
+//! one. The kernel counts its drops in messages, so a datagram-exact count of what it dropped needs `gro` off.
+
+mod queue;
+mod sender;
+mod socket;
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::{Error, Result};
+use queue::Queue;
+pub use queue::{Batch, Datagram};
+pub use sender::{SendCounts, Sender};
+use socket::Socket;
+
+/// A blocking receive ends after this, to look whether the owner asked to stop.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
+/// After a stop the socket is emptied for no longer than this, even when a sender never pauses.
+const EMPTY_FOR: Duration = Duration::from_millis(50);
+
+/// How a [`Receiver`] listens.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Options {
+    /// Asked of the kernel for its own queue, bytes; [`Counts::kernel_buffer_bytes`] says what it gave.
+    pub kernel_buffer_bytes: usize,
+    /// How much may wait for the one who takes, bytes; memory is bounded by twice this.
+    pub queue_bytes: usize,
+    /// Take trains of datagrams in one call where the kernel can (`UDP_GRO`).
+    pub gro: bool,
+}
+
+impl Default for Options {
+    /// 32 MiB in the kernel and 16 MiB here: 0.45 s at the sensor's worst case of 107 MB/s.
+    fn default() -> Self {
+        Self { kernel_buffer_bytes: 32 << 20, queue_bytes: 16 << 20, gro: true }
+    }
+}
+
+/// What came and what was lost up to now; see the module for the sums.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Counts {
+    /// Receive calls that gave something.
+    pub messages: u64,
+    /// Datagrams in them.
+    pub datagrams: u64,
+    /// Payload bytes in them.
+    pub bytes: u64,
+    /// Messages that the kernel threw away because its own queue was full.
+    pub dropped_by_kernel: u64,
+    /// Datagrams that were thrown away because nobody took them in time.
+    pub dropped_by_queue: u64,
+    /// Payload bytes in those.
+    pub bytes_dropped_by_queue: u64,
+    /// Datagrams that wait to be taken.
+    pub waiting: u64,
+    /// What the kernel's own queue may hold, bytes, as it counts them (its overhead included).
+    pub kernel_buffer_bytes: u64,
+    /// Whether trains of datagrams come in one call.
+    pub gro: bool,
+}
+
+/// Receives UDP datagrams in a thread of its own, from [`Receiver::bind`] until it is dropped.
+#[derive(Debug)]
+pub struct Receiver {
+    queue: Arc<Queue>,
+    address: SocketAddr,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Receiver {
+    /// Opens `address` and begins to receive.
+    ///
+    /// # Errors
+    ///
+    /// `Socket` where the address cannot be bound (taken, not ours), `Core(Problem)` where the queue is smaller than
+    /// the largest datagram.
+    pub fn bind(address: SocketAddr, options: Options) -> Result<Self> {
+        if options.queue_bytes < socket::LARGEST {
+            return Err(taxel_core::problem!(
+                "queue_bytes is {}: must be {} or more, the largest datagram",
+                options.queue_bytes,
+                socket::LARGEST
+            )
+            .into());
+        }
+        let place = format!("UDP {address}");
+        let socket = Socket::bind(address, &options).map_err(Error::socket(&place))?;
+        let address = socket.address().map_err(Error::socket(&place))?;
+        let counts =
+            Counts { kernel_buffer_bytes: socket.kernel_buffer_bytes(), gro: socket.gro(), ..Counts::default() };
+        let queue = Arc::new(Queue::new(options.queue_bytes, counts));
+        let theirs = Arc::clone(&queue);
+        let thread = std::thread::Builder::new()
+            .name("taxel-receive".to_owned())
+            .spawn(move || receive(socket, &theirs))
+            .map_err(Error::socket(&place))?;
+        Ok(Self { queue, address, thread: Some(thread) })
+    }
+
+    /// Where it listens; the port that was found where 0 was asked for.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// Waits until something is there and takes all of it into `batch`, whose memory is reused; false after `timeout`
+    /// with nothing, or at once when everything was taken after [`Receiver::stop`].
+    ///
+    /// # Errors
+    ///
+    /// `Socket` where the receiving thread ended because the socket failed.
+    pub fn take(&self, batch: &mut Batch, timeout: Duration) -> Result<bool> {
+        self.queue.take(batch, timeout).map_err(Error::socket(format!("UDP {}", self.address)))
+    }
+
+    /// What came and what was lost.
+    #[must_use]
+    pub fn counts(&self) -> Counts {
+        self.queue.counts()
+    }
+
+    /// Whether receiving has ended and everything was taken.
+    #[must_use]
+    pub fn is_done(&self) -> bool {
+        self.queue.is_done()
+    }
+
+    /// Asks the thread to end: it takes in what the kernel still holds, then lets go of the socket.
+    pub fn stop(&self) {
+        self.queue.stop();
+    }
+}
+
+impl Drop for Receiver {
+    fn drop(&mut self) {
+        self.stop();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The thread's one job: from the socket into the queue, until told to stop or the socket fails.
+fn receive(mut socket: Socket, queue: &Queue) {
+    let mut scratch = Batch::with_room(4 * socket::LARGEST);
+    let ended = loop {
+        if queue.stop_asked() {
+            break empty(&mut socket, &mut scratch, queue);
+        }
+        match fill(&mut socket, &mut scratch, true) {
+            Ok(messages) => queue.put(&mut scratch, messages, socket.dropped()),
+            Err(error) => break Err(error),
+        }
+    };
+    queue.close(ended.err());
+}
+
+/// Takes in what the kernel still holds.
+fn empty(socket: &mut Socket, scratch: &mut Batch, queue: &Queue) -> io::Result<()> {
+    let begun = Instant::now();
+    loop {
+        let messages = fill(socket, scratch, false)?;
+        socket.ask_dropped()?;
+        queue.put(scratch, messages, socket.dropped());
+        if messages == 0 || begun.elapsed() > EMPTY_FOR {
+            return Ok(());
+        }
+    }
+}
+
+/// Receives until nothing waits or the batch is full; `wait`s for the first message no longer than [`LOOK_EVERY`].
+fn fill(socket: &mut Socket, batch: &mut Batch, wait: bool) -> io::Result<u64> {
+    let mut messages = 0;
+    while batch.room() >= socket::LARGEST && socket.receive(batch, wait && messages == 0)? {
+        messages += 1;
+    }
+    if messages == 0 {
+        socket.ask_dropped()?;
+    }
+    Ok(messages)
+}

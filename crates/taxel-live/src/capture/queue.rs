@@ -1,0 +1,182 @@
+//! What waits between the receiving thread and the one who takes.
+
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use super::Counts;
+
+/// One datagram of a [`Batch`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Datagram {
+    /// The kernel's stamp when it came, ns of the host's clock since 1970.
+    pub arrived_ns: i64,
+    /// How many datagrams came before it; those that our queue dropped leave a gap.
+    pub number: u64,
+    start: usize,
+    end: usize,
+}
+
+/// Datagrams in the order in which they came, in memory that is used again and again.
+#[derive(Debug, Default)]
+pub struct Batch {
+    pub(super) bytes: Vec<u8>,
+    datagrams: Vec<Datagram>,
+}
+
+impl Batch {
+    /// An empty batch.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    pub(super) fn with_room(bytes: usize) -> Self {
+        Self { bytes: Vec::with_capacity(bytes), datagrams: Vec::new() }
+    }
+
+    /// How many datagrams.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.datagrams.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.datagrams.is_empty()
+    }
+
+    /// Each datagram with its payload.
+    pub fn iter(&self) -> impl Iterator<Item = (&Datagram, &[u8])> {
+        self.datagrams.iter().map(|d| (d, &self.bytes[d.start..d.end]))
+    }
+
+    /// How many bytes can still be received into it.
+    pub(super) fn room(&self) -> usize {
+        self.bytes.capacity() - self.bytes.len()
+    }
+
+    /// Notes that the bytes from `start` on are a message that came at `arrived_ns`, of datagrams of `segment` bytes,
+    /// the last of which may be shorter.
+    pub(super) fn note_message(&mut self, start: usize, segment: usize, arrived_ns: i64) {
+        let stop = self.bytes.len();
+        let mut from = start;
+        loop {
+            let end = if segment == 0 { stop } else { stop.min(from + segment) };
+            self.datagrams.push(Datagram { arrived_ns, number: 0, start: from, end });
+            if end == stop {
+                return;
+            }
+            from = end;
+        }
+    }
+
+    fn push(&mut self, datagram: Datagram, bytes: &[u8]) {
+        let start = self.bytes.len();
+        self.bytes.extend_from_slice(bytes);
+        self.datagrams.push(Datagram { start, end: self.bytes.len(), ..datagram });
+    }
+
+    fn clear(&mut self) {
+        self.bytes.clear();
+        self.datagrams.clear();
+    }
+}
+
+/// Two batches take turns: one fills while the other is worked on. A copy of each byte buys that any number of small
+/// datagrams packs tightly while the taker is behind, so that the bound in bytes is also a bound in time.
+#[derive(Debug)]
+pub(super) struct Queue {
+    state: Mutex<State>,
+    came: Condvar,
+    stop: AtomicBool,
+    limit: usize,
+}
+
+#[derive(Debug)]
+struct State {
+    waiting: Batch,
+    counts: Counts,
+    closed: bool,
+    failed: Option<io::Error>,
+}
+
+impl Queue {
+    pub(super) fn new(limit: usize, counts: Counts) -> Self {
+        let state = State { waiting: Batch::new(), counts, closed: false, failed: None };
+        Self { state: Mutex::new(state), came: Condvar::new(), stop: AtomicBool::new(false), limit }
+    }
+
+    /// Moves what was received into the waiting batch; what has no room is dropped and counted.
+    pub(super) fn put(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
+        let mut state = self.state();
+        let State { waiting, counts, .. } = &mut *state;
+        counts.messages += messages;
+        counts.dropped_by_kernel = dropped_by_kernel;
+        for (datagram, bytes) in received.iter() {
+            let number = counts.datagrams;
+            counts.datagrams += 1;
+            counts.bytes += bytes.len() as u64;
+            if waiting.bytes.len() + bytes.len() <= self.limit {
+                waiting.push(Datagram { number, ..*datagram }, bytes);
+            } else {
+                counts.dropped_by_queue += 1;
+                counts.bytes_dropped_by_queue += bytes.len() as u64;
+            }
+        }
+        let some = !waiting.is_empty();
+        drop(state);
+        received.clear();
+        if some {
+            self.came.notify_one();
+        }
+    }
+
+    pub(super) fn take(&self, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
+        batch.clear();
+        let state = self.state();
+        let nothing = |s: &mut State| s.waiting.is_empty() && !s.closed;
+        let (mut state, _) =
+            self.came.wait_timeout_while(state, timeout, nothing).unwrap_or_else(PoisonError::into_inner);
+        std::mem::swap(&mut state.waiting, batch);
+        if batch.is_empty()
+            && let Some(error) = state.failed.take()
+        {
+            return Err(error);
+        }
+        Ok(!batch.is_empty())
+    }
+
+    pub(super) fn counts(&self) -> Counts {
+        let state = self.state();
+        Counts { waiting: state.waiting.len() as u64, ..state.counts }
+    }
+
+    pub(super) fn close(&self, failed: Option<io::Error>) {
+        let mut state = self.state();
+        state.closed = true;
+        state.failed = failed;
+        drop(state);
+        self.came.notify_all();
+    }
+
+    pub(super) fn is_done(&self) -> bool {
+        let state = self.state();
+        state.closed && state.waiting.is_empty()
+    }
+
+    pub(super) fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+
+    pub(super) fn stop_asked(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

@@ -1,0 +1,144 @@
+//! UDP datagrams out, counted: what the emulated board and the benchmarks send with.
+
+use std::io;
+use std::mem::{size_of, zeroed};
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::os::fd::AsRawFd;
+use std::ptr::from_mut;
+
+use libc::c_void;
+use serde::Serialize;
+use socket2::SockAddr;
+
+use crate::{Error, Result};
+
+/// A train must fit one UDP message of IPv4 with its headers, bytes.
+const TRAIN_BYTES: usize = 65_507;
+
+/// The kernel takes no longer train (`UDP_MAX_SEGMENTS` of linux/udp.h before 6.9; later kernels take twice that).
+const TRAIN_DATAGRAMS: usize = 64;
+
+/// What was sent, whether anybody listened or not.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct SendCounts {
+    /// Send calls: trains of datagrams, or single ones.
+    pub messages: u64,
+    /// Datagrams in them.
+    pub datagrams: u64,
+    /// Payload bytes in them.
+    pub bytes: u64,
+    /// Whether the kernel cuts trains into datagrams (`UDP_SEGMENT`).
+    pub segmenting: bool,
+}
+
+/// Sends datagrams to one address, in trains where the kernel can cut them apart.
+///
+/// A datagram leaves when the next one does not fit its train, or with [`Sender::flush`]; a board flushes at the end of
+/// each frame.
+#[derive(Debug)]
+pub struct Sender {
+    socket: UdpSocket,
+    to: SocketAddr,
+    train: Vec<u8>,
+    /// Length of the train's datagrams but the last, bytes.
+    segment: usize,
+    datagrams: usize,
+    counts: SendCounts,
+}
+
+#[repr(C, align(8))]
+struct Control([u8; 64]);
+
+impl Sender {
+    /// Prepares to send to `to`; with `segment`, in trains where the kernel can.
+    ///
+    /// # Errors
+    ///
+    /// `Socket` where no socket can be had.
+    pub fn open(to: SocketAddr, segment: bool) -> Result<Self> {
+        let any: SocketAddr = match to {
+            SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+            SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+        };
+        let socket = UdpSocket::bind(any).map_err(Error::socket(format!("UDP to {to}")))?;
+        // Not connected: a connected socket would fail where nobody listens yet, and a board does not care.
+        let segmenting =
+            segment && super::socket::set(socket.as_raw_fd(), libc::SOL_UDP, libc::UDP_SEGMENT, &0).is_ok();
+        let counts = SendCounts { segmenting, ..SendCounts::default() };
+        Ok(Self { socket, to, train: Vec::with_capacity(TRAIN_BYTES), segment: 0, datagrams: 0, counts })
+    }
+
+    /// What was sent.
+    #[must_use]
+    pub fn counts(&self) -> SendCounts {
+        self.counts
+    }
+
+    /// Adds a datagram.
+    ///
+    /// # Errors
+    ///
+    /// `Socket` where the system refuses to send, as for a datagram that is too long.
+    pub fn push(&mut self, datagram: &[u8]) -> Result<()> {
+        let joins = self.counts.segmenting
+            && self.datagrams > 0
+            && self.datagrams < TRAIN_DATAGRAMS
+            && !datagram.is_empty()
+            && datagram.len() <= self.segment
+            && self.train.len() == self.datagrams * self.segment
+            && self.train.len() + datagram.len() <= TRAIN_BYTES;
+        if !joins {
+            self.flush()?;
+            self.segment = datagram.len();
+        }
+        self.train.extend_from_slice(datagram);
+        self.datagrams += 1;
+        if self.counts.segmenting { Ok(()) } else { self.flush() }
+    }
+
+    /// Sends what still waits.
+    ///
+    /// # Errors
+    ///
+    /// `Socket` where the system refuses to send.
+    pub fn flush(&mut self) -> Result<()> {
+        if self.datagrams == 0 {
+            return Ok(());
+        }
+        self.send().map_err(Error::socket(format!("UDP to {}", self.to)))?;
+        self.counts.messages += 1;
+        self.counts.datagrams += self.datagrams as u64;
+        self.counts.bytes += self.train.len() as u64;
+        self.train.clear();
+        self.datagrams = 0;
+        Ok(())
+    }
+
+    fn send(&mut self) -> io::Result<()> {
+        if self.datagrams == 1 {
+            return self.socket.send_to(&self.train, self.to).map(drop);
+        }
+        let to = SockAddr::from(self.to);
+        let mut part = libc::iovec { iov_base: self.train.as_mut_ptr().cast::<c_void>(), iov_len: self.train.len() };
+        let mut control = Control([0; 64]);
+        // SAFETY: msghdr is plain data, for which all zeros is a valid value; the name, the part and the control
+        // memory that it is given live through the call, and the control memory has room for one u16.
+        let sent = unsafe {
+            let mut message: libc::msghdr = zeroed();
+            message.msg_name = to.as_ptr().cast_mut().cast::<c_void>();
+            message.msg_namelen = to.len();
+            message.msg_iov = &raw mut part;
+            message.msg_iovlen = 1;
+            message.msg_control = from_mut(&mut control).cast::<c_void>();
+            message.msg_controllen = libc::CMSG_SPACE(size_of::<u16>() as u32) as _;
+            let header = libc::CMSG_FIRSTHDR(&raw const message);
+            (*header).cmsg_level = libc::SOL_UDP;
+            (*header).cmsg_type = libc::UDP_SEGMENT;
+            (*header).cmsg_len = libc::CMSG_LEN(size_of::<u16>() as u32) as _;
+            let segment = u16::try_from(self.segment).unwrap_or(u16::MAX);
+            libc::CMSG_DATA(header).cast::<u16>().write_unaligned(segment);
+            libc::sendmsg(self.socket.as_raw_fd(), &raw const message, 0)
+        };
+        if sent < 0 { Err(io::Error::last_os_error()) } else { Ok(()) }
+    }
+}

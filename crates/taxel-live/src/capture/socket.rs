@@ -1,0 +1,160 @@
+//! The kernel's side: a UDP socket that stamps, coalesces and counts.
+
+use std::io;
+use std::mem::{size_of, size_of_val, zeroed};
+use std::net::{SocketAddr, UdpSocket};
+use std::os::fd::{AsRawFd, RawFd};
+use std::ptr::{from_mut, from_ref};
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use libc::{c_int, c_void};
+
+use super::{Batch, LOOK_EVERY, Options};
+
+/// No UDP message, train or single, is longer than this, bytes.
+pub(super) const LARGEST: usize = 1 << 16;
+
+/// Where the drop count stands among the numbers of `SO_MEMINFO` (`SK_MEMINFO_DROPS` of linux/sock_diag.h).
+const MEMINFO_DROPS: usize = 8;
+const MEMINFO_NUMBERS: usize = 9;
+
+/// Room for three control messages: stamp, drop count, segment size.
+const CONTROL_BYTES: usize = 128;
+
+#[repr(C, align(8))]
+struct Control([u8; CONTROL_BYTES]);
+
+#[derive(Debug)]
+pub(super) struct Socket {
+    socket: UdpSocket,
+    gro: bool,
+    dropped: u64,
+}
+
+impl Socket {
+    pub(super) fn bind(address: SocketAddr, options: &Options) -> io::Result<Self> {
+        let socket = UdpSocket::bind(address)?;
+        let fd = socket.as_raw_fd();
+        let bytes = c_int::try_from(options.kernel_buffer_bytes).unwrap_or(c_int::MAX);
+        // With CAP_NET_ADMIN beyond net.core.rmem_max, without it up to there.
+        if set(fd, libc::SOL_SOCKET, libc::SO_RCVBUFFORCE, &bytes).is_err() {
+            set(fd, libc::SOL_SOCKET, libc::SO_RCVBUF, &bytes)?;
+        }
+        set(fd, libc::SOL_SOCKET, libc::SO_TIMESTAMPNS, &1_i32)?;
+        set(fd, libc::SOL_SOCKET, libc::SO_RXQ_OVFL, &1_i32)?;
+        socket.set_read_timeout(Some(LOOK_EVERY))?;
+        // Kernels before 5.0 have no UDP_GRO: then each datagram costs a call of its own, and `gro` says so.
+        let gro = options.gro && set(fd, libc::SOL_UDP, libc::UDP_GRO, &1_i32).is_ok();
+        Ok(Self { socket, gro, dropped: 0 })
+    }
+
+    pub(super) fn address(&self) -> io::Result<SocketAddr> {
+        self.socket.local_addr()
+    }
+
+    pub(super) fn gro(&self) -> bool {
+        self.gro
+    }
+
+    /// Messages that the kernel has dropped, as far as is known.
+    pub(super) fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    pub(super) fn kernel_buffer_bytes(&self) -> u64 {
+        let mut bytes = [0_u32; 1];
+        let got = get(self.socket.as_raw_fd(), libc::SO_RCVBUF, &mut bytes);
+        if got.is_ok() { u64::from(bytes[0]) } else { 0 }
+    }
+
+    /// Appends the next message to `batch`, which has room for [`LARGEST`] bytes; false where none is there, after
+    /// [`LOOK_EVERY`] when `wait` is set.
+    pub(super) fn receive(&mut self, batch: &mut Batch, wait: bool) -> io::Result<bool> {
+        let start = batch.bytes.len();
+        let room = batch.bytes.spare_capacity_mut();
+        let mut part = libc::iovec { iov_base: room.as_mut_ptr().cast::<c_void>(), iov_len: room.len() };
+        let mut control = Control([0; CONTROL_BYTES]);
+        // SAFETY: msghdr is plain data, for which all zeros is a valid value (no name, no parts, no control).
+        let mut message: libc::msghdr = unsafe { zeroed() };
+        message.msg_iov = &raw mut part;
+        message.msg_iovlen = 1;
+        message.msg_control = from_mut(&mut control).cast::<c_void>();
+        message.msg_controllen = CONTROL_BYTES as _;
+        let flags = if wait { 0 } else { libc::MSG_DONTWAIT };
+        // SAFETY: `message` names memory that lives through the call: the spare room of `batch`, and `control`.
+        let got = unsafe { libc::recvmsg(self.socket.as_raw_fd(), &raw mut message, flags) };
+        let Ok(got) = usize::try_from(got) else {
+            let error = io::Error::last_os_error();
+            return match error.kind() {
+                io::ErrorKind::WouldBlock | io::ErrorKind::Interrupted => Ok(false),
+                _ => Err(error),
+            };
+        };
+        // SAFETY: the kernel wrote `got` bytes into the spare room, which is at least as long.
+        unsafe { batch.bytes.set_len(start + got) };
+        let mut arrived_ns = None;
+        let mut segment = 0;
+        // SAFETY: `message` was filled by recvmsg and its control memory is alive; the macros stay inside
+        // msg_controllen, and each payload is read unaligned, of the type that the kernel writes for that kind.
+        unsafe {
+            let mut header = libc::CMSG_FIRSTHDR(&raw const message);
+            while !header.is_null() {
+                let data = libc::CMSG_DATA(header);
+                match ((*header).cmsg_level, (*header).cmsg_type) {
+                    (libc::SOL_SOCKET, libc::SCM_TIMESTAMPNS) => {
+                        let stamp = data.cast::<libc::timespec>().read_unaligned();
+                        arrived_ns = Some(stamp.tv_sec * 1_000_000_000 + stamp.tv_nsec);
+                    }
+                    (libc::SOL_SOCKET, libc::SO_RXQ_OVFL) => self.note_dropped(data.cast::<u32>().read_unaligned()),
+                    (libc::SOL_UDP, libc::UDP_GRO) => {
+                        segment = usize::try_from(data.cast::<c_int>().read_unaligned()).unwrap_or(0);
+                    }
+                    _ => {}
+                }
+                header = libc::CMSG_NXTHDR(&raw const message, header);
+            }
+        }
+        // The kernel stamps every message that comes after SO_TIMESTAMPNS; one already queued then has no stamp.
+        batch.note_message(start, segment, arrived_ns.unwrap_or_else(now_ns));
+        Ok(true)
+    }
+
+    /// Asks the kernel itself: the count that comes with a message says only what was dropped before that message.
+    pub(super) fn ask_dropped(&mut self) -> io::Result<()> {
+        let mut numbers = [0_u32; MEMINFO_NUMBERS];
+        get(self.socket.as_raw_fd(), libc::SO_MEMINFO, &mut numbers)?;
+        self.note_dropped(numbers[MEMINFO_DROPS]);
+        Ok(())
+    }
+
+    /// The kernel counts in 32 bits and starts again at 0.
+    #[allow(clippy::cast_possible_truncation)]
+    fn note_dropped(&mut self, total: u32) {
+        let more = total.wrapping_sub(self.dropped as u32);
+        // A message may carry an older count than the one asked for last.
+        if more <= u32::MAX / 2 {
+            self.dropped += u64::from(more);
+        }
+    }
+}
+
+/// The host's clock, ns since 1970: the one that the kernel's stamps are read from.
+pub(crate) fn now_ns() -> i64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
+}
+
+pub(super) fn set(fd: RawFd, level: c_int, name: c_int, value: &c_int) -> io::Result<()> {
+    let length = size_of::<c_int>() as libc::socklen_t;
+    // SAFETY: `value` lives through the call and `length` is its size.
+    let done = unsafe { libc::setsockopt(fd, level, name, from_ref(value).cast::<c_void>(), length) };
+    if done == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+}
+
+fn get(fd: RawFd, name: c_int, numbers: &mut [u32]) -> io::Result<()> {
+    let mut length = size_of_val(numbers) as libc::socklen_t;
+    // SAFETY: `numbers` lives through the call and `length` is its size in bytes; any bytes are valid u32.
+    let done =
+        unsafe { libc::getsockopt(fd, libc::SOL_SOCKET, name, numbers.as_mut_ptr().cast::<c_void>(), &raw mut length) };
+    if done == 0 { Ok(()) } else { Err(io::Error::last_os_error()) }
+}

@@ -1,0 +1,127 @@
+//! The sums of capture close, with the sender's own count, whatever is lost where.
+
+use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
+
+use taxel_live::Error;
+use taxel_live::capture::{Batch, Counts, Options, Receiver, SendCounts, Sender};
+
+const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
+
+fn bind(options: Options) -> Receiver {
+    Receiver::bind(ANY, options).expect("loopback binds")
+}
+
+/// Datagram `k` holds its own number, in a length that changes now and then, so that trains begin and end.
+fn datagram(k: u64) -> Vec<u8> {
+    let length = if k % 7 == 6 { 20 + (k % 90) as usize } else { 1400 };
+    let mut bytes = vec![(k % 251) as u8; length];
+    bytes[..8].copy_from_slice(&k.to_le_bytes());
+    bytes
+}
+
+fn send(to: SocketAddr, datagrams: u64, segment: bool) -> SendCounts {
+    let mut sender = Sender::open(to, segment).expect("a socket");
+    for k in 0..datagrams {
+        sender.push(&datagram(k)).expect("sent");
+    }
+    sender.flush().expect("sent");
+    sender.counts()
+}
+
+/// Stops, takes the rest; gives what was taken (number in the payload, our number) and the counts.
+fn drain(receiver: &Receiver) -> (Vec<(u64, u64)>, Counts) {
+    receiver.stop();
+    let mut batch = Batch::new();
+    let mut taken = vec![];
+    while !receiver.is_done() {
+        receiver.take(&mut batch, Duration::from_millis(100)).expect("a sound socket");
+        for (d, bytes) in batch.iter() {
+            let k = u64::from_le_bytes(bytes[..8].try_into().expect("8 bytes"));
+            assert_eq!(bytes, datagram(k), "payload {k} came as it was sent");
+            assert!(d.arrived_ns > 0);
+            taken.push((k, d.number));
+        }
+    }
+    (taken, receiver.counts())
+}
+
+#[test]
+fn every_datagram_comes_once_in_order_with_and_without_trains() {
+    for (segment, gro) in [(false, false), (false, true), (true, false), (true, true)] {
+        let receiver = bind(Options { gro, ..Options::default() });
+        let sent = send(receiver.address(), 3000, segment);
+        let (taken, counts) = drain(&receiver);
+        assert_eq!(taken, (0..3000).map(|k| (k, k)).collect::<Vec<_>>());
+        assert_eq!((counts.datagrams, counts.bytes), (sent.datagrams, sent.bytes));
+        assert_eq!((counts.dropped_by_kernel, counts.dropped_by_queue, counts.waiting), (0, 0, 0));
+        if segment && gro && counts.gro && sent.segmenting {
+            assert_eq!(counts.messages, sent.messages, "a train arrives as the train that was sent");
+            assert!(counts.messages < counts.datagrams);
+        } else {
+            assert_eq!(counts.messages, sent.datagrams);
+        }
+    }
+}
+
+#[test]
+fn what_the_kernel_drops_closes_the_sum_at_the_socket() {
+    for (segment, gro) in [(false, false), (true, false), (true, true)] {
+        // The kernel rounds 1 up to its least buffer: a datagram or two.
+        let options = Options { kernel_buffer_bytes: 1, gro, ..Options::default() };
+        let (sent, counts, taken) = (0..20)
+            .find_map(|_| {
+                let receiver = bind(options);
+                let sent = send(receiver.address(), 20_000, segment);
+                let (taken, counts) = drain(&receiver);
+                (counts.dropped_by_kernel > 0).then_some((sent, counts, taken.len() as u64))
+            })
+            .expect("a buffer of two datagrams overflows");
+        // Where trains arrive whole the kernel counts trains; else datagrams.
+        let came = if segment && counts.gro && sent.segmenting { sent.messages } else { sent.datagrams };
+        assert_eq!(came, counts.messages + counts.dropped_by_kernel);
+        assert_eq!(counts.datagrams, taken);
+        assert!(counts.datagrams < sent.datagrams);
+    }
+}
+
+#[test]
+fn what_our_queue_drops_closes_the_sum_behind_it_and_leaves_a_gap_in_the_numbers() {
+    let receiver = bind(Options { queue_bytes: 1 << 16, ..Options::default() });
+    let sent = send(receiver.address(), 2000, true);
+    // Nobody takes until all has come.
+    let begun = Instant::now();
+    while receiver.counts().datagrams < sent.datagrams && begun.elapsed() < Duration::from_secs(10) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    assert_eq!(receiver.counts().waiting + receiver.counts().dropped_by_queue, 2000);
+    send(receiver.address(), 1, false);
+    let (taken, counts) = drain(&receiver);
+    assert_eq!(counts.dropped_by_kernel, 0);
+    assert_eq!(counts.datagrams, sent.datagrams + 1);
+    assert_eq!(counts.datagrams, taken.len() as u64 + counts.dropped_by_queue);
+    assert!(counts.dropped_by_queue > 1900, "64 KiB hold about fifty of two thousand");
+    assert!(taken[..taken.len() - 1].iter().all(|&(k, number)| k == number), "a number counts what was dropped too");
+}
+
+#[test]
+fn a_port_that_is_taken_is_one_clear_error() {
+    let holder = UdpSocket::bind(ANY).expect("a port");
+    let address = holder.local_addr().expect("its address");
+    let error = Receiver::bind(address, Options::default()).expect_err("the port is taken");
+    assert!(matches!(&error, Error::Socket { source, .. } if source.kind() == std::io::ErrorKind::AddrInUse));
+    assert!(error.to_string().starts_with(&format!("UDP {address}: ")), "{error}");
+}
+
+#[test]
+fn a_queue_smaller_than_a_datagram_is_refused() {
+    let error = Receiver::bind(ANY, Options { queue_bytes: 1000, ..Options::default() }).expect_err("too small");
+    assert_eq!(error.to_string(), "queue_bytes is 1000: must be 65536 or more, the largest datagram");
+}
+
+#[test]
+fn a_datagram_to_nobody_is_sent_and_counted() {
+    let address = bind(Options::default()).address();
+    let sent = send(address, 100, true);
+    assert_eq!(sent.datagrams, 100);
+}
