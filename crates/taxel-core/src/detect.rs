@@ -1,1 +1,29 @@
 //! Spikes to detections, and their score.
+
+mod score;
+
+pub use score::{Spread, Tally, WIDEST_WINDOW_US, match_in_order, score};
+
+use serde::{Deserialize, Serialize};
+
+/// What a readout said.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Detection {
+    /// Which of the readout's neurons spoke.
+    pub label: String,
+    /// When the event was, us of the board's clock: the crossing less the encoder's latency and the trained delay.
+    pub t: i64,
+    /// When it could first be said, us of the board's clock: the end of the frame in which the potential crosses.
+    pub known: i64,
+    /// How steeply the potential rose above its threshold, mV/ms: a measure of how sure.
+    pub slope: f64,
+}
+
+/// An event that took place, by a reference.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Reference {
+    /// What happened.
+    pub label: String,
+    /// When, us of the board's clock.
+    pub t: i64,
+}
