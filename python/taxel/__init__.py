@@ -2,6 +2,7 @@
 
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel.array import Array
+from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
@@ -10,6 +11,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Array",
+    "Detections",
     "DeviceError",
     "Error",
     "Events",

@@ -4,6 +4,7 @@ mod convert;
 mod enter;
 mod errors;
 
+mod detect;
 mod nouns;
 
 use pyo3::prelude::*;
@@ -13,5 +14,6 @@ use pyo3::prelude::*;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     nouns::register(module)?;
+    detect::register(module)?;
     Ok(())
 }

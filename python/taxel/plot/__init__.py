@@ -1,5 +1,5 @@
-"""Pictures of the nouns: raster, pressure map, event picture."""
+"""Pictures of the nouns: raster, pressure map, event picture, detections."""
 
-from taxel.plot.nouns import event_picture, pressure_map, raster
+from taxel.plot.nouns import detections, event_picture, pressure_map, raster
 
-__all__ = ["event_picture", "pressure_map", "raster"]
+__all__ = ["detections", "event_picture", "pressure_map", "raster"]

@@ -7,11 +7,12 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from taxel._core import ProblemError
+from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
 
-__all__ = ["event_picture", "pressure_map", "raster"]
+__all__ = ["detections", "event_picture", "pressure_map", "raster"]
 
 ON, OFF = "#c44e52", "#4c72b0"
 
@@ -55,6 +56,16 @@ def event_picture(events: Events, ax: Axes | None = None) -> Axes:
     image = ax.imshow(picture, origin="upper", cmap="RdBu_r", vmin=-limit, vmax=limit, interpolation="nearest")
     ax.figure.colorbar(image, ax=ax, label="rises less falls")
     ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{len(events)} events, {events.duration_us / 1000:.1f} ms")
+    return ax
+
+
+def detections(found: Detections, ax: Axes | None = None) -> Axes:
+    """Draw each label's detections as marks over time (s), a row a label."""
+    ax = ax or plt.subplots(figsize=(8, 2.4), layout="constrained")[1]
+    for row, label in enumerate(found.labels):
+        ax.scatter(found[label].t / 1e6, np.full(len(found[label]), row), marker="|", s=400, color=f"C{row}")
+    ax.set(xlabel="time (s)", yticks=range(len(found.labels)), yticklabels=found.labels)
+    ax.set_ylim(-0.7, max(1, len(found.labels)) - 0.3)
     return ax
 
 

@@ -102,8 +102,9 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
         let said_t: Vec<i64> = said.iter().map(|&k| found[k].t).collect();
         let events_t: Vec<i64> = events.iter().map(|&k| truth[k].t).collect();
         let reach: Vec<i64> = events.iter().map(|&k| windows[k]).collect();
-        let pairs = match_in_order(&said_t, &events_t, &reach, stop)
-            .map_err(|error| if let crate::Error::Problem(text) = error { problem!("{label}: {text}") } else { error })?;
+        let pairs = match_in_order(&said_t, &events_t, &reach, stop).map_err(|error| {
+            if let crate::Error::Problem(text) = error { problem!("{label}: {text}") } else { error }
+        })?;
 
         let mut tally = Tally { label: label.to_owned(), ..Tally::default() };
         let (mut matched, mut met) = (vec![false; said.len()], vec![false; events.len()]);
@@ -149,7 +150,9 @@ pub fn match_in_order(found: &[i64], truth: &[i64], windows: &[i64], stop: Stop<
     }
     let cells: usize = low.iter().zip(&high).map(|(l, h)| h - l).fold(0, usize::saturating_add);
     if cells > MOST_PAIRS {
-        return Err(problem!("{cells} pairs lie within the windows, at most {MOST_PAIRS} are matched: narrow the window"));
+        return Err(problem!(
+            "{cells} pairs lie within the windows, at most {MOST_PAIRS} are matched: narrow the window"
+        ));
     }
 
     #[derive(Clone, Copy)]
@@ -309,7 +312,10 @@ mod tests {
         let truth = [event("contact", 500_000), event("contact", 0), event("lift", 10_000)];
         let tallies = score(&found, &truth, &[50_000; 3], Stop::never()).unwrap();
         let [contact, lift] = &tallies[..] else { panic!("two labels") };
-        assert_eq!((contact.label.as_str(), &contact.pairs[..], &contact.missed[..]), ("contact", &[(1, 1)][..], &[0][..]));
+        assert_eq!(
+            (contact.label.as_str(), &contact.pairs[..], &contact.missed[..]),
+            ("contact", &[(1, 1)][..], &[0][..])
+        );
         assert_eq!((&contact.false_[..], contact.false_near), (&[2, 3][..], 1));
         assert_eq!((&contact.errors_ms[..], &contact.delays_ms[..]), (&[1.0][..], &[1.3][..]));
         assert_eq!((&lift.errors_ms[..], lift.false_.len(), lift.missed.len()), (&[-1.0][..], 0, 0));

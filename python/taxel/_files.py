@@ -1,0 +1,63 @@
+"""Files are written whole or not at all, and never over another unasked."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+__all__ = ["write_whole"]
+
+
+def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object], *, overwrite: bool = False) -> Path:
+    """Write a file beside its place, then move it there.
+
+    Parameters
+    ----------
+    path : path
+    write : function of a binary file
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FileExistsError : the file is there already and `overwrite` is false
+    OSError : the folder is missing, the disk is full ...
+    """
+    place = Path(path)
+    if not overwrite and os.path.lexists(place):
+        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
+    if not place.parent.is_dir():
+        raise FileNotFoundError(errno.ENOENT, "no such folder", str(place.parent))
+    handle, name = tempfile.mkstemp(prefix=f".{place.name}.", dir=place.parent)
+    try:
+        with os.fdopen(handle, "wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(name, 0o666 & ~_umask())
+        if overwrite:
+            os.replace(name, place)
+        else:
+            # A link, unlike a rename, fails where somebody made the file meanwhile.
+            os.link(name, place)
+            os.unlink(name)
+    except BaseException as error:
+        Path(name).unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            error.filename, error.filename2 = str(place), None
+        raise
+    return place
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask

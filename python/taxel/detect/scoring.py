@@ -1,0 +1,253 @@
+"""Detections against reference events: found, missed, false, and how far off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._core import ProblemError
+from taxel.detections import Detections, _whole
+
+__all__ = ["Score", "Spread", "score"]
+
+
+class Spread(NamedTuple):
+    """Mean, standard deviation of the sample, median, 2.5th and 97.5th percentile; NaN where there are too few."""
+
+    mean: float
+    sd: float
+    median: float
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, values: ArrayLike) -> Spread:
+        """Return the spread of values.
+
+        Examples
+        --------
+        >>> Spread.of([1.0, 2.0, 3.0, 4.0])
+        2.5 ± 1.29 (median 2.5, 95 % in 1.07 to 3.92)
+        """
+        try:
+            column = np.ascontiguousarray(values, np.float64)
+        except (TypeError, ValueError) as error:
+            raise ProblemError(f"values: {error}") from None
+        if column.ndim != 1:
+            raise ProblemError(f"values have {column.ndim} dimensions: must have one")
+        return cls(*_core.spread(column))
+
+    def __repr__(self) -> str:
+        if np.isnan(self.mean):
+            return "none"
+        sd = "" if np.isnan(self.sd) else f" ± {self.sd:.3g}"
+        return f"{self.mean:.3g}{sd} (median {self.median:.3g}, 95 % in {self.low:.3g} to {self.high:.3g})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Score:
+    """Say how detections met reference events, of one label or of all together.
+
+    Attributes
+    ----------
+    label : str
+        "all" where it stands for several labels.
+    pairs : int64, shape (found, 2)
+        Which detection belongs to which reference event, by their places in what was scored.
+    missed_events, false_detections : int64
+        Places of the reference events that nothing was said of, and of the detections of nothing.
+    false_near : int
+        How many of the false ones lie within the window of a reference event: the thesis' false positives (6.5.2).
+    errors_ms, delays_ms : float64, shape (found,)
+        `t` minus reference (negative is early) and `known` minus reference.
+    by_label : dict of str to Score
+        Empty in the score of one label.
+    """
+
+    label: str
+    pairs: NDArray[np.int64]
+    missed_events: NDArray[np.int64]
+    false_detections: NDArray[np.int64]
+    false_near: int
+    errors_ms: NDArray[np.float64]
+    delays_ms: NDArray[np.float64]
+    by_label: Mapping[str, Score] = field(default_factory=dict)
+
+    @property
+    def events(self) -> int:
+        """How many reference events there are."""
+        return len(self.pairs) + len(self.missed_events)
+
+    @property
+    def found(self) -> int:
+        """How many reference events were found."""
+        return len(self.pairs)
+
+    @property
+    def missed(self) -> int:
+        """How many reference events nothing was said of."""
+        return len(self.missed_events)
+
+    @property
+    def false(self) -> int:
+        """How many detections belong to no reference event, however near they lie."""
+        return len(self.false_detections)
+
+    @property
+    def found_share(self) -> float:
+        """Found events as a share of all; NaN where there are none."""
+        return self.found / self.events if self.events else float("nan")
+
+    @property
+    def error(self) -> Spread:
+        """Spread of `t` minus reference, ms."""
+        return Spread.of(self.errors_ms)
+
+    @property
+    def delay(self) -> Spread:
+        """Spread of `known` minus reference, ms."""
+        return Spread.of(self.delays_ms)
+
+    def __getitem__(self, label: str) -> Score:
+        """Return the score of one label."""
+        if label not in self.by_label:
+            raise ProblemError(f"no label {label!r}: there are {', '.join(self.by_label) or 'none'}")
+        return self.by_label[label]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return counts and spreads (ms) as plain values, label by label; what is not known is None."""
+        one: dict[str, Any] = {
+            name: getattr(self, name) for name in ("events", "found", "missed", "false", "false_near")
+        }
+        for name, spread in (("error_ms", self.error), ("known_delay_ms", self.delay)):
+            one[name] = {part: None if np.isnan(value) else value for part, value in spread._asdict().items()}
+        if self.by_label:
+            one["by_label"] = {label: part.to_dict() for label, part in self.by_label.items()}
+        return one
+
+    def __repr__(self) -> str:
+        rows = [*self.by_label.values()] if len(self.by_label) > 1 else []
+        table: list[tuple[str, ...]] = [
+            ("", "events", "found", "missed", "false", "near", "t - event (ms)", "known - event (ms)")
+        ]
+        for one in [*rows, self]:
+            counts = (one.events, one.found, one.missed, one.false, one.false_near)
+            table.append((one.label, *map(str, counts), repr(one.error), repr(one.delay)))
+        widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
+        lines = [
+            "  ".join(
+                cell.rjust(w) if 0 < k < 6 else cell.ljust(w)
+                for k, (cell, w) in enumerate(zip(row, widths, strict=True))
+            )
+            for row in table
+        ]
+        return "\n".join(line.rstrip() for line in lines)
+
+
+def score(
+    found: Detections,
+    truth: Mapping[str, ArrayLike] | ArrayLike,
+    window_ms: float | Mapping[str, float | ArrayLike] | ArrayLike = 50.0,
+) -> Score:
+    """Score detections against reference events, label by label.
+
+    Pairs are made one to one and in the order of time: as many as the window allows, and of all ways to have so many
+    the one with the least sum of distances. Every further detection is false, inside the window too.
+
+    Parameters
+    ----------
+    found : Detections
+    truth : mapping of str to int, us; or int, shape (events,), us; or Detections
+        Times of the reference events by label. Times alone are of the one label that `found` has.
+    window_ms : float, ms, or one a reference event, or a mapping of str to either
+        How far a detection may lie from its event, either way, 0 to 3 600 000; a mapping goes by label. 50 as in 6.5.
+
+    Returns
+    -------
+    Score
+
+    Raises
+    ------
+    ProblemError : times that are not whole us, a window that makes no sense, times alone for several labels
+
+    Notes
+    -----
+    Thesis 6.5.2. Reading: the thesis counts "additional/missing spikes within 50 ms of a gait event"; spikes farther
+    away count as false here as well, and its own count stands beside it as `false_near`. Time and memory: O(events +
+    pairs within windows).
+
+    Examples
+    --------
+    >>> found = Detections(["contact"] * 3, [1_200, 90_000, 400_100], [1_500, 90_500, 400_500])
+    >>> result = score(found, {"contact": [1_000, 400_000, 800_000]})
+    >>> result.found, result.missed, result.false
+    (2, 1, 1)
+    >>> result.errors_ms
+    array([0.2, 0.1])
+    """
+    if not isinstance(found, Detections):
+        raise ProblemError(f"found is a {type(found).__name__}: must be taxel.Detections")
+    labels, times = _truth(found, truth)
+    tallies = _core.score(found._parts(), labels, times, _windows(labels, window_ms))
+    scores = {}
+    for label, said, events, missed, false, near, errors, delays in tallies:
+        scores[label] = Score(label, np.column_stack([said, events]), missed, false, near, errors, delays)
+    return Score(
+        "all" if len(scores) != 1 else next(iter(scores)),
+        np.concatenate([one.pairs for one in scores.values()] or [np.empty((0, 2), np.int64)]),
+        np.concatenate([one.missed_events for one in scores.values()] or [np.empty(0, np.int64)]),
+        np.concatenate([one.false_detections for one in scores.values()] or [np.empty(0, np.int64)]),
+        sum(one.false_near for one in scores.values()),
+        np.concatenate([one.errors_ms for one in scores.values()] or [np.empty(0)]),
+        np.concatenate([one.delays_ms for one in scores.values()] or [np.empty(0)]),
+        scores,
+    )
+
+
+def _truth(found: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -> tuple[list[str], NDArray[np.int64]]:
+    """Return the reference events as labels and times."""
+    if isinstance(truth, Detections):
+        return truth.label.tolist(), truth.t
+    if isinstance(truth, Mapping):
+        wrong = [label for label in truth if not isinstance(label, str)]
+        if wrong:
+            raise ProblemError(f"truth: {wrong[0]!r} is not a label, which must be a text")
+        columns = {label: _whole(f"truth[{label!r}]", times) for label, times in truth.items()}
+        labels = [label for label, times in columns.items() for _ in range(len(times))]
+        return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])
+    times = _whole("truth", truth)
+    if len(found.labels) > 1:
+        raise ProblemError(f"truth has no labels, found has {', '.join(found.labels)}: give times by label")
+    return [(found.labels or ("event",))[0]] * len(times), times
+
+
+def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
+    """Return the window of each reference event, whole us."""
+    windows = np.zeros(len(labels), np.int64)
+    if isinstance(window_ms, Mapping):
+        for label in dict.fromkeys(labels):
+            if label not in window_ms:
+                raise ProblemError(f"window_ms: there is none for {label!r}")
+            mine = np.array([other == label for other in labels])
+            windows[mine] = _windows([label] * int(mine.sum()), window_ms[label])
+        return windows
+    try:
+        given = np.asarray(window_ms, np.float64)
+    except (TypeError, ValueError) as error:
+        raise ProblemError(f"window_ms: {error}") from None
+    if given.ndim > 1 or (given.ndim == 1 and len(given) != len(labels)):
+        raise ProblemError(
+            f"window_ms has shape {given.shape}: must be one number, or one each of {len(labels)} events"
+        )
+    wrong = ~((given >= 0) & (given <= 3_600_000))
+    if wrong.any():
+        raise ProblemError(
+            f"window_ms is {np.atleast_1d(given)[np.atleast_1d(wrong)][0]}: must lie between 0 and 3600000"
+        )
+    windows[:] = np.rint(given * 1000.0)
+    return windows

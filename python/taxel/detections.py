@@ -1,0 +1,233 @@
+"""What a readout said, and when it could have said it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._core import FormatError, ProblemError
+from taxel._files import write_whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["Detections"]
+
+_CSV = ("label", "t_us", "known_us", "slope_mv_per_ms")
+_SAID = "said_us"
+
+
+class Detections:
+    """Hold what a readout said: label, time of the event, time at which it could be said, and how surely.
+
+    All times are us of the board's clock.
+
+    Parameters
+    ----------
+    label : str, shape (n,)
+    t : int64, shape (n,), us
+        When the event was: the crossing less the encoder's latency and the trained delay.
+    known : int64, shape (n,), us
+        When it could first be said: the end of the frame in which the potential crosses.
+    slope : float, shape (n,), mV/ms, optional
+        How steeply the potential rose above its threshold, as a measure of how sure; NaN where it is left out.
+    said : int64, shape (n,), us, optional
+        When it was said, by the host's clock less the estimated offset.
+
+    Raises
+    ------
+    ProblemError : columns of unequal length, or values that make no sense
+
+    Examples
+    --------
+    >>> found = Detections(["contact", "lift"], [1000, 9000], [1344, 9600], [0.8, 0.5])
+    >>> found
+    Detections(2: contact 1, lift 1; 1000 to 9000 us)
+    >>> found["lift"].t
+    array([9000])
+    >>> len(found.between(0, 5000))
+    1
+    """
+
+    def __init__(
+        self,
+        label: ArrayLike,
+        t: ArrayLike,
+        known: ArrayLike,
+        slope: ArrayLike | None = None,
+        said: ArrayLike | None = None,
+    ) -> None:
+        labels = np.asarray(label)
+        if labels.size == 0:
+            labels = labels.astype(np.str_)
+        if labels.ndim != 1 or labels.dtype.kind != "U":
+            raise ProblemError(f"label has shape {labels.shape} of {labels.dtype}: must be a list of texts")
+        self.label: NDArray[np.str_] = labels
+        self.t: NDArray[np.int64] = _whole("t", t)
+        self.known: NDArray[np.int64] = _whole("known", known)
+        try:
+            given = np.full(len(labels), np.nan) if slope is None else slope
+            self.slope: NDArray[np.float64] = np.ascontiguousarray(given, np.float64)
+        except (TypeError, ValueError) as error:
+            raise ProblemError(f"slope: {error}") from None
+        if self.slope.ndim != 1:
+            raise ProblemError(f"slope has {self.slope.ndim} dimensions: must have one")
+        self.said: NDArray[np.int64] | None = None if said is None else _whole("said", said)
+        if self.said is not None and len(self.said) != len(labels):
+            raise ProblemError(f"said has {len(self.said)} entries: must be {len(labels)}, one a detection")
+        _core.check_detections(self._parts())
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The labels that occur, in alphabetical order."""
+        return tuple(str(name) for name in np.unique(self.label))
+
+    def __getitem__(self, chosen: str | slice | NDArray[Any]) -> Detections:
+        """Return the detections of one label, or those chosen by slice, mask or numbers."""
+        places: Any = self.label == chosen if isinstance(chosen, str) else chosen
+        try:
+            places = np.arange(len(self))[places]
+        except (IndexError, TypeError, ValueError) as error:
+            raise ProblemError(f"detections: choose by a label, a slice, a mask or numbers: {error}") from None
+        if places.ndim != 1:
+            raise ProblemError(f"detections: {chosen!r} has {places.ndim} dimensions, must have one")
+        said = None if self.said is None else self.said[places]
+        return Detections(self.label[places], self.t[places], self.known[places], self.slope[places], said)
+
+    def between(self, start: float, stop: float) -> Detections:
+        """Return the detections of ``start <= t < stop`` (us)."""
+        try:
+            inside = (self.t >= start) & (self.t < stop)
+        except TypeError:
+            inside = None
+        if not isinstance(inside, np.ndarray) or not start <= stop:
+            raise ProblemError(f"window {start} to {stop} us: start must be a number that does not lie after stop")
+        return self[inside]
+
+    def to_numpy(self) -> NDArray[np.void]:
+        """Return one record a detection with the fields ``label t known slope``, and ``said`` where it is known."""
+        width = max(1, self.label.dtype.itemsize // 4)
+        fields: list[tuple[str, Any]] = [("label", f"U{width}"), ("t", "<i8"), ("known", "<i8"), ("slope", "<f8")]
+        if self.said is not None:
+            fields.append(("said", "<i8"))
+        records = np.empty(len(self), np.dtype(fields))
+        for name, _ in fields:
+            records[name] = getattr(self, name)
+        return records
+
+    @classmethod
+    def from_numpy(cls, records: NDArray[np.void]) -> Detections:
+        """Build detections from records with the fields ``label t known slope``, and ``said`` where it is there.
+
+        Raises
+        ------
+        ProblemError : a field is missing (names it)
+        """
+        names = getattr(getattr(records, "dtype", None), "names", None) or ()
+        missing = [name for name in ("label", "t", "known", "slope") if name not in names]
+        if missing:
+            raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
+        said = records["said"] if "said" in names else None
+        return cls(records["label"], records["t"], records["known"], records["slope"], said)
+
+    def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write a table ``label,t_us,known_us,slope_mv_per_ms[,said_us]`` and return its path.
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        """
+        text = self._csv().encode()
+        return write_whole(path, lambda file: file.write(text), overwrite=overwrite)
+
+    def _csv(self) -> str:
+        text = io.StringIO()
+        table = csv.writer(text, lineterminator="\n")
+        table.writerow([*_CSV, _SAID] if self.said is not None else _CSV)
+        columns = [self.label.tolist(), self.t.tolist(), self.known.tolist(), map(repr, self.slope.tolist())]
+        table.writerows(zip(*columns, *([] if self.said is None else [self.said.tolist()]), strict=True))
+        return text.getvalue()
+
+    @classmethod
+    def from_csv(cls, path: str | os.PathLike[str]) -> Detections:
+        """Read a table that `to_csv` wrote.
+
+        Raises
+        ------
+        FormatError : another header, or a value that makes no sense (names the line)
+        FileNotFoundError : no such file
+        """
+        rows: list[tuple[str, int, int, float, int]] = []
+        try:
+            with open(path, newline="", encoding="utf-8") as file:
+                table = csv.reader(file)
+                header = tuple(next(table, ()))
+                if header not in (_CSV, (*_CSV, _SAID)):
+                    raise FormatError(f"{path}, line 1: {','.join(header) or 'nothing'}; must be {','.join(_CSV)}")
+                for row in table:
+                    if len(row) != len(header):
+                        raise FormatError(f"{path}, line {table.line_num}: {len(row)} values; must be {len(header)}")
+                    try:
+                        numbers = int(row[1]), int(row[2]), float(row[3]), int(row[4]) if len(row) > 4 else 0
+                    except ValueError as error:
+                        raise FormatError(f"{path}, line {table.line_num}: {error}") from None
+                    rows.append((row[0], *numbers))
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise FormatError(f"{path}: not a table of text: {error}") from None
+        label, t, known, slope, said = zip(*rows, strict=True) if rows else ((), (), (), (), ())
+        return cls(label, t, known, slope, said if _SAID in header else None)
+
+    def plot(self, ax: Axes | None = None) -> Axes:
+        """Draw each label's detections as marks over time (s)."""
+        from taxel.plot import detections  # noqa: PLC0415  matplotlib loads slowly
+
+        return detections(self, ax)
+
+    def _parts(self) -> tuple[list[str], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
+        return self.label.tolist(), self.t, self.known, self.slope
+
+    @classmethod
+    def _from_parts(cls, parts: tuple[Any, ...]) -> Detections:
+        return cls(*parts)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Detections):
+            return NotImplemented
+        if (self.said is None) != (other.said is None):
+            return False
+        names = ["label", "t", "known"] + ([] if self.said is None else ["said"])
+        same = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
+        return same and np.array_equal(self.slope, other.slope, equal_nan=True)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        if not len(self):
+            return "Detections(none)"
+        counts = ", ".join(f"{name} {np.count_nonzero(self.label == name)}" for name in self.labels)
+        return f"Detections({len(self)}: {counts}; {self.t.min()} to {self.t.max()} us)"
+
+
+def _whole(name: str, values: ArrayLike) -> NDArray[np.int64]:
+    """Return a column of whole us; refuses what would change its value on the way."""
+    try:
+        given = np.asarray(values)
+        with np.errstate(invalid="ignore"):
+            column = np.ascontiguousarray(given, np.int64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ProblemError(f"{name}: {error}") from None
+    if column.ndim != 1:
+        raise ProblemError(f"{name} has {column.ndim} dimensions: must have one")
+    if given.size and (given.dtype.kind not in "iuf" or not np.array_equal(given, column)):
+        raise ProblemError(f"{name}: times must be whole us")
+    return column

@@ -1,0 +1,218 @@
+"""Detections as a noun, and their score."""
+
+import math
+
+import numpy as np
+import pytest
+import taxel
+from hypothesis import given
+from hypothesis import strategies as st
+from taxel.detect import Score, Spread, score
+
+TIMES = st.lists(st.integers(-(10**6), 10**6), max_size=12)
+
+
+def some() -> taxel.Detections:
+    return taxel.Detections(["b", "a", "b"], [3000, 1000, 2000], [3400, 1200, 2100], [0.5, 1.5, math.nan])
+
+
+def brute_force(found: list[int], truth: list[int], window: int) -> tuple[int, int]:
+    """The most pairs, and of those ways the least sum of distances, over all pairings whatever."""
+    best = {frozenset(): (0, 0)}
+    for t in truth:
+        after = dict(best)
+        for used, (pairs, cost) in best.items():
+            for j, f in enumerate(found):
+                if j not in used and abs(f - t) <= window:
+                    key, value = used | {j}, (pairs + 1, cost - abs(f - t))
+                    after[key] = max(after.get(key, (0, -1)), value)
+        best = after
+    return max(best.values())
+
+
+@given(st.lists(st.integers(0, 30), max_size=6), st.lists(st.integers(0, 30), max_size=5), st.integers(0, 10))
+def test_no_pairing_finds_more_or_lies_nearer(found: list[int], truth: list[int], window: int) -> None:
+    result = score(taxel.Detections(["e"] * len(found), found, found), truth, window / 1000)
+    distances = -int(np.rint(np.abs(result.errors_ms).sum() * 1000))
+    assert (result.found, distances) == brute_force(found, truth, window)
+
+
+@given(TIMES, TIMES, st.floats(0, 500))
+def test_found_missed_and_false_add_up(found: list[int], truth: list[int], window_ms: float) -> None:
+    result = score(taxel.Detections(["e"] * len(found), found, [t + 7 for t in found]), {"e": truth}, window_ms)
+    assert result.found + result.missed == len(truth) == result.events
+    assert result.found + result.false == len(found)
+    assert 0 <= result.false_near <= result.false
+    assert (np.abs(result.errors_ms) <= window_ms + 0.001).all()
+    assert np.allclose(result.delays_ms - result.errors_ms, 0.007)
+    for (j, i), error in zip(result.pairs, result.errors_ms, strict=True):
+        assert error == (found[j] - truth[i]) / 1000
+
+
+@given(TIMES, TIMES, st.integers(-(10**9), 10**9))
+def test_a_shift_in_time_changes_no_score(found: list[int], truth: list[int], shift: int) -> None:
+    here = score(taxel.Detections(["e"] * len(found), found, found), {"e": truth}, 30.0)
+    there_found = [t + shift for t in found]
+    there = score(
+        taxel.Detections(["e"] * len(found), there_found, there_found), {"e": [t + shift for t in truth]}, 30.0
+    )
+    assert np.array_equal(here.errors_ms, there.errors_ms)
+    assert here.false_near == there.false_near
+
+
+def test_labels_are_scored_apart() -> None:
+    result = score(some(), {"a": [1000], "b": [2000, 3001], "c": [5]}, 0.5)
+    assert {label: one.found for label, one in result.by_label.items()} == {"a": 1, "b": 2, "c": 0}
+    assert (result["c"].missed, result.missed, result.false) == (1, 1, 0)
+    assert result.to_dict()["by_label"]["b"]["error_ms"]["mean"] == pytest.approx(-0.0005)
+    assert result.to_dict()["by_label"]["a"]["error_ms"]["sd"] is None
+    assert repr(result).splitlines()[-1].startswith("all")
+    with pytest.raises(taxel.ProblemError, match="no label 'd': there are a, b, c"):
+        result["d"]
+
+
+def test_each_event_may_have_a_window_of_its_own() -> None:
+    found = taxel.Detections(["e"] * 2, [20_000, 140_000], [20_000, 140_000])
+    assert score(found, [0, 100_000], [10.0, 50.0]).pairs.tolist() == [[1, 1]]
+    assert score(found, {"e": [0, 100_000]}, {"e": 50.0}).found == 2
+
+
+def test_other_detections_can_be_the_truth() -> None:
+    assert score(some(), some()).found == 3
+    assert score(some(), some()).error == Spread(0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def test_nothing_against_nothing_is_no_error() -> None:
+    empty = score(taxel.Detections([], [], []), {})
+    assert (empty.events, empty.false) == (0, 0)
+    assert math.isnan(empty.found_share)
+    assert "none" in repr(empty)
+
+
+@given(st.lists(st.floats(-1e6, 1e6), min_size=2, max_size=30))
+def test_the_spread_is_numpys(values: list[float]) -> None:
+    spread = Spread.of(values)
+    expected = [np.mean(values), np.std(values, ddof=1), np.median(values), *np.percentile(values, [2.5, 97.5])]
+    assert np.allclose(spread, expected, rtol=1e-9, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("truth", "window_ms", "said"),
+    [
+        ({"a": [0.5]}, 50, "truth\\['a'\\]: times must be whole us"),
+        ({"a": [[1]]}, 50, "dimensions"),
+        ({"a": ["x"]}, 50, "truth"),
+        ({1: [5]}, 50, "1 is not a label"),
+        ({"a": None}, 50, "truth"),
+        ([1, 2], 50, "truth has no labels, found has a, b"),
+        ({"a": [1]}, -1, "window_ms is -1.0: must lie between 0 and 3600000"),
+        ({"a": [1]}, math.nan, "window_ms is nan"),
+        ({"a": [1]}, math.inf, "window_ms is inf"),
+        ({"a": [1]}, "wide", "window_ms"),
+        ({"a": [1]}, None, "window_ms is nan"),
+        ({"a": [1]}, [1, 2], "one each of 1 events"),
+        ({"a": [1]}, {"b": 1}, "window_ms: there is none for 'a'"),
+    ],
+)
+def test_nonsense_in_a_score_is_one_clear_error(truth: object, window_ms: object, said: str) -> None:
+    with pytest.raises(taxel.ProblemError, match=said) as error:
+        score(some(), truth, window_ms)  # type: ignore[arg-type]
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("found", [None, [1, 2], "contact", 3.0])
+def test_a_score_takes_detections_only(found: object) -> None:
+    with pytest.raises(taxel.ProblemError, match=r"must be taxel\.Detections"):
+        score(found, {})  # type: ignore[arg-type]
+
+
+def test_detections_come_back_from_numpy_and_csv(tmp_path) -> None:
+    found = some()
+    with_said = taxel.Detections(found.label, found.t, found.known, found.slope, said=[9, 8, 7])
+    for one in (found, with_said, found[:0]):
+        assert taxel.Detections.from_numpy(one.to_numpy()) == one
+        path = tmp_path / f"{len(list(tmp_path.iterdir()))}.csv"
+        assert one.to_csv(path) == path
+        assert taxel.Detections.from_csv(path) == one
+    with pytest.raises(FileExistsError):
+        found.to_csv(path)
+    found.to_csv(path, overwrite=True)
+    assert taxel.Detections.from_csv(path) == found
+    assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv"] * 3, "nothing half-written stays"
+
+
+def test_a_slope_keeps_every_digit_in_a_table(tmp_path) -> None:
+    found = taxel.Detections(['a,"b"\n'], [1], [2], [0.1 + 0.2])
+    assert taxel.Detections.from_csv(found.to_csv(tmp_path / "a.csv")) == found
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "line 1: nothing"),
+        ("a,b\n", "line 1: a,b"),
+        ("label,t_us,known_us,slope_mv_per_ms\nx,1,2\n", "line 2: 3 values; must be 4"),
+        ("label,t_us,known_us,slope_mv_per_ms\nx,1,soon,0\n", "line 2: invalid literal"),
+    ],
+)
+def test_a_table_that_is_none_is_refused_by_line(tmp_path, text: str, said: str) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    with pytest.raises(taxel.FormatError, match=said):
+        taxel.Detections.from_csv(path)
+
+
+def test_detections_are_chosen_by_label_time_and_place() -> None:
+    found = some()
+    assert found.labels == ("a", "b")
+    assert found["b"].t.tolist() == [3000, 2000]
+    assert found["c"].t.tolist() == []
+    assert found[1:].label.tolist() == ["a", "b"]
+    assert found[np.array([True, False, True])] == found["b"]
+    assert found[[-1]].t.tolist() == [2000]
+    assert found.between(1000, 3000).t.tolist() == [1000, 2000]
+    assert repr(found) == "Detections(3: a 1, b 2; 1000 to 3000 us)"
+    assert repr(found[:0]) == "Detections(none)"
+    assert found != found[:2]
+    assert found != 5
+    for wrong in (None, 9, [9], [True], 1.5, [[1]], object()):
+        with pytest.raises(taxel.ProblemError):
+            found[wrong]  # type: ignore[index]
+    for start, stop in ((5, 1), (None, 1), ("a", "b"), (math.nan, 1)):
+        with pytest.raises(taxel.ProblemError, match="window"):
+            found.between(start, stop)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ((["a"], [1], [1, 2]), "known has 2 entries, label has 1"),
+        ((["a"], [1.5], [1]), "t: times must be whole us"),
+        ((["a"], [math.nan], [1]), "t: times must be whole us"),
+        ((["a"], [2**63], [1]), "t"),
+        ((["a"], [1], ["x"]), "known"),
+        ((["a"], [[1]], [1]), "t has 2 dimensions"),
+        (([5], [1], [1]), "label has shape"),
+        ((None, [], []), "label has shape"),
+        (("a", [1], [1]), "label has shape"),
+        ((["a"], [1], [1], ["steep"]), "slope"),
+        ((["a"], [1], [1], [1.0], [1, 2]), "said has 2 entries"),
+    ],
+)
+def test_nonsense_in_detections_is_one_clear_error(columns: tuple[object, ...], said: str) -> None:
+    with pytest.raises(taxel.ProblemError, match=said) as error:
+        taxel.Detections(*columns)  # type: ignore[arg-type]
+    assert "\n" not in str(error.value)
+
+
+def test_detections_can_be_drawn() -> None:
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    assert [tick.get_text() for tick in some().plot().get_yticklabels()] == ["a", "b"]
+    some()[:0].plot()
+
+
+def test_a_score_is_of_one_label_or_of_all() -> None:
+    assert score(some()["a"], [1000]).label == "a"
+    assert isinstance(score(some(), {"a": [1]})["a"], Score)
