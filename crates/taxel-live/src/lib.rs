@@ -1,6 +1,7 @@
 //! Where the world comes in: sockets, files and threads around `taxel-core`.
 
 pub mod error;
+pub mod latency;
 
 pub mod capture;
 pub mod emulate;
