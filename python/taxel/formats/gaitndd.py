@@ -1,0 +1,197 @@
+"""One force-sensitive channel a foot, five minutes of walking (PhysioNet, Gait in Neurodegenerative Disease 1.0.0).
+
+A person is ``NAME.hea`` (WFDB header), ``NAME.let`` and ``NAME.rit`` (left and right, WFDB format 212) and ``NAME.ts``,
+the authors' step times. Numbers are raw: not N, and they drift.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import FormatError
+from taxel.array import Array
+from taxel.formats import text
+from taxel.formats.trial import MARGIN_US, Trial
+from taxel.frames import Frames
+
+__all__ = ["files", "format_212", "step_times", "trials"]
+
+#: What format 212 stores where there is no valid sample.
+NO_SAMPLE = -2048
+
+_TS_COLUMNS = [
+    *("time", "left stride", "right stride", "left swing", "right swing", "left swing %", "right swing %"),
+    *("left stance", "right stance", "left stance %", "right stance %", "double support", "double support %"),
+]
+_SOURCE = "step times that the authors derived from this very channel (left foot only)"
+
+
+def files(path: Path) -> list[Path]:
+    """Find the headers of this format: ``NAME.hea`` with ``NAME.let`` beside it."""
+    found = sorted(path.glob("*.hea")) if path.is_dir() else [path]
+    return [f for f in found if f.suffix == ".hea" and f.with_suffix(".let").exists()]
+
+
+def trials(path: str | Path) -> Iterator[Trial]:
+    """Read the left and the right channel of one person, or of all in a folder, one after the other.
+
+    The right channel has no step times of its own, so its trial has no truth. Samples that are not valid are left out.
+
+    Yields
+    ------
+    Trial
+
+    Raises
+    ------
+    FormatError : a file that does not hold what it should (names file and line or byte)
+    """
+    place = Path(path)
+    found = files(place)
+    if not found:
+        raise FormatError(f"{place}: no NAME.hea with NAME.let in it")
+    for header in found:
+        rate, samples, signals = _header(header)
+        t = np.rint(np.arange(samples) * (1e6 / rate)).astype(np.int64)
+        steps = header.with_suffix(".ts")
+        for name, first, checksum in signals:
+            file = header.parent / name
+            foot = {".let": "left", ".rit": "right"}.get(file.suffix, "")
+            values = _samples(file, samples, first, checksum)
+            valid = values != NO_SAMPLE
+            truth: dict[str, NDArray[np.int64]] = {}
+            scored = (0, 0)
+            if foot == "left" and steps.exists():
+                truth = step_times(steps)
+                ends = [times for times in truth.values() if len(times)]
+                if ends:
+                    scored = (min(e[0] for e in ends) - MARGIN_US, max(e[-1] for e in ends) + MARGIN_US)
+            yield Trial(
+                name=f"{header.stem} {foot}".strip(),
+                person=header.stem,
+                frames=Frames(
+                    values[valid].astype(np.float32)[:, None, None],
+                    t[valid],
+                    unit="raw",
+                    array=Array(1, 1, name="gaitndd foot"),
+                ),
+                truth=truth,
+                source=_SOURCE,
+                foot=foot,
+                group="healthy" if header.stem.startswith("control") else "patient",
+                scored=(int(scored[0]), int(scored[1])),
+            )
+
+
+def format_212(data: bytes, name: str = "data") -> NDArray[np.int16]:
+    """Unpack WFDB format 212: two signed 12-bit samples in three bytes.
+
+    Parameters
+    ----------
+    data : bytes
+    name : str
+        The file's name, for the error.
+
+    Returns
+    -------
+    int16, shape (2 * len(data) / 3,)
+
+    Raises
+    ------
+    FormatError : a length that is no multiple of 3
+
+    Examples
+    --------
+    >>> format_212(bytes([0x01, 0x80, 0xFF]))
+    array([   1, -1793], dtype=int16)
+    """
+    if len(data) % 3:
+        raise FormatError(f"{name}: {len(data)} bytes; format 212 has two samples in three bytes, so a multiple of 3")
+    b = np.frombuffer(data, np.uint8).reshape(-1, 3).astype(np.int16)
+    pairs = np.stack([b[:, 0] + 256 * (b[:, 1] & 15), b[:, 2] + 256 * (b[:, 1] >> 4)], axis=1)
+    return np.where(pairs > 2047, pairs - 4096, pairs).astype(np.int16).ravel()
+
+
+def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
+    """Read the left foot's heel strikes and foot-offs from the authors' step times.
+
+    Parameters
+    ----------
+    path : Path
+        ``NAME.ts``: 13 columns; the first is the left heel strike that ends the row's left stride (measured: its
+        differences are the strides), and the foot-off lies one left swing before it.
+
+    Returns
+    -------
+    dict of int64 times, us
+        ``contact`` (the start of the first stride is one too) and ``foot_off``.
+
+    Raises
+    ------
+    FormatError : a line that has not 13 numbers, or times that do not ascend (names file and line)
+    """
+    rows = [line.split() for line in text.lines(path)]
+    values = text.numbers(rows, path, 1, _TS_COLUMNS)
+    if not len(values):
+        raise FormatError(f"{path.name}: empty; must hold one line a stride")
+    time, stride, swing = values[:, 0], values[:, 1], values[:, 3]
+    off = time - swing
+    wrong = np.flatnonzero((np.diff(time, prepend=-np.inf) <= 0) | (stride <= 0) | (swing <= 0) | (swing >= stride))
+    if len(wrong):
+        raise FormatError(f"{path.name}, line {wrong[0] + 1}: time, left stride and swing do not follow one another")
+    strikes = np.unique(np.rint(np.concatenate([[time[0] - stride[0]], time]) * 1e6).astype(np.int64))
+    return {"contact": strikes, "foot_off": np.rint(off * 1e6).astype(np.int64)}
+
+
+def _header(path: Path) -> tuple[float, int, list[tuple[str, int, int]]]:
+    """Return the rate, samples, and of each signal: file, samples, first value, checksum."""
+    rows = [(k, line.split()) for k, line in enumerate(text.lines(path), start=1) if line.strip() and line[0] != "#"]
+    if not rows or len(rows[0][1]) < 4:
+        raise FormatError(f"{path.name}, line 1: must hold name, signals, rate and samples")
+    k, record = rows[0]
+    signals = int(text.number(record[1], path, k, "number of signals"))
+    rate = text.number(record[2].split("/")[0].split("(")[0], path, k, "rate")
+    samples = int(text.number(record[3], path, k, "number of samples"))
+    if rate <= 0 or samples < 1 or signals < 1:
+        raise FormatError(f"{path.name}, line {k}: {signals} signals, {rate:g} Hz, {samples} samples; must be above 0")
+    if len(rows) < 1 + signals:
+        raise FormatError(f"{path.name}: {len(rows) - 1} signal lines for {signals} signals")
+    found = []
+    for k, cells in rows[1 : 1 + signals]:
+        if len(cells) < 7:
+            raise FormatError(f"{path.name}, line {k}: {len(cells)} cells; must hold file, format ... checksum")
+        if cells[1] != "212":
+            raise FormatError(f"{path.name}, line {k}: format {cells[1]}; only 212 is read")
+        if not re.fullmatch(r"[\w.-]+", cells[0]):
+            raise FormatError(f"{path.name}, line {k}: {cells[0]!r} is not a plain file name")
+        first, checksum = (int(text.number(cells[c], path, k, w)) for c, w in ((5, "first value"), (6, "checksum")))
+        found.append((cells[0], first, checksum))
+    return rate, samples, found
+
+
+def _samples(path: Path, samples: int, first: int, checksum: int) -> NDArray[np.int16]:
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise FormatError(f"{path.name}: named in the header, but not there") from None
+    if len(data) != 3 * ((samples + 1) // 2):
+        raise FormatError(
+            f"{path.name}: {len(data)} bytes; {samples} samples of format 212 are {3 * ((samples + 1) // 2)}"
+        )
+    values = format_212(data, path.name)[:samples]
+    said = NO_SAMPLE if first == -32768 else first
+    if values[0] != said:
+        raise FormatError(f"{path.name}: first value {values[0]}; the header says {first}")
+    # The header's sum takes a sample that is not valid as -32768.
+    total = int(np.where(values == NO_SAMPLE, -32768, values).sum(dtype=np.int64))
+    if checksum not in {_int16(total), _int16(int(values.sum(dtype=np.int64)))}:
+        raise FormatError(f"{path.name}: samples sum to {_int16(total)} (16 bits); the header says {checksum}")
+    return values
+
+
+def _int16(value: int) -> int:
+    return (value + 32768) % 65536 - 32768

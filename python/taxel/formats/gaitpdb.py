@@ -1,0 +1,141 @@
+"""Eight force sensors under each foot while walking (PhysioNet, Gait in Parkinson's Disease 1.0.0).
+
+A file ``GaCo02_01.txt`` (or ``.txt.gz``) has no header and 19 columns: time in s, 8 sensors of the left foot, 8 of the
+right, the two totals, all in N. ``Co`` in the name is a healthy person, ``Pt`` a patient.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import FormatError
+from taxel.array import Array
+from taxel.formats import text
+from taxel.formats.trial import MARGIN_US, Trial
+from taxel.frames import Frames
+
+__all__ = ["contacts", "files", "trials"]
+
+_NAME = re.compile(r"((Ga|Si|Ju)(Co|Pt)\d+)_\d+\.txt(\.gz)?")
+_COLUMNS = [
+    "time",
+    *(f"{side} {k}" for side in ("left", "right") for k in range(1, 9)),
+    "total left",
+    "total right",
+]
+_SOURCE = "the foot's own total force: contact above 50 N, foot-off below 25 N, stances of 0.2 s or more"
+
+
+def files(path: Path) -> list[Path]:
+    """Find the files of this format, by their names."""
+    found = sorted(path.glob("*_*.txt*")) if path.is_dir() else [path]
+    return [f for f in found if _NAME.fullmatch(f.name)]
+
+
+def trials(path: str | Path) -> Iterator[Trial]:
+    """Read the left and the right foot of one walk, or of all in a folder, one after the other.
+
+    Truth is that of ``events.csv`` where the folder has it for that person, else reckoned by `contacts` (same rule).
+
+    Yields
+    ------
+    Trial
+        Channels 0 to 7 are sensors 1 to 8 (heel to front) of either foot; ``series["total"]`` is the total force in N.
+
+    Raises
+    ------
+    FormatError : a file that does not hold what it should (names file, line and column)
+    """
+    place = Path(path)
+    found = files(place)
+    if not found:
+        raise FormatError(f"{place}: no file such as GaCo02_01.txt in it")
+    known = _events_table((place if place.is_dir() else place.parent) / "events.csv")
+    for file in found:
+        match = _NAME.fullmatch(file.name)
+        if match is None:
+            raise FormatError(f"{file.name}: must be named such as GaCo02_01.txt")
+        person = match[1]
+        values = text.numbers([line.split("\t") for line in text.lines(file)], file, 1, _COLUMNS)
+        t = np.rint(values[:, 0] * 1e6).astype(np.int64)
+        back = np.flatnonzero(np.diff(t) <= 0)
+        if len(t) < 2 or len(back):
+            said = (
+                f"line {back[0] + 2}: time {values[back[0] + 1, 0]:g} s does"
+                if len(back)
+                else "fewer than 2 lines: must"
+            )
+            raise FormatError(f"{file.name}, {said} not ascend" if len(back) else f"{file.name}: {said} have more")
+        for n, foot in enumerate(("left", "right")):
+            total = values[:, 17 + n]
+            samples = known[person, foot] if (person, foot) in known else contacts(total)
+            if samples.size and samples.max() >= len(t):
+                raise FormatError(
+                    f"events.csv: {person} {foot}, sample {samples.max()}; {file.name} has {len(t)} lines"
+                )
+            truth = {"contact": t[samples[:, 0]], "foot_off": t[samples[:, 1]]}
+            scored = (
+                (int(truth["contact"][0]) - MARGIN_US, int(truth["foot_off"][-1]) + MARGIN_US)
+                if len(samples)
+                else (0, 0)
+            )
+            yield Trial(
+                name=f"{file.name.split('.')[0]} {foot}",
+                person=person,
+                frames=Frames(
+                    values[:, None, 1 + 8 * n : 9 + 8 * n], t, unit="N", array=Array(1, 8, name="gaitpdb foot")
+                ),
+                truth=truth,
+                source=_SOURCE,
+                foot=foot,
+                group="healthy" if match[3] == "Co" else "patient",
+                scored=scored,
+                series={"total": total},
+            )
+
+
+def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Find stances in a foot's total force.
+
+    Parameters
+    ----------
+    total : float64, shape (samples,), N, 100 samples a second
+
+    Returns
+    -------
+    int64, shape (stances, 2)
+        The first sample above 50 N and the next one below 25 N; only stances that begin after the first sample, end
+        within the recording and last 20 samples (0.2 s) or more.
+
+    Examples
+    --------
+    >>> contacts(np.repeat([0.0, 60.0, 30.0, 0.0], 30))
+    array([[30, 90]])
+    """
+    # +1 above 50, -1 below 25, 0 between: the state is the last one that is not 0.
+    said = (total > 50).astype(np.int64) - (total < 25)
+    last = np.maximum.accumulate(np.where(said != 0, np.arange(len(total)), -1))
+    loaded = (last >= 0) & (said[last] > 0)
+    edges = np.diff(loaded.astype(np.int64))
+    ups, downs = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1
+    downs = downs[np.searchsorted(downs, ups[0], side="right") :] if len(ups) else downs[:0]
+    n = min(len(ups), len(downs))
+    stances = np.stack([ups[:n], downs[:n]], axis=1)
+    return stances[stances[:, 1] - stances[:, 0] >= 20]
+
+
+def _events_table(path: Path) -> dict[tuple[str, str], NDArray[np.int64]]:
+    if not path.exists():
+        return {}
+    found: dict[tuple[str, str], list[list[int]]] = {}
+    for row in text.table(path, ["person", "foot", "contact_sample", "off_sample"]):
+        samples = [int(text.number(row[c], path, int(row["line"]), c)) for c in ("contact_sample", "off_sample")]
+        if not 0 <= samples[0] < samples[1]:
+            raise FormatError(f"{path.name}, line {row['line']}: contact {samples[0]}, off {samples[1]}; must ascend")
+        found.setdefault((row["person"], row["foot"]), []).append(samples)
+    return {key: np.array(rows, np.int64) for key, rows in found.items()}

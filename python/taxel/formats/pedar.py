@@ -1,0 +1,128 @@
+"""novel pedar insoles: the ``.asc`` export, usually 2 x 99 sensors in kPa.
+
+Some header lines, one of column names (``time[secs]``, then the sensors' numbers, left insole first), then a row a
+frame. The frame rate stands in the header only.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import FormatError
+from taxel.array import Array
+from taxel.formats import text
+from taxel.formats.trial import MARGIN_US, Trial
+from taxel.frames import Frames
+
+__all__ = ["contacts", "files", "trials"]
+
+_SOURCE = "the insole's own sum, 10 % of its largest: no truth of its own"
+
+
+def files(path: Path) -> list[Path]:
+    """Find the files of this format: ``.asc`` whose head names time in seconds."""
+    found = sorted(path.glob("*.asc")) if path.is_dir() else [path]
+    return [f for f in found if f.suffix == ".asc" and b"pressure values" in f.open("rb").read(65_536)]
+
+
+def trials(path: str | Path) -> Iterator[Trial]:
+    """Read the left and the right insole of one recording, or of all in a folder, one after the other.
+
+    The recording has no truth: contact and foot-off are where the foot's sum passes 10 % of its largest.
+
+    Yields
+    ------
+    Trial
+
+    Raises
+    ------
+    FormatError : a file that does not hold what it should (names file, line and column)
+    """
+    place = Path(path)
+    found = files(place)
+    if not found:
+        raise FormatError(f"{place}: no pedar .asc in it")
+    for file in found:
+        yield from _read(file)
+
+
+def _read(file: Path) -> Iterator[Trial]:
+    content = text.lines(file)
+    head = next((k for k, line in enumerate(content) if line.startswith("time[secs]")), None)
+    if head is None:
+        raise FormatError(f"{file.name}: no line of column names (time[secs] 1 2 ...)")
+    header = "\n".join(content[:head])
+    rate = re.search(r"scanning rate\s*\[Hz\]:\s*(\S+)", header)
+    if rate is None:
+        raise FormatError(f"{file.name}, line {head + 1}: no 'scanning rate [Hz]' before it")
+    hertz = text.number(rate[1], file, 1 + header[: rate.start()].count("\n"), "scanning rate")
+    if hertz <= 0:
+        raise FormatError(f"{file.name}: scanning rate {hertz:g} Hz; must be above 0")
+    unit = re.search(r"pressure values in\s+(\S+)", header)
+    names = content[head].split()
+    begins = [k for k, name in enumerate(names) if name == "1"]
+    if len(begins) != 2:
+        raise FormatError(
+            f"{file.name}, line {head + 1}: numbers begin at 1 {len(begins)} times; two insoles begin twice"
+        )
+    rows = [line.split() for line in content[head + 1 :] if line.strip()]
+    values = text.numbers(rows, file, head + 2, names)
+    t = np.rint(values[:, 0] * 1e6).astype(np.int64)
+    steps = np.diff(t)
+    off = np.flatnonzero(np.abs(steps - 1e6 / hertz) > 0.25e6 / hertz)
+    if len(off):
+        raise FormatError(
+            f"{file.name}, line {head + 3 + off[0]}: {steps[off[0]]} us after the line before, at {hertz:g} Hz"
+        )
+    for foot, begin, end in (("left", begins[0], begins[1]), ("right", begins[1], len(names))):
+        pressure = values[:, begin:end]
+        total = pressure.sum(axis=1)
+        stances = contacts(total)
+        truth = {"contact": t[stances[:, 0]], "foot_off": t[stances[:, 1]]}
+        yield Trial(
+            name=f"{file.stem} {foot}",
+            person=file.stem,
+            frames=Frames(
+                pressure[:, None, :],
+                t,
+                unit=unit[1] if unit else "kPa",
+                array=Array(1, end - begin, name="pedar insole"),
+            ),
+            truth=truth,
+            source=_SOURCE,
+            foot=foot,
+            scored=(int(truth["contact"][0]) - MARGIN_US, int(truth["foot_off"][-1]) + MARGIN_US)
+            if len(stances)
+            else (0, 0),
+            series={"total": total},
+        )
+
+
+def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Find stances: from the first sample of 10 % of the largest sum to the next one below.
+
+    Parameters
+    ----------
+    total : float64, shape (samples,)
+
+    Returns
+    -------
+    int64, shape (stances, 2)
+        Stances that the recording's ends cut are left out.
+
+    Examples
+    --------
+    >>> contacts(np.array([9.0, 0.0, 5.0, 10.0, 1.0, 0.5, 0.0]))
+    array([[2, 5]])
+    """
+    loaded = (total >= 0.1 * total.max()).astype(np.int64) if len(total) else np.zeros(0, np.int64)
+    edges = np.diff(loaded)
+    ups, downs = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1
+    downs = downs[np.searchsorted(downs, ups[0]) :] if len(ups) else downs[:0]
+    n = min(len(ups), len(downs))
+    return np.stack([ups[:n], downs[:n]], axis=1)

@@ -1,0 +1,225 @@
+"""A footscan-type plate, one barefoot footfall a trial (jiku-data, SpeedPP2DS; J. Biomech. 41:1987, 2008).
+
+A file ``subjNNN.h5`` holds one person: data sets ``imgNNN``, rows x columns x frames, 500 frames a second, heel at the
+low rows. Values are counts; no unit is known. The file's rows are interpolated, three from two: that is undone here.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import FormatError
+from taxel.array import Array
+from taxel.formats import text
+from taxel.formats.trial import Trial
+from taxel.frames import Frames
+
+__all__ = ["COLUMN_MM", "FRAME_US", "ROW_MM", "events", "files", "sensor_rows", "trials"]
+
+#: Between frames, us.
+FRAME_US = 2000
+#: Sensors along the walk and across it, mm: the usual footscan plate, inferred from the three rows made of two.
+ROW_MM, COLUMN_MM = 7.62, 5.08
+
+_SOURCE = (
+    "the full plate itself: contact and foot-off are its first and last loaded frame, heel-off the heel region's "
+    "fall below 5 % of its peak"
+)
+
+
+def files(path: Path) -> list[Path]:
+    """Find the files of this format: ``subj*.h5``."""
+    found = sorted(path.glob("subj*.h5")) if path.is_dir() else [path]
+    return [f for f in found if re.fullmatch(r"subj\w+\.h5", f.name)]
+
+
+def trials(path: str | Path) -> Iterator[Trial]:
+    """Read the footfalls of one person's file, or of all in a folder, one after the other.
+
+    Pictures are of the plate's own sensors (7.62 mm along the walk, 5.08 mm across), from the first frame to the one
+    after foot-off. Truth is that of ``events.csv`` where the folder has it, else reckoned by `events` (same rules).
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Yields
+    ------
+    Trial
+
+    Raises
+    ------
+    FormatError : a file that does not hold what it should
+    """
+    place = Path(path)
+    found = files(place)
+    if not found:
+        raise FormatError(f"{place}: no file subjNNN.h5 in it")
+    folder = place if place.is_dir() else place.parent
+    known, about = _events_table(folder / "events.csv"), _trials_table(folder / "trials.csv")
+    for file in found:
+        person = file.stem
+        try:
+            with h5py.File(file) as h5:
+                for name in sorted(h5):
+                    match = re.fullmatch(r"img(\d+)", name)
+                    if match is None:
+                        raise FormatError(f"{file.name}: data set {name!r}; must be named imgNNN")
+                    number = int(match[1])
+                    image = _image(h5, name, file)
+                    yield _trial(person, number, image, file, known.get((person, number)), about.get((person, number)))
+        except FormatError:
+            raise
+        except (OSError, RuntimeError, KeyError) as error:
+            if isinstance(error, PermissionError | FileNotFoundError):
+                raise
+            raise FormatError(f"{file.name}: not a whole HDF5 file ({str(error).splitlines()[0]})") from None
+
+
+def _image(h5: h5py.File, name: str, file: Path) -> NDArray[np.int32]:
+    data = h5[name]
+    if not isinstance(data, h5py.Dataset) or data.ndim != 3 or data.dtype.kind not in "ui" or 0 in data.shape:
+        raise FormatError(f"{file.name}, {name}: must be whole numbers, rows x columns x frames")
+    image: NDArray[np.int32] = data[...].astype(np.int32)
+    if image.min() < 0 or not image.any():
+        raise FormatError(f"{file.name}, {name}: {'counts below 0' if image.min() < 0 else 'never loaded'}")
+    return image
+
+
+def _trial(
+    person: str,
+    number: int,
+    image: NDArray[np.int32],
+    file: Path,
+    known: dict[str, int] | None,
+    about: dict[str, str | float] | None,
+) -> Trial:
+    frame = known or events(image)
+    end = min(frame["foot_off"] + 1, image.shape[2])
+    try:
+        sensors = sensor_rows(image)[:, :, :end]
+    except FormatError as error:
+        raise FormatError(f"{file.name}, img{number:03d}: {error}") from None
+    values = np.ascontiguousarray(sensors.transpose(2, 0, 1), np.float32)
+    array = Array(values.shape[1], values.shape[2], COLUMN_MM, name="footscan plate")
+    return Trial(
+        name=f"{person}/{number:02d}",
+        person=person,
+        frames=Frames(values, np.arange(end) * FRAME_US, unit="counts", array=array),
+        truth={e: np.array([frame[e] * FRAME_US]) for e in ("contact", "heel_off", "foot_off")},
+        source=_SOURCE,
+        about={"row_mm": ROW_MM, "column_mm": COLUMN_MM, **(about or {})},
+    )
+
+
+def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Undo the interpolation of the rows: three image rows were made of every two sensor rows.
+
+    Parameters
+    ----------
+    image : int, shape (rows, columns, frames), counts
+
+    Returns
+    -------
+    int32, shape (sensor rows, columns, frames), counts
+        Right to within 1 count; begins with the row at which the footprint's box was cut.
+
+    Raises
+    ------
+    FormatError : the rows were not made three from two
+
+    Notes
+    -----
+    With S the sensors and s the row where the box begins: image[s + 3k] = S[2k] exactly, and the two rows after it lie
+    on the straight line to S[2k+1] and from there to S[2k+2], cut down to whole counts. The phase is that of the three
+    under which the fewest cells break |3 (b - c) - (a - d)| <= 3. It looks at the whole trial: part of reading it.
+    """
+    y = np.asarray(image, np.int32)
+    rows = y.shape[0]
+    padded = np.concatenate([y, np.zeros((6, *y.shape[1:]), np.int32)])
+    breaks = []
+    for p in range(3):
+        a, b, c, d = (padded[p + k : p + k + 3 * ((rows - p + 2) // 3) : 3] for k in range(4))
+        breaks.append(int(np.count_nonzero(np.abs(3 * (b - c) - (a - d)) > 3)))
+    phase = int(np.argmin(breaks))
+    first = int(np.flatnonzero(y.any(axis=(1, 2)))[0])
+    start = first - (first - phase) % 3
+    if start < 0:
+        raise FormatError(f"rows are interpolated from row {start} on, before the first: the image is cut")
+    count = (rows - start + 2) // 3
+    a, b, c, d = (padded[start + k : start + k + 3 * count : 3] for k in range(4))
+    off = int(np.count_nonzero(np.abs(3 * (b - c) - (a - d)) > 3))
+    if 100 * off > np.count_nonzero(a | b | c | d):
+        raise FormatError(f"rows are not interpolated three from two ({off} cells off the line)")
+    between = np.maximum(np.rint((3 * (b + c) - a - d + 2) / 4), 0).astype(np.int32)
+    between[(b == 0) | (c == 0)] = 0
+    sensors = np.empty((2 * count, *y.shape[1:]), np.int32)
+    sensors[0::2], sensors[1::2] = a, between
+    return sensors
+
+
+def events(image: NDArray[np.int32]) -> dict[str, int]:
+    """Find contact, heel-off and foot-off of one footfall, as frame numbers.
+
+    Parameters
+    ----------
+    image : int, shape (rows, columns, frames), counts
+        As it is in the file.
+
+    Returns
+    -------
+    dict of int
+        ``contact``: the first frame with any load; ``foot_off``: the frame after the last; ``heel_off``: the frame
+        after the last in which the first 30 % of the rows ever loaded carry at least 5 % of their own largest sum;
+        ``p5``, ``p10``: the first frame with 5 %, 10 % of the largest sum, ``peak_sum``; ``flicker``: 1 where a frame
+        between is wholly unloaded.
+    """
+    total = image.sum(axis=(0, 1), dtype=np.int64)
+    loaded = np.flatnonzero(total > 0)
+    rows = np.flatnonzero(image.any(axis=(1, 2)))
+    n = int(rows[-1] - rows[0]) + 1
+    heel = image[rows[0] : rows[0] + math.floor(0.3 * n + 0.5)].sum(axis=(0, 1), dtype=np.int64)
+    peak = int(total.max())
+    return {
+        "contact": int(loaded[0]),
+        "p5": int(np.flatnonzero(total * 20 >= peak)[0]),
+        "p10": int(np.flatnonzero(total * 10 >= peak)[0]),
+        "heel_off": int(np.flatnonzero(heel * 20 >= heel.max())[-1]) + 1,
+        "foot_off": int(loaded[-1]) + 1,
+        "peak_sum": peak,
+        "flicker": int(len(loaded) < loaded[-1] - loaded[0] + 1),
+    }
+
+
+def _events_table(path: Path) -> dict[tuple[str, int], dict[str, int]]:
+    if not path.exists():
+        return {}
+    columns = {e: f"{e}_frame" for e in ("contact", "heel_off", "foot_off")}
+    rows = text.table(path, ["subject", "trial", *columns.values()])
+    whole = [
+        {c: int(text.number(row[c], path, int(row["line"]), c)) for c in ("trial", *columns.values())} for row in rows
+    ]
+    return {
+        (row["subject"], cells["trial"]): {event: cells[c] for event, c in columns.items()}
+        for row, cells in zip(rows, whole, strict=True)
+    }
+
+
+def _trials_table(path: Path) -> dict[tuple[str, int], dict[str, str | float]]:
+    if not path.exists():
+        return {}
+    names = {"1": "slow", "2": "normal", "3": "fast"}
+    return {
+        (row["subject"], int(text.number(row["trial"], path, int(row["line"]), "trial"))): {
+            "condition": names.get(row["condition"], row["condition"]),
+            "speed_m_s": text.number(row["speed_m_s"], path, int(row["line"]), "speed_m_s"),
+        }
+        for row in text.table(path, ["subject", "trial", "condition", "speed_m_s"])
+    }

@@ -1,0 +1,109 @@
+"""Text files of instruments: lines, cells and numbers, with the place of whatever is wrong."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import math
+import re
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import FormatError
+
+__all__ = ["lines", "number", "numbers", "table"]
+
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+
+
+def lines(path: Path) -> list[str]:
+    """Read the lines of a text file, packed by gzip or not, without their ends.
+
+    UTF-8 with or without its mark; where the bytes are not UTF-8, Latin-1, as instruments of the 1990s write.
+
+    Raises
+    ------
+    FormatError : not a text, or a damaged gzip file
+    """
+    try:
+        data = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise FormatError(f"{path.name}: not a whole gzip file ({error}); get it again") from None
+    if b"\0" in data:
+        raise FormatError(f"{path.name}, byte {data.index(0)}: a zero byte; this is not a text file")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    found = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return found[:-1] if found and not found[-1] else found
+
+
+def number(cell: str, path: Path, line: int, what: str) -> float:
+    """Read one finite number; `line` counts from 1, as editors do.
+
+    Raises
+    ------
+    FormatError : no finite number (names file, line and column)
+    """
+    text = cell.strip()
+    try:
+        value = float(text)
+    except ValueError:
+        if _DECIMAL_COMMA.fullmatch(text):
+            said = f"has a decimal comma ({text!r}); export with decimal points"
+        else:
+            said = f"is {text!r}, not a number" if text else "is empty, not a number"
+        raise FormatError(f"{path.name}, line {line}: {what} {said}") from None
+    if not math.isfinite(value) or "_" in text:
+        raise FormatError(f"{path.name}, line {line}: {what} is {text!r}, not a finite number")
+    return value
+
+
+def numbers(rows: Sequence[Sequence[str]], path: Path, first_line: int, names: Sequence[str]) -> NDArray[np.float64]:
+    """Read a block of numbers whose columns are called `names`; `first_line` is the file's line of the first row.
+
+    Raises
+    ------
+    FormatError : a row of another length, or a cell that is no number (names file, line and column)
+    """
+    columns = len(names)
+    for k, row in enumerate(rows):
+        if len(row) != columns:
+            raise FormatError(f"{path.name}, line {first_line + k}: {len(row)} cells, must have {columns}")
+    try:
+        values = np.array(rows, dtype=np.float64).reshape(len(rows), columns)
+        if np.isfinite(values).all():
+            return values
+    except ValueError:
+        pass  # the slow way below says where
+    return np.array(
+        [[number(c, path, first_line + k, n) for c, n in zip(row, names, strict=True)] for k, row in enumerate(rows)]
+    ).reshape(len(rows), columns)
+
+
+def table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
+    """Read a comma-separated table with a header line; each row also has its ``line``.
+
+    Raises
+    ------
+    FormatError : a column is missing, or a row has another length than the header (names file and line)
+    """
+    text = lines(path)
+    if not text:
+        raise FormatError(f"{path.name}: empty; must begin with a line of column names")
+    rows = list(csv.reader(text))
+    header = rows[0]
+    missing = [c for c in columns if c not in header]
+    if missing:
+        raise FormatError(f"{path.name}, line 1: no column {missing[0]!r}; there are {', '.join(header)}")
+    found = []
+    for k, row in enumerate(rows[1:], start=2):
+        if len(row) != len(header):
+            raise FormatError(f"{path.name}, line {k}: {len(row)} cells, must have {len(header)}")
+        found.append(dict(zip(header, row, strict=True)) | {"line": str(k)})
+    return found

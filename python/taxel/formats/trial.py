@@ -1,0 +1,77 @@
+"""A trial: the pictures of one foot, and when things happened."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import ProblemError
+from taxel.frames import Frames
+
+__all__ = ["MARGIN_US", "Trial"]
+
+#: Loaders count what is said from so long before the first reference event to so long after the last, us.
+MARGIN_US = 100_000
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Trial:
+    """Hold one recording of one foot: its pictures, and the reference times of its events.
+
+    Parameters
+    ----------
+    name : str
+        "subj003/17", "GaCo02_01 left": no two trials of a folder share it.
+    person : str
+    frames : Frames
+        Pictures that are missing in the file are missing here too: their times jump.
+    truth : mapping from event to int64 times, us
+        Ascending; "contact", "heel_off", "foot_off" where the recording knows them.
+    source : str
+        Where the truth comes from, in one sentence; it stands beside every figure.
+    foot : str
+        "left", "right", or "" where the recording does not say.
+    group : str
+        "healthy", "patient", or "".
+    scored : (int, int), us, optional
+        Within it the truth is complete; outside nothing may be counted as false. All pictures where it is left out.
+    series : mapping from name to float64, shape (pictures,)
+        Further columns of the file, such as the total force that the maker reckoned.
+    about : mapping
+        What else is known: condition, speed, age ...
+
+    Raises
+    ------
+    ProblemError : truth that does not ascend, or a column of another length than the pictures
+    """
+
+    name: str
+    person: str
+    frames: Frames
+    truth: Mapping[str, NDArray[np.int64]]
+    source: str
+    foot: str = ""
+    group: str = ""
+    scored: tuple[int, int] | None = None
+    series: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    about: Mapping[str, str | float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for event, times in self.truth.items():
+            back = np.flatnonzero(np.diff(times) <= 0)
+            if len(back):
+                k = int(back[0])
+                raise ProblemError(f"{self.name}: {event} {k + 1} at {times[k + 1]} us is not after {times[k]} us")
+        for name, column in self.series.items():
+            if len(column) != len(self.frames):
+                raise ProblemError(f"{self.name}: {name} has {len(column)} values for {len(self.frames)} pictures")
+        if self.scored is None:
+            t = self.frames.t
+            object.__setattr__(self, "scored", (int(t[0]), int(t[-1])) if len(t) else (0, 0))
+
+    def __repr__(self) -> str:
+        events = ", ".join(f"{len(times)} {event}" for event, times in self.truth.items()) or "no truth"
+        return f"Trial({self.name}: {self.frames!r}, {events})"
