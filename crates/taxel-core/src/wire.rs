@@ -1,1 +1,14 @@
-//! Bytes to events and back.
+//! Bytes to events and back: the board's wire, version 1 (thesis, Appendix 1, sections 3 to 5).
+//!
+//! Nothing here does I/O: push bytes as they come, in pieces of any size, and take events. Socket, file and emulated
+//! board are shells around it.
+
+pub mod command;
+pub mod decoder;
+pub mod registers;
+pub mod v1;
+
+pub use command::{Command, CommandReader};
+pub use decoder::{Counts, Decoder, Pairing};
+pub use registers::{Refusal, Registers};
+pub use v1::{STAMP_US, WORD_BYTES, Word, decode, encode};

@@ -1,0 +1,540 @@
+//! Bytes to events, as they come: finds its place after damage, unwraps time, pairs intensities, counts every loss.
+
+use serde::{Deserialize, Serialize};
+
+use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
+use crate::{Array, Events, Intensities, Marker};
+
+/// How far a stamp may lie behind the latest time and still be a step back (reordered datagrams), in stamps: 0.1 s.
+/// Reading: any other lies ahead, so silences up to 6.45 s are right from the stamps alone.
+pub const FARTHEST_BACK: i64 = 1000;
+
+/// Stamps to a turn of the 16-bit counter: 6.5536 s.
+const TURN: i64 = 65_536;
+
+/// Which change an intensity belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Pairing {
+    /// The word directly before it, where that is a change of the same taxel. Reading: so the board sends them.
+    #[default]
+    Direct,
+    /// The latest change of that taxel that has none yet, for boards that order otherwise. Every event waits for
+    /// [`Decoder::finish`], for an intensity may come at any time: for whole recordings.
+    Taxel,
+}
+
+/// What a decoder saw, and all that it dropped, by cause.
+///
+/// The sums close at any time: `bytes = 5 words + skipped`, and
+/// `words = changes + intensities + unpaired + markers + contradictory + outside`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counts {
+    /// Bytes read; up to four of a word that is not complete count when it is, or when it is given up.
+    pub bytes: u64,
+    /// Complete words, of whatever kind.
+    pub words: u64,
+    /// Bytes that belong to no complete word: those of short events, and those before the next first byte.
+    pub skipped: u64,
+    /// Events cut off by the next first byte, or by the end.
+    pub short: u64,
+    /// Changes on the array: rows of `Events`.
+    pub changes: u64,
+    /// Intensities that found their change.
+    pub intensities: u64,
+    /// Intensities that found none.
+    pub unpaired: u64,
+    /// Starts and stops.
+    pub markers: u64,
+    /// Words of a contradictory kind.
+    pub contradictory: u64,
+    /// Changes and intensities outside the array.
+    pub outside: u64,
+    /// Changes and markers that lie behind the latest time; kept.
+    pub back: u64,
+}
+
+/// Unwraps stamps into 64 bits.
+#[derive(Debug, Clone, Copy, Default)]
+struct Clock {
+    /// The latest time, in stamps.
+    latest: Option<i64>,
+    /// When, by the host's clock, the last stamp came, us.
+    heard: Option<i64>,
+}
+
+impl Clock {
+    /// Gives the unwrapped time in stamps, and whether it is a step back.
+    fn unwrap(&mut self, stamp: u16, arrived: Option<i64>) -> (i64, bool) {
+        let Some(latest) = self.latest else {
+            (self.latest, self.heard) = (Some(i64::from(stamp)), arrived);
+            return (i64::from(stamp), false);
+        };
+        let ahead = (i64::from(stamp) - latest).rem_euclid(TURN);
+        let mut time = if ahead >= TURN - FARTHEST_BACK { latest + ahead - TURN } else { latest + ahead };
+        if let (Some(now), Some(before)) = (arrived, self.heard) {
+            // The silence as the host heard it says how many whole turns the stamps do not show.
+            let expected = latest + now.saturating_sub(before).clamp(0, LONGEST_SILENCE) / STAMP_US;
+            time += ((expected - time + TURN / 2).div_euclid(TURN)).max(0) * TURN;
+        }
+        self.heard = arrived;
+        self.latest = Some(latest.max(time));
+        (time, time < latest)
+    }
+}
+
+/// A year, us: no arrival time can carry the clock out of its 64 bits.
+const LONGEST_SILENCE: i64 = 365 * 86_400 * 1_000_000;
+
+/// A change whose intensity may be the next word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Change {
+    t: i64,
+    x: u16,
+    y: u16,
+    p: bool,
+}
+
+/// Turns bytes into events as they come, wherever they are cut.
+///
+/// A change waits for the next word (its intensity), the end of its datagram ([`Self::end_of_datagram`]) or the end of
+/// the stream ([`Self::finish`]), and no longer.
+///
+/// # Examples
+///
+/// ```
+/// use taxel_core::{Array, wire::Decoder};
+/// let mut decoder = Decoder::new(Array::thesis());
+/// let mut events = decoder.push(&[0xc0, 0x00, 0x05, 0x03, 0x04], None);
+/// decoder.finish_into(&mut events);
+/// assert_eq!((events.t[0], events.x[0], events.y[0], events.p[0]), (500, 3, 4, true));
+/// ```
+#[derive(Debug, Clone)]
+pub struct Decoder {
+    array: Array,
+    /// The bytes of a word that is not complete.
+    partial: [u8; WORD_BYTES],
+    have: usize,
+    clock: Clock,
+    waiting: Option<Change>,
+    by_taxel: Option<ByTaxel>,
+    /// What each taxel held last, where intensities are differences.
+    held: Option<Vec<u16>>,
+    counts: Counts,
+}
+
+impl Decoder {
+    /// A decoder for the given array: pairs directly, takes intensities as values.
+    #[must_use]
+    pub fn new(array: Array) -> Self {
+        Self {
+            array,
+            partial: [0; WORD_BYTES],
+            have: 0,
+            clock: Clock::default(),
+            waiting: None,
+            by_taxel: None,
+            held: None,
+            counts: Counts::default(),
+        }
+    }
+
+    /// Chooses which change an intensity belongs to.
+    #[must_use]
+    pub fn pairing(mut self, pairing: Pairing) -> Self {
+        self.by_taxel = (pairing == Pairing::Taxel).then(|| ByTaxel::new(&self.array));
+        self
+    }
+
+    /// Says whether intensities are differences from the last value sent (the panel's "delta intensity"), which the
+    /// bytes do not show. They are then added up from 0 by polarity, so that events hold values either way; right from
+    /// the board's reset on, where it compares with the last value sent, and until an intensity is lost.
+    #[must_use]
+    pub fn differences(mut self, differences: bool) -> Self {
+        self.held = differences.then(|| vec![0; self.array.len()]);
+        self
+    }
+
+    /// The sensor.
+    #[must_use]
+    pub fn array(&self) -> &Array {
+        &self.array
+    }
+
+    /// What was seen and dropped so far.
+    #[must_use]
+    pub fn counts(&self) -> &Counts {
+        &self.counts
+    }
+
+    /// Takes the next bytes; gives the events that they complete.
+    ///
+    /// `arrived` is the host's clock in us when the bytes came; it tells how long a silence of more than 6.45 s was.
+    pub fn push(&mut self, bytes: &[u8], arrived: Option<i64>) -> Events {
+        let mut events = Events::empty(self.array.clone());
+        self.push_into(bytes, arrived, &mut events);
+        events
+    }
+
+    /// As [`Self::push`], into columns that are used again: appends.
+    pub fn push_into(&mut self, bytes: &[u8], arrived: Option<i64>, out: &mut Events) {
+        for &byte in bytes {
+            if byte & FIRST != 0 {
+                self.give_up_partial();
+            } else if self.have == 0 {
+                self.counts.bytes += 1;
+                self.counts.skipped += 1;
+                continue;
+            }
+            self.partial[self.have] = byte;
+            self.have += 1;
+            if self.have == WORD_BYTES {
+                self.have = 0;
+                self.counts.bytes += WORD_BYTES as u64;
+                self.counts.words += 1;
+                self.word(Word::from_bytes(self.partial), arrived, out);
+            }
+        }
+    }
+
+    /// Says that a datagram ends here: a change whose intensity has not come has none.
+    pub fn end_of_datagram(&mut self) -> Events {
+        let mut events = Events::empty(self.array.clone());
+        self.end_of_datagram_into(&mut events);
+        events
+    }
+
+    /// As [`Self::end_of_datagram`]; appends.
+    pub fn end_of_datagram_into(&mut self, out: &mut Events) {
+        if let Some(change) = self.waiting.take() {
+            append(out, change, None);
+        }
+    }
+
+    /// Ends the stream: gives the rest and is as new, but for the counts.
+    pub fn finish(&mut self) -> Events {
+        let mut events = Events::empty(self.array.clone());
+        self.finish_into(&mut events);
+        events
+    }
+
+    /// As [`Self::finish`]; appends.
+    pub fn finish_into(&mut self, out: &mut Events) {
+        self.give_up_partial();
+        self.end_of_datagram_into(out);
+        if let Some(by_taxel) = &mut self.by_taxel {
+            by_taxel.finish_into(out);
+        }
+        self.clock = Clock::default();
+        if let Some(held) = &mut self.held {
+            held.fill(0);
+        }
+    }
+
+    fn give_up_partial(&mut self) {
+        self.counts.bytes += self.have as u64;
+        self.counts.skipped += self.have as u64;
+        self.counts.short += u64::from(self.have > 0);
+        self.have = 0;
+    }
+
+    fn word(&mut self, word: Word, arrived: Option<i64>, out: &mut Events) {
+        let before = self.waiting.take();
+        let mut intensity = None;
+        match word {
+            Word::Contradictory => self.counts.contradictory += 1,
+            Word::Marker { stamp, start } => {
+                self.counts.markers += 1;
+                let t = self.time(stamp, arrived);
+                out.markers.push(Marker { t, start });
+            }
+            Word::Change { x, y, .. } | Word::Intensity { x, y, .. }
+                if u16::from(x) >= self.array.columns || u16::from(y) >= self.array.rows =>
+            {
+                self.counts.outside += 1;
+            }
+            Word::Change { stamp, x, y, p } => {
+                self.counts.changes += 1;
+                let change = Change { t: self.time(stamp, arrived), x: x.into(), y: y.into(), p };
+                match &mut self.by_taxel {
+                    Some(by_taxel) => by_taxel.change(change),
+                    None => self.waiting = Some(change),
+                }
+            }
+            Word::Intensity { ticks, x, y, p } => {
+                let (x, y) = (u16::from(x), u16::from(y));
+                let taxel = self.array.index(x, y);
+                let ticks = match &mut self.held {
+                    None => ticks,
+                    Some(held) => {
+                        let value =
+                            if p { held[taxel].saturating_add(ticks) } else { held[taxel].saturating_sub(ticks) };
+                        held[taxel] = value;
+                        value
+                    }
+                };
+                let paired = match &mut self.by_taxel {
+                    Some(by_taxel) => by_taxel.intensity(taxel, ticks),
+                    None => before.is_some_and(|c| (c.x, c.y) == (x, y)),
+                };
+                *(if paired { &mut self.counts.intensities } else { &mut self.counts.unpaired }) += 1;
+                intensity = paired.then_some(ticks);
+            }
+        }
+        if let Some(change) = before {
+            append(out, change, intensity);
+        }
+    }
+
+    /// Unwraps a stamp; us.
+    fn time(&mut self, stamp: u16, arrived: Option<i64>) -> i64 {
+        let (time, back) = self.clock.unwrap(stamp, arrived);
+        self.counts.back += u64::from(back);
+        time * STAMP_US
+    }
+}
+
+fn append(out: &mut Events, change: Change, ticks: Option<u16>) {
+    out.t.push(change.t);
+    out.x.push(change.x);
+    out.y.push(change.y);
+    out.p.push(change.p);
+    if ticks.is_some() || out.intensity.is_some() {
+        let rows = out.t.len() - 1;
+        let column =
+            out.intensity.get_or_insert_with(|| Intensities { ticks: vec![0; rows], present: vec![false; rows] });
+        column.ticks.push(ticks.unwrap_or(0));
+        column.present.push(ticks.is_some());
+    }
+}
+
+/// Changes that wait for intensities from anywhere later in the stream.
+#[derive(Debug, Clone)]
+struct ByTaxel {
+    changes: Vec<Change>,
+    ticks: Vec<Option<u16>>,
+    /// For each change, the unpaired change of its taxel before it.
+    before: Vec<Option<usize>>,
+    /// For each taxel, its latest unpaired change.
+    latest: Vec<Option<usize>>,
+    columns: usize,
+}
+
+impl ByTaxel {
+    fn new(array: &Array) -> Self {
+        Self {
+            changes: vec![],
+            ticks: vec![],
+            before: vec![],
+            latest: vec![None; array.len()],
+            columns: array.columns.into(),
+        }
+    }
+
+    fn change(&mut self, change: Change) {
+        let latest = &mut self.latest[usize::from(change.y) * self.columns + usize::from(change.x)];
+        self.before.push(latest.replace(self.changes.len()));
+        self.changes.push(change);
+        self.ticks.push(None);
+    }
+
+    /// Whether there was a change to pair with.
+    fn intensity(&mut self, taxel: usize, ticks: u16) -> bool {
+        let Some(k) = self.latest[taxel] else { return false };
+        self.ticks[k] = Some(ticks);
+        self.latest[taxel] = self.before[k];
+        true
+    }
+
+    fn finish_into(&mut self, out: &mut Events) {
+        for (change, ticks) in self.changes.drain(..).zip(self.ticks.drain(..)) {
+            append(out, change, ticks);
+        }
+        self.before.clear();
+        self.latest.fill(None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn change(stamp: u16, x: u8, y: u8) -> Word {
+        Word::Change { stamp, x, y, p: true }
+    }
+
+    fn intensity(ticks: u16, x: u8, y: u8) -> Word {
+        Word::Intensity { ticks, x, y, p: true }
+    }
+
+    fn bytes(words: &[Word]) -> Vec<u8> {
+        words.iter().flat_map(|w| w.to_bytes()).collect()
+    }
+
+    fn decode(words: &[Word]) -> (Events, Counts) {
+        crate::wire::decode(&bytes(words), Array::thesis(), Pairing::Direct)
+    }
+
+    fn intensities(events: &Events) -> Vec<Option<u16>> {
+        let i = events.intensity.clone().unwrap_or_default();
+        i.ticks.iter().zip(&i.present).map(|(&t, &p)| p.then_some(t)).collect()
+    }
+
+    #[test]
+    fn a_word_comes_back_from_its_bytes() {
+        for value in [0, 1, 0x7f, 0x80, 0x3fff, 0x4000, 0xc000, 0xffff] {
+            for p in [false, true] {
+                let (x, y) = (63, 21);
+                for word in [
+                    Word::Change { stamp: value, x, y, p },
+                    Word::Intensity { ticks: value, x, y, p },
+                    Word::Marker { stamp: value, start: p },
+                ] {
+                    assert_eq!(Word::from_bytes(word.to_bytes()), word);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn time_goes_on_over_the_wrap() {
+        let (events, counts) = decode(&[change(65_000, 0, 0), change(65_535, 0, 0), change(3, 0, 0)]);
+        assert_eq!(events.t, [6_500_000, 6_553_500, 6_553_900]);
+        assert_eq!(counts.back, 0);
+    }
+
+    #[test]
+    fn a_tenth_of_a_second_back_is_a_step_back_and_more_lies_ahead() {
+        let (events, counts) = decode(&[change(1000, 0, 0), change(0, 0, 0), change(1001, 0, 0)]);
+        assert_eq!((events.t, counts.back), (vec![100_000, 0, 100_100], 1));
+        let (events, counts) = decode(&[change(1001, 0, 0), change(0, 0, 0)]);
+        assert_eq!((events.t, counts.back), (vec![100_100, 6_553_600], 0));
+        let (events, _) = decode(&[change(0, 0, 0), change(65_535, 0, 0)]);
+        assert_eq!(events.t, [0, -100]);
+    }
+
+    #[test]
+    fn arrival_times_tell_how_long_a_silence_was() {
+        for turns in 0..4_i64 {
+            for rest in [0, 1, 999, 40_000, 65_000, 65_535] {
+                let silence = turns * TURN + rest;
+                for late in [-200_000, 0, 200_000] {
+                    let mut decoder = Decoder::new(Array::thesis());
+                    let mut events = decoder.push(&bytes(&[change(7, 0, 0)]), Some(1_000_000));
+                    let arrived = 1_000_000 + silence * STAMP_US + late;
+                    let stamp = ((7 + silence) % TURN) as u16;
+                    decoder.push_into(&bytes(&[change(stamp, 1, 0)]), Some(arrived), &mut events);
+                    decoder.finish_into(&mut events);
+                    assert_eq!(events.t[1] - events.t[0], silence * STAMP_US, "silence {silence}, late {late}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn arrival_times_out_of_all_reason_do_no_harm() {
+        let mut decoder = Decoder::new(Array::thesis());
+        for arrived in [i64::MIN, i64::MAX, 0, i64::MAX, i64::MIN] {
+            decoder.push(&bytes(&[change(7, 0, 0)]), Some(arrived));
+        }
+        assert_eq!(decoder.counts().words, 5);
+    }
+
+    #[test]
+    fn an_intensity_belongs_to_the_change_directly_before_it() {
+        let (events, counts) = decode(&[
+            change(0, 1, 1),
+            intensity(50, 1, 1),
+            intensity(51, 1, 1),
+            change(0, 2, 2),
+            intensity(52, 3, 2),
+            change(1, 3, 3),
+            change(1, 4, 4),
+            intensity(53, 4, 4),
+            intensity(54, 3, 3),
+        ]);
+        assert_eq!(intensities(&events), [Some(50), None, None, Some(53)]);
+        assert_eq!((counts.changes, counts.intensities, counts.unpaired), (4, 2, 3));
+    }
+
+    #[test]
+    fn a_whole_recording_may_be_paired_by_taxel() {
+        let words = [
+            change(0, 1, 1),
+            change(1, 1, 1),
+            change(1, 2, 2),
+            intensity(51, 1, 1),
+            intensity(52, 2, 2),
+            intensity(50, 1, 1),
+            intensity(49, 1, 1),
+        ];
+        let (events, counts) = crate::wire::decode(&bytes(&words), Array::thesis(), Pairing::Taxel);
+        assert_eq!(intensities(&events), [Some(50), Some(51), Some(52)]);
+        assert_eq!((counts.intensities, counts.unpaired), (3, 1));
+    }
+
+    #[test]
+    fn a_change_waits_no_longer_than_its_datagram() {
+        let mut decoder = Decoder::new(Array::thesis());
+        assert_eq!(decoder.push(&bytes(&[change(0, 1, 1)]), None).len(), 0);
+        assert_eq!(decoder.end_of_datagram().len(), 1);
+        assert_eq!(decoder.push(&bytes(&[intensity(5, 1, 1)]), None).len(), 0);
+        assert_eq!(decoder.counts().unpaired, 1);
+        assert_eq!(decoder.finish().len(), 0);
+    }
+
+    #[test]
+    fn any_word_ends_the_wait() {
+        let array = Array::new(8, 8, 1.0, "small").unwrap();
+        let other = [
+            change(0, 20, 1),
+            intensity(0, 1, 20),
+            Word::Marker { stamp: 0, start: true },
+            Word::Contradictory,
+            change(0, 1, 2),
+        ];
+        for word in other {
+            let mut decoder = Decoder::new(array.clone());
+            let events = decoder.push(&bytes(&[change(0, 1, 1), word]), None);
+            assert_eq!(events.len(), 1, "{word:?}");
+            assert!(decoder.push(&bytes(&[intensity(9, 1, 1)]), None).intensity.is_none());
+            assert_eq!(decoder.counts().unpaired, 1);
+        }
+    }
+
+    #[test]
+    fn differences_add_up_to_held_values() {
+        let words = [
+            change(0, 1, 1),
+            intensity(50, 1, 1),
+            Word::Change { stamp: 1, x: 1, y: 1, p: false },
+            Word::Intensity { ticks: 20, x: 1, y: 1, p: false },
+            Word::Change { stamp: 2, x: 1, y: 1, p: false },
+            Word::Intensity { ticks: 40, x: 1, y: 1, p: false },
+        ];
+        let mut decoder = Decoder::new(Array::thesis()).differences(true);
+        let mut events = decoder.push(&bytes(&words), None);
+        decoder.finish_into(&mut events);
+        assert_eq!(intensities(&events), [Some(50), Some(30), Some(0)]);
+    }
+
+    #[test]
+    fn sums_close_over_damage() {
+        let whole = bytes(&[change(0, 1, 1), intensity(5, 1, 1), Word::Contradictory, change(2, 1, 1)]);
+        for at in 0..whole.len() {
+            for damage in [0x00, 0x7f, 0x80, 0xff, 0xa8] {
+                let mut spoilt = whole.clone();
+                spoilt[at] = damage;
+                spoilt.insert(at / 2, damage);
+                let mut decoder = Decoder::new(Array::thesis());
+                decoder.push(&spoilt, None);
+                decoder.finish();
+                let c = decoder.counts();
+                assert_eq!(c.bytes, spoilt.len() as u64);
+                assert_eq!(c.bytes, 5 * c.words + c.skipped);
+                let kinds = c.changes + c.intensities + c.unpaired + c.markers + c.contradictory + c.outside;
+                assert_eq!(c.words, kinds);
+            }
+        }
+    }
+}
