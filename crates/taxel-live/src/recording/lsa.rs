@@ -1,0 +1,92 @@
+//! The manual's raw recordings (Appendix 1, section 3): `NAME.lsa` holds all bytes as they came and nothing else, an empty
+//! `NAME.lss` says that it is complete. The manual's program overwrites without a warning; this one refuses.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::create;
+use crate::{Error, Result};
+
+/// A `.lsa` being written. Its `.lss` appears with [`LsaWriter::finish`], and only then.
+#[derive(Debug)]
+pub struct LsaWriter {
+    path: PathBuf,
+    overwrite: bool,
+    out: BufWriter<File>,
+}
+
+impl LsaWriter {
+    /// Begins a file.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the `.lsa` or its `.lss` exists (and `overwrite` is not set), or the file cannot be created.
+    pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
+        let done = done(path);
+        if overwrite {
+            match std::fs::remove_file(&done) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(&done)(error)),
+                _ => {}
+            }
+        } else if done.exists() {
+            return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
+        }
+        Ok(Self { path: path.to_owned(), overwrite, out: BufWriter::new(create(path, overwrite)?) })
+    }
+
+    /// Keeps the next bytes.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the disk is full or gone.
+    pub fn bytes(&mut self, bytes: &[u8]) -> Result<()> {
+        self.out.write_all(bytes).map_err(Error::file(&self.path))
+    }
+
+    /// Hands over to the operating system what still waits in memory; call it each 100 ms or so.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the disk is full or gone.
+    pub fn flush(&mut self) -> Result<()> {
+        self.out.flush().map_err(Error::file(&self.path))
+    }
+
+    /// Says that the recording is complete: all bytes are on the disk, then the empty `.lss` appears.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the disk is full or gone; there is no `.lss` then.
+    pub fn finish(mut self) -> Result<()> {
+        self.flush()?;
+        self.out.get_ref().sync_all().map_err(Error::file(&self.path))?;
+        create(&done(&self.path), self.overwrite).map(drop)
+    }
+}
+
+/// The bytes of a `.lsa`, and whether its `.lss` says that it is complete.
+///
+/// # Errors
+///
+/// `File` where it cannot be read.
+pub fn read_lsa(path: &Path) -> Result<(Vec<u8>, bool)> {
+    Ok((std::fs::read(path).map_err(Error::file(path))?, done(path).exists()))
+}
+
+/// The name of a recording in automatic mode: the index appended to the name, before the extension.
+#[must_use]
+pub fn numbered(path: &Path, index: u32) -> PathBuf {
+    let mut name = path.file_stem().unwrap_or_default().to_owned();
+    name.push(index.to_string());
+    if let Some(extension) = path.extension() {
+        name.push(".");
+        name.push(extension);
+    }
+    path.with_file_name(name)
+}
+
+/// Where the `.lss` of a `.lsa` stands.
+fn done(path: &Path) -> PathBuf {
+    path.with_extension("lss")
+}

@@ -1,0 +1,516 @@
+//! Reads the live format, finished or not, whole or damaged.
+//!
+//! The index is rebuilt each time by walking from record to record (a few bytes each, milliseconds a gigabyte), so an
+//! unfinished file needs nothing special: the official readers start from a summary at the end that it does not have.
+//! Where a record makes no sense the walk goes on at the next chunk that does; what lies between is counted.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::{MAGIC, parse_record};
+use serde::Deserialize;
+use serde_json::Value;
+use taxel_core::{Marker, Stop};
+
+use super::mcap_writer::{BEGIN, END};
+use super::{Counts, DetectionRecord, Header, Note, Topic};
+use crate::{Error, Result};
+
+/// No chunk of a sane file is larger, packed or unpacked; a damaged length must not make us ask for terabytes.
+const LARGEST_CHUNK: usize = 1 << 30;
+
+/// No metadata record of ours is larger.
+const LARGEST_METADATA: u64 = 1 << 24;
+
+/// Opcode, length.
+const RECORD_HEAD: u64 = 9;
+
+/// A recording of the live format, opened.
+#[derive(Debug)]
+pub struct Reader {
+    path: PathBuf,
+    file: File,
+    header: Header,
+    ending: Option<Ending>,
+    blocks: Vec<Block>,
+    rebuilt: Rebuilt,
+}
+
+/// How a recording says that it ended.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Ending {
+    /// As planned, with what was lost.
+    Finished {
+        /// What was received and lost.
+        counts: Counts,
+        /// The writer's line about it.
+        verdict: String,
+    },
+    /// Writing failed: what the operating system said.
+    Stopped(String),
+}
+
+/// What had to be left out of a file, or put up with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Rebuilt {
+    /// Whether the file lacks its end: writing was killed, or the file was cut.
+    pub unfinished: bool,
+    /// Bytes at the end of the file that belong to a record which is not whole.
+    pub torn_bytes: u64,
+    /// Places where the walk lost its way and found it again.
+    pub gaps: u64,
+    /// Bytes skipped there.
+    pub skipped_bytes: u64,
+    /// Chunks whose checksum or content is wrong; known once they were read.
+    pub bad_chunks: u64,
+}
+
+/// One message as it stands in the file.
+#[derive(Debug, Clone, Copy)]
+pub struct Message<'a> {
+    /// Its channel.
+    pub topic: Topic,
+    /// Our arrival number, of datagrams.
+    pub number: u64,
+    /// The host's clock, ns since 1970.
+    pub at_ns: i64,
+    /// The content.
+    pub data: &'a [u8],
+}
+
+/// All small messages of a recording.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Remarks {
+    /// Register files, by time of the host, ns.
+    pub registers: Vec<(i64, [u32; 8])>,
+    /// Starts and stops, as the board marked them.
+    pub markers: Vec<Marker>,
+    /// Notes of people.
+    pub notes: Vec<Note>,
+    /// What readouts said, and when by the host's clock, ns.
+    pub detections: Vec<(i64, DetectionRecord)>,
+    /// The last counts, from before the end.
+    pub counts: Option<Counts>,
+    /// How many datagrams there are, and their bytes.
+    pub datagrams: u64,
+    /// Bytes in them.
+    pub datagram_bytes: u64,
+    /// First and last arrival, ns since 1970.
+    pub arrivals: Option<(i64, i64)>,
+    /// How many pictures there are.
+    pub pictures: u64,
+}
+
+/// A chunk, or a run of records outside chunks (as other tools may write them).
+#[derive(Debug, Clone, Copy)]
+struct Block {
+    offset: u64,
+    length: u64,
+    bare: bool,
+}
+
+impl Reader {
+    /// Opens a file and rebuilds its index; a file that is still being written is read up to now.
+    ///
+    /// # Errors
+    ///
+    /// `File` where it cannot be read; `Core` (format) where it is no MCAP file, or not one of ours.
+    pub fn open(path: &Path) -> Result<Self> {
+        let file = File::open(path).map_err(Error::file(path))?;
+        let length = file.metadata().map_err(Error::file(path))?.len();
+        let mut walk = Walk::of(path, &file, length);
+        walk.magic()?;
+        walk.records()?;
+        let Walk { begin, end, ending, blocks, rebuilt, .. } = walk;
+        let mut reader = Self {
+            path: path.to_owned(),
+            file,
+            header: Header {
+                array: taxel_core::Array::thesis(),
+                registers: None,
+                difference: false,
+                source: String::new(),
+                started_ns: 0,
+            },
+            ending,
+            blocks,
+            rebuilt,
+        };
+        // The copy beside the datagrams' channel has a checksum, the others have not.
+        let Some(header) = reader.checked_header()?.or(end).or(begin) else {
+            return Err(format(
+                path,
+                "an MCAP file without the header of a taxel recording (metadata record \"taxel\")",
+            ));
+        };
+        reader.header = header;
+        Ok(reader)
+    }
+
+    /// What the recording says of itself.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// How it ended, where it says so.
+    #[must_use]
+    pub fn ending(&self) -> Option<&Ending> {
+        self.ending.as_ref()
+    }
+
+    /// What opening had to put up with; bad chunks are known once they were read.
+    #[must_use]
+    pub fn rebuilt(&self) -> Rebuilt {
+        self.rebuilt
+    }
+
+    /// Hands out all messages in the order of the file; a bad chunk is skipped. Gives how many were.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the file cannot be read, `Core` where `take` says so or the caller stops.
+    pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<u64> {
+        let mut topics: BTreeMap<u16, Option<Topic>> = BTreeMap::new();
+        let (mut bad, mut last) = (0, 0_u64);
+        let mut bytes = Vec::new();
+        for block in &self.blocks {
+            stop.check()?;
+            let mut wrong = None;
+            let sound = self.records(*block, &mut bytes, |record| {
+                match record {
+                    Record::Channel(channel) => {
+                        topics.insert(channel.id, Topic::of_name(&channel.topic));
+                    }
+                    Record::Message { header, data } => {
+                        let topic = topics.get(&header.channel_id).copied();
+                        if let Some(topic) = topic.unwrap_or_else(|| Topic::of_number(header.channel_id)) {
+                            let mut number = u64::from(header.sequence);
+                            if topic == Topic::Datagrams {
+                                number = unwrap(last, header.sequence);
+                                last = number;
+                            }
+                            let at_ns = i64::try_from(header.log_time).unwrap_or(i64::MAX);
+                            wrong = take(Message { topic, number, at_ns, data: &data }).err();
+                        }
+                    }
+                    _ => {}
+                }
+                wrong.is_none()
+            })?;
+            if let Some(error) = wrong {
+                return Err(error);
+            }
+            bad += u64::from(!sound);
+        }
+        Ok(bad)
+    }
+
+    /// Collects everything but the datagrams' bytes and the pictures. Gives how many chunks are bad, too.
+    ///
+    /// # Errors
+    ///
+    /// As [`Reader::messages`].
+    pub fn remarks(&self, stop: Stop<'_>) -> Result<(Remarks, u64)> {
+        let mut all = Remarks::default();
+        let bad = self.messages(stop, |message| {
+            match message.topic {
+                Topic::Datagrams => {
+                    all.datagrams += 1;
+                    all.datagram_bytes += message.data.len() as u64;
+                    let (first, last) = all.arrivals.unwrap_or((message.at_ns, message.at_ns));
+                    all.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
+                }
+                Topic::Pressure => all.pictures += 1,
+                // A message that does not parse has a sound checksum: another program wrote it, and it is left alone.
+                Topic::Registers => {
+                    #[derive(Deserialize)]
+                    struct Said {
+                        registers: [u32; 8],
+                    }
+                    if let Ok(said) = serde_json::from_slice::<Said>(message.data) {
+                        all.registers.push((message.at_ns, said.registers));
+                    }
+                }
+                Topic::Markers => {
+                    if let Ok(said) = serde_json::from_slice::<Value>(message.data)
+                        && let (Some(t), Some(start)) = (said["t_us"].as_i64(), said["start"].as_bool())
+                    {
+                        all.markers.push(Marker { t, start });
+                    }
+                }
+                Topic::Notes => {
+                    if let Ok(said) = serde_json::from_slice::<Value>(message.data)
+                        && let Some(text) = said["message"].as_str()
+                    {
+                        let t_us = said["t_us"].as_i64();
+                        all.notes.push(Note { at_ns: message.at_ns, t_us, text: text.to_owned() });
+                    }
+                }
+                Topic::Detections => {
+                    if let Ok(said) = serde_json::from_slice(message.data) {
+                        all.detections.push((message.at_ns, said));
+                    }
+                }
+                Topic::Counts => all.counts = serde_json::from_slice(message.data).ok().or(all.counts.take()),
+            }
+            Ok(())
+        })?;
+        Ok((all, bad))
+    }
+
+    /// The header's copy in the first chunk that has one.
+    fn checked_header(&self) -> Result<Option<Header>> {
+        let (mut bytes, mut header) = (Vec::new(), None);
+        for block in &self.blocks {
+            self.records(*block, &mut bytes, |record| {
+                if let Record::Channel(channel) = record {
+                    header = channel.metadata.get("header").and_then(|text| serde_json::from_str(text).ok());
+                }
+                header.is_none()
+            })?;
+            if header.is_some() {
+                break;
+            }
+        }
+        Ok(header)
+    }
+
+    /// Hands out the records of a block until `take` gives false; gives whether the block is sound.
+    fn records(&self, block: Block, bytes: &mut Vec<u8>, mut take: impl FnMut(Record<'_>) -> bool) -> Result<bool> {
+        let Ok(length) = usize::try_from(block.length) else { return Ok(false) };
+        bytes.resize(length, 0);
+        self.file.read_exact_at(bytes, block.offset).map_err(Error::file(&self.path))?;
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(LARGEST_CHUNK);
+        let mut reader = LinearReader::new_with_options(options);
+        let mut given = 0;
+        while let Some(event) = reader.next_event() {
+            match event {
+                Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                    // At the end nothing is given: the reader ends there, or says what is missing.
+                    let more = wanted.min(length - given);
+                    reader.insert(more).copy_from_slice(&bytes[given..given + more]);
+                    reader.notify_read(more);
+                    given += more;
+                }
+                Ok(LinearReadEvent::Record { data, opcode }) => match parse_record(opcode, data) {
+                    Ok(record) => {
+                        if !take(record) {
+                            return Ok(true);
+                        }
+                    }
+                    Err(_) => return Ok(false),
+                },
+                Err(_) => return Ok(false),
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// The walk from record to record.
+struct Walk<'a> {
+    path: &'a Path,
+    file: &'a File,
+    length: u64,
+    begin: Option<Header>,
+    end: Option<Header>,
+    ending: Option<Ending>,
+    blocks: Vec<Block>,
+    rebuilt: Rebuilt,
+}
+
+impl<'a> Walk<'a> {
+    fn of(path: &'a Path, file: &'a File, length: u64) -> Self {
+        let rebuilt = Rebuilt { unfinished: true, ..Rebuilt::default() };
+        Self { path, file, length, begin: None, end: None, ending: None, blocks: vec![], rebuilt }
+    }
+
+    /// Up to `wanted` bytes at `offset`; fewer at the end of the file.
+    fn bytes(&self, offset: u64, wanted: u64) -> Result<Vec<u8>> {
+        let n = usize::try_from(wanted.min(self.length.saturating_sub(offset))).unwrap_or(0);
+        let mut bytes = vec![0; n];
+        self.file.read_exact_at(&mut bytes, offset).map_err(Error::file(self.path))?;
+        Ok(bytes)
+    }
+
+    fn magic(&self) -> Result<()> {
+        let start = self.bytes(0, MAGIC.len() as u64)?;
+        if start == MAGIC {
+            return Ok(());
+        }
+        if MAGIC.starts_with(&start) {
+            let n = start.len();
+            return Err(format(self.path, &format!("byte {n}: the file ends inside the MCAP magic, it holds nothing")));
+        }
+        let hex: Vec<String> = start.iter().take(4).map(|b| format!("{b:02X}")).collect();
+        Err(format(self.path, &format!("byte 0: starts with {}, not with the MCAP magic (89 4D 43 41)", hex.join(" "))))
+    }
+
+    fn records(&mut self) -> Result<()> {
+        let mut at = MAGIC.len() as u64;
+        while at < self.length {
+            let Some((opcode, length)) = self.sound(at)? else {
+                match self.next_sound(at + 1)? {
+                    Some(next) => {
+                        self.rebuilt.gaps += 1;
+                        self.rebuilt.skipped_bytes += next - at;
+                        at = next;
+                        continue;
+                    }
+                    None => {
+                        self.rebuilt.torn_bytes = self.length - at;
+                        return Ok(());
+                    }
+                }
+            };
+            match opcode {
+                op::DATA_END => {
+                    self.rebuilt.unfinished = false;
+                    return Ok(());
+                }
+                op::METADATA => self.metadata(at, length)?,
+                op::CHUNK => self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: false }),
+                op::SCHEMA | op::CHANNEL | op::MESSAGE => match self.blocks.last_mut() {
+                    Some(block) if block.bare && block.offset + block.length == at && block.length < 1 << 20 => {
+                        block.length += RECORD_HEAD + length;
+                    }
+                    _ => self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: true }),
+                },
+                _ => {}
+            }
+            at += RECORD_HEAD + length;
+        }
+        Ok(())
+    }
+
+    /// Opcode and length of the record at `at`, where they make sense.
+    fn sound(&self, at: u64) -> Result<Option<(u8, u64)>> {
+        let head = self.bytes(at, 80)?;
+        let (Some(&opcode), Some(length)) = (head.first(), number(&head, 1)) else { return Ok(None) };
+        let fits = at.checked_add(RECORD_HEAD).and_then(|a| a.checked_add(length)).is_some_and(|e| e <= self.length);
+        // What may stand before the end of the data. A flipped bit in an opcode must not hide a chunk, so lengths that can
+        // be checked are.
+        let known = match opcode {
+            op::CHUNK => chunk_fits(&head, length),
+            op::MESSAGE_INDEX => head.get(11..15).is_some_and(|b| word(b) + 6 == length),
+            op::METADATA => head.get(9..13).is_some_and(|b| word(b) + 8 <= length),
+            op::DATA_END => length == 4,
+            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::ATTACHMENT => true,
+            _ => false,
+        };
+        Ok((fits && known).then_some((opcode, length)))
+    }
+
+    /// The next place from `at` on where a chunk or a metadata record of ours stands.
+    fn next_sound(&self, mut at: u64) -> Result<Option<u64>> {
+        const WINDOW: u64 = 1 << 20;
+        while at < self.length {
+            let window = self.bytes(at, WINDOW)?;
+            for (k, &byte) in window.iter().enumerate() {
+                if byte != op::CHUNK && byte != op::METADATA {
+                    continue;
+                }
+                let place = at + k as u64;
+                if let Some((opcode, length)) = self.sound(place)? {
+                    let ours = || -> Result<bool> {
+                        Ok(length < LARGEST_METADATA
+                            && self.bytes(place + RECORD_HEAD + 4, BEGIN.len() as u64)? == BEGIN.as_bytes())
+                    };
+                    if opcode == op::CHUNK || ours()? {
+                        return Ok(Some(place));
+                    }
+                }
+            }
+            at += window.len() as u64;
+        }
+        Ok(None)
+    }
+
+    fn metadata(&mut self, at: u64, length: u64) -> Result<()> {
+        if length > LARGEST_METADATA {
+            return Ok(());
+        }
+        let body = self.bytes(at + RECORD_HEAD, length)?;
+        let Ok(Record::Metadata(record)) = parse_record(op::METADATA, &body) else { return Ok(()) };
+        let header = record.metadata.get("header").and_then(|text| serde_json::from_str(text).ok());
+        match record.name.as_str() {
+            BEGIN => self.begin = header,
+            END => {
+                self.end = header;
+                self.ending = match record.metadata.get("stopped") {
+                    Some(why) => Some(Ending::Stopped(why.clone())),
+                    None => record.metadata.get("counts").and_then(|text| serde_json::from_str(text).ok()).map(
+                        |counts: Counts| Ending::Finished {
+                            verdict: record.metadata.get("verdict").cloned().unwrap_or_else(|| counts.verdict()),
+                            counts,
+                        },
+                    ),
+                };
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// Whether the lengths inside a chunk's header agree with the record's.
+fn chunk_fits(head: &[u8], length: u64) -> bool {
+    // opcode 1, length 8, start 8, end 8, size 8, checksum 4, name of the compression, packed size 8
+    const NAME: usize = 37;
+    let Some(name_bytes) = head.get(NAME..NAME + 4).map(|b| word(b) as usize).filter(|&n| n <= 16) else {
+        return false;
+    };
+    let packed = number(head, NAME + 4 + name_bytes);
+    let rest = (NAME + 4 + name_bytes + 8) as u64 - RECORD_HEAD;
+    let size = number(head, 25);
+    packed.and_then(|p| p.checked_add(rest)) == Some(length)
+        && size.is_some_and(|s| s <= LARGEST_CHUNK as u64)
+        && length <= LARGEST_CHUNK as u64
+}
+
+/// The 64-bit number at `place`.
+fn number(bytes: &[u8], place: usize) -> Option<u64> {
+    bytes.get(place..place + 8).and_then(|b| b.try_into().ok()).map(u64::from_le_bytes)
+}
+
+/// The 32-bit number in four bytes.
+fn word(bytes: &[u8]) -> u64 {
+    bytes.iter().rev().fold(0, |word, &byte| word << 8 | u64::from(byte))
+}
+
+/// The number with these low 32 bits that is nearest to the last one.
+fn unwrap(last: u64, low: u32) -> u64 {
+    #[allow(clippy::cast_possible_truncation, clippy::cast_possible_wrap)]
+    let step = i64::from(low.wrapping_sub(last as u32) as i32);
+    last.checked_add_signed(step).unwrap_or(u64::from(low))
+}
+
+/// An error about the content of a file.
+fn format(path: &Path, said: &str) -> Error {
+    taxel_core::Error::Format(format!("{}: {said}", path.display())).into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrival_numbers_go_on_beyond_32_bits() {
+        let mut last = u64::from(u32::MAX) - 1;
+        for expected in [u64::from(u32::MAX), 1 << 32, (1 << 32) + 1] {
+            #[allow(clippy::cast_possible_truncation)]
+            let low = expected as u32;
+            last = unwrap(last, low);
+            assert_eq!(last, expected);
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! The channels of a recording, with their schemas.
+
+/// A channel of a recording. Its number is the same in every file, so that a file whose first chunk (where the channel
+/// records are) is damaged can still be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u16)]
+pub enum Topic {
+    /// Raw datagrams of the board, version 1 of the wire.
+    Datagrams = 1,
+    /// The board's register file, when it was set.
+    Registers = 2,
+    /// Starts and stops as the board marked them.
+    Markers = 3,
+    /// Notes of people.
+    Notes = 4,
+    /// What a readout said.
+    Detections = 5,
+    /// What was received and lost so far.
+    Counts = 6,
+    /// The low-rate picture.
+    Pressure = 7,
+}
+
+impl Topic {
+    /// All, by number.
+    pub const ALL: [Self; 7] =
+        [Self::Datagrams, Self::Registers, Self::Markers, Self::Notes, Self::Detections, Self::Counts, Self::Pressure];
+
+    /// The name in the file.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Datagrams => "/datagrams",
+            Self::Registers => "/registers",
+            Self::Markers => "/markers",
+            Self::Notes => "/notes",
+            Self::Detections => "/detections",
+            Self::Counts => "/counts",
+            Self::Pressure => "/pressure",
+        }
+    }
+
+    /// How its messages are encoded.
+    pub(super) fn encoding(self) -> &'static str {
+        match self {
+            Self::Datagrams => "taxel.wire.v1",
+            _ => "json",
+        }
+    }
+
+    /// Name and JSON schema of its messages; datagrams have none, they are the board's own bytes.
+    pub(super) fn schema(self) -> Option<(&'static str, &'static str)> {
+        Some(match self {
+            Self::Datagrams => return None,
+            Self::Registers => ("taxel.Registers", include_str!("schemas/Registers.json")),
+            Self::Markers => ("taxel.Marker", include_str!("schemas/Marker.json")),
+            Self::Notes => ("foxglove.Log", include_str!("schemas/Log.json")),
+            Self::Detections => ("taxel.Detection", include_str!("schemas/Detection.json")),
+            Self::Counts => ("taxel.Counts", include_str!("schemas/Counts.json")),
+            Self::Pressure => ("foxglove.RawImage", include_str!("schemas/RawImage.json")),
+        })
+    }
+
+    /// The topic of a channel's name.
+    pub(super) fn of_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|t| t.name() == name)
+    }
+
+    /// The topic of a channel's number in a file of ours.
+    pub(super) fn of_number(number: u16) -> Option<Self> {
+        Self::ALL.into_iter().find(|t| *t as u16 == number)
+    }
+}

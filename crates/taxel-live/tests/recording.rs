@@ -1,0 +1,212 @@
+//! The live format survives: what is written is read back, finished or not, whole or damaged.
+
+use std::path::{Path, PathBuf};
+
+use taxel_core::{Array, Marker, Stop};
+use taxel_live::recording::{
+    Compression, Counts, DetectionRecord, Ending, Header, NOTHING_LOST, Options, Reader, Topic, Writer,
+};
+
+/// A folder that is gone when the test ends.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("taxel-recording-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+fn header() -> Header {
+    Header {
+        array: Array::thesis(),
+        registers: Some([8, 300, 300, 55 << 16 | 75, 150, 63 << 16 | 3 << 8, 0, 0]),
+        difference: false,
+        source: "udp 127.0.0.1:5208".to_owned(),
+        started_ns: 1_000_000_000_000,
+    }
+}
+
+/// The bytes of datagram `k`: enough of them for more than one chunk.
+fn datagram(k: u64) -> Vec<u8> {
+    (0..1400).map(|i| u8::try_from((k * 7 + i) % 251).unwrap()).collect()
+}
+
+fn record(path: &Path, datagrams: u64, compression: Compression) {
+    let writer = Writer::create(path, &header(), Options { compression, overwrite: false }).unwrap();
+    for k in 0..datagrams {
+        writer.datagram(1_000_000_000_000 + i64::try_from(k).unwrap() * 1000, k, &datagram(k)).unwrap();
+    }
+    writer.note(1_000_000_000_500, Some(192), "left heel").unwrap();
+    writer.marker(1_000_000_000_600, Marker { t: 384, start: true }).unwrap();
+    let said = DetectionRecord { label: "contact".to_owned(), t_us: 100, known_us: 192, slope: 1.5 };
+    writer.detection(1_000_000_000_700, &said).unwrap();
+    writer.registers(1_000_000_000_800, &header().registers.unwrap()).unwrap();
+    writer.picture(1_000_000_000_900, 192, 64, &vec![75; 4096], 150).unwrap();
+    let counts = Counts { received: datagrams, ..Counts::default() };
+    writer.finish(counts).unwrap();
+}
+
+fn datagrams(reader: &Reader) -> (Vec<(u64, i64, Vec<u8>)>, u64) {
+    let mut all = vec![];
+    let bad = reader
+        .messages(Stop::never(), |m| {
+            if m.topic == Topic::Datagrams {
+                all.push((m.number, m.at_ns, m.data.to_vec()));
+            }
+            Ok(())
+        })
+        .unwrap();
+    (all, bad)
+}
+
+#[test]
+fn what_was_written_is_read_back_with_any_compression() {
+    let folder = Folder::new("round");
+    for (name, compression) in [("none", Compression::None), ("lz4", Compression::Lz4), ("zstd", Compression::Zstd)] {
+        let path = folder.0.join(name);
+        record(&path, 3000, compression);
+        let reader = Reader::open(&path).unwrap();
+        assert_eq!(reader.header(), &header());
+        assert!(!reader.rebuilt().unfinished);
+        let (all, bad) = datagrams(&reader);
+        assert_eq!((all.len(), bad), (3000, 0));
+        for (k, (number, at, bytes)) in (0_u64..).zip(&all) {
+            let arrived = 1_000_000_000_000 + i64::try_from(k).unwrap() * 1000;
+            assert_eq!((*number, *at, bytes), (k, arrived, &datagram(k)));
+        }
+        let (remarks, _) = reader.remarks(Stop::never()).unwrap();
+        assert_eq!(remarks.notes[0].text, "left heel");
+        assert_eq!(remarks.notes[0].t_us, Some(192));
+        assert_eq!(remarks.markers, vec![Marker { t: 384, start: true }]);
+        assert_eq!(remarks.detections[0].1.label, "contact");
+        assert_eq!(remarks.registers[0].1, header().registers.unwrap());
+        assert_eq!((remarks.datagrams, remarks.datagram_bytes, remarks.pictures), (3000, 4_200_000, 1));
+        let Some(Ending::Finished { counts, verdict }) = reader.ending() else { panic!("not finished") };
+        assert_eq!((counts.received, counts.recorded, verdict.as_str()), (3000, 3000, NOTHING_LOST));
+    }
+}
+
+#[test]
+fn an_existing_file_is_replaced_only_when_asked() {
+    let folder = Folder::new("exists");
+    let path = folder.0.join("a.mcap");
+    std::fs::write(&path, b"precious").unwrap();
+    let said = Writer::create(&path, &header(), Options::default()).err().unwrap().to_string();
+    assert!(said.contains("a.mcap") && said.to_lowercase().contains("exists"), "{said}");
+    assert_eq!(std::fs::read(&path).unwrap(), b"precious");
+    let options = Options { overwrite: true, ..Options::default() };
+    Writer::create(&path, &header(), options).unwrap().finish(Counts::default()).unwrap();
+    assert!(Reader::open(&path).is_ok());
+}
+
+#[test]
+fn a_file_cut_anywhere_gives_its_whole_chunks() {
+    let folder = Folder::new("cut");
+    let path = folder.0.join("whole.mcap");
+    record(&path, 2000, Compression::Lz4);
+    let bytes = std::fs::read(&path).unwrap();
+    let (all, _) = datagrams(&Reader::open(&path).unwrap());
+    let mut before = 0;
+    for k in 0..=400 {
+        let cut = bytes.len() * k / 400;
+        let part = folder.0.join("part.mcap");
+        std::fs::write(&part, &bytes[..cut]).unwrap();
+        let Ok(reader) = Reader::open(&part) else {
+            assert!(cut < 2000, "nothing read of {cut} bytes");
+            continue;
+        };
+        let (left, bad) = datagrams(&reader);
+        assert_eq!(bad, 0);
+        assert!(left.len() >= before, "fewer datagrams of more bytes");
+        assert_eq!(left[..], all[..left.len()]);
+        before = left.len();
+    }
+    assert_eq!(before, 2000);
+}
+
+#[test]
+fn a_damaged_chunk_is_skipped_and_counted() {
+    let folder = Folder::new("damage");
+    let path = folder.0.join("whole.mcap");
+    record(&path, 3000, Compression::None);
+    let mut bytes = std::fs::read(&path).unwrap();
+    let (all, _) = datagrams(&Reader::open(&path).unwrap());
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x40;
+    std::fs::write(&path, &bytes).unwrap();
+    let (left, bad) = datagrams(&Reader::open(&path).unwrap());
+    assert_eq!(bad, 1);
+    assert!(left.len() > 1000 && left.len() < 3000, "{} datagrams are left", left.len());
+    assert!(left.iter().all(|d| all.contains(d)));
+}
+
+#[test]
+fn a_damaged_length_loses_no_more_than_its_chunk() {
+    let folder = Folder::new("length");
+    let path = folder.0.join("whole.mcap");
+    record(&path, 3000, Compression::None);
+    let whole = std::fs::read(&path).unwrap();
+    // Chunks by the lengths that agree: opcode 6, and the record's length less the packed size is 40 without a name.
+    let chunk = (5000..whole.len())
+        .find(|&k| {
+            let word = |at: usize| whole.get(at..at + 8).map(|b| u64::from_le_bytes(b.try_into().unwrap()));
+            whole[k] == 6 && word(k + 1).is_some_and(|n| n > 1000 && word(k + 41).is_some_and(|m| m + 40 == n))
+        })
+        .unwrap();
+    let opcodes = (0..8).map(|bit| (chunk, 1 << bit));
+    for (place, flip) in opcodes.chain([(chunk + 3, 1), (chunk + 8, 0x80), (chunk + 30, 0xFF), (chunk + 37, 2)]) {
+        let mut bytes = whole.clone();
+        bytes[place] ^= flip;
+        std::fs::write(&path, &bytes).unwrap();
+        let reader = Reader::open(&path).unwrap();
+        let (left, bad) = datagrams(&reader);
+        assert_eq!(reader.rebuilt().gaps + bad, 1, "byte {place} ^ {flip}: {:?}", reader.rebuilt());
+        assert!(left.len() >= 2000, "byte {place}: {} datagrams are left", left.len());
+        assert!(!reader.rebuilt().unfinished);
+    }
+}
+
+#[test]
+fn a_writer_that_is_dropped_keeps_everything_and_says_that_it_was_not_finished() {
+    let folder = Folder::new("drop");
+    let path = folder.0.join("a.mcap");
+    let writer = Writer::create(&path, &header(), Options::default()).unwrap();
+    for k in 0..100 {
+        writer.datagram(k, u64::try_from(k).unwrap(), &datagram(0)).unwrap();
+    }
+    drop(writer);
+    let reader = Reader::open(&path).unwrap();
+    assert_eq!(datagrams(&reader).0.len(), 100);
+    assert_eq!(reader.ending(), None);
+}
+
+#[test]
+fn a_full_disk_is_one_error() {
+    let options = Options { overwrite: true, ..Options::default() };
+    let said = Writer::create(Path::new("/dev/full"), &header(), options).err().map(|e| e.to_string());
+    assert_eq!(said.as_deref(), Some("/dev/full: No space left on device (os error 28)"));
+}
+
+#[test]
+fn wrong_files_are_refused_in_one_line() {
+    let folder = Folder::new("wrong");
+    let path = folder.0.join("a.mcap");
+    for (bytes, said) in [
+        (&b"\x1f\x8b\x08\x00\x00\x00\x00\x00"[..], "byte 0: starts with 1F 8B 08 00, not with the MCAP magic"),
+        (&b""[..], "byte 0: the file ends inside the MCAP magic"),
+        (&b"\x89MCAP0\r"[..], "byte 7: the file ends inside the MCAP magic"),
+        (&b"\x89MCAP0\r\n"[..], "without the header of a taxel recording"),
+    ] {
+        std::fs::write(&path, bytes).unwrap();
+        let error = Reader::open(&path).unwrap_err().to_string();
+        assert!(error.contains(said) && error.contains("a.mcap") && !error.contains('\n'), "{error}");
+    }
+}
