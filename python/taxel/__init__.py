@@ -1,10 +1,12 @@
 """Touch as events: from the bytes of a tactile array to decisions that say when."""
 
+from taxel import metrics
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel.array import Array
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
 __version__ = "0.1.0"
@@ -17,7 +19,9 @@ __all__ = [
     "Events",
     "FormatError",
     "Frames",
+    "Neuron",
     "ProblemError",
     "SceneError",
     "SpikeTrains",
+    "metrics",
 ]

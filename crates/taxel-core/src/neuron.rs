@@ -1,1 +1,232 @@
-//! Spikes to spikes: the SRM0 neuron.
+//! Spikes to spikes: the SRM0 neuron (thesis 6.3.1).
+//!
+//! [`Neuron`] holds the parameters, [`NeuronStream`] runs it spike by spike, in continuous time or on a grid;
+//! [`Neuron::run`] is the same stream fed with whole trains, so live and recorded inputs give the same spikes.
+
+mod grid;
+mod kernel;
+mod srm0;
+mod streaming;
+
+pub use kernel::{State, alpha};
+pub use streaming::{NeuronStream, OutputSpike};
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Result, SpikeTrains, Stop, problem};
+
+/// What remains of the inputs after the neuron's own spike.
+///
+/// Reading: 6.7 masks the potential for the refractory time and then has the whole linear sum back (`Keep`), while the
+/// sentence before it says that inputs of that time have no effect (`Ignore`); figures 6.9 to 6.11 need `Reset`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AfterSpike {
+    /// Every input counts (6.7 as printed).
+    #[default]
+    Keep,
+    /// Inputs of the refractory time are lost.
+    Ignore,
+    /// Every input up to the end of the refractory time is lost.
+    Reset,
+}
+
+/// The threshold before the first output spike.
+///
+/// Reading: 6.9 sets the time of a spike number 0 to 0, which raises the threshold from the start; a neuron that has not
+/// fired has no threshold rise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum FirstThreshold {
+    /// `theta_0` until the first spike.
+    #[default]
+    #[serde(rename = "theta_0")]
+    Base,
+    /// Raised as though the neuron had fired where the listening starts.
+    #[serde(rename = "printed")]
+    Printed,
+}
+
+/// Where the potential is compared with the threshold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Time {
+    /// At every instant: crossings are found exactly between the input spikes.
+    #[default]
+    Continuous,
+    /// At the points `start + k step_ms`.
+    Grid,
+}
+
+/// Parameters of an SRM0 neuron with alpha kernel; the defaults are those of Table 6.1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Neuron {
+    /// Membrane time constant, ms.
+    pub tau: f64,
+    /// Baseline threshold, mV.
+    pub theta_0: f64,
+    /// Rise of the threshold by a spike, mV.
+    pub theta_plus: f64,
+    /// Time constant by which that rise decays, ms; `2 tau` where left out, as in Tables 6.1 and 6.2.
+    pub tau_rec: Option<f64>,
+    /// Absolute refractory time, ms.
+    pub refractory: f64,
+    /// What remains after a spike.
+    pub after_spike: AfterSpike,
+    /// The threshold before the first spike.
+    pub first_threshold: FirstThreshold,
+    /// Continuous time or a grid.
+    pub time: Time,
+    /// Step of the grid, ms.
+    pub step_ms: f64,
+}
+
+impl Default for Neuron {
+    fn default() -> Self {
+        Self {
+            tau: 15.0,
+            theta_0: 0.3,
+            theta_plus: 0.2,
+            tau_rec: None,
+            refractory: 3.0,
+            after_spike: AfterSpike::Keep,
+            first_threshold: FirstThreshold::Base,
+            time: Time::Continuous,
+            step_ms: 1.0,
+        }
+    }
+}
+
+impl Neuron {
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter, its value and what would be right.
+    pub fn check(&self) -> Result<()> {
+        let above_0 = [
+            ("tau", self.tau, "ms"),
+            ("theta_0", self.theta_0, "mV"),
+            ("tau_rec", self.tau_rec(), "ms"),
+            ("step_ms", self.step_ms, "ms"),
+        ];
+        for (name, value, unit) in above_0 {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(problem!("{name} is {value} {unit}: must be above 0 and finite"));
+            }
+        }
+        for (name, value, unit) in [("theta_plus", self.theta_plus, "mV"), ("refractory", self.refractory, "ms")] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(problem!("{name} is {value} {unit}: must be 0 or more and finite"));
+            }
+        }
+        if self.refractory == 0.0 && self.after_spike != AfterSpike::Reset {
+            return Err(problem!(
+                "refractory is 0 ms: must be above 0 unless after_spike is \"reset\", else the neuron fires without end"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The time constant by which the threshold recovers, ms.
+    #[must_use]
+    pub fn tau_rec(&self) -> f64 {
+        self.tau_rec.unwrap_or(2.0 * self.tau)
+    }
+
+    /// The threshold `since` ms after the last spike (6.8), or before the first one, mV.
+    ///
+    /// In the refractory time the potential is 0 and the threshold does not matter.
+    #[must_use]
+    pub fn threshold(&self, since: Option<f64>) -> f64 {
+        let rise = since.map_or(0.0, |s| {
+            let recovering = s - self.refractory;
+            // A rise that rounding puts a hair before its time must still be there (an input can lie just on the edge).
+            if recovering < -1e-9 { 0.0 } else { self.theta_plus * (-recovering / self.tau_rec()).exp() }
+        });
+        self.theta_0 + rise
+    }
+
+    /// Starts the neuron at `start` ms with its threshold multiplied by `threshold`.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for parameters, weights or a factor that make no sense.
+    pub fn stream(&self, weights: &[f64], threshold: f64, start: f64) -> Result<NeuronStream> {
+        NeuronStream::new(self, weights, threshold, start)
+    }
+
+    /// The output spikes to whole trains, from their start to their stop.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for parameters, weights, a factor or trains that make no sense; `Interrupted` where the caller stops it.
+    pub fn run(
+        &self,
+        weights: &[f64],
+        trains: &SpikeTrains,
+        threshold: f64,
+        stop: Stop<'_>,
+    ) -> Result<Vec<OutputSpike>> {
+        trains.check()?;
+        self.check_weights(weights, trains.len())?;
+        let mut stream = self.stream(weights, threshold, trains.start)?;
+        let mut out = Vec::new();
+        for (k, spike) in trains.by_time().iter().enumerate() {
+            if k % 4096 == 0 {
+                stop.check()?;
+            }
+            stream.push(spike.t, spike.train, &mut out)?;
+        }
+        stream.advance(trains.stop, &mut out);
+        Ok(out)
+    }
+
+    /// The potential at `times` (ms, ascending), given that the neuron fired at `spikes` (ms, ascending); mV.
+    ///
+    /// Without spikes this is the linear sum 6.4. With them it is 6.7: 0 in the refractory time, then what `after_spike`
+    /// leaves. At a spike itself it is what the potential came up to.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for parameters, weights or trains that make no sense, or times that do not ascend.
+    pub fn potential(&self, weights: &[f64], trains: &SpikeTrains, times: &[f64], spikes: &[f64]) -> Result<Vec<f64>> {
+        self.check()?;
+        trains.check()?;
+        self.check_weights(weights, trains.len())?;
+        for (name, list) in [("times", times), ("spikes", spikes)] {
+            if let Some(k) = list.iter().position(|t| !t.is_finite()) {
+                return Err(problem!("{name}[{k}] is {}: must be finite", list[k]));
+            }
+            if let Some(k) = list.windows(2).position(|w| w[1] < w[0]) {
+                return Err(problem!(
+                    "{name}[{}] is {} ms, after {} ms: times must ascend",
+                    k + 1,
+                    list[k + 1],
+                    list[k]
+                ));
+            }
+        }
+        Ok(srm0::potential(self, weights, trains, times, spikes))
+    }
+
+    pub(crate) fn check_weights(&self, weights: &[f64], trains: usize) -> Result<()> {
+        if weights.len() != trains {
+            return Err(problem!("weights: {} for {trains} trains, must be one a train", weights.len()));
+        }
+        if let Some(n) = weights.iter().position(|w| !w.is_finite()) {
+            return Err(problem!("weights[{n}] is {}: must be finite", weights[n]));
+        }
+        Ok(())
+    }
+
+    /// Whether an input at `t` is lost, given the last output spike before it.
+    pub(crate) fn loses(&self, t: f64, last_spike: Option<f64>) -> bool {
+        let Some(spike) = last_spike else { return false };
+        match self.after_spike {
+            AfterSpike::Keep => false,
+            AfterSpike::Ignore => spike < t && t <= spike + self.refractory,
+            AfterSpike::Reset => t <= spike + self.refractory,
+        }
+    }
+}

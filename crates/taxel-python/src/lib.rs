@@ -5,6 +5,7 @@ mod enter;
 mod errors;
 
 mod detect;
+mod neuron;
 mod nouns;
 
 use pyo3::prelude::*;
@@ -15,5 +16,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     nouns::register(module)?;
     detect::register(module)?;
+    neuron::register(module)?;
     Ok(())
 }

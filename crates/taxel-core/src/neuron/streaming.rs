@@ -1,0 +1,229 @@
+//! The neuron at work: input spikes in, output spikes out, the same wherever the stream is cut.
+
+use super::grid::GridStream;
+use super::srm0::next_crossing;
+use super::{AfterSpike, FirstThreshold, Neuron, State, Time};
+use crate::{Result, problem};
+
+/// A spike of the neuron.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutputSpike {
+    /// When the potential crossed the threshold (on a grid: the first point at or above it), ms.
+    pub t: f64,
+    /// How steeply it crossed, mV/ms.
+    pub slope: f64,
+}
+
+/// A neuron that runs while its inputs arrive.
+///
+/// Output depends on the inputs alone, not on when [`NeuronStream::advance`] is called: what a crossing needs is reckoned
+/// from the last input, never from the last call.
+#[derive(Debug, Clone)]
+pub struct NeuronStream {
+    weights: Vec<f64>,
+    now: f64,
+    clock: Clock,
+}
+
+#[derive(Debug, Clone)]
+enum Clock {
+    Continuous(ContinuousStream),
+    Grid(GridStream),
+}
+
+impl NeuronStream {
+    pub(super) fn new(neuron: &Neuron, weights: &[f64], threshold: f64, start: f64) -> Result<Self> {
+        neuron.check()?;
+        neuron.check_weights(weights, weights.len())?;
+        if !(threshold.is_finite() && threshold > 0.0) {
+            return Err(problem!("threshold factor is {threshold}: must be above 0 and finite"));
+        }
+        if !start.is_finite() {
+            return Err(problem!("start is {start} ms: must be finite"));
+        }
+        let clock = match neuron.time {
+            Time::Continuous => Clock::Continuous(ContinuousStream::new(neuron, threshold, start)),
+            Time::Grid => Clock::Grid(GridStream::new(neuron, threshold, start)),
+        };
+        Ok(Self { weights: weights.to_vec(), now: start, clock })
+    }
+
+    /// Takes the next input spike, at `t` ms on train `train`; gives what the neuron fired up to there.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the spike comes before an earlier one, or names a train without a weight.
+    pub fn push(&mut self, t: f64, train: u32, out: &mut Vec<OutputSpike>) -> Result<()> {
+        if t.is_nan() || t < self.now {
+            return Err(problem!("input spike at {t} ms: time has come to {} ms already", self.now));
+        }
+        let Some(&weight) = self.weights.get(train as usize) else {
+            return Err(problem!("input spike at {t} ms: train {train} of {}", self.weights.len()));
+        };
+        self.now = t;
+        match &mut self.clock {
+            Clock::Continuous(stream) => stream.push(t, weight, out),
+            Clock::Grid(stream) => stream.push(t, weight, out),
+        }
+        Ok(())
+    }
+
+    /// Moves time on to `t` ms: no input will come before it any more. An earlier time changes nothing.
+    pub fn advance(&mut self, t: f64, out: &mut Vec<OutputSpike>) {
+        if t >= self.now {
+            self.now = t;
+            match &mut self.clock {
+                Clock::Continuous(stream) => stream.settle(t, out),
+                Clock::Grid(stream) => stream.settle(t, out),
+            }
+        }
+    }
+
+    /// The potential now, as 6.7 has it (0 in the refractory time), mV.
+    #[must_use]
+    pub fn potential(&self) -> f64 {
+        let (refractory, value) = match &self.clock {
+            Clock::Continuous(s) => (&s.threshold, s.state.after((self.now - s.at).max(0.0), s.neuron.tau).b),
+            Clock::Grid(s) => (&s.threshold, s.potential(self.now)),
+        };
+        if refractory.silent_at(self.now) { 0.0 } else { value }
+    }
+}
+
+/// The threshold with its memory of the last spike.
+#[derive(Debug, Clone)]
+pub(super) struct Threshold {
+    /// `theta_0` times the factor, mV.
+    pub(super) base: f64,
+    plus: f64,
+    tau_rec: f64,
+    refractory: f64,
+    /// The last spike, or where the printed reading puts spike number 0.
+    since: Option<f64>,
+    /// The last spike proper.
+    pub(super) fired: Option<f64>,
+}
+
+/// Rounding of a grid point or an input on the very edge of the refractory time, ms.
+pub(super) const EDGE: f64 = 1e-9;
+
+impl Threshold {
+    pub(super) fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
+        Self {
+            base: neuron.theta_0 * factor,
+            plus: neuron.theta_plus * factor,
+            tau_rec: neuron.tau_rec(),
+            refractory: neuron.refractory,
+            since: (neuron.first_threshold == FirstThreshold::Printed).then_some(start),
+            fired: None,
+        }
+    }
+
+    pub(super) fn fire(&mut self, t: f64) {
+        self.since = Some(t);
+        self.fired = Some(t);
+    }
+
+    /// What is left of the rise at `t`, mV.
+    pub(super) fn rise(&self, t: f64) -> f64 {
+        self.since.map_or(0.0, |since| {
+            let recovering = t - since - self.refractory;
+            if recovering < -EDGE { 0.0 } else { self.plus * (-recovering / self.tau_rec).exp() }
+        })
+    }
+
+    /// Whether the neuron cannot fire at `t`: `0 < t - spike <= refractory` (6.6).
+    pub(super) fn silent_at(&self, t: f64) -> bool {
+        self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + EDGE)
+    }
+
+    /// When the rise sets in and the refractory time ends.
+    fn edge(&self) -> Option<f64> {
+        self.since.map(|since| since + self.refractory)
+    }
+}
+
+/// Continuous time: the next crossing is known exactly from the state after the last input.
+#[derive(Debug, Clone)]
+struct ContinuousStream {
+    neuron: Neuron,
+    threshold: Threshold,
+    /// The potential at `at`.
+    state: State,
+    at: f64,
+    /// The end of the refractory time (or the start of the printed first rise), while it lies ahead.
+    edge: Option<f64>,
+    next: Next,
+}
+
+/// The next crossing if no input comes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Next {
+    Unknown,
+    Never,
+    At(f64),
+}
+
+impl ContinuousStream {
+    fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
+        let threshold = Threshold::new(neuron, factor, start);
+        let edge = threshold.edge();
+        Self { neuron: neuron.clone(), threshold, state: State::default(), at: start, edge, next: Next::Never }
+    }
+
+    fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
+        self.settle(t, out);
+        if self.neuron.loses(t, self.threshold.fired) {
+            return;
+        }
+        self.move_to(t);
+        self.state.a += weight;
+    }
+
+    fn move_to(&mut self, t: f64) {
+        if t > self.at {
+            self.state = self.state.after(t - self.at, self.neuron.tau);
+            self.at = t;
+        }
+        self.next = Next::Unknown;
+    }
+
+    /// Fires whatever crosses up to `until`, included.
+    fn settle(&mut self, until: f64, out: &mut Vec<OutputSpike>) {
+        loop {
+            let waiting = self.edge.is_some() && self.threshold.fired.is_some();
+            // At the state's own time the potential has been compared already: an input adds 0 there.
+            if !waiting && until > self.at && self.next == Next::Unknown {
+                self.next = self.crossing();
+            }
+            match (self.next, self.edge) {
+                (Next::At(t), edge) if !waiting && t <= until && edge.is_none_or(|e| t < e) => self.fire(t, out),
+                (_, Some(edge)) if edge <= until => {
+                    self.move_to(edge);
+                    self.edge = None;
+                    // The neuron is free again: it fires at once where the potential is above the threshold already.
+                    self.next = self.crossing();
+                }
+                _ => return,
+            }
+        }
+    }
+
+    fn crossing(&self) -> Next {
+        // Before the printed first rise sets in there is none; it is an edge of its own.
+        let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(self.at) };
+        let found = next_crossing(self.state, self.neuron.tau, self.threshold.base, rise, self.threshold.tau_rec);
+        found.map_or(Next::Never, |s| Next::At(self.at + s))
+    }
+
+    fn fire(&mut self, t: f64, out: &mut Vec<OutputSpike>) {
+        let slope = self.state.after(t - self.at, self.neuron.tau).slope(self.neuron.tau);
+        out.push(OutputSpike { t, slope });
+        self.threshold.fire(t);
+        self.edge = self.threshold.edge();
+        if self.neuron.after_spike == AfterSpike::Reset {
+            self.state = State::default();
+        }
+        self.move_to(t);
+    }
+}

@@ -1,0 +1,74 @@
+//! The neuron and the distances between its spike trains.
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use taxel_core::neuron::Neuron;
+use taxel_core::{metrics, problem};
+
+use crate::convert::{SpikesIn, array, slice, to_spikes};
+use crate::enter::enter;
+use crate::errors::core;
+
+pub(crate) fn to_neuron(json: &str) -> PyResult<Neuron> {
+    let neuron: Neuron = serde_json::from_str(json).map_err(|e| core(problem!("neuron: {e}")))?;
+    neuron.check().map_err(core)?;
+    Ok(neuron)
+}
+
+/// Checks parameters; gives them back with every default filled in.
+#[pyfunction]
+fn check_neuron(parameters: &str) -> PyResult<String> {
+    let neuron = to_neuron(parameters)?;
+    serde_json::to_string(&neuron).map_err(|e| core(problem!("neuron: {e}")))
+}
+
+/// Times and slopes of the output spikes.
+#[pyfunction]
+fn neuron_run<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    trains: SpikesIn<'py>,
+    threshold: f64,
+) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    let (neuron, trains) = (to_neuron(parameters)?, to_spikes(trains)?);
+    let weights = slice("weights", &weights)?;
+    let spikes = enter(py, |stop| neuron.run(weights, &trains, threshold, stop))?;
+    let (times, slopes) = spikes.iter().map(|s| (s.t, s.slope)).unzip();
+    Ok((array(py, times), array(py, slopes)))
+}
+
+/// The potential at these times.
+#[pyfunction]
+fn neuron_potential<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    trains: SpikesIn<'py>,
+    times: PyReadonlyArray1<'py, f64>,
+    spikes: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (neuron, trains) = (to_neuron(parameters)?, to_spikes(trains)?);
+    let (weights, times, spikes) = (slice("weights", &weights)?, slice("times", &times)?, slice("spikes", &spikes)?);
+    let potential = enter(py, |_| neuron.potential(weights, &trains, times, spikes))?;
+    Ok(array(py, potential))
+}
+
+/// Victor-Purpura distance.
+#[pyfunction]
+fn victor_purpura<'py>(
+    py: Python<'py>,
+    a: PyReadonlyArray1<'py, f64>,
+    b: PyReadonlyArray1<'py, f64>,
+    q: f64,
+) -> PyResult<f64> {
+    let (a, b) = (slice("a", &a)?, slice("b", &b)?);
+    enter(py, |stop| metrics::victor_purpura(a, b, q, stop))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(check_neuron, module)?)?;
+    module.add_function(wrap_pyfunction!(neuron_run, module)?)?;
+    module.add_function(wrap_pyfunction!(neuron_potential, module)?)?;
+    module.add_function(wrap_pyfunction!(victor_purpura, module)?)
+}

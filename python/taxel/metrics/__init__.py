@@ -1,0 +1,40 @@
+"""Distances between spike trains."""
+
+from __future__ import annotations
+
+from numpy.typing import ArrayLike
+
+from taxel import _core
+from taxel._arguments import floats, number
+
+__all__ = ["victor_purpura"]
+
+
+def victor_purpura(a: ArrayLike, b: ArrayLike, *, q: float) -> float:
+    """Return the cheapest way to turn spike train `a` into spike train `b`.
+
+    Removing or adding a spike costs 1, moving it by dt costs ``q * |dt|``: spikes more than ``2 / q`` apart never match.
+
+    Parameters
+    ----------
+    a, b : float64, shapes (n,) and (m,), ms, ascending; either may be empty
+    q : float, 1/ms, 0 or more; infinite: only spikes at the very same time match
+
+    Returns
+    -------
+    float, 0 or more; 1 is one spike removed
+
+    Raises
+    ------
+    ProblemError : times not ascending or not finite (names train and index), or `q` below 0
+
+    Notes
+    -----
+    Victor and Purpura (1996), J. Neurophysiol. 76:1310; thesis 6.3.5. Time O(n m), memory O(m).
+
+    Examples
+    --------
+    >>> round(victor_purpura([10.0, 20.0, 30.0], [12.0, 24.0, 30.0], q=0.1), 6)
+    0.6
+    """
+    return _core.victor_purpura(floats("a", a), floats("b", b), number("q", q))

@@ -1,0 +1,175 @@
+"""The SRM0 neuron: spikes to spikes."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._arguments import floats, number, parameters
+from taxel._core import ProblemError
+from taxel.spikes import SpikeTrains
+
+__all__ = ["Neuron"]
+
+
+class Neuron:
+    """Describe a neuron of the simplified Spike Response Model (SRM0) with alpha kernel; run it on spike trains.
+
+    The defaults are those of Table 6.1; Table 6.2 (gait) differs in `tau`: 70 ms for contact, 190 ms for foot-off.
+
+    Parameters
+    ----------
+    tau : float, ms, above 0
+        Membrane time constant.
+    theta_0 : float, mV, above 0
+        Baseline threshold.
+    theta_plus : float, mV, 0 or more
+        Rise of the threshold by a spike.
+    tau_rec : float, ms, above 0, optional
+        Time constant by which that rise decays; ``2 * tau`` where left out, as in Tables 6.1 and 6.2.
+    refractory : float, ms
+        Absolute refractory time: 0 potential, no spike.
+    after_spike : {"keep", "ignore", "reset"}
+        What remains of the inputs after a spike. "keep": all (6.7 as printed). "ignore": those of the refractory time
+        are lost. "reset": all up to the end of the refractory time are lost.
+    first_threshold : {"theta_0", "printed"}
+        The threshold before the first spike: `theta_0`, or raised from the start as 6.9 prints it.
+    time : {"continuous", "grid"}
+        Crossings are found exactly, or looked for at the points ``start + k * step_ms``.
+    step_ms : float, ms, above 0
+        Step of the grid.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    Thesis 6.3.1, equations 6.4 to 6.8. The choices that it leaves open stand on the page *Readings*.
+
+    Examples
+    --------
+    >>> neuron = Neuron(tau=10.0, after_spike="reset")
+    >>> trains = SpikeTrains.from_lists([[0.0], [2.0]], stop=50.0)
+    >>> neuron.run([1.0, 0.5], trains).round(3)
+    array([3.366])
+    >>> neuron.potential([1.0, 0.5], trains, [0.0, 10.0]).round(3)
+    array([0.   , 0.548])
+    """
+
+    def __init__(
+        self,
+        *,
+        tau: float = 15.0,
+        theta_0: float = 0.3,
+        theta_plus: float = 0.2,
+        tau_rec: float | None = None,
+        refractory: float = 3.0,
+        after_spike: Literal["keep", "ignore", "reset"] = "keep",
+        first_threshold: Literal["theta_0", "printed"] = "theta_0",
+        time: Literal["continuous", "grid"] = "continuous",
+        step_ms: float = 1.0,
+    ) -> None:
+        self.tau = tau
+        self.theta_0 = theta_0
+        self.theta_plus = theta_plus
+        self.tau_rec = tau_rec
+        self.refractory = refractory
+        self.after_spike = after_spike
+        self.first_threshold = first_threshold
+        self.time = time
+        self.step_ms = step_ms
+        _core.check_neuron(self._json())
+
+    def run(self, weights: ArrayLike, trains: SpikeTrains, *, threshold: float = 1.0) -> NDArray[np.float64]:
+        """Return when the neuron fires.
+
+        Parameters
+        ----------
+        weights : float64, shape (trains,), mV
+        trains : SpikeTrains
+            Unsigned, or signed ones split into ON and OFF (`SpikeTrains.split_by_sign`).
+        threshold : float, above 0
+            A factor on the threshold (a readout's `run_threshold`).
+
+        Returns
+        -------
+        float64, shape (spikes,), ms, between the start and the stop of `trains`
+
+        Raises
+        ------
+        ProblemError : not one weight a train, or nothing finite
+
+        Notes
+        -----
+        In continuous time each crossing is the root of the potential less threshold, to rounding. Cost: O(1) a spike.
+        """
+        return self._run(weights, trains, threshold)[0]
+
+    def potential(
+        self,
+        weights: ArrayLike,
+        trains: SpikeTrains,
+        times: ArrayLike,
+        *,
+        spikes: ArrayLike = (),
+    ) -> NDArray[np.float64]:
+        """Return the membrane potential.
+
+        Parameters
+        ----------
+        weights : float64, shape (trains,), mV
+        trains : SpikeTrains
+        times : float64, shape (n,), ms, ascending
+        spikes : float64, ms, ascending
+            When the neuron fired; without any, the linear sum 6.4. With them 6.7: 0 in the refractory time, then what
+            `after_spike` leaves; at a spike itself, what the potential came up to.
+
+        Returns
+        -------
+        float64, shape (n,), mV
+
+        Raises
+        ------
+        ProblemError : times that do not ascend, or not one weight a train
+        """
+        return _core.neuron_potential(
+            self._json(),
+            floats("weights", weights),
+            _trains(trains)._parts(),
+            floats("times", times),
+            floats("spikes", spikes),
+        )
+
+    def _run(
+        self, weights: ArrayLike, trains: SpikeTrains, threshold: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        factor = number("threshold", threshold)
+        return _core.neuron_run(self._json(), floats("weights", weights), _trains(trains)._parts(), factor)
+
+    def _parameters(self) -> dict[str, object]:
+        return dict(vars(self))
+
+    def _json(self) -> str:
+        return parameters(self._parameters())
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Neuron):
+            return NotImplemented
+        return self._parameters() == other._parameters()
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        default = Neuron.__init__.__kwdefaults__
+        changed = [f"{name}={value!r}" for name, value in vars(self).items() if value != default[name]]
+        return f"Neuron({', '.join(changed)})"
+
+
+def _trains(trains: SpikeTrains) -> SpikeTrains:
+    if not isinstance(trains, SpikeTrains):
+        raise ProblemError(f"trains is a {type(trains).__name__}: must be SpikeTrains")
+    return trains
