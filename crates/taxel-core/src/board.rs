@@ -1,1 +1,564 @@
-//! The emulated board, as a state machine.
+//! The emulated board, as a state machine: trip times and commands in, datagrams and status lines out.
+//!
+//! It keeps the contract between board and logic word for word (reference, section 3, "What makes an event"), so that
+//! host, emulator and logic agree. It has no clock of its own: each frame moves its time on.
+
+mod scan;
+
+use scan::Lfsr;
+use serde::{Deserialize, Serialize};
+
+use crate::wire::registers::Registers;
+use crate::wire::{Command, CommandReader, WORD_BYTES, Word};
+use crate::{Array, Result, problem};
+
+/// Most words of a datagram: 1400 bytes (read).
+pub const DATAGRAM_WORDS: usize = 280;
+
+/// Where the board sends its datagrams (read).
+pub const PORT: u16 = 5208;
+
+/// A trip time that says: the comparator had not returned when the ramp began. A fault, not a value.
+pub const NOT_RETURNED: u16 = u16::MAX;
+
+/// Words that the queue holds by default (read): two frames of 4096 taxels, change and intensity.
+pub const QUEUE_WORDS: usize = 16_384;
+
+/// What a new value is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Previous {
+    /// The last value sent, 0 after reset. Reading: only so does the host's picture stay within the floor.
+    #[default]
+    LastSent,
+    /// The last value sampled, as the thesis words it in 4.3.
+    LastSample,
+}
+
+/// What an intensity word holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum IntensityWord {
+    /// The new value.
+    #[default]
+    Value,
+    /// How far it is from the previous one ("delta intensity"); polarity is the sign.
+    Difference,
+}
+
+/// What the board did and lost.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct BoardCounts {
+    /// Frames scanned.
+    pub frames: u64,
+    /// Taxels that changed by more than the noise floor.
+    pub changes: u64,
+    /// Words that entered the queue.
+    pub words: u64,
+    /// Datagrams that the sink took.
+    pub datagrams: u64,
+    /// Words that the sink took.
+    pub sent: u64,
+    /// Changes dropped with their intensities, and markers, because the queue was full.
+    pub dropped: u64,
+    /// Conversions whose comparator had not returned.
+    pub not_returned: u64,
+}
+
+/// The board: registers, previous values, time and queue.
+///
+/// # Examples
+///
+/// ```
+/// use taxel_core::{Array, board::Board, wire::Registers};
+/// let mut board = Board::new(Registers::preset("5.2 kHz")?, &Array::thesis())?;
+/// let mut bytes = vec![];
+/// board.frame(&[0; 4096], |datagram| { bytes.extend_from_slice(datagram); true })?;
+/// assert!(bytes.is_empty());
+/// let mut ticks = [0; 4096];
+/// ticks[64 * 4 + 3] = 40;
+/// board.frame(&ticks, |datagram| { bytes.extend_from_slice(datagram); true })?;
+/// assert_eq!(bytes, [0xc0, 0, 1, 3, 4, 0xe0, 0, 40, 3, 4]);
+/// # Ok::<(), taxel_core::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Board {
+    array: Array,
+    previous: Previous,
+    intensity: IntensityWord,
+    capacity: usize,
+    /// As written, and as the scan uses them: taken over at a frame's edge.
+    written: Registers,
+    active: Registers,
+    reader: CommandReader,
+    sense_lines: Vec<Vec<u16>>,
+    lfsr: Lfsr,
+    /// Since reset, 10 ns.
+    time: u64,
+    /// By taxel: what a new value is compared with.
+    values: Vec<u16>,
+    /// By taxel: whether this frame's value makes an event. By driven line: whether any of its taxels does.
+    changed: Vec<bool>,
+    line_changed: Vec<bool>,
+    /// The datagram that fills, and the whole ones that the sink has not taken yet.
+    filling: Vec<u8>,
+    waiting: std::collections::VecDeque<Vec<u8>>,
+    waiting_words: usize,
+    counts: BoardCounts,
+    /// What the last status lines said, by fault.
+    told: [u64; 3],
+}
+
+impl Board {
+    /// A board after reset, with the given registers.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the array has more than 64 rows or columns, which the wire's addresses cannot say; `Device`
+    /// where the registers break a rule.
+    pub fn new(registers: Registers, array: &Array) -> Result<Self> {
+        if array.rows > 64 || array.columns > 64 {
+            return Err(problem!("array of {} x {} taxels: the board scans up to 64 x 64", array.rows, array.columns));
+        }
+        registers.check(array)?;
+        Ok(Self {
+            array: array.clone(),
+            previous: Previous::default(),
+            intensity: IntensityWord::default(),
+            capacity: QUEUE_WORDS,
+            written: registers,
+            active: registers,
+            reader: CommandReader::default(),
+            sense_lines: scan::sense_lines(registers.channels),
+            lfsr: Lfsr::new(),
+            time: 0,
+            values: vec![0; array.len()],
+            changed: vec![false; array.len()],
+            line_changed: vec![false; array.columns.into()],
+            filling: Vec::with_capacity(DATAGRAM_WORDS * WORD_BYTES),
+            waiting: std::collections::VecDeque::new(),
+            waiting_words: 0,
+            counts: BoardCounts::default(),
+            told: [0; 3],
+        })
+    }
+
+    /// Chooses what a new value is compared with.
+    #[must_use]
+    pub fn previous(mut self, previous: Previous) -> Self {
+        self.previous = previous;
+        self
+    }
+
+    /// Chooses what an intensity word holds.
+    #[must_use]
+    pub fn intensity(mut self, intensity: IntensityWord) -> Self {
+        self.intensity = intensity;
+        self
+    }
+
+    /// Bounds the queue, in words; below 2 nothing gets through.
+    #[must_use]
+    pub fn queue(mut self, words: usize) -> Self {
+        self.capacity = words;
+        self
+    }
+
+    /// What the board says at reset.
+    #[must_use]
+    pub fn greeting(&self) -> String {
+        format!("taxel-board v1 {}x{} {}ch\n", self.array.rows, self.array.columns, self.active.channels)
+    }
+
+    /// The registers as written; the scan takes them over at the next frame's edge.
+    #[must_use]
+    pub fn registers(&self) -> &Registers {
+        &self.written
+    }
+
+    /// What the board did and lost so far.
+    #[must_use]
+    pub fn counts(&self) -> &BoardCounts {
+        &self.counts
+    }
+
+    /// The start of the next frame since reset, us.
+    #[must_use]
+    pub fn time_us(&self) -> f64 {
+        self.time as f64 / 100.0
+    }
+
+    /// Takes command bytes as they come; gives the status lines that answer them, each with its line end.
+    pub fn command(&mut self, bytes: &[u8]) -> String {
+        bytes.iter().filter_map(|&byte| self.reader.push(byte)).collect::<Vec<_>>().into_iter().fold(
+            String::new(),
+            |mut lines, command| {
+                lines += &self.execute(command);
+                lines.push('\n');
+                lines
+            },
+        )
+    }
+
+    fn execute(&mut self, command: Command) -> String {
+        let Command { register, value } = command;
+        if register == 6 && value < 8 {
+            return format!("ok REG{value}=0x{:08X}", self.written.word(value as u8));
+        }
+        let recording = self.written.record;
+        match self.written.write(command, &self.array) {
+            Err(refusal) => format!("bad REG{register} rule {}", refusal.rule),
+            Ok(()) => {
+                if self.written.record != recording {
+                    self.mark(self.written.record);
+                }
+                format!("ok REG{register}=0x{value:08X}")
+            }
+        }
+    }
+
+    /// Starts or stops a recording, as a write of `record` does: a marker goes out where that changes anything.
+    pub fn record(&mut self, start: bool) {
+        if self.written.record != start {
+            self.written.record = start;
+            self.mark(start);
+        }
+    }
+
+    fn mark(&mut self, start: bool) {
+        let word = Word::Marker { stamp: stamp(self.time), start };
+        self.enqueue(&word.to_bytes(), &mut |_| false);
+    }
+
+    /// The faults whose count has moved since this was last asked, one status line each.
+    pub fn faults(&mut self) -> String {
+        let now = [
+            ("queue", self.counts.dropped),
+            ("comparator", self.counts.not_returned),
+            ("command", self.reader.skipped()),
+        ];
+        let mut lines = String::new();
+        for ((name, count), told) in now.into_iter().zip(&mut self.told) {
+            if count != *told {
+                lines += &format!("fault {name} {count}\n");
+                *told = count;
+            }
+        }
+        lines
+    }
+
+    /// Scans one frame and moves time on by it.
+    ///
+    /// `ticks` are the trip times of the comparators by taxel index, in 1/300 us from the ramp's start; one at or above
+    /// the ramp's length reads as that length, and [`NOT_RETURNED`] is a fault. `sink` gets each datagram's payload and
+    /// says whether it took it; what it does not take waits in the queue, and a full queue drops a taxel's words.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where there is not one trip time a taxel.
+    pub fn frame(&mut self, ticks: &[u16], mut sink: impl FnMut(&[u8]) -> bool) -> Result<()> {
+        if ticks.len() != self.array.len() {
+            return Err(problem!("frame of {} trip times: the array has {} taxels", ticks.len(), self.array.len()));
+        }
+        self.offer(&mut sink);
+        self.active = self.written;
+        let registers = self.active;
+        let mut lines: Vec<u16> = (0..u16::from(registers.lines)).collect();
+        if registers.random_lines {
+            self.lfsr.shuffle(&mut lines);
+        }
+        if self.compare(ticks) {
+            for (place, &x) in (0_u64..).zip(&lines) {
+                if self.line_changed[usize::from(x)] {
+                    self.line(x, self.time + place * u64::from(registers.line_period), ticks, &mut sink);
+                }
+            }
+        }
+        if self.previous == Previous::LastSample {
+            self.sample(ticks, registers.lines.into());
+        }
+        self.flush(&mut sink);
+        self.time += registers.frame_10ns();
+        self.counts.frames += 1;
+        Ok(())
+    }
+
+    /// Finds the taxels whose value makes an event, in one pass over the whole array; says whether there is any.
+    fn compare(&mut self, ticks: &[u16]) -> bool {
+        let columns = usize::from(self.array.columns);
+        let (ramp, floor, lines) = (self.active.ramp, u16::from(self.active.noise_floor), self.active.lines.into());
+        self.line_changed.fill(false);
+        let rows = ticks.chunks_exact(columns).zip(self.values.chunks_exact(columns));
+        for ((ticks, values), changed) in rows.zip(self.changed.chunks_exact_mut(columns)) {
+            for x in 0..columns {
+                let hit = ticks[x].min(ramp).abs_diff(values[x]) > floor && ticks[x] != NOT_RETURNED;
+                changed[x] = hit;
+                self.line_changed[x] |= hit;
+            }
+            self.counts.not_returned += ticks[..lines].iter().map(|&t| u64::from(t == NOT_RETURNED)).sum::<u64>();
+        }
+        self.line_changed[..lines].iter().any(|&hit| hit)
+    }
+
+    /// Queues the events of one driven line, step after step, channel after channel.
+    fn line(&mut self, x: u16, start: u64, ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
+        let registers = self.active;
+        for step in 0..self.sense_lines.len() {
+            let at =
+                if registers.frame_sync { self.time } else { start + step as u64 * u64::from(registers.step_period) };
+            for channel in 0..self.sense_lines[step].len() {
+                let y = self.sense_lines[step][channel];
+                if y >= self.array.rows {
+                    continue;
+                }
+                let taxel = self.array.index(x, y);
+                if !self.changed[taxel] || self.array.exists.as_ref().is_some_and(|exists| !exists[taxel]) {
+                    continue;
+                }
+                let (value, before) = (ticks[taxel].min(registers.ramp), self.values[taxel]);
+                let (x, y, p) = (x as u8, y as u8, value >= before);
+                let word = match self.intensity {
+                    IntensityWord::Value => value,
+                    IntensityWord::Difference => value.abs_diff(before),
+                };
+                let mut words = [0; 2 * WORD_BYTES];
+                words[..WORD_BYTES].copy_from_slice(&Word::Change { stamp: stamp(at), x, y, p }.to_bytes());
+                words[WORD_BYTES..].copy_from_slice(&Word::Intensity { ticks: word, x, y, p }.to_bytes());
+                self.counts.changes += 1;
+                if self.enqueue(&words, sink) {
+                    self.values[taxel] = value;
+                }
+            }
+        }
+    }
+
+    /// Remembers this frame's samples, sent or not.
+    fn sample(&mut self, ticks: &[u16], lines: usize) {
+        let columns = usize::from(self.array.columns);
+        for (ticks, values) in ticks.chunks_exact(columns).zip(self.values.chunks_exact_mut(columns)) {
+            for x in 0..lines {
+                if ticks[x] != NOT_RETURNED {
+                    values[x] = ticks[x].min(self.active.ramp);
+                }
+            }
+        }
+    }
+
+    /// Queues the words of a taxel, or a marker; false where the queue is full and they were dropped.
+    fn enqueue(&mut self, words: &[u8], sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
+        if self.filling.len() + words.len() > DATAGRAM_WORDS * WORD_BYTES {
+            self.flush(sink);
+        }
+        let count = words.len() / WORD_BYTES;
+        if self.waiting_words + self.filling.len() / WORD_BYTES + count > self.capacity {
+            self.counts.dropped += 1;
+            return false;
+        }
+        self.filling.extend_from_slice(words);
+        self.counts.words += count as u64;
+        true
+    }
+
+    /// Offers the sink what waits, oldest first.
+    fn offer(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
+        while let Some(oldest) = self.waiting.front() {
+            let words = oldest.len() / WORD_BYTES;
+            if !sink(oldest) {
+                break;
+            }
+            self.waiting.pop_front();
+            self.waiting_words -= words;
+            self.took(words);
+        }
+    }
+
+    /// Ends the datagram that fills: sent after what waits, or left to wait.
+    fn flush(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
+        self.offer(sink);
+        let words = self.filling.len() / WORD_BYTES;
+        if words == 0 {
+            return;
+        }
+        if self.waiting.is_empty() && sink(&self.filling) {
+            self.filling.clear();
+            self.took(words);
+        } else {
+            self.waiting_words += words;
+            self.waiting.push_back(self.filling.split_off(0));
+        }
+    }
+
+    fn took(&mut self, words: usize) {
+        self.counts.datagrams += 1;
+        self.counts.sent += words as u64;
+    }
+}
+
+/// The stamp of a time in 10 ns.
+fn stamp(time: u64) -> u16 {
+    ((time / 10_000) & 0xffff) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{Pairing, decode, registers::PRESETS};
+
+    fn board() -> Board {
+        Board::new(Registers::default(), &Array::thesis()).unwrap()
+    }
+
+    fn play(board: &mut Board, ticks: &[u16]) -> Vec<Vec<u8>> {
+        let mut datagrams = vec![];
+        board
+            .frame(ticks, |datagram| {
+                datagrams.push(datagram.to_vec());
+                true
+            })
+            .unwrap();
+        datagrams
+    }
+
+    fn words(datagrams: &[Vec<u8>]) -> Vec<Word> {
+        let word = |w: &[u8]| Word::from_bytes(w.try_into().unwrap());
+        datagrams.iter().flat_map(|d| d.chunks(WORD_BYTES)).map(word).collect()
+    }
+
+    #[test]
+    fn a_full_frame_goes_line_by_line_step_by_step_channel_by_channel() {
+        let datagrams = play(&mut board(), &[100; 4096]);
+        assert!(datagrams.iter().all(|d| d.len() <= 1400 && d.len() % 10 == 0));
+        assert_eq!(datagrams.len(), (8192_usize).div_ceil(280));
+        let (events, _) = decode(&datagrams.concat(), Array::thesis(), Pairing::Direct);
+        let order: Vec<(u16, u16)> = events.x.iter().copied().zip(events.y.iter().copied()).collect();
+        let mut expected = vec![];
+        for line in 0..64 {
+            for step in 0..4 {
+                expected.extend((0..16).map(|channel| (line, 4 * channel + step)));
+            }
+        }
+        assert_eq!(order, expected);
+    }
+
+    #[test]
+    fn a_change_must_exceed_the_floor_and_a_ramp_is_never_exceeded() {
+        let mut board = board();
+        let mut ticks = vec![0; 4096];
+        ticks[7] = 3;
+        assert!(play(&mut board, &ticks).is_empty());
+        ticks[7] = 4;
+        let change = Word::Change { stamp: 1, x: 7, y: 0, p: true };
+        assert_eq!(words(&play(&mut board, &ticks)), [change, Word::Intensity { ticks: 4, x: 7, y: 0, p: true }]);
+        ticks[7] = 9000;
+        assert_eq!(words(&play(&mut board, &ticks))[1], Word::Intensity { ticks: 150, x: 7, y: 0, p: true });
+        ticks[7] = NOT_RETURNED;
+        assert!(play(&mut board, &ticks).is_empty());
+        assert_eq!((board.faults(), board.faults()), ("fault comparator 1\n".to_owned(), String::new()));
+    }
+
+    #[test]
+    fn a_slow_rise_is_sent_with_the_last_value_sent_and_never_with_the_last_sample() {
+        let sent = |mut board: Board| -> usize {
+            (0..20_u16).map(|frame| play(&mut board, &[frame; 4096]).concat().len() / 10).sum()
+        };
+        assert_eq!(sent(board()), 4 * 4096);
+        assert_eq!(sent(board().previous(Previous::LastSample)), 0);
+    }
+
+    #[test]
+    fn differences_carry_their_sign_in_the_polarity() {
+        let mut board = board().intensity(IntensityWord::Difference);
+        let mut ticks = vec![0; 4096];
+        for (value, difference, p) in [(50, 50, true), (20, 30, false)] {
+            ticks[0] = value;
+            assert_eq!(words(&play(&mut board, &ticks))[1], Word::Intensity { ticks: difference, x: 0, y: 0, p });
+        }
+    }
+
+    #[test]
+    fn stamps_are_the_frames_with_sync_and_the_steps_without() {
+        let slow = Registers { line_period: 10_000, ..Registers::default() };
+        for (frame_sync, expected) in [(true, 0), (false, 63)] {
+            let mut board = Board::new(Registers { frame_sync, ..slow }, &Array::thesis()).unwrap();
+            let all = words(&play(&mut board, &[100; 4096]));
+            let Some(Word::Change { stamp, .. }) = all.iter().rev().nth(1) else { panic!("a change") };
+            assert_eq!(*stamp, expected);
+        }
+    }
+
+    #[test]
+    fn random_lines_visit_each_line_once_a_frame_in_an_order_of_its_own() {
+        let registers = Registers { random_lines: true, noise_floor: 0, ..Registers::default() };
+        let mut board = Board::new(registers, &Array::thesis()).unwrap();
+        let mut orders = std::collections::HashSet::new();
+        for frame in 0..50_u16 {
+            let (events, _) = decode(&play(&mut board, &[frame + 1; 4096]).concat(), Array::thesis(), Pairing::Direct);
+            let order: Vec<u16> = events.x.chunks(64).map(|line| line[0]).collect();
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            assert_eq!(sorted, (0..64).collect::<Vec<u16>>());
+            assert!(orders.insert(order), "frame {frame} repeats an order");
+        }
+    }
+
+    #[test]
+    fn a_full_queue_drops_both_words_of_a_taxel_and_counts_them() {
+        let mut board = board().queue(1000);
+        board.frame(&[100; 4096], |_| false).unwrap();
+        assert_eq!((board.counts().words, board.counts().dropped), (1000, 4096 - 500));
+        let later = play(&mut board, &[100; 4096]);
+        // What was never sent still differs, so it comes with the next frame.
+        assert_eq!(words(&later).len(), 2 * 4096);
+        assert_eq!(board.counts().sent, board.counts().words);
+        assert_eq!(board.faults(), "fault queue 3596\n");
+    }
+
+    #[test]
+    fn commands_are_answered_and_taken_over_at_a_frames_edge() {
+        let mut board = board();
+        assert_eq!(board.greeting(), "taxel-board v1 64x64 16ch\n");
+        let write = |register, value| Command { register, value }.to_bytes();
+        assert_eq!(board.command(&write(4, 160)), "ok REG4=0x000000A0\n");
+        assert_eq!(board.command(&write(4, 165)), "bad REG4 rule 3\n");
+        assert_eq!(board.command(&write(6, 4)), "ok REG4=0x000000A0\n");
+        assert_eq!(board.command(&write(6, 8)), "bad REG6 rule 4\n");
+        assert_eq!(
+            board.command(&[write(5, 0x003f_0a00), write(6, 5)].concat()),
+            "ok REG5=0x003F0A00\nok REG5=0x003F0A00\n"
+        );
+        let bytes = write(1, 400);
+        let answers: Vec<String> = bytes.iter().map(|&byte| board.command(&[byte])).collect();
+        assert_eq!(answers.concat(), "ok REG1=0x00000190\n");
+        play(&mut board, &[0; 4096]);
+        assert_eq!(board.time_us(), 256.0);
+    }
+
+    #[test]
+    fn record_marks_the_stream_once_each_way() {
+        let mut board = board();
+        play(&mut board, &[0; 4096]);
+        board.command(&Command { register: 7, value: 1 << 16 }.to_bytes());
+        board.record(true);
+        assert_eq!(words(&play(&mut board, &[0; 4096])), [Word::Marker { stamp: 1, start: true }]);
+        board.record(false);
+        assert_eq!(words(&play(&mut board, &[0; 4096])), [Word::Marker { stamp: 3, start: false }]);
+    }
+
+    #[test]
+    fn presets_play_on_boards_that_fit_them() {
+        for (name, registers) in PRESETS {
+            let mut board = Board::new(registers, &Array::thesis()).unwrap();
+            assert_eq!(words(&play(&mut board, &[50; 4096])).len(), 8192, "{name}");
+        }
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        let mut board = board();
+        assert!(board.frame(&[0; 4095], |_| true).unwrap_err().to_string().contains("4095 trip times"));
+        let wide = Array::new(2, 65, 1.0, "wide").unwrap();
+        assert!(Board::new(Registers::default(), &wide).unwrap_err().to_string().contains("up to 64 x 64"));
+        let small = Array::new(8, 8, 1.0, "small").unwrap();
+        assert!(Board::new(Registers::default(), &small).unwrap_err().to_string().contains("8 columns to drive"));
+    }
+}
