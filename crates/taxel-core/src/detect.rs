@@ -1,8 +1,12 @@
 //! Spikes to detections, and their score.
 
+mod frame_clock;
 mod score;
+mod stream;
 
+pub use frame_clock::FrameClock;
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, match_in_order, score};
+pub use stream::ReadoutStream;
 
 use serde::{Deserialize, Serialize};
 

@@ -58,6 +58,23 @@ impl Events {
         self.t.is_empty()
     }
 
+    /// The events of a range of places, without markers.
+    #[must_use]
+    pub fn piece(&self, range: std::ops::Range<usize>) -> Self {
+        Self {
+            array: self.array.clone(),
+            t: self.t[range.clone()].to_vec(),
+            x: self.x[range.clone()].to_vec(),
+            y: self.y[range.clone()].to_vec(),
+            p: self.p[range.clone()].to_vec(),
+            intensity: self
+                .intensity
+                .as_ref()
+                .map(|i| Intensities { ticks: i.ticks[range.clone()].to_vec(), present: i.present[range].to_vec() }),
+            markers: vec![],
+        }
+    }
+
     /// Checks that columns are equally long and that every event lies on the array.
     ///
     /// # Errors

@@ -1,0 +1,98 @@
+//! When the host could first know: the end of the board's frame in which something happens.
+
+use crate::{Result, problem};
+
+/// The board's stamps count units of 100 us (Table 5.4).
+const STAMP_NS: i128 = 100_000;
+
+/// Which frame a time belongs to, and when that frame ends.
+///
+/// With frame sync all events of a frame carry the stamp of its start, cut down to whole units of 100 us, which is up to
+/// one unit *before* the frame starts. So a time belongs to the frame whose stamp is the last at or before it, and not to
+/// the one that fills that moment. Frame `k` of 192 us has the stamp `floor(1.92 k)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameClock {
+    period_ns: i128,
+    /// The last picture's time where pictures come; the board's frames start at time 0.
+    picture_ns: Option<i128>,
+}
+
+impl FrameClock {
+    /// Frames of `period_us`.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the period is not between 1 us and one hour.
+    pub fn new(period_us: f64) -> Result<Self> {
+        if !(1.0..=3.6e9).contains(&period_us) {
+            return Err(problem!("frame_us is {period_us}: must lie between 1 us and one hour, 3600000000"));
+        }
+        Ok(Self { period_ns: (period_us * 1000.0).round() as i128, picture_ns: None })
+    }
+
+    /// From now on frames count from the picture at `t` us, which is the start of its frame.
+    pub fn picture(&mut self, t: i64) {
+        self.picture_ns = Some(i128::from(t) * 1000);
+    }
+
+    /// The end of the frame to which the time `t` ms belongs, us, rounded up.
+    #[must_use]
+    pub fn end_of(&self, t: f64) -> i64 {
+        // Whole ns: a time that is a stamp must not fall into the frame before by rounding.
+        let t = (t * 1e6).round() as i128;
+        let end = match self.picture_ns {
+            Some(picture) => picture + ((t - picture).div_euclid(self.period_ns) + 1) * self.period_ns,
+            None => {
+                let next_stamp = (t.div_euclid(STAMP_NS) + 1) * STAMP_NS;
+                // The last frame that starts before the next stamp; it ends where its successor starts.
+                next_stamp.div_euclid(self.period_ns) * self.period_ns
+                    + if next_stamp.rem_euclid(self.period_ns) == 0 { 0 } else { self.period_ns }
+            }
+        };
+        i64::try_from(end.div_euclid(1000) + i128::from(end.rem_euclid(1000) > 0)).unwrap_or(i64::MAX)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stamp_belongs_to_its_frame() {
+        let clock = FrameClock::new(192.0).unwrap();
+        for k in 0..100_000_i64 {
+            let stamp_us = 192 * k / 100 * 100;
+            assert_eq!(clock.end_of(stamp_us as f64 / 1000.0), 192 * (k + 1), "frame {k}");
+            // ... and so do the grid of frames and the last moment before the next stamp.
+            assert_eq!(clock.end_of(k as f64 * 0.192), 192 * (k + 1), "frame {k}");
+            let next_us = 192 * (k + 1) / 100 * 100;
+            assert_eq!(clock.end_of((next_us as f64 - 0.001) / 1000.0), 192 * (k + 1), "frame {k}");
+        }
+    }
+
+    #[test]
+    fn a_frame_never_ends_before_what_happens_in_it() {
+        for period in [48.0, 192.0, 499.84, 1000.0, 2000.0] {
+            let clock = FrameClock::new(period).unwrap();
+            for k in 0..50_000 {
+                let t = f64::from(k) * 0.0137;
+                let end = clock.end_of(t) as f64 / 1000.0;
+                assert!(end >= t && end <= t + period / 1000.0 + 0.101, "{t} ms in a frame that ends at {end} ms");
+            }
+        }
+    }
+
+    #[test]
+    fn pictures_start_their_frames() {
+        let mut clock = FrameClock::new(2000.0).unwrap();
+        clock.picture(7_000);
+        assert_eq!([7.0, 8.999, 9.0, 13.5].map(|t| clock.end_of(t)), [9_000, 9_000, 11_000, 15_000]);
+    }
+
+    #[test]
+    fn a_period_that_makes_no_sense_is_refused() {
+        for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e12] {
+            assert!(FrameClock::new(wrong).is_err());
+        }
+    }
+}
