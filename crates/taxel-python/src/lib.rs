@@ -3,6 +3,7 @@
 mod convert;
 mod enter;
 mod errors;
+mod knock;
 
 mod detect;
 mod neuron;
@@ -14,6 +15,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
+    knock::register(module)?;
     nouns::register(module)?;
     detect::register(module)?;
     neuron::register(module)?;
