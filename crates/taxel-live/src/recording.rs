@@ -18,9 +18,10 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use taxel_core::Array;
+use taxel_core::wire::Registers;
 
 pub use lsa::{LsaWriter, numbered, read_lsa};
-pub use mcap_reader::{Ending, Message, Reader, Rebuilt, Remarks};
+pub use mcap_reader::{Decoded, Ending, Message, Reader, Rebuilt, Remarks};
 pub use mcap_writer::Writer;
 pub use topic::Topic;
 
@@ -37,9 +38,9 @@ pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wir
 pub struct Header {
     /// The sensor.
     pub array: Array,
-    /// REG0 to REG7 as the board holds them, where they are known.
+    /// What the board's registers held at the beginning, where that is known.
     #[serde(default)]
-    pub registers: Option<[u32; 8]>,
+    pub registers: Option<Registers>,
     /// Whether intensity words are differences (the board's option) instead of values.
     #[serde(default)]
     pub difference: bool,
@@ -127,21 +128,8 @@ impl Counts {
     }
 }
 
-/// One detection as a recording keeps it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DetectionRecord {
-    /// What.
-    pub label: String,
-    /// When the event was, us of the board's clock.
-    pub t_us: i64,
-    /// When it could first be said, us of the board's clock.
-    pub known_us: i64,
-    /// How steeply the potential crossed, mV/ms.
-    pub slope: f64,
-}
-
 /// Something written down while recording.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Note {
     /// When, by the host's clock, ns since 1970.
     pub at_ns: i64,
