@@ -106,13 +106,15 @@ impl Counts {
     /// One line: nothing lost after arrival, or what was lost where.
     #[must_use]
     pub fn verdict(&self) -> String {
+        let missing = self.received.saturating_sub(self.dropped_by_queue + self.recorded);
         let lost: Vec<String> = [
-            ("messages dropped by the kernel", self.dropped_by_kernel),
-            ("datagrams dropped by taxel", self.dropped_by_queue),
+            (self.dropped_by_kernel, "messages dropped by the kernel"),
+            (self.dropped_by_queue, "datagrams dropped by taxel's queue"),
+            (missing, "datagrams received but not recorded"),
         ]
         .iter()
-        .filter(|(_, n)| *n > 0)
-        .map(|(what, n)| format!("{n} {what}"))
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, what)| format!("{n} {what}"))
         .collect();
         let damage: Vec<String> = self
             .decoder

@@ -210,3 +210,18 @@ fn wrong_files_are_refused_in_one_line() {
         assert!(error.contains(said) && error.contains("a.mcap") && !error.contains('\n'), "{error}");
     }
 }
+
+#[test]
+fn the_verdict_says_what_was_lost_where() {
+    let sound = Counts { received: 10, recorded: 10, ..Counts::default() };
+    assert_eq!(sound.verdict(), NOTHING_LOST);
+    let lossy = Counts { received: 10, recorded: 6, dropped_by_kernel: 2, dropped_by_queue: 3, ..Counts::default() };
+    let said = lossy.verdict();
+    for part in
+        ["LOST: 2 messages dropped by the kernel", "3 datagrams dropped by taxel's queue", "1 datagrams received"]
+    {
+        assert!(said.contains(part), "{said}");
+    }
+    let damaged = Counts { decoder: [("skipped".to_owned(), 7), ("short".to_owned(), 0)].into(), ..sound };
+    assert_eq!(damaged.verdict(), format!("{NOTHING_LOST}; in the bytes that came: 7 skipped"));
+}

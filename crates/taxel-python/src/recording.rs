@@ -21,22 +21,12 @@ fn from_json<T: serde::de::DeserializeOwned>(what: &str, text: &str) -> PyResult
 }
 
 /// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram.
-type DecodedOut<'py> = (
-    EventsOut<'py>,
-    String,
-    u64,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<u64>>,
-    Bound<'py, PyArray1<u64>>,
-);
+type DecodedOut<'py> =
+    (EventsOut<'py>, String, u64, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<u64>>);
 
 /// Arrival ns, number, where each begins, all bytes.
-type DatagramsOut<'py> = (
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<u64>>,
-    Bound<'py, PyArray1<i64>>,
-    Bound<'py, PyArray1<u8>>,
-);
+type DatagramsOut<'py> =
+    (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u8>>);
 
 /// A recording of the live format, opened.
 #[pyclass(frozen)]
@@ -109,11 +99,7 @@ struct RecordingWriter {
 }
 
 impl RecordingWriter {
-    fn with<T: Send>(
-        &self,
-        py: Python<'_>,
-        work: impl FnOnce(&Writer) -> taxel_live::Result<T> + Send,
-    ) -> PyResult<T> {
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Writer) -> taxel_live::Result<T> + Send) -> PyResult<T> {
         enter(py, |_| {
             let writer = self.writer.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
             match writer.as_ref() {
@@ -154,7 +140,9 @@ impl RecordingWriter {
             for (k, two) in offsets.windows(2).enumerate() {
                 let range = usize::try_from(two[0]).ok().zip(usize::try_from(two[1]).ok());
                 let Some(datagram) = range.and_then(|(from, to)| bytes.get(from..to)) else {
-                    return Err(taxel_core::problem!("datagram {k}: bytes {} to {} are not there", two[0], two[1]).into());
+                    return Err(
+                        taxel_core::problem!("datagram {k}: bytes {} to {} are not there", two[0], two[1]).into()
+                    );
                 };
                 writer.datagram(arrived_ns[k], number[k], datagram)?;
             }
