@@ -18,10 +18,9 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use taxel_core::Array;
-use taxel_core::wire::Registers;
 
 pub use lsa::{LsaWriter, numbered, read_lsa};
-pub use mcap_reader::{Decoded, Ending, Message, Reader, Rebuilt, Remarks};
+pub use mcap_reader::{Ending, Message, Reader, Rebuilt, Remarks};
 pub use mcap_writer::Writer;
 pub use topic::Topic;
 
@@ -38,9 +37,9 @@ pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wir
 pub struct Header {
     /// The sensor.
     pub array: Array,
-    /// What the board's registers held at the beginning, where that is known.
+    /// REG0 to REG7 as the board holds them, where they are known.
     #[serde(default)]
-    pub registers: Option<Registers>,
+    pub registers: Option<[u32; 8]>,
     /// Whether intensity words are differences (the board's option) instead of values.
     #[serde(default)]
     pub difference: bool,
@@ -106,15 +105,13 @@ impl Counts {
     /// One line: nothing lost after arrival, or what was lost where.
     #[must_use]
     pub fn verdict(&self) -> String {
-        let missing = self.received.saturating_sub(self.dropped_by_queue + self.recorded);
         let lost: Vec<String> = [
-            (self.dropped_by_kernel, "messages dropped by the kernel"),
-            (self.dropped_by_queue, "datagrams dropped by taxel's queue"),
-            (missing, "datagrams received but not recorded"),
+            ("messages dropped by the kernel", self.dropped_by_kernel),
+            ("datagrams dropped by taxel", self.dropped_by_queue),
         ]
         .iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, what)| format!("{n} {what}"))
+        .filter(|(_, n)| *n > 0)
+        .map(|(what, n)| format!("{n} {what}"))
         .collect();
         let damage: Vec<String> = self
             .decoder
@@ -130,8 +127,21 @@ impl Counts {
     }
 }
 
+/// One detection as a recording keeps it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DetectionRecord {
+    /// What.
+    pub label: String,
+    /// When the event was, us of the board's clock.
+    pub t_us: i64,
+    /// When it could first be said, us of the board's clock.
+    pub known_us: i64,
+    /// How steeply the potential crossed, mV/ms.
+    pub slope: f64,
+}
+
 /// Something written down while recording.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Note {
     /// When, by the host's clock, ns since 1970.
     pub at_ns: i64,

@@ -8,7 +8,6 @@ mod knock;
 mod detect;
 mod neuron;
 mod nouns;
-mod recording;
 
 use pyo3::prelude::*;
 
@@ -20,6 +19,5 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     nouns::register(module)?;
     detect::register(module)?;
     neuron::register(module)?;
-    recording::register(module)?;
     Ok(())
 }

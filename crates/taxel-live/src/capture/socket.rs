@@ -5,11 +5,11 @@ use std::mem::{size_of, size_of_val, zeroed};
 use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::{AsRawFd, RawFd};
 use std::ptr::{from_mut, from_ref};
-use std::time::{SystemTime, UNIX_EPOCH};
 
 use libc::{c_int, c_void};
 
 use super::{Batch, LOOK_EVERY, Options};
+use crate::recording::now_ns;
 
 /// No UDP message, train or single, is longer than this, bytes.
 pub(super) const LARGEST: usize = 1 << 16;
@@ -136,12 +136,6 @@ impl Socket {
             self.dropped += u64::from(more);
         }
     }
-}
-
-/// The host's clock, ns since 1970: the one that the kernel's stamps are read from.
-pub(crate) fn now_ns() -> i64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
 pub(super) fn set(fd: RawFd, level: c_int, name: c_int, value: &c_int) -> io::Result<()> {

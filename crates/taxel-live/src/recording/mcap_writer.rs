@@ -16,11 +16,9 @@ use mcap::records::{MessageHeader, Metadata, op};
 use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions};
 use serde_json::json;
-use taxel_core::detect::Detection;
-use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
-use super::{Compression, Counts, FLUSH_EVERY, Header, Options, Topic, create};
+use super::{Compression, Counts, DetectionRecord, FLUSH_EVERY, Header, Options, Topic, create};
 use crate::{Error, Result};
 
 /// A chunk is closed when it is this large, or when the queue is empty.
@@ -129,13 +127,13 @@ impl Writer {
         self.push(Topic::Datagrams, arrived_ns, number, bytes)
     }
 
-    /// Keeps the board's registers, as they are from now on.
+    /// Keeps the board's register file (REG0 to REG7), as it is from now on.
     ///
     /// # Errors
     ///
     /// As [`Writer::datagram`], also below.
-    pub fn registers(&self, at_ns: i64, registers: &Registers) -> Result<()> {
-        self.push_json(Topic::Registers, at_ns, &json!(registers))
+    pub fn registers(&self, at_ns: i64, registers: &[u32; 8]) -> Result<()> {
+        self.push_json(Topic::Registers, at_ns, &json!({ "registers": registers }))
     }
 
     /// Keeps a start or stop that the board marked.
@@ -164,10 +162,8 @@ impl Writer {
     /// # Errors
     ///
     /// As [`Writer::datagram`].
-    pub fn detection(&self, at_ns: i64, detection: &Detection) -> Result<()> {
-        let Detection { label, t, known, slope } = detection;
-        let said = json!({ "label": label, "t_us": t, "known_us": known, "slope": slope });
-        self.push_json(Topic::Detections, at_ns, &said)
+    pub fn detection(&self, at_ns: i64, detection: &DetectionRecord) -> Result<()> {
+        self.push_json(Topic::Detections, at_ns, &json!(detection))
     }
 
     /// Keeps what was received and lost so far, so that an unfinished recording knows too; call it about once a second.

@@ -1,0 +1,194 @@
+//! The second thread: decodes what was received, hands the events on, and records.
+
+use std::time::{Duration, Instant};
+
+use taxel_core::Events;
+use taxel_core::wire::Decoder;
+
+use super::{Options, Shared, handover};
+use crate::Result;
+use crate::capture::Batch;
+use crate::clock::BoardClock;
+use crate::recording::now_ns;
+
+/// How often those who look on get a new picture, the recording too.
+const PICTURE_EVERY: Duration = Duration::from_millis(100);
+
+/// How often an unfinished recording learns what was lost.
+const COUNTS_EVERY: Duration = Duration::from_secs(1);
+
+/// In silence the readout's time is moved on this often at most, and once a frame where frames are longer.
+const TICK: Duration = Duration::from_micros(500);
+
+/// How long to wait for datagrams where silence means nothing.
+const IDLE: Duration = Duration::from_millis(20);
+
+/// Events are handed on when so many are there, also in the middle of a large batch.
+const HAND_ON: usize = 1 << 14;
+
+/// The largest datagram of a board that closes frames with a shorter one: 280 events.
+const FULL: usize = 280 * taxel_core::wire::WORD_BYTES;
+
+pub(super) fn run(shared: &Shared, decoder: Decoder, options: &Options, listens: bool) {
+    let mut work = Work {
+        shared,
+        decoder,
+        options,
+        listens,
+        clock: BoardClock::default(),
+        events: Events::empty(options.array.clone()),
+        held: vec![0; options.array.len()],
+        has_intensities: false,
+        decoded: 0,
+        counted: 0,
+        pictured: Instant::now(),
+        told: Instant::now(),
+    };
+    if let Err(error) = work.all() {
+        shared.fail(error);
+    }
+    shared.handover.close();
+    if !listens {
+        shared.ended.store(true, std::sync::atomic::Ordering::Release);
+    }
+}
+
+struct Work<'a> {
+    shared: &'a Shared,
+    decoder: Decoder,
+    options: &'a Options,
+    listens: bool,
+    clock: BoardClock,
+    events: Events,
+    held: Vec<u16>,
+    /// Whether any intensity has come: from then on every piece has the column, so that a lost one is one missing value.
+    has_intensities: bool,
+    decoded: u64,
+    counted: u64,
+    pictured: Instant,
+    told: Instant,
+}
+
+impl Work<'_> {
+    fn all(&mut self) -> Result<()> {
+        let frame_us = self.options.registers.frame_us();
+        let tick = if self.listens { TICK.max(Duration::from_secs_f64(frame_us * 1e-6)) } else { IDLE };
+        let mut batch = Batch::new();
+        while !self.shared.receiver.is_done() {
+            if self.shared.receiver.take(&mut batch, tick)? {
+                self.decode(&batch)?;
+                if let Some(recorder) = &self.shared.recorder {
+                    recorder.datagrams(&batch)?;
+                }
+            } else {
+                self.silence();
+            }
+            self.look()?;
+        }
+        self.decoder.finish_into(&mut self.events);
+        self.hand_on()?;
+        self.silence();
+        Ok(())
+    }
+
+    fn decode(&mut self, batch: &Batch) -> Result<()> {
+        for (datagram, bytes) in batch.iter() {
+            let before = self.events.len();
+            self.decoder.push_into(bytes, Some(datagram.arrived_ns / 1000), &mut self.events);
+            self.decoder.end_of_datagram_into(&mut self.events);
+            let now = now_ns();
+            self.decoded += 1;
+            if let Some(&t) = self.events.t[before..].last() {
+                // What a frame saw leaves at its end, but for a full datagram, which leaves as soon as it is full.
+                if bytes.len() < FULL {
+                    self.clock.note(t + self.frame_us(), datagram.arrived_ns);
+                }
+            }
+            self.shared.board().decode_latency.note(now - datagram.arrived_ns);
+            if self.events.len() >= HAND_ON {
+                self.hand_on()?;
+            }
+        }
+        self.hand_on()
+    }
+
+    #[allow(clippy::cast_possible_truncation)]
+    fn frame_us(&self) -> i64 {
+        self.options.registers.frame_us() as i64
+    }
+
+    /// Hands the events on to the readout, and tells those who look on.
+    fn hand_on(&mut self) -> Result<()> {
+        let events = &mut self.events;
+        if let Some(intensity) = &events.intensity {
+            self.has_intensities = true;
+            for k in 0..events.t.len() {
+                if intensity.present[k] {
+                    self.held[events.array.index(events.x[k], events.y[k])] = intensity.ticks[k];
+                }
+            }
+        }
+        if let Some(recorder) = &self.shared.recorder {
+            events.markers.iter().try_for_each(|m| recorder.marker(*m))?;
+        }
+        {
+            let mut board = self.shared.board();
+            board.markers.extend_from_slice(&events.markers);
+            let counters = &mut board.counters;
+            counters.decoded = self.decoded;
+            counters.wire = *self.decoder.counts();
+            counters.events += events.len() as u64;
+            counters.offset = self.clock.offset();
+            counters.board_us = counters.board_us.max(events.t.iter().max().copied());
+            counters.markers += events.markers.len() as u64;
+            counters.marked_start = events.markers.last().map(|m| m.start).or(counters.marked_start);
+        }
+        if self.listens {
+            let dropped = self.shared.handover.put(events);
+            self.shared.board().counters.events_dropped = dropped;
+        }
+        handover::clear(events);
+        if self.has_intensities {
+            events.intensity.get_or_insert_default();
+        }
+        Ok(())
+    }
+
+    /// Nothing waits: the readout's time may move on by the host's clock.
+    #[allow(clippy::cast_possible_truncation)]
+    fn silence(&self) {
+        if self.listens
+            && let Some(offset) = self.clock.offset()
+        {
+            let guard = (self.options.guard_frames * self.options.registers.frame_us()) as i64;
+            // What a frame sees leaves at its end: before the start of the frame that ends now all has come.
+            self.shared.handover.quiet(offset.board_us(now_ns()) - self.frame_us() - guard);
+        }
+    }
+
+    /// What others look at, at their own pace.
+    fn look(&mut self) -> Result<()> {
+        if self.pictured.elapsed() < PICTURE_EVERY {
+            return Ok(());
+        }
+        self.pictured = Instant::now();
+        let new = self.decoded != self.counted;
+        self.counted = self.decoded;
+        let counters = {
+            let mut board = self.shared.board();
+            board.picture.copy_from_slice(&self.held);
+            board.counters.clone()
+        };
+        let Some(recorder) = &self.shared.recorder else { return Ok(()) };
+        recorder.flush()?;
+        if new && let Some(board_us) = counters.board_us {
+            recorder.picture(board_us, self.options.array.columns, &self.held, self.options.registers.ramp)?;
+        }
+        if self.told.elapsed() >= COUNTS_EVERY {
+            self.told = Instant::now();
+            let capture = self.shared.receiver.counts();
+            recorder.so_far(&super::Counters { capture, ..counters })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,172 @@
+//! What waits between decoding and reading out.
+
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+
+use taxel_core::{Array, Events, Intensities};
+
+/// Events that wait for the readout, and how far the board's time has come without any.
+#[derive(Debug)]
+pub(super) struct Handover {
+    state: Mutex<State>,
+    came: Condvar,
+    limit: usize,
+}
+
+#[derive(Debug)]
+struct State {
+    events: Events,
+    /// After these events there is nothing before this time, us.
+    quiet_until: Option<i64>,
+    dropped: u64,
+    closed: bool,
+}
+
+/// What the readout takes at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Taken {
+    /// After the events there is nothing before this time, us.
+    pub quiet_until: Option<i64>,
+    /// Nothing will come any more.
+    pub last: bool,
+}
+
+impl Handover {
+    pub(super) fn new(array: &Array, limit: usize) -> Self {
+        let state = State { events: Events::empty(array.clone()), quiet_until: None, dropped: 0, closed: false };
+        Self { state: Mutex::new(state), came: Condvar::new(), limit }
+    }
+
+    /// Hands events over and leaves `events` empty; those that find no room are dropped, and counted in what this gives.
+    pub(super) fn put(&self, events: &mut Events) -> u64 {
+        let mut state = self.state();
+        let room = self.limit.saturating_sub(state.events.len());
+        if state.events.is_empty() && state.events.markers.is_empty() && events.len() <= room {
+            std::mem::swap(&mut state.events, events);
+        } else {
+            let dropped = events.len().saturating_sub(room);
+            state.dropped += dropped as u64;
+            append(&mut state.events, events, room.min(events.len()));
+            clear(events);
+        }
+        state.quiet_until = None;
+        let dropped = state.dropped;
+        drop(state);
+        self.came.notify_one();
+        dropped
+    }
+
+    /// Says that after all that was handed over nothing comes before `t` us.
+    pub(super) fn quiet(&self, t: i64) {
+        self.state().quiet_until = Some(t);
+        self.came.notify_one();
+    }
+
+    pub(super) fn close(&self) {
+        self.state().closed = true;
+        self.came.notify_one();
+    }
+
+    /// Waits for something and takes all of it.
+    pub(super) fn take(&self, events: &mut Events) -> Taken {
+        clear(events);
+        let nothing =
+            |s: &mut State| s.events.is_empty() && s.events.markers.is_empty() && s.quiet_until.is_none() && !s.closed;
+        let mut state = self.came.wait_while(self.state(), nothing).unwrap_or_else(PoisonError::into_inner);
+        std::mem::swap(&mut state.events, events);
+        Taken { quiet_until: state.quiet_until.take(), last: state.closed }
+    }
+
+    /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Empties columns that are used again.
+pub(super) fn clear(events: &mut Events) {
+    events.t.clear();
+    events.x.clear();
+    events.y.clear();
+    events.p.clear();
+    if let Some(intensity) = &mut events.intensity {
+        intensity.ticks.clear();
+        intensity.present.clear();
+    }
+    events.markers.clear();
+}
+
+/// Appends the first `n` events of `more`, and all its markers.
+pub(super) fn append(to: &mut Events, more: &Events, n: usize) {
+    let rows = to.len();
+    to.t.extend_from_slice(&more.t[..n]);
+    to.x.extend_from_slice(&more.x[..n]);
+    to.y.extend_from_slice(&more.y[..n]);
+    to.p.extend_from_slice(&more.p[..n]);
+    to.markers.extend_from_slice(&more.markers);
+    if to.intensity.is_some() || more.intensity.is_some() {
+        let none = || Intensities { ticks: vec![0; rows], present: vec![false; rows] };
+        let column = to.intensity.get_or_insert_with(none);
+        match &more.intensity {
+            Some(intensity) => {
+                column.ticks.extend_from_slice(&intensity.ticks[..n]);
+                column.present.extend_from_slice(&intensity.present[..n]);
+            }
+            None => {
+                column.ticks.resize(rows + n, 0);
+                column.present.resize(rows + n, false);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn events(t: &[i64], ticks: Option<u16>) -> Events {
+        let n = t.len();
+        let intensity = ticks.map(|v| Intensities { ticks: vec![v; n], present: vec![true; n] });
+        let (x, y, p) = (vec![1; n], vec![2; n], vec![true; n]);
+        Events { t: t.to_vec(), x, y, p, intensity, ..Events::empty(Array::thesis()) }
+    }
+
+    #[test]
+    fn what_was_handed_over_in_pieces_is_taken_as_one() {
+        let handover = Handover::new(&Array::thesis(), 10);
+        for (t, ticks) in [(&[1, 2][..], None), (&[3], Some(7)), (&[4], None)] {
+            let mut piece = events(t, ticks);
+            assert_eq!(handover.put(&mut piece), 0);
+            assert!(piece.is_empty());
+        }
+        let mut taken = Events::empty(Array::thesis());
+        assert_eq!(handover.take(&mut taken), Taken { quiet_until: None, last: false });
+        assert_eq!(taken.t, [1, 2, 3, 4]);
+        let intensity = taken.intensity.as_ref().expect("one had an intensity");
+        assert_eq!(intensity.ticks, [0, 0, 7, 0]);
+        assert_eq!(intensity.present, [false, false, true, false]);
+        taken.check().expect("columns are equally long");
+    }
+
+    #[test]
+    fn what_finds_no_room_is_counted() {
+        let handover = Handover::new(&Array::thesis(), 3);
+        assert_eq!(handover.put(&mut events(&[1, 2], None)), 0);
+        assert_eq!(handover.put(&mut events(&[3, 4, 5], None)), 2);
+        let mut taken = Events::empty(Array::thesis());
+        handover.take(&mut taken);
+        assert_eq!(taken.t, [1, 2, 3]);
+    }
+
+    #[test]
+    fn silence_is_taken_once_and_only_where_nothing_came_after_it() {
+        let handover = Handover::new(&Array::thesis(), 10);
+        let mut taken = Events::empty(Array::thesis());
+        handover.quiet(100);
+        assert_eq!(handover.take(&mut taken).quiet_until, Some(100));
+        handover.quiet(200);
+        handover.put(&mut events(&[150], None));
+        assert_eq!(handover.take(&mut taken).quiet_until, None);
+        handover.close();
+        assert!(handover.take(&mut taken).last);
+    }
+}

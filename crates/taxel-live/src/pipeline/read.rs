@@ -1,0 +1,141 @@
+//! The third thread: encodes, reads out, and says.
+
+use std::ops::Range;
+use std::sync::atomic::Ordering;
+
+use crossbeam_channel::Sender;
+use taxel_core::detect::{Detection, ReadoutStream};
+use taxel_core::{Events, Result};
+
+use super::handover::{Taken, append};
+use super::{Options, Said, Shared, Sink};
+use crate::recording::now_ns;
+
+/// Makes the readout from the events of a stretch at rest, and that stretch (us).
+pub type AfterTare = Box<dyn FnOnce(&Events, Range<i64>) -> Result<ReadoutStream> + Send>;
+
+/// Who listens to the events.
+pub enum Ear {
+    /// Nobody: capture and record only.
+    Deaf,
+    /// A readout.
+    Reading(Box<ReadoutStream>),
+    /// A readout that first needs a tare: from the first event on for so long (us of the board's clock), or until the
+    /// board marks a start.
+    Taring(i64, AfterTare),
+}
+
+pub(super) struct Reader {
+    state: State,
+    sinks: Vec<Box<dyn Sink>>,
+    say: Sender<Said>,
+    found: Vec<Detection>,
+    events: Events,
+}
+
+enum State {
+    Reading(Box<ReadoutStream>),
+    /// What was heard of the stretch so far.
+    Taring {
+        stretch_us: i64,
+        after: AfterTare,
+        heard: Box<Events>,
+    },
+    /// Between the two, and after an error.
+    Idle,
+}
+
+impl Reader {
+    pub(super) fn new(ear: Ear, sinks: Vec<Box<dyn Sink>>, say: Sender<Said>, options: &Options) -> Self {
+        let events = Events::empty(options.array.clone());
+        let state = match ear {
+            Ear::Deaf => State::Idle,
+            Ear::Reading(stream) => State::Reading(stream),
+            Ear::Taring(stretch_us, after) => State::Taring { stretch_us, after, heard: Box::new(events.clone()) },
+        };
+        Self { state, sinks, say, found: vec![], events }
+    }
+
+    pub(super) fn run(mut self, shared: &Shared) {
+        shared.board().counters.taring = matches!(self.state, State::Taring { .. });
+        loop {
+            let taken = shared.handover.take(&mut self.events);
+            if let Err(error) = self.hear(shared, taken) {
+                shared.fail(error);
+                self.state = State::Idle;
+            }
+            if taken.last {
+                break;
+            }
+        }
+        shared.ended.store(true, Ordering::Release);
+    }
+
+    fn hear(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
+        match &mut self.state {
+            State::Reading(stream) => {
+                stream.push_events(&self.events, &mut self.found)?;
+                if let Some(t) = taken.quiet_until {
+                    stream.advance(t, &mut self.found)?;
+                }
+            }
+            State::Taring { stretch_us, heard, .. } => {
+                append(heard, &self.events, self.events.len());
+                if let Some(stretch) = at_rest(heard, *stretch_us, taken.quiet_until) {
+                    self.begin(shared, stretch)?;
+                }
+            }
+            State::Idle => {}
+        }
+        if !self.events.is_empty() {
+            let counters = &mut shared.board().counters;
+            counters.read_out += self.events.len() as u64;
+            if let State::Reading(stream) = &self.state {
+                counters.late = stream.late();
+            }
+        }
+        self.say_all(shared)
+    }
+
+    /// The tare is complete: makes the readout, which hears all that came, so that it knows what taxels hold.
+    fn begin(&mut self, shared: &Shared, stretch: Range<i64>) -> crate::Result<()> {
+        let State::Taring { after, heard, .. } = std::mem::replace(&mut self.state, State::Idle) else { return Ok(()) };
+        let end = stretch.end;
+        let mut stream = Box::new(after(&heard, stretch)?);
+        stream.push_events(&heard, &mut self.found)?;
+        // What is said of the rest itself is not meant: a board that was just reset tells of every taxel.
+        self.found.retain(|d| d.known >= end);
+        self.state = State::Reading(stream);
+        shared.board().counters.taring = false;
+        Ok(())
+    }
+
+    /// From the thread that made them: to the sinks first, then into the recording and to who asks.
+    fn say_all(&mut self, shared: &Shared) -> crate::Result<()> {
+        for detection in self.found.drain(..) {
+            let said_ns = now_ns();
+            let offset = shared.board().counters.offset;
+            let said = Said { said: offset.map_or(detection.known, |o| o.board_us(said_ns)), detection, said_ns };
+            self.sinks.iter_mut().for_each(|sink| sink.take(&said));
+            if let Some(recorder) = &shared.recorder {
+                recorder.detection(&said)?;
+            }
+            let late_ns = (said.said - said.detection.known) * 1000;
+            let dropped = self.say.try_send(said).is_err();
+            let mut board = shared.board();
+            board.counters.detections += 1;
+            board.counters.detections_dropped += u64::from(dropped);
+            board.said_latency.note(late_ns);
+        }
+        Ok(())
+    }
+}
+
+/// The stretch at rest, once it is over: from the first event on for `stretch_us`, or until a start was marked.
+fn at_rest(heard: &Events, stretch_us: i64, quiet_until: Option<i64>) -> Option<Range<i64>> {
+    let first = *heard.t.first()?;
+    let marked = heard.markers.iter().find(|m| m.start && m.t > first).map(|m| m.t);
+    let stop = marked.unwrap_or(i64::MAX).min(first + stretch_us);
+    let now = heard.t.last().copied().max(quiet_until).max(marked)?;
+    (now >= stop).then_some(first..stop)
+}
