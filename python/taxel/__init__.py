@@ -1,6 +1,6 @@
 """Touch as events: from the bytes of a tactile array to decisions that say when."""
 
-from taxel import metrics
+from taxel import detect, metrics
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel.array import Array
 from taxel.detections import Detections
@@ -23,5 +23,6 @@ __all__ = [
     "ProblemError",
     "SceneError",
     "SpikeTrains",
+    "detect",
     "metrics",
 ]

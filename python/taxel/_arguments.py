@@ -1,35 +1,147 @@
-"""A caller's arguments, on their way to the compiled part."""
+"""A caller's arguments, checked once by name, on their way to the nouns and to the compiled part."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+import os
+from collections.abc import Collection, Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._core import ProblemError
 
-__all__ = ["floats", "number", "parameters"]
+__all__ = [
+    "column",
+    "fields",
+    "flag",
+    "floats",
+    "instance",
+    "number",
+    "numbers",
+    "parameters",
+    "path",
+    "shown",
+    "text",
+    "whole",
+    "window",
+]
+
+T = TypeVar("T")
+
+
+def shown(value: object) -> str:
+    """Return what a value looks like in an error: one line, not long."""
+    said = " ".join(repr(value).split())
+    return said if len(said) <= 60 else f"{said[:57]}..."
+
+
+def instance(name: str, value: object, kind: type[T]) -> T:
+    """Return a value of a class of taxel's; refuse any other, by name."""
+    if not isinstance(value, kind):
+        raise ProblemError(f"{name} is {shown(value)}: must be a taxel.{kind.__name__}")
+    return value
 
 
 def number(name: str, value: object) -> float:
     """Return a float; refuse what is none, by name."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise ProblemError(f"{name} is {value!r}: must be a number")
-    return float(value)
+        raise ProblemError(f"{name} is {shown(value)}: must be a number")
+    try:
+        return float(value)
+    except OverflowError:
+        raise ProblemError(f"{name} is {shown(value)}: must fit a float") from None
+
+
+def whole(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1) -> int:
+    """Return a whole number within limits; a float without a fraction will do."""
+    real = isinstance(value, float | np.floating) and float(value).is_integer()
+    if isinstance(value, bool) or not (real or isinstance(value, int | np.integer)) or not least <= value <= most:  # type: ignore[operator]
+        raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {least} to {most}")
+    return int(value)  # type: ignore[call-overload, no-any-return]
+
+
+def flag(name: str, value: object) -> bool:
+    """Return a boolean; refuse what is none, by name."""
+    if not isinstance(value, bool | np.bool_):
+        raise ProblemError(f"{name} is {shown(value)}: must be True or False")
+    return bool(value)
+
+
+def text(name: str, value: object, among: Collection[str] = ()) -> str:
+    """Return a text, one of a closed list where there is one."""
+    if not isinstance(value, str) or (among and value not in among):
+        wanted = f"one of {', '.join(map(repr, among))}" if among else "a text"
+        raise ProblemError(f"{name} is {shown(value)}: must be {wanted}")
+    return value
+
+
+def path(name: str, value: object) -> str:
+    """Return a file's name; refuse what cannot be one (a number would be an open file to Python)."""
+    said = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    if not isinstance(said, str) or not said or "\0" in said:
+        raise ProblemError(f"{name} is {shown(value)}: must be a path")
+    return said
+
+
+def window(unit: str, start: object, stop: object) -> tuple[float, float]:
+    """Return a stretch of time whose start does not lie after its stop; either may be infinite."""
+    first, last = number("start", start), number("stop", stop)
+    if not first <= last:
+        raise ProblemError(f"window {first} to {last} {unit}: start must not lie after stop")
+    return first, last
+
+
+def numbers(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
+    """Return a contiguous array of any shape; refuse what is no number, or would change its value on the way."""
+    try:
+        given = np.asarray(values)
+        if given.size == 0 and given.dtype.kind not in "biuf":
+            given = given.astype(dtype)
+        if given.dtype.kind not in "biufO":
+            raise ProblemError(f"{name}: holds {given.dtype}, must hold numbers")
+        with np.errstate(invalid="ignore", over="ignore"):
+            array = np.ascontiguousarray(given, dtype).reshape(given.shape)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ProblemError(f"{name}: {error}") from None
+    if given.dtype != array.dtype:
+        if array.dtype.kind == "f":
+            # A float may lose digits (float32) but not its value.
+            changed = np.isinf(array) & ~np.isinf(given.astype(np.float64))
+        else:
+            changed = np.asarray(given != array)
+        if changed.any():
+            place = tuple(int(k[0]) for k in np.nonzero(np.atleast_1d(changed)))
+            where = f"[{', '.join(map(str, place))}]" if given.ndim else ""
+            value = shown(np.atleast_1d(given).astype(object)[place])
+            wanted = {"b": "True or False", "f": "a number that fits"}.get(array.dtype.kind, "a whole number that fits")
+            fits = "" if array.dtype.kind == "b" else f" {array.dtype.name}"
+            raise ProblemError(f"{name}{where} is {value}: must be {wanted}{fits}")
+    return array
+
+
+def column(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
+    """Return a contiguous array of one dimension; refuse what would change its value on the way."""
+    array = numbers(name, values, dtype)
+    if array.ndim != 1:
+        raise ProblemError(f"{name} has {array.ndim} dimensions: must have one")
+    return array
 
 
 def floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return a contiguous float64 array of one dimension; refuse what is none, by name."""
-    try:
-        array = np.ascontiguousarray(values, np.float64)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(f"{name}: {error}") from None
-    if np.ndim(values) != 1:
-        raise ProblemError(f"{name} has {np.ndim(values)} dimensions: must have one")
-    return array
+    return column(name, values, np.float64)
+
+
+def fields(records: object, wanted: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of a record array's fields; refuse one that lacks a field."""
+    names = getattr(getattr(records, "dtype", None), "names", None) or ()
+    missing = [name for name in wanted if name not in names]
+    if missing:
+        raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
+    return tuple(names)
 
 
 def parameters(values: Mapping[str, object]) -> str:
@@ -37,13 +149,16 @@ def parameters(values: Mapping[str, object]) -> str:
 
     def plain(name: str, value: object) -> object:
         if isinstance(value, Mapping):
-            return {key: plain(str(key), entry) for key, entry in value.items()}
+            return {str(key): plain(str(key), entry) for key, entry in value.items()}
         if isinstance(value, list | tuple | np.ndarray):
-            return [plain(f"{name}[{k}]", entry) for k, entry in enumerate(value)]
+            return [
+                plain(f"{name}[{k}]", entry)
+                for k, entry in enumerate(np.atleast_1d(value) if isinstance(value, np.ndarray) else value)
+            ]
         if value is None or isinstance(value, str | bool | np.bool_):
             return bool(value) if isinstance(value, np.bool_) else value
         if isinstance(value, int | np.integer):
-            return int(value)
+            return whole(name, value)
         real = number(name, value)
         if not math.isfinite(real):
             raise ProblemError(f"{name} is {real}: must be finite")

@@ -9,6 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
+from taxel._arguments import flag
+from taxel._arguments import path as checked_path
+
 __all__ = ["write_whole"]
 
 
@@ -31,7 +34,8 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object
     FileExistsError : the file is there already and `overwrite` is false
     OSError : the folder is missing, the disk is full ...
     """
-    place = Path(path)
+    place = Path(checked_path("path", path))
+    overwrite = flag("overwrite", overwrite)
     if not overwrite and os.path.lexists(place):
         raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
     if not place.parent.is_dir():

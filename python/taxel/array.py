@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from taxel._arguments import number, numbers, shown, text, whole
 from taxel._core import ProblemError
 
 __all__ = ["Array"]
@@ -46,21 +46,14 @@ class Array:
 
     def __post_init__(self) -> None:
         for field in ("rows", "columns"):
-            value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or not 1 <= value <= 65_535:
-                raise ProblemError(f"{field} is {value!r}: must be a whole number from 1 to 65535")
-            object.__setattr__(self, field, int(value))
-        try:
-            pitch = float(self.pitch_mm)
-        except (TypeError, ValueError):
-            pitch = float("nan")
+            object.__setattr__(self, field, whole(field, getattr(self, field), 1, 65_535))
+        pitch = number("pitch_mm", self.pitch_mm)
         if not (np.isfinite(pitch) and pitch > 0):
-            raise ProblemError(f"pitch_mm is {self.pitch_mm!r}: must be above 0 and finite")
+            raise ProblemError(f"pitch_mm is {shown(self.pitch_mm)}: must be above 0 and finite")
         object.__setattr__(self, "pitch_mm", pitch)
-        if not isinstance(self.name, str):
-            raise ProblemError(f"name is {self.name!r}: must be a text")
+        text("name", self.name)
         if self.exists is not None:
-            exists = np.array(self.exists, dtype=bool)
+            exists = numbers("exists", self.exists, np.bool_).copy()
             if exists.shape != self.shape:
                 raise ProblemError(f"exists has shape {exists.shape}: must be {self.shape}")
             exists.setflags(write=False)
@@ -76,7 +69,7 @@ class Array:
         """How many taxels exist."""
         return self.rows * self.columns if self.exists is None else int(np.count_nonzero(self.exists))
 
-    def index(self, x: Iterable[int] | int, y: Iterable[int] | int) -> NDArray[np.int64]:
+    def index(self, x: ArrayLike, y: ArrayLike) -> NDArray[np.int64]:
         """Return the index ``row * columns + column`` of taxels.
 
         Parameters
@@ -87,8 +80,19 @@ class Array:
         Returns
         -------
         int64, the shape of `x`
+
+        Raises
+        ------
+        ProblemError : a column or row that the array has not, or shapes that do not fit
         """
-        return np.asarray(np.asarray(y, np.int64) * self.columns + np.asarray(x, np.int64))
+        column, row = numbers("x", x, np.int64), numbers("y", y, np.int64)
+        for name, place, end in (("x", column, self.columns), ("y", row, self.rows)):
+            if place.size and not (place.min() >= 0 and place.max() < end):
+                raise ProblemError(f"{name} reaches from {place.min()} to {place.max()}: must lie in 0 to {end - 1}")
+        try:
+            return np.asarray(row * self.columns + column)
+        except ValueError:
+            raise ProblemError(f"x has shape {column.shape}, y {row.shape}: must be equal") from None
 
     def _parts(self) -> tuple[int, int, float, str, list[bool] | None]:
         """Return what the compiled part wants."""

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
+from taxel._arguments import column, fields, floats, shown, window
+from taxel._arguments import path as checked_path
 from taxel._core import FormatError, ProblemError
 from taxel._files import write_whole
 
@@ -64,22 +66,18 @@ class Detections:
         slope: ArrayLike | None = None,
         said: ArrayLike | None = None,
     ) -> None:
-        labels = np.asarray(label)
-        if labels.size == 0:
-            labels = labels.astype(np.str_)
-        if labels.ndim != 1 or labels.dtype.kind != "U":
-            raise ProblemError(f"label has shape {labels.shape} of {labels.dtype}: must be a list of texts")
-        self.label: NDArray[np.str_] = labels
-        self.t: NDArray[np.int64] = _whole("t", t)
-        self.known: NDArray[np.int64] = _whole("known", known)
         try:
-            given = np.full(len(labels), np.nan) if slope is None else slope
-            self.slope: NDArray[np.float64] = np.ascontiguousarray(given, np.float64)
+            labels = np.asarray(label)
+            labels = labels.astype(np.str_) if labels.size == 0 else labels
         except (TypeError, ValueError) as error:
-            raise ProblemError(f"slope: {error}") from None
-        if self.slope.ndim != 1:
-            raise ProblemError(f"slope has {self.slope.ndim} dimensions: must have one")
-        self.said: NDArray[np.int64] | None = None if said is None else _whole("said", said)
+            raise ProblemError(f"label: {error}") from None
+        if labels.ndim != 1 or labels.dtype.kind != "U":
+            raise ProblemError(f"label is {shown(label)}: must be a list of texts")
+        self.label: NDArray[np.str_] = labels
+        self.t: NDArray[np.int64] = column("t", t, np.int64)
+        self.known: NDArray[np.int64] = column("known", known, np.int64)
+        self.slope: NDArray[np.float64] = floats("slope", np.full(len(labels), np.nan) if slope is None else slope)
+        self.said: NDArray[np.int64] | None = None if said is None else column("said", said, np.int64)
         if self.said is not None and len(self.said) != len(labels):
             raise ProblemError(f"said has {len(self.said)} entries: must be {len(labels)}, one a detection")
         _core.check_detections(self._parts())
@@ -100,19 +98,14 @@ class Detections:
         except (IndexError, TypeError, ValueError) as error:
             raise ProblemError(f"detections: choose by a label, a slice, a mask or numbers: {error}") from None
         if places.ndim != 1:
-            raise ProblemError(f"detections: {chosen!r} has {places.ndim} dimensions, must have one")
+            raise ProblemError(f"detections: {shown(chosen)} has {places.ndim} dimensions, must have one")
         said = None if self.said is None else self.said[places]
         return Detections(self.label[places], self.t[places], self.known[places], self.slope[places], said)
 
     def between(self, start: float, stop: float) -> Detections:
         """Return the detections of ``start <= t < stop`` (us)."""
-        try:
-            inside = (self.t >= start) & (self.t < stop)
-        except TypeError:
-            inside = None
-        if not isinstance(inside, np.ndarray) or not start <= stop:
-            raise ProblemError(f"window {start} to {stop} us: start must be a number that does not lie after stop")
-        return self[inside]
+        start, stop = window("us", start, stop)
+        return self[(self.t >= start) & (self.t < stop)]
 
     def to_numpy(self) -> NDArray[np.void]:
         """Return one record a detection with the fields ``label t known slope``, and ``said`` where it is known."""
@@ -133,10 +126,7 @@ class Detections:
         ------
         ProblemError : a field is missing (names it)
         """
-        names = getattr(getattr(records, "dtype", None), "names", None) or ()
-        missing = [name for name in ("label", "t", "known", "slope") if name not in names]
-        if missing:
-            raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
+        names = fields(records, ("label", "t", "known", "slope"))
         said = records["said"] if "said" in names else None
         return cls(records["label"], records["t"], records["known"], records["slope"], said)
 
@@ -169,7 +159,7 @@ class Detections:
         """
         rows: list[tuple[str, int, int, float, int]] = []
         try:
-            with open(path, newline="", encoding="utf-8") as file:
+            with open(checked_path("path", path), newline="", encoding="utf-8") as file:
                 table = csv.reader(file)
                 header = tuple(next(table, ()))
                 if header not in (_CSV, (*_CSV, _SAID)):
@@ -216,18 +206,3 @@ class Detections:
             return "Detections(none)"
         counts = ", ".join(f"{name} {np.count_nonzero(self.label == name)}" for name in self.labels)
         return f"Detections({len(self)}: {counts}; {self.t.min()} to {self.t.max()} us)"
-
-
-def _whole(name: str, values: ArrayLike) -> NDArray[np.int64]:
-    """Return a column of whole us; refuses what would change its value on the way."""
-    try:
-        given = np.asarray(values)
-        with np.errstate(invalid="ignore"):
-            column = np.ascontiguousarray(given, np.int64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ProblemError(f"{name}: {error}") from None
-    if column.ndim != 1:
-        raise ProblemError(f"{name} has {column.ndim} dimensions: must have one")
-    if given.size and (given.dtype.kind not in "iuf" or not np.array_equal(given, column)):
-        raise ProblemError(f"{name}: times must be whole us")
-    return column

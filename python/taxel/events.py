@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
+from taxel._arguments import column, fields, instance, shown, window
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -65,22 +66,20 @@ class Events:
         present: ArrayLike | None = None,
         markers: Sequence[tuple[int, bool]] = (),
     ) -> None:
-        if not isinstance(array, Array):
-            raise ProblemError(f"array is {array!r}: must be a taxel.Array")
-        self.array = array
-        self.t: NDArray[np.int64] = _column("t", t, np.int64)
-        self.x: NDArray[np.uint16] = _column("x", x, np.uint16)
-        self.y: NDArray[np.uint16] = _column("y", y, np.uint16)
-        self.p: NDArray[np.bool_] = _column("p", p, np.bool_)
+        self.array = instance("array", array, Array)
+        self.t: NDArray[np.int64] = column("t", t, np.int64)
+        self.x: NDArray[np.uint16] = column("x", x, np.uint16)
+        self.y: NDArray[np.uint16] = column("y", y, np.uint16)
+        self.p: NDArray[np.bool_] = column("p", p, np.bool_)
         self.intensity: NDArray[np.uint16] | None = None
         self.present: NDArray[np.bool_] | None = None
         if intensity is not None:
-            self.intensity = _column("intensity", intensity, np.uint16)
+            self.intensity = column("intensity", intensity, np.uint16)
             all_of_them = np.ones(len(self.intensity), np.bool_)
-            self.present = all_of_them if present is None else _column("present", present, np.bool_)
+            self.present = all_of_them if present is None else column("present", present, np.bool_)
         elif present is not None:
             raise ProblemError("present without intensity: give both or neither")
-        self.markers = tuple((int(at), bool(start)) for at, start in markers)
+        self.markers = _markers(markers)
         _core.check_events(self._parts())
 
     def __len__(self) -> int:
@@ -93,15 +92,14 @@ class Events:
 
     def between(self, start: float, stop: float) -> Events:
         """Return the events of ``start <= t < stop`` (us), with the markers of that time."""
+        start, stop = window("us", start, stop)
         kept = self[(self.t >= start) & (self.t < stop)]
         kept.markers = tuple(m for m in self.markers if start <= m[0] < stop)
         return kept
 
     def region(self, x: slice, y: slice) -> Events:
         """Return the events of a rectangle of columns `x` and rows `y` (slices without a step); the array stays."""
-        if x.step not in (None, 1) or y.step not in (None, 1):
-            raise ProblemError("region: slices of columns and rows have no step")
-        columns, rows = x.indices(self.array.columns), y.indices(self.array.rows)
+        columns, rows = region(self.array, x, y)
         inside = (self.x >= columns[0]) & (self.x < columns[1]) & (self.y >= rows[0]) & (self.y < rows[1])
         return self[inside]
 
@@ -138,10 +136,7 @@ class Events:
         ------
         ProblemError : a field is missing (names it)
         """
-        names = records.dtype.names or ()
-        missing = [name for name in ("t", "x", "y", "p") if name not in names]
-        if missing:
-            raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
+        names = fields(records, ("t", "x", "y", "p"))
         intensity, present = (records[name] if name in names else None for name in ("intensity", "present"))
         return cls(
             records["t"], records["x"], records["y"], records["p"], array=array, intensity=intensity, present=present
@@ -176,10 +171,7 @@ class Events:
     @classmethod
     def from_faery(cls, records: NDArray[np.void], array: Array) -> Events:
         """Build events from faery's event array."""
-        names = records.dtype.names or ()
-        missing = [name for name in ("t", "x", "y", "on") if name not in names]
-        if missing:
-            raise ProblemError(f"records have the fields {', '.join(names) or 'none'}: {missing[0]} is missing")
+        fields(records, ("t", "x", "y", "on"))
         return cls(records["t"], records["x"], records["y"], records["on"], array=array)
 
     def plot(self, ax: Axes | None = None) -> Axes:
@@ -251,20 +243,27 @@ class Events:
         return f"Events({len(self)} events, {time}, {self.array.rows} x {self.array.columns} taxels, {said}{marks})"
 
 
-def _column(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
-    """Return a contiguous column; refuses what would change its value on the way."""
+def region(array: Array, x: slice, y: slice) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Return first and last (exclusive) column and row of a rectangle."""
+    limits = []
+    for name, chosen, size in (("x", x, array.columns), ("y", y, array.rows)):
+        if not isinstance(chosen, slice) or chosen.step not in (None, 1):
+            raise ProblemError(f"{name} is {shown(chosen)}: must be a slice without a step, as slice(8, 16)")
+        try:
+            first, last, _ = chosen.indices(size)
+        except TypeError:
+            raise ProblemError(f"{name} is {shown(chosen)}: a slice goes from one whole number to another") from None
+        limits.append((first, last))
+    return limits[0], limits[1]
+
+
+def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...]:
     try:
-        given = np.asarray(values)
-        if given.size == 0:
-            given = given.astype(dtype)
-        column = np.ascontiguousarray(given, dtype)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ProblemError(f"{name}: {error}") from None
-    if column.ndim != 1:
-        raise ProblemError(f"{name} has {column.ndim} dimensions: must have one")
-    if given.dtype != column.dtype:
-        wrong = np.flatnonzero(~(given == column))
-        if len(wrong):
-            k = int(wrong[0])
-            raise ProblemError(f"{name}[{k}] is {given[k]}: must fit {np.dtype(dtype).name}")
-    return column
+        pairs = [(at, start) for at, start in markers]
+        t = column("markers", [at for at, _ in pairs], np.int64)
+        starts = column("markers", [start for _, start in pairs], np.bool_)
+    except (TypeError, ValueError):
+        raise ProblemError(
+            f"markers is {shown(markers)}: must be pairs of a time (us) and start (True) or stop"
+        ) from None
+    return tuple(zip(t.tolist(), starts.tolist(), strict=True))

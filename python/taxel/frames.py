@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taxel._arguments import column, instance, numbers, shown, text, whole, window
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
     from taxel.events import Events
 
 __all__ = ["Frames"]
+
+#: Of pictures made from events: 16 GiB.
+MOST_VALUES = 2**32
 
 
 class Frames:
@@ -43,26 +47,18 @@ class Frames:
     """
 
     def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
-        try:
-            self.values: NDArray[np.float32] = np.ascontiguousarray(values, np.float32)
-            given = np.asarray(t)
-            self.t: NDArray[np.int64] = np.ascontiguousarray(given, np.int64)
-        except (TypeError, ValueError) as error:
-            raise ProblemError(f"frames: {error}") from None
+        self.values: NDArray[np.float32] = numbers("values", values, np.float32)
+        self.t: NDArray[np.int64] = column("t", t, np.int64)
         if self.values.ndim != 3:
             raise ProblemError(f"values have {self.values.ndim} dimensions: must have three (n, rows, columns)")
-        if self.t.ndim != 1 or len(self.t) != len(self.values):
+        if len(self.t) != len(self.values):
             raise ProblemError(f"t has shape {self.t.shape}: must be ({len(self.values)},), one time a picture")
-        if not np.array_equal(given, self.t):
-            raise ProblemError("t: times must be whole us")
         back = np.flatnonzero(np.diff(self.t) <= 0)
         if len(back):
             k = int(back[0])
             raise ProblemError(f"t[{k + 1}] is {self.t[k + 1]} us, not after t[{k}] = {self.t[k]} us")
-        if not isinstance(unit, str) or not unit:
-            raise ProblemError(f"unit is {unit!r}: must be a text")
-        self.unit = unit
-        self.array = Array(*self.values.shape[1:]) if array is None else array
+        self.unit = text("unit", unit)
+        self.array = Array(*self.values.shape[1:]) if array is None else instance("array", array, Array)
         if self.array.shape != self.values.shape[1:]:
             raise ProblemError(f"pictures have shape {self.values.shape[1:]}: the array has {self.array.shape}")
 
@@ -84,16 +80,22 @@ class Frames:
         ------
         ProblemError : events without intensities, or a period below 1 us
         """
+        if not hasattr(events, "intensity"):
+            raise ProblemError(f"events is {shown(events)}: must be taxel.Events")
         if events.intensity is None or events.present is None:
             raise ProblemError("events without intensities: pictures need the held values")
-        if period_us < 1 or int(period_us) != period_us:
-            raise ProblemError(f"period_us is {period_us}: must be a whole number, 1 or more")
-        array = events.array
-        if start is None:
-            start = int(events.t.min()) if len(events) else 0
-        if stop is None:
-            stop = int(events.t.max()) + 1 if len(events) else start
-        t = np.arange(start, stop, int(period_us), dtype=np.int64)
+        period, array = whole("period_us", period_us, 1), events.array
+        first = int(events.t.min()) if len(events) else 0
+        first = first if start is None else whole("start", start)
+        end = int(events.t.max()) + 1 if len(events) else first
+        end = end if stop is None else whole("stop", stop)
+        pictures = max(0, -((first - end) // period))
+        if pictures * array.rows * array.columns > MOST_VALUES:
+            raise ProblemError(
+                f"{pictures} pictures from {first} to {end} us would not fit the memory: take a shorter stretch or a "
+                f"period longer than {period} us"
+            )
+        t = np.arange(pictures, dtype=np.int64) * period + first
         values = np.zeros((len(t), array.rows * array.columns), np.float32)
         there = np.flatnonzero(events.present)
         order = there[np.argsort(events.t[there], kind="stable")]
@@ -112,17 +114,22 @@ class Frames:
 
     def __getitem__(self, chosen: slice) -> Frames:
         """Return a run of pictures."""
+        if not isinstance(chosen, slice):
+            raise ProblemError(f"frames[{shown(chosen)}]: choose pictures by a slice")
         return Frames(self.values[chosen], self.t[chosen], unit=self.unit, array=self.array)
 
     def between(self, start: float, stop: float) -> Frames:
         """Return the pictures of ``start <= t < stop`` (us)."""
-        first, last = np.searchsorted(self.t, [start, stop])
+        first, last = np.searchsorted(self.t, window("us", start, stop))
         return self[int(first) : int(last)]
 
     def region(self, x: slice, y: slice) -> Frames:
         """Return the pictures of a rectangle of columns `x` and rows `y`, as a smaller array."""
-        values = self.values[:, y, x]
-        exists = None if self.array.exists is None else self.array.exists[y, x]
+        from taxel.events import region  # noqa: PLC0415  events know frames
+
+        columns, rows = region(self.array, x, y)
+        values = self.values[:, slice(*rows), slice(*columns)]
+        exists = None if self.array.exists is None else self.array.exists[slice(*rows), slice(*columns)]
         if 0 in values.shape[1:]:
             raise ProblemError(f"region {x}, {y}: no taxel of {self.array!r} lies in it")
         array = Array(values.shape[1], values.shape[2], self.array.pitch_mm, exists, self.array.name)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
+from taxel._arguments import column, floats, number, shown, window
 from taxel._core import ProblemError
 
 if TYPE_CHECKING:
@@ -52,19 +53,10 @@ class SpikeTrains:
         stop: float,
         values: ArrayLike | None = None,
     ) -> None:
-        try:
-            self.times: NDArray[np.float64] = np.ascontiguousarray(times, np.float64)
-            self.offsets: NDArray[np.int64] = np.ascontiguousarray(offsets, np.int64)
-            self.values: NDArray[np.float32] | None = (
-                None if values is None else np.ascontiguousarray(values, np.float32)
-            )
-            self.start, self.stop = float(start), float(stop)
-        except (TypeError, ValueError) as error:
-            raise ProblemError(f"spike trains: {error}") from None
-        for name in ("times", "offsets", "values"):
-            array = getattr(self, name)
-            if array is not None and array.ndim != 1:
-                raise ProblemError(f"{name} has {array.ndim} dimensions: must have one")
+        self.times: NDArray[np.float64] = floats("times", times)
+        self.offsets: NDArray[np.int64] = column("offsets", offsets, np.int64)
+        self.values: NDArray[np.float32] | None = None if values is None else column("values", values, np.float32)
+        self.start, self.stop = number("start", start), number("stop", stop)
         _core.check_spikes(self._parts())
 
     @classmethod
@@ -95,17 +87,15 @@ class SpikeTrains:
         ------
         ProblemError : times that make no sense (names train and spike)
         """
-        try:
-            arrays = [np.atleast_1d(np.asarray(train, np.float64)).ravel() for train in times]
-            signed = None if values is None else [np.atleast_1d(np.asarray(v, np.float32)).ravel() for v in values]
-        except (TypeError, ValueError) as error:
-            raise ProblemError(f"spike trains: {error}") from None
+        arrays = _by_train("times", times, np.float64)
+        signed = None if values is None else _by_train("values", values, np.float32)
         if signed is not None and [len(v) for v in signed] != [len(a) for a in arrays]:
             raise ProblemError("values: must have the lengths of the trains, one value a spike")
         flat = np.concatenate(arrays) if arrays else np.empty(0)
         offsets = np.concatenate([[0], np.cumsum([len(a) for a in arrays])]).astype(np.int64)
         if stop is None:
-            stop = max(float(start), float(flat.max())) if flat.size and np.isfinite(flat).all() else float(start)
+            begin = number("start", start)
+            stop = max(begin, float(flat.max())) if flat.size and np.isfinite(flat).all() else begin
         return cls(flat, offsets, start, stop, np.concatenate(signed) if signed else None)
 
     def __len__(self) -> int:
@@ -116,6 +106,8 @@ class SpikeTrains:
 
     def __getitem__(self, train: int) -> NDArray[np.float64]:
         """Return the times of one train, ms."""
+        if isinstance(train, bool) or not isinstance(train, int | np.integer):
+            raise ProblemError(f"trains[{shown(train)}]: choose one train by its number, several by select")
         n = int(train)
         if not -len(self) <= n < len(self):
             raise IndexError(f"train {n} of {len(self)}")
@@ -138,8 +130,7 @@ class SpikeTrains:
 
     def between(self, start: float, stop: float) -> SpikeTrains:
         """Return the spikes of ``start <= t < stop`` (ms), with that window; times stay as they are."""
-        if not (np.isfinite(start) and np.isfinite(stop) and start <= stop):
-            raise ProblemError(f"window {start} to {stop} ms: start must not lie after stop")
+        start, stop = window("ms", start, stop)
         return self._where((self.times >= start) & (self.times < stop), start, stop)
 
     def select(self, trains: ArrayLike) -> SpikeTrains:
@@ -154,12 +145,15 @@ class SpikeTrains:
         ------
         ProblemError : a number outside the trains
         """
-        chosen = np.asarray(trains)
+        try:
+            chosen = np.atleast_1d(np.asarray(trains))
+        except ValueError as error:
+            raise ProblemError(f"trains: {error}") from None
         if chosen.dtype == bool:
             if chosen.shape != (len(self),):
                 raise ProblemError(f"mask has shape {chosen.shape}: must be ({len(self)},)")
             chosen = np.flatnonzero(chosen)
-        numbers = [int(n) for n in np.atleast_1d(chosen)]
+        numbers = column("trains", chosen, np.int64).tolist()
         outside = [n for n in numbers if not 0 <= n < len(self)]
         if outside:
             raise ProblemError(f"train {outside[0]}: there are trains 0 to {len(self) - 1}")
@@ -200,7 +194,13 @@ class SpikeTrains:
 
         The window is the widest of theirs.
         """
-        if not trains:
+        try:
+            foreign = [train for train in trains if not hasattr(train, "rescale")]
+        except TypeError:
+            foreign = [trains]
+        if foreign:
+            raise ProblemError(f"trains: {shown(foreign[0])} must be a neo.SpikeTrain")
+        if not len(trains):
             return cls.from_lists([])
         times = [np.asarray(t.rescale("ms").magnitude, np.float64) for t in trains]
         start = min(float(t.t_start.rescale("ms").magnitude) for t in trains)
@@ -242,3 +242,11 @@ class SpikeTrains:
     def __repr__(self) -> str:
         signed = ", signed" if self.signed else ""
         return f"SpikeTrains({len(self)} trains, {len(self.times)} spikes{signed}, {self.start:g} to {self.stop:g} ms)"
+
+
+def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> list[NDArray[Any]]:
+    try:
+        entries = list(lists)
+    except TypeError:
+        raise ProblemError(f"{name} is {shown(lists)}: must be one list a train") from None
+    return [column(f"{name}[{n}]", np.atleast_1d(np.asarray(entry, object)), dtype) for n, entry in enumerate(entries)]

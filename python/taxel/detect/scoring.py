@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
+from taxel._arguments import column, floats, instance, numbers, shown
 from taxel._core import ProblemError
-from taxel.detections import Detections, _whole
+from taxel.detections import Detections
 
 __all__ = ["Score", "Spread", "score"]
 
@@ -34,13 +35,7 @@ class Spread(NamedTuple):
         >>> Spread.of([1.0, 2.0, 3.0, 4.0])
         2.5 ± 1.29 (median 2.5, 95 % in 1.07 to 3.92)
         """
-        try:
-            column = np.ascontiguousarray(values, np.float64)
-        except (TypeError, ValueError) as error:
-            raise ProblemError(f"values: {error}") from None
-        if column.ndim != 1:
-            raise ProblemError(f"values have {column.ndim} dimensions: must have one")
-        return cls(*_core.spread(column))
+        return cls(*_core.spread(floats("values", values)))
 
     def __repr__(self) -> str:
         if np.isnan(self.mean):
@@ -190,8 +185,7 @@ def score(
     >>> result.errors_ms
     array([0.2, 0.1])
     """
-    if not isinstance(found, Detections):
-        raise ProblemError(f"found is a {type(found).__name__}: must be taxel.Detections")
+    instance("found", found, Detections)
     labels, times = _truth(found, truth)
     tallies = _core.score(found._parts(), labels, times, _windows(labels, window_ms))
     scores = {}
@@ -216,11 +210,11 @@ def _truth(found: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -> tup
     if isinstance(truth, Mapping):
         wrong = [label for label in truth if not isinstance(label, str)]
         if wrong:
-            raise ProblemError(f"truth: {wrong[0]!r} is not a label, which must be a text")
-        columns = {label: _whole(f"truth[{label!r}]", times) for label, times in truth.items()}
+            raise ProblemError(f"truth: {shown(wrong[0])} is not a label, which must be a text")
+        columns = {label: column(f"truth[{label!r}]", times, np.int64) for label, times in truth.items()}
         labels = [label for label, times in columns.items() for _ in range(len(times))]
         return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])
-    times = _whole("truth", truth)
+    times = column("truth", truth, np.int64)
     if len(found.labels) > 1:
         raise ProblemError(f"truth has no labels, found has {', '.join(found.labels)}: give times by label")
     return [(found.labels or ("event",))[0]] * len(times), times
@@ -236,10 +230,7 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
             mine = np.array([other == label for other in labels])
             windows[mine] = _windows([label] * int(mine.sum()), window_ms[label])
         return windows
-    try:
-        given = np.asarray(window_ms, np.float64)
-    except (TypeError, ValueError) as error:
-        raise ProblemError(f"window_ms: {error}") from None
+    given = numbers("window_ms", window_ms, np.float64)
     if given.ndim > 1 or (given.ndim == 1 and len(given) != len(labels)):
         raise ProblemError(
             f"window_ms has shape {given.shape}: must be one number, or one each of {len(labels)} events"
