@@ -18,9 +18,10 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use taxel_core::Array;
+use taxel_core::wire::Registers;
 
 pub use lsa::{LsaWriter, numbered, read_lsa};
-pub use mcap_reader::{Ending, Message, Reader, Rebuilt, Remarks};
+pub use mcap_reader::{Decoded, Ending, Message, Reader, Rebuilt, Remarks};
 pub use mcap_writer::Writer;
 pub use topic::Topic;
 
@@ -37,12 +38,16 @@ pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wir
 pub struct Header {
     /// The sensor.
     pub array: Array,
-    /// REG0 to REG7 as the board holds them, where they are known.
+    /// What the board's registers held at the beginning, where that is known.
     #[serde(default)]
-    pub registers: Option<[u32; 8]>,
+    pub registers: Option<Registers>,
     /// Whether intensity words are differences (the board's option) instead of values.
     #[serde(default)]
     pub difference: bool,
+    /// What is added to decoded times, us: whole turns of the board's 6.5536 s counter before the first stamp, where a
+    /// file was converted; 0 for what came from a board.
+    #[serde(default)]
+    pub origin_us: i64,
     /// Where the datagrams came from: "udp 0.0.0.0:5208", a file's name ...
     #[serde(default)]
     pub source: String,
@@ -105,13 +110,15 @@ impl Counts {
     /// One line: nothing lost after arrival, or what was lost where.
     #[must_use]
     pub fn verdict(&self) -> String {
+        let missing = self.received.saturating_sub(self.dropped_by_queue + self.recorded);
         let lost: Vec<String> = [
-            ("messages dropped by the kernel", self.dropped_by_kernel),
-            ("datagrams dropped by taxel", self.dropped_by_queue),
+            (self.dropped_by_kernel, "messages dropped by the kernel"),
+            (self.dropped_by_queue, "datagrams dropped by taxel's queue"),
+            (missing, "datagrams received but not recorded"),
         ]
         .iter()
-        .filter(|(_, n)| *n > 0)
-        .map(|(what, n)| format!("{n} {what}"))
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, what)| format!("{n} {what}"))
         .collect();
         let damage: Vec<String> = self
             .decoder
@@ -127,21 +134,8 @@ impl Counts {
     }
 }
 
-/// One detection as a recording keeps it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct DetectionRecord {
-    /// What.
-    pub label: String,
-    /// When the event was, us of the board's clock.
-    pub t_us: i64,
-    /// When it could first be said, us of the board's clock.
-    pub known_us: i64,
-    /// How steeply the potential crossed, mV/ms.
-    pub slope: f64,
-}
-
 /// Something written down while recording.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Note {
     /// When, by the host's clock, ns since 1970.
     pub at_ns: i64,

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use taxel_core::detect::Detection;
+use taxel_core::wire::Registers;
 use taxel_core::{Array, Marker, Stop};
-use taxel_live::recording::{
-    Compression, Counts, DetectionRecord, Ending, Header, NOTHING_LOST, Options, Reader, Topic, Writer,
-};
+use taxel_live::recording::{Compression, Counts, Ending, Header, NOTHING_LOST, Options, Reader, Topic, Writer};
 
 /// A folder that is gone when the test ends.
 struct Folder(PathBuf);
@@ -27,8 +27,9 @@ impl Drop for Folder {
 fn header() -> Header {
     Header {
         array: Array::thesis(),
-        registers: Some([8, 300, 300, 55 << 16 | 75, 150, 63 << 16 | 3 << 8, 0, 0]),
+        registers: Some(Registers::default()),
         difference: false,
+        origin_us: 0,
         source: "udp 127.0.0.1:5208".to_owned(),
         started_ns: 1_000_000_000_000,
     }
@@ -46,7 +47,7 @@ fn record(path: &Path, datagrams: u64, compression: Compression) {
     }
     writer.note(1_000_000_000_500, Some(192), "left heel").unwrap();
     writer.marker(1_000_000_000_600, Marker { t: 384, start: true }).unwrap();
-    let said = DetectionRecord { label: "contact".to_owned(), t_us: 100, known_us: 192, slope: 1.5 };
+    let said = Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5 };
     writer.detection(1_000_000_000_700, &said).unwrap();
     writer.registers(1_000_000_000_800, &header().registers.unwrap()).unwrap();
     writer.picture(1_000_000_000_900, 192, 64, &vec![75; 4096], 150).unwrap();
@@ -86,7 +87,7 @@ fn what_was_written_is_read_back_with_any_compression() {
         assert_eq!(remarks.notes[0].text, "left heel");
         assert_eq!(remarks.notes[0].t_us, Some(192));
         assert_eq!(remarks.markers, vec![Marker { t: 384, start: true }]);
-        assert_eq!(remarks.detections[0].1.label, "contact");
+        assert_eq!(remarks.detections[0].1, Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5 });
         assert_eq!(remarks.registers[0].1, header().registers.unwrap());
         assert_eq!((remarks.datagrams, remarks.datagram_bytes, remarks.pictures), (3000, 4_200_000, 1));
         let Some(Ending::Finished { counts, verdict }) = reader.ending() else { panic!("not finished") };
@@ -209,4 +210,19 @@ fn wrong_files_are_refused_in_one_line() {
         let error = Reader::open(&path).unwrap_err().to_string();
         assert!(error.contains(said) && error.contains("a.mcap") && !error.contains('\n'), "{error}");
     }
+}
+
+#[test]
+fn the_verdict_says_what_was_lost_where() {
+    let sound = Counts { received: 10, recorded: 10, ..Counts::default() };
+    assert_eq!(sound.verdict(), NOTHING_LOST);
+    let lossy = Counts { received: 10, recorded: 6, dropped_by_kernel: 2, dropped_by_queue: 3, ..Counts::default() };
+    let said = lossy.verdict();
+    for part in
+        ["LOST: 2 messages dropped by the kernel", "3 datagrams dropped by taxel's queue", "1 datagrams received"]
+    {
+        assert!(said.contains(part), "{said}");
+    }
+    let damaged = Counts { decoder: [("skipped".to_owned(), 7), ("short".to_owned(), 0)].into(), ..sound };
+    assert_eq!(damaged.verdict(), format!("{NOTHING_LOST}; in the bytes that came: 7 skipped"));
 }

@@ -8,6 +8,7 @@ mod knock;
 mod detect;
 mod neuron;
 mod nouns;
+mod recording;
 
 use pyo3::prelude::*;
 
@@ -19,5 +20,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     nouns::register(module)?;
     detect::register(module)?;
     neuron::register(module)?;
+    recording::register(module)?;
     Ok(())
 }

@@ -5,13 +5,12 @@ use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-use taxel_core::detect::Detection;
 use taxel_core::{Marker, problem};
 
 use super::{Counters, Options, Record, Said};
 use crate::Result;
 use crate::capture::Batch;
-use crate::recording::{self, DetectionRecord, Header, LsaWriter, Writer, now_ns};
+use crate::recording::{self, Header, LsaWriter, Writer, now_ns};
 
 /// A recording being written. Raw `.lsa` holds bytes and nothing else: what else there is to keep is left out of it.
 pub(super) struct Recorder {
@@ -32,8 +31,9 @@ impl Recorder {
             Some("mcap") => {
                 let header = Header {
                     array: options.array.clone(),
-                    registers: Some(std::array::from_fn(|n| options.registers.word(n as u8))),
+                    registers: Some(options.registers),
                     difference: options.differences,
+                    origin_us: 0,
                     source: format!("udp {address}"),
                     started_ns: now_ns(),
                 };
@@ -76,10 +76,7 @@ impl Recorder {
 
     pub(super) fn detection(&self, said: &Said) -> Result<()> {
         match &self.kind {
-            Kind::Mcap(writer) => {
-                let Detection { label, t, known, slope } = said.detection.clone();
-                writer.detection(said.said_ns, &DetectionRecord { label, t_us: t, known_us: known, slope })
-            }
+            Kind::Mcap(writer) => writer.detection(said.said_ns, &said.detection),
             Kind::Lsa(_) => Ok(()),
         }
     }

@@ -12,12 +12,14 @@ use std::path::{Path, PathBuf};
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{MAGIC, parse_record};
-use serde::Deserialize;
+use serde::Serialize;
 use serde_json::Value;
-use taxel_core::{Marker, Stop};
+use taxel_core::detect::Detection;
+use taxel_core::wire::{self, Decoder, Pairing, Registers};
+use taxel_core::{Events, Marker, Stop};
 
 use super::mcap_writer::{BEGIN, END};
-use super::{Counts, DetectionRecord, Header, Note, Topic};
+use super::{Counts, Header, Note, Topic};
 use crate::{Error, Result};
 
 /// No chunk of a sane file is larger, packed or unpacked; a damaged length must not make us ask for terabytes.
@@ -41,7 +43,8 @@ pub struct Reader {
 }
 
 /// How a recording says that it ended.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Ending {
     /// As planned, with what was lost.
     Finished {
@@ -55,7 +58,7 @@ pub enum Ending {
 }
 
 /// What had to be left out of a file, or put up with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct Rebuilt {
     /// Whether the file lacks its end: writing was killed, or the file was cut.
     pub unfinished: bool,
@@ -65,8 +68,6 @@ pub struct Rebuilt {
     pub gaps: u64,
     /// Bytes skipped there.
     pub skipped_bytes: u64,
-    /// Chunks whose checksum or content is wrong; known once they were read.
-    pub bad_chunks: u64,
 }
 
 /// One message as it stands in the file.
@@ -82,17 +83,41 @@ pub struct Message<'a> {
     pub data: &'a [u8],
 }
 
+/// A recording's datagrams as events, with what belongs to each datagram.
+#[derive(Debug, Clone)]
+pub struct Decoded {
+    /// What changed, when.
+    pub events: Events,
+    /// What the decoder saw and dropped.
+    pub counts: wire::Counts,
+    /// When each datagram came, ns since 1970.
+    pub arrived_ns: Vec<i64>,
+    /// Our arrival number of each.
+    pub number: Vec<u64>,
+    /// The first event of each; with pairing by taxel all events come at the end.
+    pub first: Vec<u64>,
+    /// Chunks that could not be used.
+    pub bad_chunks: u64,
+}
+
+impl Decoded {
+    fn empty(events: Events) -> Self {
+        let counts = wire::Counts::default();
+        Self { events, counts, arrived_ns: vec![], number: vec![], first: vec![], bad_chunks: 0 }
+    }
+}
+
 /// All small messages of a recording.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Remarks {
-    /// Register files, by time of the host, ns.
-    pub registers: Vec<(i64, [u32; 8])>,
+    /// The board's registers as they were set, by time of the host, ns.
+    pub registers: Vec<(i64, Registers)>,
     /// Starts and stops, as the board marked them.
     pub markers: Vec<Marker>,
     /// Notes of people.
     pub notes: Vec<Note>,
     /// What readouts said, and when by the host's clock, ns.
-    pub detections: Vec<(i64, DetectionRecord)>,
+    pub detections: Vec<(i64, Detection)>,
     /// The last counts, from before the end.
     pub counts: Option<Counts>,
     /// How many datagrams there are, and their bytes.
@@ -133,6 +158,7 @@ impl Reader {
                 array: taxel_core::Array::thesis(),
                 registers: None,
                 difference: false,
+                origin_us: 0,
                 source: String::new(),
                 started_ns: 0,
             },
@@ -163,7 +189,7 @@ impl Reader {
         self.ending.as_ref()
     }
 
-    /// What opening had to put up with; bad chunks are known once they were read.
+    /// What opening had to put up with; what is wrong inside a chunk shows when it is read.
     #[must_use]
     pub fn rebuilt(&self) -> Rebuilt {
         self.rebuilt
@@ -228,12 +254,8 @@ impl Reader {
                 Topic::Pressure => all.pictures += 1,
                 // A message that does not parse has a sound checksum: another program wrote it, and it is left alone.
                 Topic::Registers => {
-                    #[derive(Deserialize)]
-                    struct Said {
-                        registers: [u32; 8],
-                    }
-                    if let Ok(said) = serde_json::from_slice::<Said>(message.data) {
-                        all.registers.push((message.at_ns, said.registers));
+                    if let Ok(said) = serde_json::from_slice(message.data) {
+                        all.registers.push((message.at_ns, said));
                     }
                 }
                 Topic::Markers => {
@@ -252,8 +274,13 @@ impl Reader {
                     }
                 }
                 Topic::Detections => {
-                    if let Ok(said) = serde_json::from_slice(message.data) {
-                        all.detections.push((message.at_ns, said));
+                    if let Ok(said) = serde_json::from_slice::<Value>(message.data)
+                        && let (Some(label), Some(t), Some(known)) =
+                            (said["label"].as_str(), said["t_us"].as_i64(), said["known_us"].as_i64())
+                    {
+                        // JSON has no NaN: a slope that is not known is written as null.
+                        let slope = said["slope"].as_f64().unwrap_or(f64::NAN);
+                        all.detections.push((message.at_ns, Detection { label: label.to_owned(), t, known, slope }));
                     }
                 }
                 Topic::Counts => all.counts = serde_json::from_slice(message.data).ok().or(all.counts.take()),
@@ -261,6 +288,34 @@ impl Reader {
             Ok(())
         })?;
         Ok((all, bad))
+    }
+
+    /// Decodes all datagrams.
+    ///
+    /// # Errors
+    ///
+    /// As [`Reader::messages`].
+    pub fn decode(&self, pairing: Pairing, stop: Stop<'_>) -> Result<Decoded> {
+        let array = self.header.array.clone();
+        let mut decoder = Decoder::new(array.clone()).pairing(pairing).differences(self.header.difference);
+        let mut decoded = Decoded::empty(Events::empty(array));
+        let bad = self.messages(stop, |message| {
+            if message.topic == Topic::Datagrams {
+                let before = decoded.events.len();
+                decoder.push_into(message.data, Some(message.at_ns / 1000), &mut decoded.events);
+                decoder.end_of_datagram_into(&mut decoded.events);
+                decoded.arrived_ns.push(message.at_ns);
+                decoded.number.push(message.number);
+                decoded.first.push(before as u64);
+            }
+            Ok(())
+        })?;
+        decoder.finish_into(&mut decoded.events);
+        decoded.events.t.iter_mut().for_each(|t| *t += self.header.origin_us);
+        decoded.events.markers.iter_mut().for_each(|m| m.t += self.header.origin_us);
+        decoded.counts = *decoder.counts();
+        decoded.bad_chunks = bad;
+        Ok(decoded)
     }
 
     /// The header's copy in the first chunk that has one.

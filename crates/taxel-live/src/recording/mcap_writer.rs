@@ -16,9 +16,11 @@ use mcap::records::{MessageHeader, Metadata, op};
 use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions};
 use serde_json::json;
+use taxel_core::detect::Detection;
+use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
-use super::{Compression, Counts, DetectionRecord, FLUSH_EVERY, Header, Options, Topic, create};
+use super::{Compression, Counts, FLUSH_EVERY, Header, Options, Topic, create};
 use crate::{Error, Result};
 
 /// A chunk is closed when it is this large, or when the queue is empty.
@@ -127,13 +129,13 @@ impl Writer {
         self.push(Topic::Datagrams, arrived_ns, number, bytes)
     }
 
-    /// Keeps the board's register file (REG0 to REG7), as it is from now on.
+    /// Keeps the board's registers, as they are from now on.
     ///
     /// # Errors
     ///
     /// As [`Writer::datagram`], also below.
-    pub fn registers(&self, at_ns: i64, registers: &[u32; 8]) -> Result<()> {
-        self.push_json(Topic::Registers, at_ns, &json!({ "registers": registers }))
+    pub fn registers(&self, at_ns: i64, registers: &Registers) -> Result<()> {
+        self.push_json(Topic::Registers, at_ns, &json!(registers))
     }
 
     /// Keeps a start or stop that the board marked.
@@ -162,8 +164,10 @@ impl Writer {
     /// # Errors
     ///
     /// As [`Writer::datagram`].
-    pub fn detection(&self, at_ns: i64, detection: &DetectionRecord) -> Result<()> {
-        self.push_json(Topic::Detections, at_ns, &json!(detection))
+    pub fn detection(&self, at_ns: i64, detection: &Detection) -> Result<()> {
+        let Detection { label, t, known, slope } = detection;
+        let said = json!({ "label": label, "t_us": t, "known_us": known, "slope": slope });
+        self.push_json(Topic::Detections, at_ns, &said)
     }
 
     /// Keeps what was received and lost so far, so that an unfinished recording knows too; call it about once a second.
@@ -327,29 +331,45 @@ impl Broken {
     }
 }
 
-/// The file: what is written waits in memory until it is whole, and is then handed over in one piece.
+/// The file behind a small buffer that, unlike the standard library's, is thrown away when a write failed.
 struct Sheet {
     file: File,
     waiting: Vec<u8>,
+    written: u64,
     /// How far the file holds whole records.
     whole: u64,
 }
 
+/// From here on bytes go to the file without a stay in the buffer.
+const LARGE: usize = 1 << 14;
+
 impl Write for Sheet {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.waiting.extend_from_slice(bytes);
+        if bytes.len() < LARGE {
+            self.waiting.extend_from_slice(bytes);
+        } else {
+            self.hand_over()?;
+            self.file.write_all(bytes)?;
+            self.written += bytes.len() as u64;
+        }
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        self.file.write_all(&self.waiting)?;
-        self.whole += self.waiting.len() as u64;
-        self.waiting.clear();
+        self.hand_over()?;
+        self.whole = self.written;
         Ok(())
     }
 }
 
 impl Sheet {
+    fn hand_over(&mut self) -> io::Result<()> {
+        self.file.write_all(&self.waiting)?;
+        self.written += self.waiting.len() as u64;
+        self.waiting.clear();
+        Ok(())
+    }
+
     /// After a failed write: cuts what is torn off, and closes the file where the disk still has room for that.
     fn salvage(mut self, why: &str) {
         let mut close = |end: &[u8]| -> io::Result<()> {
@@ -387,7 +407,7 @@ impl Pen {
             .calculate_data_section_crc(false)
             .disable_seeking(true)
             .chunk_size(Some(2 * CHUNK_BYTES as u64));
-        let sheet = Sheet { file, waiting: Vec::new(), whole: 0 };
+        let sheet = Sheet { file, waiting: Vec::new(), written: 0, whole: 0 };
         let mut pen = Self { mcap: options.create(NoSeek::new(sheet))?, header: header.clone() };
         let said = BTreeMap::from([("header".to_owned(), json!(header).to_string())]);
         pen.mcap.write_metadata(&Metadata { name: BEGIN.to_owned(), metadata: said.clone() })?;

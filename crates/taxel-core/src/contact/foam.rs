@@ -1,0 +1,244 @@
+//! Open-cell foam as independent columns: stress of a strain, force of a ball's depth.
+
+use std::f64::consts::PI;
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Error, Result};
+
+/// Open-cell foam: elastic, then collapsing, then dense (Gibson and Ashby, *Cellular Solids*, chapter 5).
+///
+/// Stress is `E e` up to the yield strain, then `E e_y ((e_D - e_y) / (e_D - e))^m`, and from 0.02 before `e_D`, where
+/// the solid itself is pressed, straight on. Two losses come on top: Hunt and Crossley's `F (1 + chi v)`, and a dashpot
+/// in each column, `F + eta v dF/dd`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Foam {
+    /// Young's modulus E, kPa. A guess: makers' foams lie between 20 and 100.
+    pub modulus_kpa: f64,
+    /// Of the layer, mm (thesis 4.3.1).
+    pub thickness_mm: f64,
+    /// Poisson's ratio in compression; the columns are a fair picture only near 0.
+    pub poisson: f64,
+    /// Strain e_y at which cells collapse.
+    pub yield_strain: f64,
+    /// Strain e_D at which the walls all touch.
+    pub densification_strain: f64,
+    /// Exponent m of the way there, between 1 and 2.
+    pub exponent: f64,
+    /// chi, s/m: loss that grows with speed. 0.25 sends a ball back at about three quarters of its speed.
+    pub damping_s_m: f64,
+    /// eta, ms: the dashpot's time. A guess, and one that carries the demo's delays.
+    pub dashpot_ms: f64,
+}
+
+/// How far before e_D the law goes straight on: the slope there, some 15 MPa, is that of solid polyurethane.
+const SOLID: f64 = 0.02;
+
+impl Default for Foam {
+    fn default() -> Self {
+        Self {
+            modulus_kpa: 60.0,
+            thickness_mm: 10.0,
+            poisson: 0.0,
+            yield_strain: 0.05,
+            densification_strain: 0.95,
+            exponent: 1.2,
+            damping_s_m: 0.25,
+            dashpot_ms: 1.0,
+        }
+    }
+}
+
+impl Foam {
+    /// Checks that the law makes sense.
+    ///
+    /// # Errors
+    ///
+    /// `Scene`, naming the parameter.
+    pub fn check(&self) -> Result<()> {
+        let wrong =
+            |name: &str, value: f64, right: &str| Err(Error::Scene(format!("foam: {name} is {value}: {right}")));
+        let above_0 = |x: f64| x.is_finite() && x > 0.0;
+        if !above_0(self.modulus_kpa) {
+            return wrong("modulus_kpa", self.modulus_kpa, "must be above 0");
+        }
+        if !above_0(self.thickness_mm) {
+            return wrong("thickness_mm", self.thickness_mm, "must be above 0");
+        }
+        if !(0.0..0.5).contains(&self.poisson) {
+            return wrong("poisson", self.poisson, "must be from 0 to below 0.5");
+        }
+        if !(above_0(self.yield_strain) && self.yield_strain < self.densification_strain - SOLID) {
+            return wrong("yield_strain", self.yield_strain, "must be above 0 and well below densification_strain");
+        }
+        if !(above_0(self.densification_strain) && self.densification_strain <= 1.0) {
+            return wrong("densification_strain", self.densification_strain, "must be above 0, at most 1");
+        }
+        if !(self.exponent > 1.0 && self.exponent < 2.0) {
+            return wrong("exponent", self.exponent, "must be above 1 and below 2");
+        }
+        if !(self.damping_s_m.is_finite() && self.damping_s_m >= 0.0) {
+            return wrong("damping_s_m", self.damping_s_m, "must be 0 or more");
+        }
+        if !(self.dashpot_ms.is_finite() && self.dashpot_ms >= 0.0) {
+            return wrong("dashpot_ms", self.dashpot_ms, "must be 0 or more");
+        }
+        Ok(())
+    }
+
+    /// The deepest that anything can sink: the layer's thickness, mm.
+    #[must_use]
+    pub fn floor_mm(&self) -> f64 {
+        self.thickness_mm
+    }
+
+    /// The law's middle part, without its end.
+    fn collapse_kpa(&self, strain: f64) -> f64 {
+        let left = self.densification_strain - self.yield_strain;
+        self.modulus_kpa * self.yield_strain * (left / (self.densification_strain - strain)).powf(self.exponent)
+    }
+
+    /// Where the solid begins: strain, stress in kPa, slope in kPa.
+    fn solid(&self) -> (f64, f64, f64) {
+        let strain = self.densification_strain - SOLID;
+        let stress = self.collapse_kpa(strain);
+        (strain, stress, self.exponent * stress / SOLID)
+    }
+
+    /// Stress of a strain at rest, kPa; 0 where the column is not pressed.
+    #[must_use]
+    pub fn stress_kpa(&self, strain: f64) -> f64 {
+        if strain <= self.yield_strain {
+            return self.modulus_kpa * strain.max(0.0);
+        }
+        if strain <= self.densification_strain - SOLID {
+            return self.collapse_kpa(strain);
+        }
+        let (begins, stress, slope) = self.solid();
+        stress + slope * (strain - begins)
+    }
+
+    /// The integrals over strain of stress and of strain times stress, from 0; kPa.
+    fn moments(&self, strain: f64) -> (f64, f64) {
+        let (modulus, m) = (self.modulus_kpa, self.exponent);
+        let linear = strain.clamp(0.0, self.yield_strain);
+        let (mut zeroth, mut first) = (modulus * linear.powi(2) / 2.0, modulus * linear.powi(3) / 3.0);
+        if strain > self.yield_strain {
+            let whole = self.densification_strain - self.yield_strain;
+            let left = (self.densification_strain - strain).max(SOLID);
+            let scale = modulus * self.yield_strain * whole.powf(m);
+            let rise = scale * (left.powf(1.0 - m) - whole.powf(1.0 - m)) / (m - 1.0);
+            zeroth += rise;
+            first += self.densification_strain * rise - scale * (whole.powf(2.0 - m) - left.powf(2.0 - m)) / (2.0 - m);
+        }
+        let (begins, stress, slope) = self.solid();
+        if strain > begins {
+            let past = strain - begins;
+            zeroth += stress * past + slope * past * past / 2.0;
+            first +=
+                begins * stress * past + (stress + slope * begins) * past.powi(2) / 2.0 + slope * past.powi(3) / 3.0;
+        }
+        (zeroth, first)
+    }
+
+    /// Force of a ball held at a depth, N, and how it grows with depth, N/mm.
+    ///
+    /// Columns sum in closed form: `F = 2 pi` times the integral over `u` from 0 to the depth `d` of
+    /// `stress(u / h) (R - d + u)`.
+    #[must_use]
+    pub fn force(&self, radius_mm: f64, depth_mm: f64) -> (f64, f64) {
+        if depth_mm <= 0.0 {
+            return (0.0, 0.0);
+        }
+        let (depth, h) = (depth_mm.min(self.floor_mm()), self.thickness_mm);
+        let (zeroth, first) = self.moments(depth / h);
+        let milli = 1e-3 * 2.0 * PI;
+        let force = milli * ((radius_mm - depth) * h * zeroth + h * h * first);
+        let stiffness = milli * (radius_mm * self.stress_kpa(depth / h) - h * zeroth);
+        (force, stiffness)
+    }
+
+    /// The depth at which a ball is held by `force_n`, mm.
+    #[must_use]
+    pub fn depth_of(&self, radius_mm: f64, force_n: f64) -> f64 {
+        let (mut low, mut high) = (0.0, self.floor_mm());
+        while high - low > 1e-9 {
+            let middle = f64::midpoint(low, high);
+            if self.force(radius_mm, middle).0 < force_n { low = middle } else { high = middle }
+        }
+        f64::midpoint(low, high)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_closed_force_equals_the_sum_over_columns() {
+        let foam = Foam::default();
+        for (radius, depth) in [(25.0_f64, 0.3_f64), (25.0, 4.0), (35.0, 7.5), (30.0, 9.3), (25.0, 9.7)] {
+            let rings = 400_000;
+            let edge = (2.0 * radius * depth - depth * depth).sqrt();
+            let sum: f64 = (0..rings)
+                .map(|k| {
+                    let r = edge * (f64::from(k) + 0.5) / f64::from(rings);
+                    let column = depth - (radius - (radius * radius - r * r).sqrt());
+                    foam.stress_kpa(column / foam.thickness_mm) * 2.0 * PI * r * edge / f64::from(rings)
+                })
+                .sum();
+            let (force, stiffness) = foam.force(radius, depth);
+            assert!((force / (sum * 1e-3) - 1.0).abs() < 1e-6, "{radius} {depth}: {force} against {sum}");
+            let next = foam.force(radius, depth + 1e-6).0;
+            assert!(((next - force) / 1e-6 / stiffness - 1.0).abs() < 1e-4);
+        }
+    }
+
+    #[test]
+    fn a_small_depth_follows_the_linear_column_law() {
+        // F = pi R E d^2 / h to first order in d / R.
+        let foam = Foam::default();
+        let (force, _) = foam.force(30.0, 0.05);
+        let linear = PI * 30.0 * 60.0 * 0.05 * 0.05 / 10.0 * 1e-3;
+        assert!((force / linear - 1.0).abs() < 2e-3);
+    }
+
+    #[test]
+    fn stress_rises_without_a_jump() {
+        let foam = Foam::default();
+        let stresses: Vec<f64> = (0..9_490).map(|k| foam.stress_kpa(f64::from(k) * 1e-4)).collect();
+        assert!(stresses.windows(2).all(|w| w[1] >= w[0] && w[1] - w[0] < 0.03 * (1.0 + w[1])));
+        assert!(foam.stress_kpa(-1.0) == 0.0);
+    }
+
+    #[test]
+    fn depth_is_the_inverse_of_force() {
+        let foam = Foam::default();
+        for force in [0.05, 0.35, 4.9, 60.0] {
+            let depth = foam.depth_of(28.0, force);
+            assert!((foam.force(28.0, depth).0 / force - 1.0).abs() < 1e-6);
+        }
+    }
+
+    type Spoil = fn(&mut Foam);
+
+    #[test]
+    fn each_nonsense_parameter_is_named() {
+        let wrong: [(&str, Spoil); 7] = [
+            ("modulus_kpa", |f| f.modulus_kpa = 0.0),
+            ("thickness_mm", |f| f.thickness_mm = f64::NAN),
+            ("poisson", |f| f.poisson = 0.5),
+            ("yield_strain", |f| f.yield_strain = 0.96),
+            ("densification_strain", |f| f.densification_strain = 1.1),
+            ("exponent", |f| f.exponent = 1.0),
+            ("dashpot_ms", |f| f.dashpot_ms = -0.1),
+        ];
+        for (name, spoil) in wrong {
+            let mut foam = Foam::default();
+            spoil(&mut foam);
+            assert!(foam.check().unwrap_err().to_string().contains(name), "{name}");
+        }
+        Foam::default().check().unwrap();
+    }
+}

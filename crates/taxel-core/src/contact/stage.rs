@@ -1,0 +1,349 @@
+//! Acts played one after the other into the frames that the board reads.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Contact, Footprint, Kind, Motion, Scene, Taxels};
+use crate::{Array, Error, Result};
+
+/// Pictures laid over the array: what a recording of another sensor would have done to this one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Pictures {
+    /// Picture after picture, row by row: the share of the way from rest to the ramp's end, 0 to 1.
+    pub values: Vec<f32>,
+    /// From one picture to the next, us; between them each taxel follows a straight line.
+    pub period_us: f64,
+}
+
+/// One stretch of what the board is shown.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Act {
+    /// Nothing touches the array.
+    Silence {
+        /// ms.
+        ms: f64,
+    },
+    /// A ball is dropped.
+    Ball(Scene),
+    /// Pictures are laid over it.
+    Pictures(Pictures),
+}
+
+/// The board's lines are read in four groups a frame, each as the touch then is.
+const GROUPS: usize = 4;
+
+/// Acts, made ready to be played frame by frame.
+///
+/// The fabric answers after 50 us (thesis 4.4.1): a group of lines, read during a quarter of a frame, shows the force of
+/// the quarter before. Lines are read from left to right (a driven line is a column of the sensor).
+#[derive(Debug)]
+pub struct Stage {
+    taxels: Taxels,
+    frame_us: f64,
+    parts: Vec<Part>,
+    contacts: Vec<Contact>,
+    /// Part and frame within it that come next.
+    part: usize,
+    frame: usize,
+    clean: Vec<f32>,
+    profile: Vec<f32>,
+    drive: Vec<f32>,
+}
+
+#[derive(Debug)]
+struct Part {
+    frames: usize,
+    what: What,
+}
+
+#[derive(Debug)]
+enum What {
+    Silence,
+    Ball { motion: Motion, footprint: Footprint, reach: [Vec<Reached>; GROUPS], pressed: [bool; GROUPS] },
+    Pictures { pictures: Pictures, count: usize },
+}
+
+/// A taxel that a ball can reach, and where it lies among the footprint's rings.
+#[derive(Debug)]
+struct Reached {
+    index: u32,
+    ring: u32,
+    share: f32,
+}
+
+impl Stage {
+    /// Makes acts ready: motion, touches and footprints are worked out here, some milliseconds for each ball.
+    ///
+    /// # Errors
+    ///
+    /// `Scene` where an act cannot be played (it is numbered from 0), or taxels and array differ in size.
+    pub fn new(array: &Array, taxels: Taxels, frame_us: f64, acts: &[Act]) -> Result<Self> {
+        if taxels.len() != array.len() {
+            return Err(Error::Scene(format!("{} taxels: the array has {}", taxels.len(), array.len())));
+        }
+        if !(frame_us.is_finite() && frame_us > 0.0 && frame_us <= 4_000.0) {
+            return Err(Error::Scene(format!("frame is {frame_us} us: must be above 0, at most 4000")));
+        }
+        let (mut parts, mut contacts, mut begins) = (vec![], vec![], 0_usize);
+        for (n, act) in acts.iter().enumerate() {
+            let (part, touches) = part(array, frame_us, act).map_err(|error| match error {
+                Error::Scene(text) => Error::Scene(format!("act {n}: {text}")),
+                other => other,
+            })?;
+            let offset = begins as f64 * frame_us;
+            contacts.extend(touches.into_iter().map(|c| Contact {
+                start_us: c.start_us + offset,
+                stop_us: c.stop_us + offset,
+                ..c
+            }));
+            begins += part.frames;
+            parts.push(part);
+        }
+        let clean = (0..taxels.len()).map(|k| taxels.ticks(k, 0.0)).collect();
+        Ok(Self { taxels, frame_us, parts, contacts, part: 0, frame: 0, clean, profile: vec![], drive: vec![] })
+    }
+
+    /// All touches of all acts, by time; us from the first frame's start.
+    #[must_use]
+    pub fn contacts(&self) -> &[Contact] {
+        &self.contacts
+    }
+
+    /// How many frames there are in all.
+    #[must_use]
+    pub fn frames(&self) -> usize {
+        self.parts.iter().map(|p| p.frames).sum()
+    }
+
+    /// Force at each frame's start, N; 0 under pictures, whose force nobody knows.
+    #[must_use]
+    pub fn force_n(&self) -> Vec<f32> {
+        let mut force = Vec::with_capacity(self.frames());
+        for part in &self.parts {
+            match &part.what {
+                What::Ball { motion, .. } => force.extend((0..part.frames).map(|k| motion.force_n[GROUPS * k])),
+                What::Silence | What::Pictures { .. } => force.resize(force.len() + part.frames, 0.0),
+            }
+        }
+        force
+    }
+
+    /// Puts the next frame's ticks, by taxel, into `ticks`; false, and nothing done, after the last.
+    ///
+    /// # Errors
+    ///
+    /// `Scene` where `ticks` has another length than the array.
+    pub fn frame(&mut self, ticks: &mut [u16]) -> Result<bool> {
+        if ticks.len() != self.clean.len() {
+            return Err(Error::Scene(format!("room for {} ticks: must be {}", ticks.len(), self.clean.len())));
+        }
+        while self.parts.get(self.part).is_some_and(|p| self.frame == p.frames) {
+            self.part += 1;
+            self.frame = 0;
+        }
+        let Some(part) = self.parts.get_mut(self.part) else { return Ok(false) };
+        match &mut part.what {
+            What::Silence => {}
+            What::Ball { motion, footprint, reach, pressed } => {
+                for group in 0..GROUPS {
+                    let now = (GROUPS * self.frame + group).min(motion.force_n.len() - 1);
+                    let before = now.saturating_sub(1);
+                    let force = f32::midpoint(motion.force_n[now], motion.force_n[before]);
+                    if force == 0.0 && !pressed[group] {
+                        continue;
+                    }
+                    pressed[group] = force > 0.0;
+                    let depth = f32::midpoint(motion.depth_mm[now], motion.depth_mm[before]);
+                    footprint.profile(f64::from(depth), &mut self.profile);
+                    self.drive.clear();
+                    self.drive.extend(self.profile.iter().map(|stress| self.taxels.drive(stress * force)));
+                    for at in &reach[group] {
+                        let (ring, index) = (at.ring as usize, at.index as usize);
+                        let drive = self.drive[ring] + at.share * (self.drive[ring + 1] - self.drive[ring]);
+                        self.clean[index] = self.taxels.ticks(index, drive);
+                    }
+                }
+            }
+            What::Pictures { pictures, count } => {
+                let place = self.frame as f64 * self.frame_us / pictures.period_us;
+                let (k, share) = ((place as usize).min(*count - 1), place.fract() as f32);
+                let size = self.clean.len();
+                let now = &pictures.values[k * size..(k + 1) * size];
+                let next = if k + 1 < *count { &pictures.values[(k + 1) * size..(k + 2) * size] } else { now };
+                let top = f32::from(self.taxels.ramp());
+                for (index, clean) in self.clean.iter_mut().enumerate() {
+                    let rest = self.taxels.ticks(index, 0.0);
+                    *clean = rest + (now[index] + share * (next[index] - now[index])) * (top - rest);
+                }
+            }
+        }
+        self.frame += 1;
+        self.taxels.convert(&self.clean, ticks);
+        Ok(true)
+    }
+}
+
+fn part(array: &Array, frame_us: f64, act: &Act) -> Result<(Part, Vec<Contact>)> {
+    match act {
+        Act::Silence { ms } => {
+            if !(0.0..=86_400_000.0).contains(ms) {
+                return Err(Error::Scene(format!("silence of {ms} ms: must be 0 to a day")));
+            }
+            Ok((Part { frames: (ms * 1e3 / frame_us).round() as usize, what: What::Silence }, vec![]))
+        }
+        Act::Ball(scene) => {
+            let mut motion = Motion::of(scene, frame_us / GROUPS as f64)?;
+            let footprint = Footprint::new(&scene.foam, scene.ball.radius_mm)?;
+            let mut reach = [const { Vec::new() }; GROUPS];
+            for y in 0..array.rows {
+                for x in 0..array.columns {
+                    let across = f64::from(x) * array.pitch_mm - scene.x_mm;
+                    let along = f64::from(y) * array.pitch_mm - scene.y_mm;
+                    if let Some((ring, share)) = Footprint::ring(across.hypot(along)) {
+                        let group = GROUPS * usize::from(x) / usize::from(array.columns);
+                        reach[group].push(Reached { index: array.index(x, y) as u32, ring: ring as u32, share });
+                    }
+                }
+            }
+            let contacts = std::mem::take(&mut motion.contacts);
+            let frames = motion.force_n.len().div_ceil(GROUPS);
+            Ok((Part { frames, what: What::Ball { motion, footprint, reach, pressed: [false; GROUPS] } }, contacts))
+        }
+        Act::Pictures(pictures) => {
+            let size = array.len();
+            let count = pictures.values.len() / size;
+            if count == 0 || pictures.values.len() != count * size {
+                return Err(Error::Scene(format!(
+                    "{} values: must be whole pictures of {size}",
+                    pictures.values.len()
+                )));
+            }
+            if let Some(value) = pictures.values.iter().find(|v| !(0.0..=1.0).contains(*v)) {
+                return Err(Error::Scene(format!("picture value {value}: must be a share of the ramp, 0 to 1")));
+            }
+            if !(pictures.period_us.is_finite() && pictures.period_us >= frame_us) {
+                let period = pictures.period_us;
+                return Err(Error::Scene(format!("pictures each {period} us: must be {frame_us} (a frame) or more")));
+            }
+            let frames = (count as f64 * pictures.period_us / frame_us).ceil() as usize;
+            let contacts = touched(pictures, count, size);
+            Ok((Part { frames, what: What::Pictures { pictures: pictures.clone(), count } }, contacts))
+        }
+    }
+}
+
+/// The touch of pictures: from the last empty one before to the first empty one after all that are not.
+fn touched(pictures: &Pictures, count: usize, size: usize) -> Vec<Contact> {
+    let loaded = |k: usize| pictures.values[k * size..(k + 1) * size].iter().any(|v| *v > 0.0);
+    let Some(first) = (0..count).find(|k| loaded(*k)) else { return vec![] };
+    let last = (0..count).rev().find(|k| loaded(*k)).unwrap_or(first);
+    vec![Contact {
+        kind: Kind::Pictures,
+        start_us: first.saturating_sub(1) as f64 * pictures.period_us,
+        stop_us: (last + 1) as f64 * pictures.period_us,
+        speed_m_s: 0.0,
+        peak_n: 0.0,
+    }]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Sensor;
+    use super::*;
+
+    const FRAME_US: f64 = 192.0;
+
+    fn stage(sensor: &Sensor, acts: &[Act]) -> Stage {
+        let array = Array::thesis();
+        Stage::new(&array, Taxels::new(sensor, array.len(), 150, 3).unwrap(), FRAME_US, acts).unwrap()
+    }
+
+    fn quiet() -> Sensor {
+        Sensor { noise_ticks: 0.0, gain_spread: 0.0, offset_mv: 0.0, ..Sensor::default() }
+    }
+
+    fn ball(index: u32) -> Act {
+        Act::Ball(Scene::draw(&Array::thesis(), 1, index, false).unwrap())
+    }
+
+    #[test]
+    fn taxels_rise_within_a_frame_of_a_touch_and_return_after_it() {
+        let mut stage = stage(&quiet(), &[Act::Silence { ms: 100.0 }, ball(0)]);
+        let contacts = stage.contacts().to_vec();
+        let mut ticks = vec![0; 4096];
+        let mut rest = vec![];
+        let mut loaded = vec![];
+        while stage.frame(&mut ticks).unwrap() {
+            if rest.is_empty() {
+                rest.clone_from(&ticks);
+            }
+            loaded.push(ticks.iter().zip(&rest).filter(|(a, b)| a > b).count());
+        }
+        assert_eq!(loaded.len(), stage.frames());
+        let first = contacts[0].start_us / FRAME_US;
+        let before = first as usize;
+        assert!(loaded[..before].iter().all(|n| *n == 0));
+        assert!(loaded[before + 2] > 20, "{:?}", &loaded[before..before + 4]);
+        for contact in &contacts {
+            let after = (contact.stop_us / FRAME_US) as usize + 2;
+            assert_eq!(loaded[after], 0, "{contact:?}");
+        }
+    }
+
+    #[test]
+    fn force_and_touches_agree() {
+        let stage = stage(&quiet(), &[ball(0), Act::Silence { ms: 20.0 }, ball(1)]);
+        let force = stage.force_n();
+        assert_eq!(force.len(), stage.frames());
+        for (k, force) in force.iter().enumerate() {
+            let at = k as f64 * FRAME_US;
+            let inside = stage.contacts().iter().any(|c| c.start_us < at && at < c.stop_us);
+            assert_eq!(*force > 0.0, inside, "frame {k}");
+        }
+    }
+
+    #[test]
+    fn the_same_seed_plays_the_same_frames() {
+        let play = || {
+            let mut stage = stage(&Sensor::default(), &[Act::Silence { ms: 3.0 }, ball(2)]);
+            let mut ticks = vec![0; 4096];
+            for _ in 0..1_200 {
+                assert!(stage.frame(&mut ticks).unwrap());
+            }
+            ticks
+        };
+        assert_eq!(play(), play());
+    }
+
+    #[test]
+    fn pictures_are_reached_in_straight_lines() {
+        let mut values = vec![0.0; 3 * 4096];
+        values[4096 + 70] = 1.0;
+        let act = Act::Pictures(Pictures { values, period_us: 1920.0 });
+        let mut stage = stage(&quiet(), &[act]);
+        let mut seen = vec![];
+        let mut ticks = vec![0; 4096];
+        while stage.frame(&mut ticks).unwrap() {
+            seen.push(ticks[70]);
+        }
+        assert_eq!(seen.len(), 30);
+        assert_eq!(seen[10], 150);
+        let halfway = f64::midpoint(f64::from(seen[0]), 150.0);
+        assert!((f64::from(seen[5]) - halfway).abs() <= 1.0 && (f64::from(seen[15]) - halfway).abs() <= 1.0);
+        assert_eq!(stage.contacts()[0].start_us, 0.0);
+        assert_eq!(stage.contacts()[0].stop_us, 3840.0);
+    }
+
+    #[test]
+    fn an_act_that_cannot_be_played_is_named() {
+        let array = Array::thesis();
+        let taxels = Taxels::new(&quiet(), 4096, 150, 0).unwrap();
+        let text = |acts: &[Act]| Stage::new(&array, taxels.clone(), FRAME_US, acts).unwrap_err().to_string();
+        assert!(text(&[Act::Silence { ms: 1.0 }, Act::Silence { ms: f64::NAN }]).contains("act 1"));
+        assert!(text(&[Act::Pictures(Pictures { values: vec![0.0; 5], period_us: 2e3 })]).contains("whole pictures"));
+        assert!(text(&[Act::Pictures(Pictures { values: vec![2.0; 4096], period_us: 2e3 })]).contains("share"));
+        assert!(text(&[Act::Pictures(Pictures { values: vec![0.0; 4096], period_us: 1.0 })]).contains("a frame"));
+        let few = Taxels::new(&quiet(), 7, 150, 0).unwrap();
+        assert!(Stage::new(&array, few, FRAME_US, &[]).is_err());
+    }
+}

@@ -1,0 +1,242 @@
+//! Recordings: the live format's reader and writer, and the manual's raw files.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde_json::json;
+use taxel_core::detect::Detection;
+use taxel_core::{Marker, Stop, wire};
+use taxel_live::recording::{Counts, Header, LsaWriter, Options, Reader, Topic, Writer, numbered};
+
+use crate::convert::{EventsOut, array, from_events, slice};
+use crate::enter::enter;
+use crate::errors::{ProblemError, core};
+
+/// A parameter object from its JSON.
+fn from_json<T: serde::de::DeserializeOwned>(what: &str, text: &str) -> PyResult<T> {
+    serde_json::from_str(text).map_err(|e| ProblemError::new_err(format!("{what}: {e}")))
+}
+
+/// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram.
+type DecodedOut<'py> =
+    (EventsOut<'py>, String, u64, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<u64>>);
+
+/// Arrival ns, number, where each begins, all bytes.
+type DatagramsOut<'py> =
+    (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u8>>);
+
+/// A recording of the live format, opened.
+#[pyclass(frozen)]
+struct RecordingReader {
+    reader: Reader,
+}
+
+#[pymethods]
+impl RecordingReader {
+    #[new]
+    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        Ok(Self { reader: enter(py, |_| Reader::open(&path))? })
+    }
+
+    /// What the recording says of itself, how it ended, and what was rebuilt: JSON.
+    fn about(&self) -> String {
+        let reader = &self.reader;
+        json!({ "header": reader.header(), "ending": reader.ending(), "rebuilt": reader.rebuilt() }).to_string()
+    }
+
+    /// Registers, notes, detections, counts, sizes: JSON.
+    fn remarks(&self, py: Python<'_>) -> PyResult<String> {
+        let (all, bad_chunks) = enter(py, |stop| self.reader.remarks(stop))?;
+        let detections: Vec<_> = all.detections.iter().map(|(at, d)| (at, &d.label, d.t, d.known, d.slope)).collect();
+        let markers: Vec<_> = all.markers.iter().map(|m| (m.t, m.start)).collect();
+        let said = json!({
+            "registers": all.registers, "markers": markers, "notes": all.notes, "detections": detections,
+            "counts": all.counts, "datagrams": all.datagrams, "datagram_bytes": all.datagram_bytes,
+            "arrivals": all.arrivals, "pictures": all.pictures, "bad_chunks": bad_chunks,
+        });
+        Ok(said.to_string())
+    }
+
+    /// Decodes all datagrams.
+    fn decode<'py>(&self, py: Python<'py>, pairing: &str) -> PyResult<DecodedOut<'py>> {
+        let pairing: wire::Pairing = from_json("pairing", &json!(pairing).to_string())?;
+        let decoded = enter(py, |stop| self.reader.decode(pairing, stop))?;
+        Ok((
+            from_events(py, decoded.events),
+            json!(decoded.counts).to_string(),
+            decoded.bad_chunks,
+            array(py, decoded.arrived_ns),
+            array(py, decoded.number),
+            array(py, decoded.first),
+        ))
+    }
+
+    /// All datagrams as they came.
+    fn datagrams<'py>(&self, py: Python<'py>) -> PyResult<DatagramsOut<'py>> {
+        let (mut arrived, mut number, mut offsets, mut bytes) = (vec![], vec![], vec![0_i64], vec![]);
+        enter(py, |stop: Stop<'_>| {
+            self.reader.messages(stop, |message| {
+                if message.topic == Topic::Datagrams {
+                    arrived.push(message.at_ns);
+                    number.push(message.number);
+                    bytes.extend_from_slice(message.data);
+                    offsets.push(i64::try_from(bytes.len()).unwrap_or(i64::MAX));
+                }
+                Ok(())
+            })
+        })?;
+        Ok((array(py, arrived), array(py, number), array(py, offsets), array(py, bytes)))
+    }
+}
+
+/// A recording of the live format, being written.
+#[pyclass(frozen)]
+struct RecordingWriter {
+    writer: Mutex<Option<Writer>>,
+}
+
+impl RecordingWriter {
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Writer) -> taxel_live::Result<T> + Send) -> PyResult<T> {
+        enter(py, |_| {
+            let writer = self.writer.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+            match writer.as_ref() {
+                Some(writer) => work(writer),
+                None => Err(taxel_core::problem!("the recording is finished: begin a new one").into()),
+            }
+        })
+    }
+}
+
+#[pymethods]
+impl RecordingWriter {
+    /// Begins a recording; `header` is JSON.
+    #[new]
+    fn create(py: Python<'_>, path: PathBuf, header: &str, compression: &str, overwrite: bool) -> PyResult<Self> {
+        let header: Header = from_json("header", header)?;
+        let options = Options { compression: compression.parse().map_err(core)?, overwrite };
+        let writer = enter(py, |_| Writer::create(&path, &header, options))?;
+        Ok(Self { writer: Mutex::new(Some(writer)) })
+    }
+
+    /// Keeps datagrams: arrival ns, number, where each begins in `bytes` (and where the last ends), bytes.
+    fn datagrams(
+        &self,
+        py: Python<'_>,
+        arrived_ns: PyReadonlyArray1<'_, i64>,
+        number: PyReadonlyArray1<'_, u64>,
+        offsets: PyReadonlyArray1<'_, i64>,
+        bytes: PyReadonlyArray1<'_, u8>,
+    ) -> PyResult<()> {
+        let (arrived_ns, number) = (slice("arrived_ns", &arrived_ns)?, slice("number", &number)?);
+        let (offsets, bytes) = (slice("offsets", &offsets)?, slice("bytes", &bytes)?);
+        if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
+            let n = arrived_ns.len();
+            return Err(ProblemError::new_err(format!("{n} arrivals: need {n} numbers and {} offsets", n + 1)));
+        }
+        self.with(py, |writer| {
+            for (k, two) in offsets.windows(2).enumerate() {
+                let range = usize::try_from(two[0]).ok().zip(usize::try_from(two[1]).ok());
+                let Some(datagram) = range.and_then(|(from, to)| bytes.get(from..to)) else {
+                    return Err(
+                        taxel_core::problem!("datagram {k}: bytes {} to {} are not there", two[0], two[1]).into()
+                    );
+                };
+                writer.datagram(arrived_ns[k], number[k], datagram)?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Keeps one datagram.
+    fn datagram(&self, py: Python<'_>, arrived_ns: i64, number: u64, bytes: &[u8]) -> PyResult<()> {
+        self.with(py, |writer| writer.datagram(arrived_ns, number, bytes))
+    }
+
+    /// Keeps a note.
+    fn note(&self, py: Python<'_>, at_ns: i64, t_us: Option<i64>, text: &str) -> PyResult<()> {
+        self.with(py, |writer| writer.note(at_ns, t_us, text))
+    }
+
+    /// Keeps a start or stop of the board.
+    fn marker(&self, py: Python<'_>, at_ns: i64, t_us: i64, start: bool) -> PyResult<()> {
+        self.with(py, |writer| writer.marker(at_ns, Marker { t: t_us, start }))
+    }
+
+    /// Keeps a detection.
+    fn detection(
+        &self,
+        py: Python<'_>,
+        at_ns: i64,
+        label: String,
+        t_us: i64,
+        known_us: i64,
+        slope: f64,
+    ) -> PyResult<()> {
+        let said = Detection { label, t: t_us, known: known_us, slope };
+        self.with(py, |writer| writer.detection(at_ns, &said))
+    }
+
+    /// Keeps registers, given as JSON.
+    fn registers(&self, py: Python<'_>, at_ns: i64, registers: &str) -> PyResult<()> {
+        let registers: wire::Registers = from_json("registers", registers)?;
+        self.with(py, |writer| writer.registers(at_ns, &registers))
+    }
+
+    /// Keeps a picture of held ticks, row by row.
+    fn picture(
+        &self,
+        py: Python<'_>,
+        at_ns: i64,
+        t_us: i64,
+        columns: u16,
+        ticks: PyReadonlyArray1<'_, u16>,
+        full: u16,
+    ) -> PyResult<()> {
+        let ticks = slice("ticks", &ticks)?;
+        self.with(py, |writer| writer.picture(at_ns, t_us, columns, ticks, full))
+    }
+
+    /// Ends the recording; counts in and out as JSON.
+    fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<String> {
+        let counts: Counts = from_json("counts", counts)?;
+        let writer = self.writer.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
+        let Some(writer) = writer else {
+            return Err(ProblemError::new_err("the recording is finished: begin a new one"));
+        };
+        Ok(json!(enter(py, |_| writer.finish(counts))?).to_string())
+    }
+}
+
+/// The verdict line of counts given as JSON.
+#[pyfunction]
+fn recording_verdict(counts: &str) -> PyResult<String> {
+    Ok(from_json::<Counts>("counts", counts)?.verdict())
+}
+
+/// Writes raw bytes as a complete `.lsa` with its `.lss`.
+#[pyfunction]
+fn write_lsa(py: Python<'_>, path: PathBuf, bytes: &Bound<'_, PyBytes>, overwrite: bool) -> PyResult<()> {
+    let bytes = bytes.as_bytes();
+    enter(py, |_| {
+        let mut writer = LsaWriter::create(&path, overwrite)?;
+        writer.bytes(bytes)?;
+        writer.finish()
+    })
+}
+
+/// The name of a recording in automatic mode: the index appended to the name.
+#[pyfunction]
+fn numbered_path(path: PathBuf, index: u32) -> PathBuf {
+    numbered(&path, index)
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<RecordingReader>()?;
+    module.add_class::<RecordingWriter>()?;
+    module.add_function(wrap_pyfunction!(recording_verdict, module)?)?;
+    module.add_function(wrap_pyfunction!(write_lsa, module)?)?;
+    module.add_function(wrap_pyfunction!(numbered_path, module)?)
+}
