@@ -103,6 +103,7 @@ impl Reader {
         let end = stretch.end;
         let mut stream = Box::new(after(&heard, stretch)?);
         stream.push_events(&heard, &mut self.found)?;
+        stream.advance(end, &mut self.found)?;
         // What is said of the rest itself is not meant: a board that was just reset tells of every taxel.
         self.found.retain(|d| d.known >= end);
         self.state = State::Reading(stream);

@@ -1,0 +1,400 @@
+//! From the emulated board's frames to recorded datagrams and detections: nothing is lost uncounted, and the recording
+//! gives what was heard live.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{Ipv4Addr, SocketAddr, TcpStream};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use taxel_core::board::Board;
+use taxel_core::detect::{Detection, FrameClock, ReadoutStream};
+use taxel_core::encode::Stream;
+use taxel_core::neuron::Neuron;
+use taxel_core::wire::{Command, Decoder, Registers};
+use taxel_core::{Array, Events, Result, Spike, Stop};
+use taxel_live::capture::Sender;
+use taxel_live::emulate::{self, Emulator, Report, Touch};
+use taxel_live::pipeline::{Ear, Live, Options, Record, Said, Summary};
+use taxel_live::recording::{Compression, Reader, Topic};
+
+const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
+
+/// A file name of its own for each test, removed at the end.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("taxel-{}-{name}", std::process::id()));
+        let _ = std::fs::remove_file(&path);
+        Self(path)
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+        let _ = std::fs::remove_file(self.0.with_extension("lss"));
+    }
+}
+
+/// Presses that come and go every 40 ms on a square that wanders; quiet from frame `pressed` on.
+fn presses(frames: u64, pressed: u64) -> impl Touch {
+    let mut k = 0;
+    move |ticks: &mut [u16]| {
+        ticks.fill(20);
+        let (press, phase) = (k / 208, (k % 208) as u16);
+        if k < pressed && phase < 80 {
+            let (x, y) = ((press * 7 % 50) as usize, (press * 11 % 50) as usize);
+            for row in y..y + 6 {
+                ticks[row * 64 + x..row * 64 + x + 6].fill(20 + 2 * phase.min(80 - phase));
+            }
+        }
+        k += 1;
+        k <= frames
+    }
+}
+
+/// What the board says to these frames, straight from its state machine.
+fn sent(frames: u64, pressed: u64) -> Events {
+    let array = Array::thesis();
+    let mut board = Board::new(Registers::default(), &array).expect("a valid preset");
+    let mut decoder = Decoder::new(array.clone());
+    let mut events = Events::empty(array.clone());
+    let mut touch = presses(frames, pressed);
+    let mut ticks = vec![0; array.len()];
+    while touch.frame(&mut ticks) {
+        board
+            .frame(&ticks, |datagram| {
+                decoder.push_into(datagram, None, &mut events);
+                decoder.end_of_datagram_into(&mut events);
+                true
+            })
+            .expect("a frame of the array's size");
+    }
+    decoder.finish_into(&mut events);
+    events
+}
+
+fn emulate(to: SocketAddr, real_time: bool, mut touch: impl Touch) -> Report {
+    let array = Array::thesis();
+    let board = Board::new(Registers::default(), &array).expect("a valid preset");
+    let options = emulate::Options { real_time, ..emulate::Options::to(to) };
+    let mut emulator = Emulator::open(board, &array, options).expect("a socket");
+    emulator.run(&mut touch, |_| {}, Stop::never()).expect("sent")
+}
+
+/// Every event is a spike of train 0; `slow` makes it take so long for each piece.
+struct EveryEvent {
+    slow: Duration,
+}
+
+impl Stream for EveryEvent {
+    fn trains(&self) -> usize {
+        1
+    }
+    fn signed(&self) -> bool {
+        false
+    }
+    fn latency_ms(&self) -> f64 {
+        0.0
+    }
+    fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()> {
+        std::thread::sleep(self.slow);
+        out.extend(events.t.iter().map(|&t| Spike { t: t as f64 / 1000.0, train: 0, value: 1.0 }));
+        Ok(())
+    }
+    fn push_frame(&mut self, _: i64, _: &[f32], _: &mut Vec<Spike>) -> Result<()> {
+        Ok(())
+    }
+    fn advance(&mut self, _: i64, _: &mut Vec<Spike>) {}
+}
+
+/// Speaks after 40 events within `tau` ms, which is how slowly its kernel rises.
+fn readout(tau: f64, slow: Duration) -> ReadoutStream {
+    let clock = FrameClock::new(192.0).expect("a frame");
+    let neuron = Neuron { tau, refractory: 15.0, theta_0: 0.4, ..Neuron::default() };
+    let neurons = std::iter::once(("touch".to_owned(), neuron, vec![0.03], 0.0));
+    ReadoutStream::new(Box::new(EveryEvent { slow }), Array::thesis(), clock, 1.0, neurons).expect("one weight")
+}
+
+fn options(record: Option<&Scratch>) -> Options {
+    let record = record.map(|s| Record { path: s.0.clone(), compression: Compression::Lz4, overwrite: false });
+    // A loaded machine may hold frames back for longer than 5 frames: here no event may come late.
+    Options { record, guard_frames: 1000.0, ..Options::new(Array::thesis()) }
+}
+
+fn wait_for(live: &Live, what: impl Fn(&Live) -> bool) {
+    let begun = Instant::now();
+    while !what(live) {
+        assert!(begun.elapsed() < Duration::from_secs(30), "never came: {:?}", live.counters());
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn assert_closed(summary: &Summary, report: &Report) {
+    let c = &summary.counters;
+    assert_eq!(report.board.datagrams, report.sent.datagrams);
+    assert_eq!(c.capture.datagrams, c.decoded + c.capture.dropped_by_queue);
+    assert_eq!(c.capture.waiting, 0);
+    assert_eq!(c.wire.bytes, 5 * c.wire.words + c.wire.skipped);
+    assert_eq!(c.wire.bytes, c.capture.bytes - c.capture.bytes_dropped_by_queue);
+    assert_eq!(c.capture.messages + c.capture.dropped_by_kernel, report.sent.messages);
+}
+
+fn recorded(path: &Scratch) -> (Events, Vec<Detection>) {
+    let reader = Reader::open(&path.0).expect("a recording");
+    let mut decoder = Decoder::new(reader.header().array.clone());
+    let mut events = Events::empty(reader.header().array.clone());
+    reader
+        .messages(Stop::never(), |message| {
+            if message.topic == Topic::Datagrams {
+                decoder.push_into(message.data, Some(message.at_ns / 1000), &mut events);
+                decoder.end_of_datagram_into(&mut events);
+            }
+            Ok(())
+        })
+        .expect("sound chunks");
+    decoder.finish_into(&mut events);
+    let said = reader.remarks(Stop::never()).expect("sound chunks").0.detections;
+    let said =
+        said.into_iter().map(|(_, d)| Detection { label: d.label, t: d.t_us, known: d.known_us, slope: d.slope });
+    (events, said.collect())
+}
+
+#[test]
+fn a_recording_holds_the_events_that_the_board_sent() {
+    let path = Scratch::new("events.mcap");
+    let live = Live::start(ANY, options(Some(&path)), Ear::Deaf, vec![]).expect("a port and a file");
+    let report = emulate(live.address(), false, presses(3000, 3000));
+    let summary = live.stop().expect("a sound way");
+    assert_closed(&summary, &report);
+    let expected = sent(3000, 3000);
+    assert!(expected.len() > 4096);
+    assert_eq!(summary.counters.events, expected.len() as u64);
+    assert_eq!(recorded(&path).0, expected);
+    assert!(summary.verdict.starts_with("nothing lost after arrival"), "{}", summary.verdict);
+}
+
+#[test]
+fn a_raw_recording_holds_the_bytes_and_is_complete_at_the_end() {
+    let path = Scratch::new("bytes.lsa");
+    let live = Live::start(ANY, options(Some(&path)), Ear::Deaf, vec![]).expect("a port and a file");
+    let report = emulate(live.address(), false, presses(1000, 1000));
+    wait_for(&live, |live| live.counters().wire.bytes == report.sent.bytes);
+    assert!(!path.0.with_extension("lss").exists(), "not complete yet");
+    live.stop().expect("a sound way");
+    let mut decoder = Decoder::new(Array::thesis());
+    let mut events = decoder.push(&std::fs::read(&path.0).expect("the file"), None);
+    decoder.finish_into(&mut events);
+    assert_eq!(events, sent(1000, 1000));
+    assert!(path.0.with_extension("lss").exists());
+}
+
+#[test]
+fn what_is_said_live_is_what_the_recording_says() {
+    let path = Scratch::new("said.mcap");
+    let heard = Arc::new(Mutex::new(Vec::<Said>::new()));
+    let sink = Arc::clone(&heard);
+    let sinks: Vec<Box<dyn taxel_live::pipeline::Sink>> =
+        vec![Box::new(move |said: &Said| sink.lock().expect("sound").push(said.clone()))];
+    let ear = Ear::Reading(Box::new(readout(20.0, Duration::ZERO)));
+    let live = Live::start(ANY, options(Some(&path)), ear, sinks).expect("a port and a file");
+    // Quiet at the end, so that all is said before the stop.
+    let report = emulate(live.address(), true, presses(5000, 3000));
+    let mut queued = vec![];
+    while let Some(said) = live.next(Duration::from_millis(500)).expect("a sound way") {
+        queued.push(said);
+    }
+    let summary = live.stop().expect("a sound way");
+    assert_closed(&summary, &report);
+    assert_eq!(summary.counters.late, 0);
+    assert_eq!(summary.counters.events, summary.counters.read_out);
+    let heard = heard.lock().expect("sound");
+    assert_eq!(*heard, queued, "sink and queue hear the same");
+    let live_said: Vec<Detection> = heard.iter().map(|s| s.detection.clone()).collect();
+    let (events, said) = recorded(&path);
+    assert_eq!(said, live_said, "the recording keeps what was said");
+    let again = readout(20.0, Duration::ZERO).run_events(&events, 5000 * 192, Stop::never()).expect("a sound readout");
+    assert_eq!(again, live_said);
+    assert!(again.len() > 5, "the presses are heard: {}", again.len());
+    // By the host's clock less the offset no detection can be said before it was known, but for the clocks' estimate.
+    assert!(heard.iter().all(|s| s.said >= s.detection.known - 192), "{heard:?}");
+}
+
+#[test]
+fn in_silence_time_moves_on_by_the_hosts_clock() {
+    let live = Live::start(
+        ANY,
+        Options { guard_frames: 5.0, ..options(None) },
+        Ear::Reading(Box::new(readout(20.0, Duration::ZERO))),
+        vec![],
+    )
+    .expect("a port");
+    // The board's first frame is all that ever comes; the potential crosses some ms after it.
+    emulate(live.address(), true, |ticks: &mut [u16]| {
+        let first = ticks[0] == 0;
+        ticks.fill(0);
+        ticks[..40].fill(20);
+        first
+    });
+    let said = live.next(Duration::from_secs(30)).expect("a sound way").expect("it is said though nothing follows");
+    assert!(said.detection.t > 1000, "the kernel takes its time: {said:?}");
+    live.stop().expect("a sound way");
+}
+
+#[test]
+fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
+    let live = Live::start(ANY, options(None), Ear::Deaf, vec![]).expect("a port");
+    let mut datagrams: Vec<Vec<u8>> = vec![];
+    let mut board = Board::new(Registers::default(), &Array::thesis()).expect("a valid preset");
+    let mut touch = presses(800, 800);
+    let mut ticks = vec![0; 4096];
+    while touch.frame(&mut ticks) {
+        board
+            .frame(&ticks, |datagram| {
+                datagrams.push(datagram.to_vec());
+                true
+            })
+            .expect("a frame");
+    }
+    let mut random = 7_u32;
+    let mut next = |n: usize| {
+        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (random >> 8) as usize % n
+    };
+    for k in 0..datagrams.len() {
+        let length = datagrams[k].len();
+        match next(6) {
+            0 => datagrams[k].truncate(next(length)),
+            1 => datagrams[k].drain(..next(length)).for_each(drop),
+            2 => datagrams[k][next(length)] ^= 1 << next(8),
+            3 if k > 0 => datagrams.swap(k, k - 1),
+            _ => {}
+        }
+    }
+    let mut sender = Sender::open(live.address(), true).expect("a socket");
+    datagrams.iter().for_each(|d| sender.push(d).expect("sent"));
+    sender.flush().expect("sent");
+    let summary = live.stop().expect("a sound way");
+    let (c, sent) = (summary.counters, sender.counts());
+    assert_eq!((c.capture.datagrams, c.capture.bytes, c.decoded), (sent.datagrams, sent.bytes, sent.datagrams));
+    assert_eq!(c.wire.bytes, sent.bytes);
+    assert_eq!(c.wire.bytes, 5 * c.wire.words + c.wire.skipped);
+    let w = c.wire;
+    assert!(w.skipped > 0 && w.short > 0 && w.unpaired > 0 && w.back > 0, "{w:?}");
+    let kinds = w.changes + w.intensities + w.unpaired + w.markers + w.contradictory + w.outside;
+    assert_eq!(w.words, kinds);
+    for cause in ["bytes skipped", "short events", "steps back in time"] {
+        assert!(summary.verdict.contains(cause), "{}", summary.verdict);
+    }
+}
+
+#[test]
+fn a_slow_readout_loses_events_where_they_are_counted_and_the_recording_loses_none() {
+    let path = Scratch::new("slow.mcap");
+    let ear = Ear::Reading(Box::new(readout(20.0, Duration::from_millis(50))));
+    let live =
+        Live::start(ANY, Options { readout_events: 1000, ..options(Some(&path)) }, ear, vec![]).expect("started");
+    let report = emulate(live.address(), false, presses(3000, 3000));
+    let summary = live.stop().expect("a sound way");
+    assert_closed(&summary, &report);
+    let c = &summary.counters;
+    assert!(c.events_dropped > 0);
+    assert_eq!(c.events, c.read_out + c.events_dropped);
+    assert_eq!(recorded(&path).0, sent(3000, 3000));
+}
+
+#[test]
+fn a_file_that_exists_is_kept_and_its_port_is_let_go() {
+    let path = Scratch::new("kept.mcap");
+    std::fs::write(&path.0, "mine").expect("written");
+    let error = Live::start(ANY, options(Some(&path)), Ear::Deaf, vec![]).err().expect("refused");
+    assert!(matches!(&error, taxel_live::Error::File { .. }), "{error}");
+    assert_eq!(std::fs::read(&path.0).expect("still there"), b"mine");
+}
+
+#[test]
+fn a_port_that_is_taken_leaves_no_file_behind() {
+    let path = Scratch::new("unborn.mcap");
+    let holder = Live::start(ANY, options(None), Ear::Deaf, vec![]).expect("a port");
+    let error = Live::start(holder.address(), options(Some(&path)), Ear::Deaf, vec![]).err().expect("refused");
+    assert!(matches!(&error, taxel_live::Error::Socket { .. }), "{error}");
+    assert!(!path.0.exists());
+}
+
+#[test]
+fn a_stop_ends_also_while_datagrams_pour_in() {
+    let live = Live::start(ANY, options(None), Ear::Deaf, vec![]).expect("a port");
+    let to = live.address();
+    let done = Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let theirs = Arc::clone(&done);
+    let pouring = std::thread::spawn(move || {
+        let mut sender = Sender::open(to, true).expect("a socket");
+        while !theirs.load(std::sync::atomic::Ordering::Relaxed) {
+            sender.push(&[0; 1400]).expect("sent");
+        }
+    });
+    wait_for(&live, |live| live.counters().decoded > 1000);
+    let summary = live.stop().expect("a sound way");
+    done.store(true, std::sync::atomic::Ordering::Relaxed);
+    pouring.join().expect("sent all along");
+    let c = summary.counters;
+    assert_eq!(c.capture.datagrams, c.decoded + c.capture.dropped_by_queue);
+}
+
+#[test]
+fn a_tare_is_made_of_the_stretch_before_the_start_marker() {
+    let stretch = Arc::new(Mutex::new(None));
+    let theirs = Arc::clone(&stretch);
+    let after = Box::new(move |events: &Events, range: std::ops::Range<i64>| {
+        *theirs.lock().expect("sound") = Some((events.len(), range));
+        Ok(readout(1.0, Duration::ZERO))
+    });
+    let live = Live::start(ANY, options(None), Ear::Taring(1_000_000, after), vec![]).expect("a port");
+    wait_for(&live, |live| live.counters().taring);
+    let array = Array::thesis();
+    let board = Board::new(Registers::default(), &array).expect("a valid preset");
+    let commands = vec![(260, Command::new(7, 1 << 16).expect("a command"))];
+    let options = emulate::Options { commands, ..emulate::Options::to(live.address()) };
+    let mut emulator = Emulator::open(board, &array, options).expect("a socket");
+    let report = emulator.run(&mut presses(1000, 0), |_| {}, Stop::never()).expect("sent");
+    wait_for(&live, |live| !live.counters().taring);
+    assert_eq!(live.take_markers().iter().map(|m| (m.t, m.start)).collect::<Vec<_>>(), [(260 * 192 / 100 * 100, true)]);
+    let summary = live.stop().expect("a sound way");
+    assert_closed(&summary, &report);
+    assert_eq!(*stretch.lock().expect("sound"), Some((4096, 0..260 * 192 / 100 * 100)));
+    assert_eq!(summary.counters.detections, 0, "what the first frame tells of every taxel is not said");
+}
+
+#[test]
+fn the_board_takes_commands_and_answers() {
+    let live = Live::start(ANY, options(None), Ear::Deaf, vec![]).expect("a port");
+    let array = Array::thesis();
+    let board = Board::new(Registers::default(), &array).expect("a valid preset");
+    let control = Some(ANY);
+    let options = emulate::Options { control, ..emulate::Options::to(live.address()) };
+    let mut emulator = Emulator::open(board, &array, options).expect("sockets");
+    let address = emulator.control_address().expect("a port");
+    let stop = std::sync::atomic::AtomicBool::new(false);
+    let asked = || stop.load(std::sync::atomic::Ordering::Relaxed);
+    std::thread::scope(|scope| {
+        let board = scope.spawn(|| emulator.run(&mut presses(u64::MAX, 0), |_| {}, Stop::when(&asked)));
+        let mut cable = TcpStream::connect(address).expect("the board listens");
+        let mut lines = BufReader::new(cable.try_clone().expect("a handle")).lines();
+        let mut answer = |command: Option<(u8, u32)>| {
+            if let Some((register, value)) = command {
+                cable.write_all(&Command::new(register, value).expect("a command").to_bytes()).expect("sent");
+            }
+            lines.next().expect("a line").expect("text")
+        };
+        assert_eq!(answer(None), "taxel-board v1 64x64 16ch");
+        assert_eq!(answer(Some((7, 1 << 16))), "ok REG7=0x00010000");
+        assert_eq!(answer(Some((2, 301))), "bad REG2 rule 1");
+        wait_for(&live, |live| live.counters().marked_start == Some(true));
+        stop.store(true, std::sync::atomic::Ordering::Relaxed);
+        let report = board.join().expect("no panic").expect("sent");
+        assert_eq!(report.late.count, report.board.frames);
+    });
+    live.stop().expect("a sound way");
+}
