@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-import taxel
 from hypothesis import given
 from hypothesis import strategies as st
+
+import taxel
 from taxel.detect import Score, Spread, score
 
 TIMES = st.lists(st.integers(-(10**6), 10**6), max_size=12)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from taxel import FormatError, formats
 from taxel.formats import gaitndd, gaitpdb, moticon, pedar, plate
 
