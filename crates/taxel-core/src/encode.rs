@@ -1,11 +1,33 @@
 //! Events or frames to spikes, live or whole: the same spikes either way.
 
-use crate::{Events, Result, Spike};
+mod change_events;
+mod contact_area;
+mod fa1;
+mod level_crossing;
+mod power;
+mod running_range;
+mod sampled;
+mod tare;
+mod threshold_izhikevich;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+pub use change_events::{ChangeEvents, Previous, Rounding};
+pub use contact_area::ContactArea;
+pub use fa1::{Decay, Fa1};
+pub use level_crossing::LevelCrossing;
+pub use running_range::{FirstWindow, RunningRange};
+pub use tare::{Tare, TareBuilder};
+pub use threshold_izhikevich::{Begin, Published, ThresholdIzhikevich};
+
+use crate::{Array, Error, Events, Frames, Intensities, Result, Spike, SpikeTrains, Stop, problem};
 
 /// An encoder at work: takes what comes, in order of time, and hands on spikes as soon as they are certain.
 ///
 /// A stamp is over when a later one comes or when the caller moves time on with [`Stream::advance`]; what depends on a
-/// whole stamp is reckoned then, and its spikes have the stamp's time. So pieces and the whole give the same spikes.
+/// whole stamp is reckoned then, and its spikes have the stamp's time. So pieces and the whole give the same spikes,
+/// in the same order: by time, then by train.
 pub trait Stream: Send {
     /// How many trains the encoder speaks on.
     fn trains(&self) -> usize;
@@ -16,20 +38,272 @@ pub trait Stream: Send {
     /// How much later than the touch itself a spike comes, ms: what the encoder's own rule costs.
     fn latency_ms(&self) -> f64;
 
-    /// Takes the next events.
+    /// Takes the next events; one behind the latest stamp counts as of that stamp.
     ///
     /// # Errors
     ///
-    /// `Problem` where the encoder needs intensities that are not there, or reads frames only.
+    /// `Problem` where the encoder needs intensities that are not there, or the stream was begun with frames.
     fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()>;
 
     /// Takes the next picture, row by row, at `t` us.
     ///
     /// # Errors
     ///
-    /// `Problem` where the picture has another size, comes out of order, or the encoder reads events only.
+    /// `Problem` where the picture has another size, holds NaN, comes out of order, or the stream was begun with events.
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()>;
 
     /// Says that nothing will come any more before `t` us (exclusive).
     fn advance(&mut self, t: i64, out: &mut Vec<Spike>);
+
+    /// Says that nothing more will come: holds what came last for one period and the latency, so that all spikes that
+    /// it owes come out. Gives the end of that, ms, or `None` where nothing ever came.
+    fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64>;
+}
+
+/// Any encoder with its parameters; in JSON an object whose `name` says which.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "name", rename_all = "snake_case")]
+pub enum Encoder {
+    /// Changes since the last sent value, with 1 to 10 bits.
+    ChangeEvents(ChangeEvents),
+    /// Plain crossings of levels.
+    LevelCrossing(LevelCrossing),
+    /// A threshold and a pair of Izhikevich neurons.
+    ThresholdIzhikevich(ThresholdIzhikevich),
+    /// The FA-1 afferent of equations 5.1 to 5.5.
+    Fa1(Fa1),
+    /// How many taxels are loaded.
+    ContactArea(ContactArea),
+}
+
+impl Encoder {
+    /// Reads an encoder from JSON and checks every parameter; what is left out has its default.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter.
+    pub fn from_json(json: &str) -> Result<Self> {
+        let value: Value = serde_json::from_str(json).map_err(|e| problem!("encoder: not JSON: {e}"))?;
+        let encoder: Self = serde_json::from_value(value.clone()).map_err(|e| said(&value, &e))?;
+        encoder.check()?;
+        Ok(encoder)
+    }
+
+    /// The encoder with all its parameters, as JSON.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        // Numbers were checked to be finite, and nothing else in here can fail to be written.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+
+    /// Checks every parameter, for encoders that were not read from JSON.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter, its value and what would be right.
+    pub fn check(&self) -> Result<()> {
+        match self {
+            Self::ChangeEvents(e) => e.check(),
+            Self::LevelCrossing(e) => e.check(),
+            Self::ThresholdIzhikevich(e) => e.check(),
+            Self::Fa1(e) => e.check(),
+            Self::ContactArea(e) => e.check(),
+        }
+    }
+
+    /// Begins to encode what an array feels.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where a parameter makes no sense, or a contact area has no tare or another array's.
+    pub fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        self.check()?;
+        match self {
+            Self::ChangeEvents(e) => e.stream(array),
+            Self::LevelCrossing(e) => e.stream(array),
+            Self::ThresholdIzhikevich(e) => e.stream(array),
+            Self::Fa1(e) => e.stream(array),
+            Self::ContactArea(e) => e.stream(array),
+        }
+    }
+
+    /// How much later than the touch itself a spike comes, ms: what the encoder's own rule costs.
+    #[must_use]
+    pub fn latency_ms(&self) -> f64 {
+        match self {
+            Self::LevelCrossing(e) => e.latency_ms(),
+            Self::ThresholdIzhikevich(e) => e.latency_ms(),
+            Self::ChangeEvents(_) | Self::Fa1(_) | Self::ContactArea(_) => 0.0,
+        }
+    }
+
+    /// On how many trains the encoder speaks for an array.
+    #[must_use]
+    pub fn trains(&self, array: &Array) -> usize {
+        let channels = sampled::Channels::new(array).len();
+        match self {
+            Self::ChangeEvents(_) | Self::Fa1(_) => channels,
+            Self::LevelCrossing(e) => e.trains(channels),
+            Self::ThresholdIzhikevich(e) => e.trains(channels),
+            Self::ContactArea(e) => e.trains(),
+        }
+    }
+
+    /// Whether its spikes carry a signed value, so that a neuron hears each train as two, ON and OFF.
+    #[must_use]
+    pub fn signed(&self) -> bool {
+        !matches!(self, Self::ContactArea(_))
+    }
+
+    /// Whether it must be given a tare before it can work: a tare belongs to a board and a day, not to an encoder.
+    #[must_use]
+    pub fn needs_tare(&self) -> bool {
+        matches!(self, Self::ContactArea(ContactArea { tare: None, .. }))
+    }
+
+    /// The same encoder with this tare; one that reads none stays as it is.
+    #[must_use]
+    pub fn with_tare(&self, tare: &Tare) -> Self {
+        match self {
+            Self::ContactArea(e) => Self::ContactArea(ContactArea { tare: Some(tare.clone()), ..e.clone() }),
+            other => other.clone(),
+        }
+    }
+
+    /// Encodes a whole recording of events.
+    ///
+    /// The window begins at the first stamp and ends one period and the latency after the last, with the last values
+    /// held until then.
+    ///
+    /// # Errors
+    ///
+    /// As [`Encoder::stream`] and [`Stream::push_events`]; `Interrupted` where asked to stop.
+    pub fn encode_events(&self, events: &Events, stop: Stop<'_>) -> Result<SpikeTrains> {
+        /// Events between two looks at `stop`.
+        const PIECE: usize = 65_536;
+        let mut stream = self.stream(&events.array)?;
+        let mut out = vec![];
+        if events.len() <= PIECE {
+            stream.push_events(events, &mut out)?;
+        } else {
+            for begin in (0..events.len()).step_by(PIECE) {
+                stop.check()?;
+                stream.push_events(&piece(events, begin..events.len().min(begin + PIECE)), &mut out)?;
+            }
+        }
+        collect(stream, out, events.t.first().copied())
+    }
+
+    /// Encodes a whole recording of frames.
+    ///
+    /// # Errors
+    ///
+    /// As [`Encoder::encode_events`].
+    pub fn encode_frames(&self, frames: &Frames, stop: Stop<'_>) -> Result<SpikeTrains> {
+        frames.check()?;
+        self.encode_pictures(&frames.array, &frames.t, &frames.values, stop)
+    }
+
+    /// Encodes pictures, row by row and one after the other, at `t` us.
+    ///
+    /// # Errors
+    ///
+    /// As [`Encoder::encode_events`].
+    pub fn encode_pictures(&self, array: &Array, t: &[i64], values: &[f32], stop: Stop<'_>) -> Result<SpikeTrains> {
+        let mut stream = self.stream(array)?;
+        let mut out = vec![];
+        for (k, (&t, picture)) in t.iter().zip(values.chunks_exact(array.len())).enumerate() {
+            if k % 64 == 0 {
+                stop.check()?;
+            }
+            stream.push_frame(t, picture, &mut out)?;
+        }
+        collect(stream, out, t.first().copied())
+    }
+}
+
+fn collect(mut stream: Box<dyn Stream>, mut out: Vec<Spike>, first: Option<i64>) -> Result<SpikeTrains> {
+    let start = first.map_or(0.0, ms);
+    let end = stream.finish(&mut out).unwrap_or(start);
+    SpikeTrains::from_spikes(&out, stream.trains(), stream.signed(), start, end)
+}
+
+fn piece(events: &Events, range: std::ops::Range<usize>) -> Events {
+    Events {
+        array: events.array.clone(),
+        t: events.t[range.clone()].to_vec(),
+        x: events.x[range.clone()].to_vec(),
+        y: events.y[range.clone()].to_vec(),
+        p: events.p[range.clone()].to_vec(),
+        intensity: events
+            .intensity
+            .as_ref()
+            .map(|i| Intensities { ticks: i.ticks[range.clone()].to_vec(), present: i.present[range].to_vec() }),
+        markers: vec![],
+    }
+}
+
+/// Names the parameter that serde could not read: it says only what is wrong with it.
+fn said(value: &Value, error: &serde_json::Error) -> Error {
+    let Some(object) = value.as_object() else {
+        return problem!("encoder is {value}: must be an object with a name and parameters");
+    };
+    let Some(name) = object.get("name").and_then(Value::as_str) else {
+        return problem!("encoder without a name: must be one of {}", NAMES.join(", "));
+    };
+    if !NAMES.contains(&name) {
+        return problem!("encoder {name}: must be one of {}", NAMES.join(", "));
+    }
+    for (key, one) in object.iter().filter(|(key, _)| *key != "name") {
+        let alone = serde_json::json!({ "name": name, key: one });
+        if let Err(error) = serde_json::from_value::<Encoder>(alone)
+            && !error.to_string().starts_with("missing field")
+        {
+            return if error.to_string().starts_with("unknown field") {
+                problem!("encoder {name}: {error}")
+            } else {
+                problem!("encoder {name}: {key}: {error}")
+            };
+        }
+    }
+    problem!("encoder {name}: {error}")
+}
+
+const NAMES: [&str; 5] = ["change_events", "level_crossing", "threshold_izhikevich", "fa1", "contact_area"];
+
+/// us to ms.
+fn ms(t: i64) -> f64 {
+    t as f64 / 1000.0
+}
+
+/// Spikes from place `from` on by time, then by train.
+fn sort_from(out: &mut [Spike], from: usize) {
+    out[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
+}
+
+/// A time in ms that must be a whole number of us, 1 or more.
+fn micros(name: &str, ms: f64) -> Result<i64> {
+    let us = (ms * 1000.0).round();
+    if !((1.0..1e15).contains(&us) && (ms * 1000.0 - us).abs() < 1e-6 * us) {
+        return Err(problem!("{name} is {ms}: must be a whole number of us, 0.001 ms or more"));
+    }
+    Ok(us as i64)
+}
+
+fn check_levels(levels: &[f64]) -> Result<()> {
+    if levels.is_empty() {
+        return Err(problem!("levels: must hold one level or more"));
+    }
+    if let Some(level) = levels.iter().find(|l| !(l.is_finite() && l.abs() <= f64::from(f32::MAX))) {
+        return Err(problem!("levels hold {level}: must be finite"));
+    }
+    match levels.windows(2).find(|w| w[1] as f32 <= w[0] as f32) {
+        Some(w) => Err(problem!("levels: {} after {}, must ascend", w[1], w[0])),
+        None => Ok(()),
+    }
+}
+
+/// The step of the wire's stamps, ms (wire.md, section 1).
+fn stamp_period() -> f64 {
+    0.1
 }

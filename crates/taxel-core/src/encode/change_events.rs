@@ -1,0 +1,149 @@
+//! Change events: how far a taxel moved since its last event, with 1 to 10 bits (equation 5.7).
+
+use serde::{Deserialize, Serialize};
+
+use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
+use super::{Stream, micros, ms};
+use crate::{Array, Result, Spike, problem};
+
+/// Change events: U = value - previous value in units of the noise floor, saturating at +-(2^bits - 1).
+///
+/// A spike's value is the quantised change. The first sample is the first previous value and gives none. Reckoned in
+/// f32. One signed train a taxel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ChangeEvents {
+    /// The smallest change that counts, in the sensor's unit, above 0; theta_0 of equation 5.7. Default 3 ticks, the
+    /// floor of the board's fast presets (wire.md, section 3).
+    #[serde(default = "three")]
+    pub noise_floor: f64,
+    /// Bits an event, 1 to 10 (figure 5.7). Default 1: rise or fall.
+    #[serde(default = "one_bit")]
+    pub bits: u32,
+    /// What a sample is compared with. Default the value last sent.
+    #[serde(default)]
+    pub previous: Previous,
+    /// How U / theta_0 becomes whole. Default truncation.
+    #[serde(default)]
+    pub rounding: Rounding,
+    /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
+    #[serde(default = "super::stamp_period")]
+    pub period_ms: f64,
+}
+
+/// What a sample is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Previous {
+    /// The value at the last event (wire.md, section 3, rule 2): slow changes show too.
+    #[default]
+    LastSent,
+    /// The last sample, as thesis 4.3 words it.
+    LastSample,
+}
+
+/// How U / theta_0 becomes whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rounding {
+    /// Towards zero, and an event only where |U| is above the noise floor (wire.md, section 3, rule 3).
+    #[default]
+    Truncate,
+    /// Downwards, as 5.7 is printed: any fall, however small, is -1.
+    Floor,
+}
+
+fn three() -> f64 {
+    3.0
+}
+
+fn one_bit() -> u32 {
+    1
+}
+
+impl Default for ChangeEvents {
+    fn default() -> Self {
+        Self {
+            noise_floor: three(),
+            bits: one_bit(),
+            previous: Previous::default(),
+            rounding: Rounding::default(),
+            period_ms: super::stamp_period(),
+        }
+    }
+}
+
+impl ChangeEvents {
+    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let changes = Changes {
+            floor: self.noise_floor as f32,
+            most: ((1_u32 << self.bits) - 1) as f32,
+            previous: self.previous,
+            rounding: self.rounding,
+            last: vec![],
+            channels: Channels::new(array).len(),
+        };
+        Ok(Box::new(Sampled::new(changes, array, self.period_ms, 0.0)?))
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        let floor = self.noise_floor;
+        if !(floor.is_finite() && floor as f32 > 0.0 && (floor as f32).is_finite()) {
+            return Err(problem!("noise_floor is {floor}: must be above 0 and finite"));
+        }
+        if !(1..=10).contains(&self.bits) {
+            return Err(problem!("bits is {}: must be 1 to 10", self.bits));
+        }
+        micros("period_ms", self.period_ms).map(drop)
+    }
+}
+
+struct Changes {
+    floor: f32,
+    most: f32,
+    previous: Previous,
+    rounding: Rounding,
+    last: Vec<Block>,
+    channels: usize,
+}
+
+impl Rule for Changes {
+    fn trains(&self) -> usize {
+        self.channels
+    }
+
+    fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
+        self.last = held.to_vec();
+    }
+
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+        let floor = self.floor;
+        for (block, (new, last)) in held.iter().zip(&mut self.last).enumerate().filter(|(b, _)| changed[*b]) {
+            let moved = |new: f32, last: f32| match self.rounding {
+                Rounding::Truncate => (new - last).abs() > floor,
+                Rounding::Floor => new - last >= floor || new < last,
+            };
+            if new.iter().zip(last.iter()).fold(false, |any, (&new, &last)| any | moved(new, last)) {
+                for (lane, (&new, last)) in new.iter().zip(last.iter_mut()).enumerate() {
+                    if moved(new, *last) {
+                        let units = (new - *last) / floor;
+                        let whole = match self.rounding {
+                            Rounding::Truncate => units.trunc(),
+                            Rounding::Floor => units.floor(),
+                        };
+                        let value = whole.clamp(-self.most, self.most);
+                        out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value });
+                        *last = new;
+                    }
+                }
+            }
+            if self.previous == Previous::LastSample {
+                *last = *new;
+            }
+        }
+    }
+
+    fn idle(&self) -> bool {
+        true
+    }
+}

@@ -1,0 +1,262 @@
+//! How many taxels are loaded, as crossings of 2, 4, 8, 16, 32: no place in it, so that what is learnt transfers.
+
+use serde::{Deserialize, Serialize};
+
+use super::sampled::{BLOCK, Block, Channels, Source, blocks};
+use super::{Stream, Tare, ms};
+use crate::{Array, Events, Result, Spike, problem};
+
+/// Contact area: rises and falls of the number of loaded taxels through levels.
+///
+/// A taxel is loaded while its held value stands above its tared rest by the board's noise floor and half a tick; it
+/// counts if one of its 8 neighbours is loaded too, so that noise does not. A taxel never heard of, in the tare or
+/// since, is unloaded. Reckoned once a stamp, after its last event; spikes have the stamp's time. Trains, unsigned:
+/// rises through each level, then falls below each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactArea {
+    /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
+    #[serde(default = "three")]
+    pub noise_floor: f64,
+    /// Numbers of taxels, ascending; default 2, 4, 8, 16, 32.
+    #[serde(default = "doubling")]
+    pub levels: Vec<u32>,
+    /// The taxels' rest. It belongs to a board and a day: a saved readout has none and is given one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tare: Option<Tare>,
+}
+
+fn three() -> f64 {
+    3.0
+}
+
+fn doubling() -> Vec<u32> {
+    vec![2, 4, 8, 16, 32]
+}
+
+impl Default for ContactArea {
+    fn default() -> Self {
+        Self { noise_floor: three(), levels: doubling(), tare: None }
+    }
+}
+
+impl ContactArea {
+    pub(super) fn check(&self) -> Result<()> {
+        if !(self.noise_floor.is_finite() && self.noise_floor >= 0.0) {
+            return Err(problem!("noise_floor is {}: must be 0 or more and finite", self.noise_floor));
+        }
+        if self.levels.is_empty() {
+            return Err(problem!("levels: must hold one number of taxels or more"));
+        }
+        if self.levels[0] == 0 || self.levels.windows(2).any(|w| w[1] <= w[0]) {
+            return Err(problem!("levels are {:?}: must ascend from 1 or more", self.levels));
+        }
+        self.tare.as_ref().map_or(Ok(()), Tare::check)
+    }
+
+    pub(super) fn trains(&self) -> usize {
+        2 * self.levels.len()
+    }
+
+    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let Some(tare) = &self.tare else {
+            return Err(problem!("contact area without a tare: take one at rest and give it to the encoder"));
+        };
+        if (tare.array.rows, tare.array.columns) != (array.rows, array.columns) {
+            let (of, to) = (&tare.array, array);
+            return Err(problem!(
+                "tare of {} x {} taxels: the array has {} x {}",
+                of.rows,
+                of.columns,
+                to.rows,
+                to.columns
+            ));
+        }
+        let n = blocks(array.len());
+        let exists = |place: usize| array.exists.as_ref().is_none_or(|e| e[place]);
+        let mut loaded_from = vec![[f32::INFINITY; BLOCK]; n];
+        for (place, rest) in tare.rest.iter().enumerate().filter(|&(place, _)| exists(place)) {
+            if let Some(rest) = rest {
+                loaded_from[place / BLOCK][place % BLOCK] = round_up(rest + self.noise_floor + 0.5);
+            }
+        }
+        Ok(Box::new(Area {
+            levels: self.levels.clone(),
+            rows: usize::from(array.rows),
+            columns: usize::from(array.columns),
+            loaded_from,
+            loaded: vec![[0; BLOCK]; n],
+            neighbours: vec![0; array.len()],
+            area: 0,
+            said: 0,
+            held: vec![[0.0; BLOCK]; n],
+            changed: vec![false; n],
+            // Place by place: which taxels exist is in `loaded_from`.
+            channels: Channels::new(&Array { exists: None, ..array.clone() }),
+            source: Source::Unknown,
+        }))
+    }
+}
+
+/// The smallest f32 that is not below `x`.
+fn round_up(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) < x { near.next_up() } else { near }
+}
+
+struct Area {
+    levels: Vec<u32>,
+    rows: usize,
+    columns: usize,
+    /// From which value on each place is loaded; infinite where it has no rest.
+    loaded_from: Vec<Block>,
+    /// 1 where a place is loaded.
+    loaded: Vec<[u8; BLOCK]>,
+    /// How many neighbours of each place are loaded.
+    neighbours: Vec<u8>,
+    /// How many loaded places have a loaded neighbour.
+    area: u32,
+    /// The area at the end of the last stamp.
+    said: u32,
+    held: Vec<Block>,
+    changed: Vec<bool>,
+    channels: Channels,
+    source: Source,
+}
+
+impl Area {
+    fn is_loaded(&self, place: usize) -> bool {
+        self.loaded[place / BLOCK][place % BLOCK] != 0
+    }
+
+    /// Loads or unloads a place, and keeps the counts of its neighbours and the area in step.
+    fn toggle(&mut self, place: usize) {
+        let loaded = !self.is_loaded(place);
+        self.loaded[place / BLOCK][place % BLOCK] = u8::from(loaded);
+        let (row, column) = (place / self.columns, place % self.columns);
+        for y in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
+            for x in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
+                let other = y * self.columns + x;
+                if other == place {
+                    continue;
+                }
+                let counted = self.neighbours[other] > 0;
+                if loaded {
+                    self.neighbours[other] += 1;
+                } else {
+                    self.neighbours[other] -= 1;
+                }
+                if self.is_loaded(other) && counted != (self.neighbours[other] > 0) {
+                    self.area = if loaded { self.area + 1 } else { self.area - 1 };
+                }
+            }
+        }
+        if self.neighbours[place] > 0 {
+            self.area = if loaded { self.area + 1 } else { self.area - 1 };
+        }
+    }
+
+    /// The stamp at `t` us is over: says which levels the area passed since the last one.
+    fn say(&mut self, t: i64, out: &mut Vec<Spike>) {
+        let (before, now) = (self.said, self.area);
+        if before == now {
+            return;
+        }
+        for (train, &level) in self.levels.iter().enumerate() {
+            if before < level && level <= now {
+                out.push(Spike { t: ms(t), train: train as u32, value: 1.0 });
+            }
+        }
+        for (train, &level) in self.levels.iter().enumerate() {
+            if now < level && level <= before {
+                out.push(Spike { t: ms(t), train: (self.levels.len() + train) as u32, value: 1.0 });
+            }
+        }
+        self.said = now;
+    }
+}
+
+impl Stream for Area {
+    fn trains(&self) -> usize {
+        2 * self.levels.len()
+    }
+
+    fn signed(&self) -> bool {
+        false
+    }
+
+    fn latency_ms(&self) -> f64 {
+        0.0
+    }
+
+    fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()> {
+        self.channels.check(events)?;
+        let Some(intensity) = &events.intensity else {
+            return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
+        };
+        let Some(&first) = events.t.first() else { return Ok(()) };
+        let mut present = match self.source {
+            Source::Frames { .. } => return Err(problem!("event at {first} us: this stream was begun with frames")),
+            Source::Events { present } => present,
+            Source::Unknown => first,
+        };
+        for k in 0..events.len() {
+            if events.t[k] > present {
+                self.say(present, out);
+                present = events.t[k];
+            }
+            if intensity.present[k] {
+                let place = usize::from(events.y[k]) * self.columns + usize::from(events.x[k]);
+                let value = f32::from(intensity.ticks[k]);
+                if (value >= self.loaded_from[place / BLOCK][place % BLOCK]) != self.is_loaded(place) {
+                    self.toggle(place);
+                }
+            }
+        }
+        self.source = Source::Events { present };
+        Ok(())
+    }
+
+    fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
+        self.source.frame(t)?;
+        self.channels.load(t, values, &mut self.held, &mut self.changed)?;
+        for block in 0..self.held.len() {
+            if !std::mem::take(&mut self.changed[block]) {
+                continue;
+            }
+            let (held, from, loaded) = (&self.held[block], &self.loaded_from[block], self.loaded[block]);
+            let now: [u8; BLOCK] = std::array::from_fn(|lane| u8::from(held[lane] >= from[lane]));
+            if now != loaded {
+                for lane in (0..BLOCK).filter(|&lane| now[lane] != loaded[lane]) {
+                    self.toggle(block * BLOCK + lane);
+                }
+            }
+        }
+        self.say(t, out);
+        Ok(())
+    }
+
+    fn advance(&mut self, t: i64, out: &mut Vec<Spike>) {
+        match &mut self.source {
+            Source::Unknown => {}
+            Source::Frames { open } => *open = t.max(*open),
+            Source::Events { present } => {
+                let stamp = *present;
+                if t > stamp {
+                    *present = t;
+                    self.say(stamp, out);
+                }
+            }
+        }
+    }
+
+    fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64> {
+        let end = match self.source {
+            Source::Unknown => return None,
+            Source::Events { present } => present,
+            Source::Frames { open } => open - 1,
+        };
+        self.advance(end + 1, out);
+        Some(ms(end))
+    }
+}

@@ -1,0 +1,253 @@
+//! FA-1 encoder: pressure change to signed spikes (thesis 5.4.2, equations 5.1 to 5.5).
+//!
+//! Each taxel integrates the change of its compressed pressure and fires where that passes a threshold, which a spike
+//! raises by `T A theta_0` and a quiet sample lowers by `B theta_0`. Order within a sample: the threshold moves by the
+//! last sample's spike, the change is added, both are compared, a spike resets the integral.
+//!
+//! Reading: as printed, equation 5.5 lets the threshold sink below `theta_0` for one sample, by less than `B theta_0`,
+//! before its third case restores it. Kept, so that spikes equal the thesis'.
+
+use serde::{Deserialize, Serialize};
+
+use super::power::power;
+use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
+use super::{Stream, micros, ms};
+use crate::{Array, Result, Spike, problem};
+
+/// The FA-1 afferent exactly as equations 5.1 to 5.5, polarity kept.
+///
+/// Reckoned in f64; pressure below 0 counts as 0 before 5.1. It begins as if the first sample had always been. One
+/// signed train a taxel.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fa1 {
+    /// Power of the compression 5.1, above 0; default 0.7 (Table 5.3).
+    #[serde(default = "alpha")]
+    pub alpha: f64,
+    /// A, 1/ms: how much a spike raises the threshold; default 20 (Table 5.3).
+    #[serde(default = "twenty")]
+    pub a: f64,
+    /// B: how fast the threshold decays; default 0.05 (Table 5.3).
+    #[serde(default = "one_twentieth")]
+    pub b: f64,
+    /// What B is reckoned by; default the sample.
+    #[serde(default)]
+    pub decay: Decay,
+    /// The baseline threshold itself, 0 or more, in compressed units; left out, it is made from `range`. Table 5.3
+    /// prints 0: with it every change fires.
+    #[serde(default)]
+    pub theta_0: Option<f64>,
+    /// The largest pressure, in the sensor's unit: theta_0 = range^alpha / 1024 (text to Table 5.3). Default 150 ticks,
+    /// the ramp of the board's 5.2 kHz preset.
+    #[serde(default)]
+    pub range: Option<f64>,
+    /// T, ms: the sampling period, of events and of frames; default 1, where "about 100 Hz" holds. Frames must come at
+    /// this period, give or take half of it.
+    #[serde(default = "one")]
+    pub period_ms: f64,
+}
+
+/// What the threshold's decay B is reckoned by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Decay {
+    /// By the sample, B theta_0 each, as 5.5 is printed.
+    #[default]
+    Sample,
+    /// By the ms, B T theta_0 a sample: then the sampling period does not change the decay.
+    Ms,
+}
+
+fn alpha() -> f64 {
+    0.7
+}
+
+fn twenty() -> f64 {
+    20.0
+}
+
+fn one_twentieth() -> f64 {
+    0.05
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+/// Ticks of the ramp of the preset 5.2 kHz (wire.md, section 3).
+const RAMP: f64 = 150.0;
+
+impl Default for Fa1 {
+    fn default() -> Self {
+        Self {
+            alpha: alpha(),
+            a: twenty(),
+            b: one_twentieth(),
+            decay: Decay::default(),
+            theta_0: None,
+            range: None,
+            period_ms: one(),
+        }
+    }
+}
+
+impl Fa1 {
+    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let afferents = Afferents::new(self, Channels::new(array).len());
+        Ok(Box::new(Sampled::new(afferents, array, self.period_ms, 0.0)?.steady()))
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        if !(self.alpha.is_finite() && self.alpha > 0.0 && self.alpha <= 4.0) {
+            return Err(problem!("alpha is {}: must be above 0 and at most 4", self.alpha));
+        }
+        for (name, value) in [("a", self.a), ("b", self.b), ("theta_0", self.theta_0.unwrap_or(0.0))] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(problem!("{name} is {value}: must be 0 or more and finite"));
+            }
+        }
+        if let Some(range) = self.range {
+            if self.theta_0.is_some() {
+                return Err(problem!("theta_0 and range: give one of them"));
+            }
+            if !(range.is_finite() && range > 0.0) {
+                return Err(problem!("range is {range}: must be above 0 and finite"));
+            }
+        }
+        micros("period_ms", self.period_ms).map(drop)
+    }
+
+    /// The baseline threshold, in compressed units.
+    #[must_use]
+    pub fn baseline(&self) -> f64 {
+        self.theta_0.unwrap_or_else(|| self.range.unwrap_or(RAMP).powf(self.alpha) / 1024.0)
+    }
+}
+
+/// The state of the afferents of one block.
+#[derive(Clone)]
+struct Afferent {
+    /// rho of the last sample (5.1).
+    rho: [f64; BLOCK],
+    /// U (5.3).
+    u: [f64; BLOCK],
+    /// theta (5.5).
+    theta: [f64; BLOCK],
+    /// s of the last sample (5.4).
+    s: [f64; BLOCK],
+    /// Whether a sample without change would leave all this as it is.
+    still: bool,
+}
+
+struct Afferents {
+    alpha: f64,
+    jump: f64,
+    decay: f64,
+    theta_0: f64,
+    blocks: Vec<Afferent>,
+    channels: usize,
+    /// 5.1 of every tick.
+    table: Box<[f64]>,
+}
+
+/// How many ticks a word of the wire can hold.
+const TICKS: u16 = u16::MAX;
+
+impl Afferents {
+    fn new(parameters: &Fa1, channels: usize) -> Self {
+        let (theta_0, t) = (parameters.baseline(), parameters.period_ms);
+        let mut table = vec![0.0; usize::from(TICKS) + 1];
+        for (k, rho) in table.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {
+            let ticks = std::array::from_fn(|lane| (k * BLOCK + lane) as f32);
+            power(&ticks, parameters.alpha, rho);
+        }
+        Self {
+            alpha: parameters.alpha,
+            jump: t * parameters.a * theta_0,
+            decay: match parameters.decay {
+                Decay::Sample => parameters.b * theta_0,
+                Decay::Ms => parameters.b * t * theta_0,
+            },
+            theta_0,
+            blocks: vec![],
+            channels,
+            table: table.into_boxed_slice(),
+        }
+    }
+
+    /// 5.1, from the table where all values are ticks.
+    #[inline(always)]
+    fn compress(alpha: f64, table: &[f64], values: &Block, rho: &mut [f64; BLOCK]) {
+        /// Added to a whole number below 2^22, it shows that number in the lowest bits.
+        const SHIFT: f32 = 8_388_608.0; // 2^23
+        let whole = |v: f32| (v + SHIFT) - SHIFT == v && v >= 0.0 && v <= f32::from(TICKS);
+        if values.iter().fold(true, |all, &v| all & whole(v)) {
+            for (rho, &v) in rho.iter_mut().zip(values) {
+                *rho = table[((v + SHIFT).to_bits() & u32::from(TICKS)) as usize];
+            }
+        } else {
+            power(values, alpha, rho);
+        }
+    }
+}
+
+impl Afferent {
+    /// One sample; says whether any afferent fired.
+    #[inline(always)]
+    fn sample(&mut self, rho: &[f64; BLOCK], jump: f64, decay: f64, theta_0: f64) -> bool {
+        let (mut fired, mut moved) = (false, false);
+        for (lane, &rho) in rho.iter().enumerate() {
+            let theta = self.theta[lane];
+            let quiet = if theta > theta_0 { theta - decay } else { theta_0 };
+            let theta = if self.s[lane] != 0.0 { theta + jump } else { quiet };
+            let u = self.u[lane] + (rho - self.rho[lane]);
+            let s = f64::from(u8::from(u > theta)) - f64::from(u8::from(u < -theta));
+            self.rho[lane] = rho;
+            self.theta[lane] = theta;
+            self.s[lane] = s;
+            self.u[lane] = if s != 0.0 { 0.0 } else { u };
+            fired |= s != 0.0;
+            moved |= theta != theta_0;
+        }
+        self.still = !fired && !moved;
+        fired
+    }
+}
+
+impl Rule for Afferents {
+    fn trains(&self) -> usize {
+        self.channels
+    }
+
+    fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
+        let blank =
+            Afferent { rho: [0.0; BLOCK], u: [0.0; BLOCK], theta: [self.theta_0; BLOCK], s: [0.0; BLOCK], still: true };
+        self.blocks = vec![blank; held.len()];
+        for (afferent, values) in self.blocks.iter_mut().zip(held) {
+            Self::compress(self.alpha, &self.table, values, &mut afferent.rho);
+        }
+    }
+
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+        let (jump, decay, theta_0) = (self.jump, self.decay, self.theta_0);
+        let mut rho = [0.0; BLOCK];
+        for (block, afferent) in self.blocks.iter_mut().enumerate() {
+            if changed[block] {
+                Self::compress(self.alpha, &self.table, &held[block], &mut rho);
+            } else if afferent.still {
+                continue;
+            } else {
+                rho = afferent.rho;
+            }
+            if afferent.sample(&rho, jump, decay, theta_0) {
+                for (lane, &s) in afferent.s.iter().enumerate().filter(|&(_, &s)| s != 0.0) {
+                    out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value: s as f32 });
+                }
+            }
+        }
+    }
+
+    fn idle(&self) -> bool {
+        self.blocks.iter().all(|b| b.still)
+    }
+}

@@ -1,0 +1,326 @@
+//! Plain crossings of levels, with release below the level, a time that a crossing must hold, and tonic spikes.
+
+use std::collections::VecDeque;
+
+use serde::{Deserialize, Serialize};
+
+use super::running_range::{RunningRange, Window};
+use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
+use super::{Stream, check_levels, micros, ms, sort_from};
+use crate::{Array, Result, Spike, problem};
+
+/// Crossings of levels: +1 where a taxel comes to a level, -1 where it falls below its release.
+///
+/// A taxel is above a level from the sample that reaches it until one below the release. Trains: taxel times levels
+/// (`taxel * levels + level`), signed; with `tonic_ms` one more a taxel behind them. Values and levels are compared in
+/// f32. An encoder begins settled: the first sample makes no crossing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LevelCrossing {
+    /// Levels in the sensor's unit, or in shares of the running range where there is one; ascending.
+    pub levels: Vec<f64>,
+    /// Release as a share of each level, above 0 and up to 1; 1 (plain crossings) where neither release is given.
+    #[serde(default)]
+    pub release_share: Option<f64>,
+    /// Release as a distance below each level, 0 or more; instead of the share.
+    #[serde(default)]
+    pub release_by: Option<f64>,
+    /// How long a crossing must last before it is said, ms; it is said then, so this is the latency. Default 0.
+    #[serde(default)]
+    pub hold_ms: f64,
+    /// Tonic spikes, the slowly adapting part: one at the crossing and then every so many ms while above; none by
+    /// default.
+    #[serde(default)]
+    pub tonic_ms: Option<f64>,
+    /// The level while above which tonic spikes come, one of `levels`; the first where it is left out.
+    #[serde(default)]
+    pub tonic_level: Option<f64>,
+    /// Levels on the channel's own running range instead of the sensor's unit.
+    #[serde(default)]
+    pub running_range: Option<RunningRange>,
+    /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
+    #[serde(default = "super::stamp_period")]
+    pub period_ms: f64,
+}
+
+impl LevelCrossing {
+    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let crossings = Crossings::new(self, Channels::new(array).len())?;
+        Ok(Box::new(Sampled::new(crossings, array, self.period_ms, self.latency_ms())?))
+    }
+
+    pub(super) fn latency_ms(&self) -> f64 {
+        self.hold_ms
+    }
+
+    pub(super) fn trains(&self, channels: usize) -> usize {
+        channels * (self.levels.len() + usize::from(self.tonic_ms.is_some()))
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        check_levels(&self.levels)?;
+        micros("period_ms", self.period_ms)?;
+        if self.hold_ms != 0.0 {
+            micros("hold_ms", self.hold_ms)?;
+        }
+        match (self.release_share, self.release_by) {
+            (Some(_), Some(_)) => return Err(problem!("release_share and release_by: give one of them")),
+            (Some(share), None) if !(share > 0.0 && share <= 1.0) => {
+                return Err(problem!("release_share is {share}: must be above 0 and at most 1"));
+            }
+            (Some(share), None) if share < 1.0 && self.levels[0] <= 0.0 => {
+                let level = self.levels[0];
+                return Err(problem!("release_share is {share}, but level {level} is not above 0: use release_by"));
+            }
+            (None, Some(by)) if !(by.is_finite() && by >= 0.0) => {
+                return Err(problem!("release_by is {by}: must be 0 or more"));
+            }
+            _ => {}
+        }
+        if let Some(every) = self.tonic_ms {
+            micros("tonic_ms", every)?;
+        }
+        if let Some(level) = self.tonic_level {
+            if self.tonic_ms.is_none() {
+                return Err(problem!("tonic_level without tonic_ms: say how often"));
+            }
+            if !self.levels.contains(&level) {
+                return Err(problem!("tonic_level is {level}: must be one of the levels {:?}", self.levels));
+            }
+        }
+        self.running_range.as_ref().map_or(Ok(()), RunningRange::check)
+    }
+
+    fn release(&self, level: f64) -> f64 {
+        match (self.release_share, self.release_by) {
+            (_, Some(by)) => level - by,
+            (Some(share), None) => level * share,
+            (None, None) => level,
+        }
+    }
+}
+
+/// One level at one channel.
+#[derive(Clone, Copy)]
+struct State {
+    /// At or above this the taxel is above ...
+    on_at: f32,
+    /// ... until it reads less than this.
+    off_at: f32,
+    /// What the samples say.
+    above: bool,
+    /// What was said: follows `above` once that has held.
+    said: bool,
+    /// When `above` last changed, us.
+    since: i64,
+}
+
+struct Crossings {
+    channels: usize,
+    levels: Vec<f64>,
+    releases: Vec<f64>,
+    hold: i64,
+    /// `channel * levels + level`.
+    states: Vec<State>,
+    /// Crossings on trial: when they will have held, and which; all hold equally long, so this is in order.
+    trials: VecDeque<(i64, usize)>,
+    tonic: Option<Tonic>,
+    window: Option<Window>,
+}
+
+struct Tonic {
+    every: i64,
+    level: usize,
+    /// When each channel speaks next, with the crossing that this belongs to; all wait equally long.
+    next: VecDeque<(i64, usize, i64)>,
+    /// When the crossing was said that a channel is above by; `None` while below.
+    above_since: Vec<Option<i64>>,
+}
+
+impl Crossings {
+    fn new(parameters: &LevelCrossing, channels: usize) -> Result<Self> {
+        parameters.check()?;
+        let levels = parameters.levels.clone();
+        let releases: Vec<f64> = levels.iter().map(|&l| parameters.release(l)).collect();
+        let tonic = match parameters.tonic_ms {
+            None => None,
+            Some(every) => Some(Tonic {
+                every: micros("tonic_ms", every)?,
+                level: parameters.tonic_level.and_then(|l| levels.iter().position(|&m| m == l)).unwrap_or(0),
+                next: VecDeque::new(),
+                above_since: vec![None; channels],
+            }),
+        };
+        let blank = |(&on, &off): (&f64, &f64)| State {
+            on_at: on as f32,
+            off_at: off as f32,
+            above: false,
+            said: false,
+            since: i64::MIN,
+        };
+        let states = (0..channels).flat_map(|_| levels.iter().zip(&releases).map(blank)).collect();
+        Ok(Self {
+            channels,
+            hold: if parameters.hold_ms == 0.0 { 0 } else { micros("hold_ms", parameters.hold_ms)? },
+            states,
+            trials: VecDeque::new(),
+            tonic,
+            window: parameters.running_range.as_ref().map(|r| Window::new(r, blocks(channels))).transpose()?,
+            levels,
+            releases,
+        })
+    }
+
+    /// Puts the levels on the running range; a channel without any range stays below all of them.
+    fn scale(&mut self, ranges: &[(f64, f64)]) {
+        for (states, &(low, high)) in self.states.chunks_mut(self.levels.len()).zip(ranges) {
+            for ((state, level), release) in states.iter_mut().zip(&self.levels).zip(&self.releases) {
+                (state.on_at, state.off_at) = if high > low {
+                    ((low + level * (high - low)) as f32, (low + release * (high - low)) as f32)
+                } else {
+                    (f32::INFINITY, f32::INFINITY)
+                };
+            }
+        }
+    }
+
+    /// The first sample that counts: no crossing, but tonic spikes where it is above.
+    fn settle(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
+        let levels = self.levels.len();
+        for channel in 0..self.channels {
+            let value = held[channel / BLOCK][channel % BLOCK];
+            for level in 0..levels {
+                let state = &mut self.states[channel * levels + level];
+                state.above = value >= state.on_at;
+                state.said = state.above;
+                if state.said {
+                    self.speak_tonic(t, channel, level, true, out);
+                }
+            }
+        }
+    }
+
+    fn cross(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+        let from = out.len();
+        self.say_trials(t, true, out);
+        let levels = self.levels.len();
+        for (block, _) in changed.iter().enumerate().filter(|&(_, &c)| c) {
+            for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
+                let value = held[block][channel % BLOCK];
+                for train in channel * levels..(channel + 1) * levels {
+                    let state = &mut self.states[train];
+                    let above = value >= if state.above { state.off_at } else { state.on_at };
+                    if above != state.above {
+                        state.above = above;
+                        state.since = t;
+                        if self.hold == 0 {
+                            self.say(t, train, out);
+                        } else if above != state.said {
+                            self.trials.push_back((t + self.hold, train));
+                        }
+                    }
+                }
+            }
+        }
+        self.say_tonic(t, true, out);
+        sort_from(out, from);
+    }
+
+    fn say(&mut self, t: i64, train: usize, out: &mut Vec<Spike>) {
+        let state = &mut self.states[train];
+        state.said = state.above;
+        let on = state.said;
+        out.push(Spike { t: ms(t), train: train as u32, value: if on { 1.0 } else { -1.0 } });
+        self.speak_tonic(t, train / self.levels.len(), train % self.levels.len(), on, out);
+    }
+
+    /// Begins or ends a channel's tonic spikes, where `level` is theirs.
+    fn speak_tonic(&mut self, t: i64, channel: usize, level: usize, on: bool, out: &mut Vec<Spike>) {
+        let first = self.states.len();
+        let Some(tonic) = self.tonic.as_mut().filter(|tonic| tonic.level == level) else { return };
+        tonic.above_since[channel] = on.then_some(t);
+        if on {
+            out.push(Spike { t: ms(t), train: (first + channel) as u32, value: 1.0 });
+            tonic.next.push_back((t + tonic.every, channel, t));
+        }
+    }
+
+    /// Says the crossings that will have held before `t`, or at `t` too, with the tonic spikes before each.
+    fn say_trials(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
+        while let Some(&(due, train)) = self.trials.front()
+            && (due < t || (at_too && due == t))
+        {
+            self.trials.pop_front();
+            self.say_tonic(due, false, out);
+            let state = self.states[train];
+            if state.above != state.said && state.since == due - self.hold {
+                self.say(due, train, out);
+            }
+        }
+    }
+
+    /// Says the tonic spikes before `t`, or at `t` too.
+    fn say_tonic(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
+        let first = self.states.len();
+        let Some(tonic) = &mut self.tonic else { return };
+        while let Some(&(due, channel, since)) = tonic.next.front()
+            && (due < t || (at_too && due == t))
+        {
+            tonic.next.pop_front();
+            if tonic.above_since[channel] == Some(since) {
+                out.push(Spike { t: ms(due), train: (first + channel) as u32, value: 1.0 });
+                tonic.next.push_back((due + tonic.every, channel, since));
+            }
+        }
+    }
+}
+
+impl Rule for Crossings {
+    fn trains(&self) -> usize {
+        self.states.len() + if self.tonic.is_some() { self.channels } else { 0 }
+    }
+
+    fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
+        match &mut self.window {
+            None => self.settle(t, held, out),
+            Some(window) => window.take(t, held),
+        }
+    }
+
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+        let Some(mut window) = self.window.take() else { return self.cross(t, held, changed, out) };
+        let everything = vec![true; held.len()];
+        if let Some(first) = window.first_full(t) {
+            self.scale(&first.ranges);
+            if let Some((begin, later)) = first.samples.split_first() {
+                self.settle(begin.0, &begin.1, out);
+                for (at, held) in later {
+                    self.pass(*at, out);
+                    self.cross(*at, held, &everything, out);
+                }
+                self.pass(t, out);
+                self.cross(t, held, &everything, out);
+            } else {
+                self.settle(t, held, out);
+            }
+        } else if let Some(ranges) = window.renewed(t) {
+            self.scale(&ranges);
+            self.cross(t, held, &everything, out);
+        } else if window.is_full() {
+            self.cross(t, held, changed, out);
+        }
+        window.take(t, held);
+        self.window = Some(window);
+    }
+
+    fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
+        let from = out.len();
+        self.say_trials(t, false, out);
+        self.say_tonic(t, false, out);
+        sort_from(out, from);
+    }
+
+    fn idle(&self) -> bool {
+        self.window.is_none() && self.trials.is_empty() && self.tonic.as_ref().is_none_or(|t| t.next.is_empty())
+    }
+}

@@ -1,0 +1,157 @@
+//! A channel's own range: percentiles of a past window, renewed now and then.
+
+use std::collections::VecDeque;
+
+use serde::{Deserialize, Serialize};
+
+use super::micros;
+use super::sampled::{BLOCK, Block};
+use crate::{Result, problem};
+
+/// Levels as shares of a channel's running range, y = (x - low) / (high - low), against drift and unknown gain.
+///
+/// `low` and `high` are percentiles (linear between ranks) of the samples of the window that ends, exclusive, at the
+/// last renewal. Renewals stand at the first sample plus the window plus whole `renew_s`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunningRange {
+    /// The percentile that reads 0, from 0; default 10.
+    #[serde(default = "ten")]
+    pub low: f64,
+    /// The percentile that reads 1, to 100; default 95.
+    #[serde(default = "ninety_five")]
+    pub high: f64,
+    /// How long the window is, s; default 10.
+    #[serde(default = "ten")]
+    pub window_s: f64,
+    /// How often the percentiles are renewed, s; default 1.
+    #[serde(default = "one")]
+    pub renew_s: f64,
+    /// What happens until the first window is full.
+    #[serde(default)]
+    pub first_window: FirstWindow,
+}
+
+/// What a running range does until its first window is full.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FirstWindow {
+    /// Says nothing; the encoder begins, settled, with the first sample after it.
+    #[default]
+    Silent,
+    /// Is read by its own percentiles once it is full: for recordings, as its spikes come late by up to the window.
+    Itself,
+}
+
+fn ten() -> f64 {
+    10.0
+}
+
+fn ninety_five() -> f64 {
+    95.0
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl RunningRange {
+    pub(super) fn check(&self) -> Result<()> {
+        if !(self.low >= 0.0 && self.low < self.high && self.high <= 100.0) {
+            let (low, high) = (self.low, self.high);
+            return Err(problem!("running_range from {low} to {high}: must ascend within 0 to 100 percent"));
+        }
+        micros("running_range window_s", self.window_s * 1000.0)?;
+        micros("running_range renew_s", self.renew_s * 1000.0).map(drop)
+    }
+}
+
+/// The samples of the last window.
+pub(super) struct Window {
+    low: f64,
+    high: f64,
+    length: i64,
+    renew: i64,
+    replay: bool,
+    samples: VecDeque<(i64, Vec<Block>)>,
+    /// When the percentiles are next reckoned; `None` before the first sample.
+    next: Option<i64>,
+    full: bool,
+    blocks: usize,
+}
+
+/// The first window, once it is full.
+pub(super) struct First {
+    /// Low and high by channel.
+    pub(super) ranges: Vec<(f64, f64)>,
+    /// Its samples, where it is to be read by its own percentiles.
+    pub(super) samples: Vec<(i64, Vec<Block>)>,
+}
+
+impl Window {
+    pub(super) fn new(range: &RunningRange, blocks: usize) -> Result<Self> {
+        Ok(Self {
+            low: range.low,
+            high: range.high,
+            length: micros("running_range window_s", range.window_s * 1000.0)?,
+            renew: micros("running_range renew_s", range.renew_s * 1000.0)?,
+            replay: range.first_window == FirstWindow::Itself,
+            samples: VecDeque::new(),
+            next: None,
+            full: false,
+            blocks,
+        })
+    }
+
+    pub(super) fn is_full(&self) -> bool {
+        self.full
+    }
+
+    /// Takes a sample, after it was read.
+    pub(super) fn take(&mut self, t: i64, held: &[Block]) {
+        self.next.get_or_insert(t + self.length);
+        self.samples.push_back((t, held.to_vec()));
+    }
+
+    /// The first window, if the sample at `t` is the first after it.
+    pub(super) fn first_full(&mut self, t: i64) -> Option<First> {
+        let end = self.next.filter(|&end| !self.full && t >= end)?;
+        self.full = true;
+        let samples = if self.replay { self.samples.iter().cloned().collect() } else { vec![] };
+        self.next = Some(end + self.renew);
+        Some(First { ranges: self.percentiles(), samples })
+    }
+
+    /// New low and high by channel, if a renewal fell due up to `t` and its window is not empty.
+    pub(super) fn renewed(&mut self, t: i64) -> Option<Vec<(f64, f64)>> {
+        let due = self.next.filter(|&due| self.full && t >= due)?;
+        let latest = due + (t - due) / self.renew * self.renew;
+        self.next = Some(latest + self.renew);
+        while self.samples.front().is_some_and(|s| s.0 < latest - self.length) {
+            self.samples.pop_front();
+        }
+        (!self.samples.is_empty()).then(|| self.percentiles())
+    }
+
+    fn percentiles(&self) -> Vec<(f64, f64)> {
+        let mut values = Vec::with_capacity(self.samples.len());
+        let mut ranges = Vec::with_capacity(self.blocks * BLOCK);
+        for channel in 0..self.blocks * BLOCK {
+            values.clear();
+            values.extend(self.samples.iter().map(|s| s.1[channel / BLOCK][channel % BLOCK]));
+            ranges.push((percentile(&mut values, self.low), percentile(&mut values, self.high)));
+        }
+        ranges
+    }
+}
+
+/// The percentile of values, linear between ranks (Hyndman and Fan's 7th, NumPy's default).
+fn percentile(values: &mut [f32], percent: f64) -> f64 {
+    let place = percent / 100.0 * (values.len() - 1) as f64;
+    let (_, below, above) = values.select_nth_unstable_by(place as usize, f32::total_cmp);
+    let below = f64::from(*below);
+    match above.iter().copied().min_by(f32::total_cmp) {
+        Some(next) => below + (f64::from(next) - below) * place.fract(),
+        None => below,
+    }
+}

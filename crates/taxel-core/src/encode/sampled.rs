@@ -1,0 +1,338 @@
+//! Encoders that read pressure: pictures as they come, or held intensities sampled at a fixed period.
+//!
+//! A [`Rule`] knows one encoder's law and nothing of events, pieces or order; [`Sampled`] brings it the samples. What
+//! did not change since the last sample is known by block, so a rule need not look at it.
+
+use super::{Stream, micros, ms};
+use crate::{Array, Events, Result, Spike, problem};
+
+/// Channels that are looked at together; the compiler turns loops over a block into vector instructions.
+pub(super) const BLOCK: usize = 64;
+
+/// One value a channel, for [`BLOCK`] channels.
+pub(super) type Block = [f32; BLOCK];
+
+/// What an encoder does with samples; channels are the existing taxels in the order of their index.
+///
+/// The last block is filled up with channels that always read 0 and must never spike.
+pub(super) trait Rule: Send {
+    fn trains(&self) -> usize;
+
+    /// The first sample: the encoder begins as if it had always been so.
+    fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>);
+
+    /// A later sample; only blocks that `changed` differ from the last one. Everything before `t` was passed.
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>);
+
+    /// What falls due before `t` (exclusive) while the last sample holds.
+    fn pass(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
+
+    /// Whether nothing would ever come while the last sample holds, so that samples without change may be left out.
+    fn idle(&self) -> bool;
+}
+
+/// Which taxels are channels.
+pub(super) struct Channels {
+    rows: u16,
+    columns: u16,
+    name: String,
+    /// The place of each channel in a picture; `None` where every place is a channel.
+    places: Option<Vec<u32>>,
+    /// The channel of each place, [`NONE`] where no taxel exists; `None` as above.
+    of_place: Option<Vec<u32>>,
+}
+
+const NONE: u32 = u32::MAX;
+
+impl Channels {
+    pub(super) fn new(array: &Array) -> Self {
+        let (mut places, mut of_place) = (None, None);
+        if let Some(exists) = &array.exists {
+            let there: Vec<u32> = (0..).zip(exists).filter(|&(_, &e)| e).map(|(place, _)| place).collect();
+            let mut channels = vec![NONE; exists.len()];
+            for (channel, &place) in (0..).zip(&there) {
+                channels[place as usize] = channel;
+            }
+            (places, of_place) = (Some(there), Some(channels));
+        }
+        Self { rows: array.rows, columns: array.columns, name: array.name.clone(), places, of_place }
+    }
+
+    /// How many taxels exist.
+    pub(super) fn len(&self) -> usize {
+        self.places.as_ref().map_or(self.grid(), Vec::len)
+    }
+
+    fn grid(&self) -> usize {
+        usize::from(self.rows) * usize::from(self.columns)
+    }
+
+    pub(super) fn of(&self, x: u16, y: u16) -> Option<usize> {
+        let place = usize::from(y) * usize::from(self.columns) + usize::from(x);
+        match &self.of_place {
+            None => Some(place),
+            Some(of) => (of[place] != NONE).then_some(of[place] as usize),
+        }
+    }
+
+    /// Copies a picture into blocks and marks those that changed.
+    pub(super) fn load(&self, t: i64, values: &[f32], held: &mut [Block], changed: &mut [bool]) -> Result<()> {
+        if values.len() != self.grid() {
+            let (rows, columns) = (self.rows, self.columns);
+            return Err(problem!("frame at {t} us: {} values, must be {rows} x {columns}", values.len()));
+        }
+        let Some(places) = &self.places else {
+            let (whole, rest) = values.as_chunks::<BLOCK>();
+            for ((new, block), changed) in whole.iter().zip(held.iter_mut()).zip(changed.iter_mut()) {
+                self.take(t, new, block, changed)?;
+            }
+            if let Some((block, changed)) = held.last_mut().zip(changed.last_mut())
+                && !rest.is_empty()
+            {
+                let mut new = [0.0; BLOCK];
+                new[..rest.len()].copy_from_slice(rest);
+                self.take(t, &new, block, changed)?;
+            }
+            return Ok(());
+        };
+        for ((places, block), changed) in places.chunks(BLOCK).zip(held.iter_mut()).zip(changed.iter_mut()) {
+            let mut new = [0.0; BLOCK];
+            for (value, &place) in new.iter_mut().zip(places) {
+                *value = values[place as usize];
+            }
+            self.take(t, &new, block, changed)?;
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn take(&self, t: i64, new: &Block, block: &mut Block, changed: &mut bool) -> Result<()> {
+        if new.iter().zip(block.iter()).fold(0, |any, (a, b)| any | (a.to_bits() ^ b.to_bits())) == 0 {
+            return Ok(());
+        }
+        if let Some(bad) = new.iter().find(|v| !v.is_finite()) {
+            return Err(problem!("frame at {t} us holds {bad}: values must be finite"));
+        }
+        *block = *new;
+        *changed = true;
+        Ok(())
+    }
+
+    /// Refuses events of another sensor, or columns that make no sense.
+    pub(super) fn check(&self, events: &Events) -> Result<()> {
+        let (rows, columns) = (events.array.rows, events.array.columns);
+        if (rows, columns) != (self.rows, self.columns) {
+            let (name, wanted) = (&self.name, (self.rows, self.columns));
+            return Err(problem!(
+                "events of {rows} x {columns} taxels: the encoder was begun for {name}, {} x {}",
+                wanted.0,
+                wanted.1
+            ));
+        }
+        if let Some(&t) = events.t.iter().find(|t| t.unsigned_abs() > FARTHEST) {
+            return Err(problem!("event at {t} us: lies too far from 0"));
+        }
+        events.check()
+    }
+}
+
+/// Times beyond this, us (36 000 years), are refused, so that no sum of times can overflow.
+pub(super) const FARTHEST: u64 = 1 << 60;
+
+/// How many blocks hold `channels`.
+pub(super) fn blocks(channels: usize) -> usize {
+    channels.div_ceil(BLOCK)
+}
+
+/// What a stream has been fed with; one stream takes events or frames, never both.
+pub(super) enum Source {
+    Unknown,
+    /// `present`: nothing comes before it any more.
+    Events {
+        present: i64,
+    },
+    /// `open`: the first time at which a frame may still come.
+    Frames {
+        open: i64,
+    },
+}
+
+impl Source {
+    /// Takes the time of a frame.
+    pub(super) fn frame(&mut self, t: i64) -> Result<()> {
+        match *self {
+            Source::Events { .. } => return Err(problem!("frame at {t} us: this stream was begun with events")),
+            Source::Frames { open } if t < open => {
+                return Err(problem!("frame at {t} us: must come at {open} us or later, times ascend"));
+            }
+            _ if t.unsigned_abs() > FARTHEST => return Err(problem!("frame at {t} us: lies too far from 0")),
+            _ => {}
+        }
+        *self = Source::Frames { open: t + 1 };
+        Ok(())
+    }
+}
+
+/// A rule fed with samples: each frame is one; events are read as held intensities every `period`.
+///
+/// The samples of events stand at the first stamp plus whole periods, and each holds what came up to and at its time.
+/// A taxel reads 0 until it is heard. An event behind the latest stamp (reordered datagrams) counts as of that stamp.
+pub(super) struct Sampled<R> {
+    rule: R,
+    channels: Channels,
+    period: i64,
+    latency_ms: f64,
+    held: Vec<Block>,
+    changed: Vec<bool>,
+    quiet: bool,
+    source: Source,
+    /// The time of the next sample of events.
+    next: i64,
+    /// The time of the last sample, once begun.
+    last: i64,
+    begun: bool,
+    steady: bool,
+}
+
+impl<R: Rule> Sampled<R> {
+    pub(super) fn new(rule: R, array: &Array, period_ms: f64, latency_ms: f64) -> Result<Self> {
+        let channels = Channels::new(array);
+        let n = blocks(channels.len());
+        Ok(Self {
+            rule,
+            channels,
+            period: micros("period_ms", period_ms)?,
+            latency_ms,
+            held: vec![[0.0; BLOCK]; n],
+            changed: vec![false; n],
+            quiet: true,
+            source: Source::Unknown,
+            next: 0,
+            last: 0,
+            begun: false,
+            steady: false,
+        })
+    }
+
+    /// Frames must come at the period, give or take half of it.
+    pub(super) fn steady(mut self) -> Self {
+        self.steady = true;
+        self
+    }
+
+    fn sample(&mut self, t: i64, out: &mut Vec<Spike>) {
+        if self.begun {
+            self.rule.pass(t, out);
+            self.rule.sample(t, &self.held, &self.changed, out);
+        } else {
+            self.rule.begin(t, &self.held, out);
+            self.begun = true;
+        }
+        self.last = t;
+        self.changed.fill(false);
+        self.quiet = true;
+    }
+
+    /// Takes all samples of events before `t`.
+    fn sample_until(&mut self, t: i64, out: &mut Vec<Spike>) {
+        while self.next < t {
+            if self.quiet && self.begun && self.rule.idle() {
+                let left = t.abs_diff(self.next).div_ceil(self.period.unsigned_abs());
+                self.next = self.next.saturating_add_unsigned(left.saturating_mul(self.period.unsigned_abs()));
+                return;
+            }
+            self.sample(self.next, out);
+            self.next += self.period;
+        }
+    }
+}
+
+impl<R: Rule> Stream for Sampled<R> {
+    fn trains(&self) -> usize {
+        self.rule.trains()
+    }
+
+    fn signed(&self) -> bool {
+        true
+    }
+
+    fn latency_ms(&self) -> f64 {
+        self.latency_ms
+    }
+
+    fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()> {
+        self.channels.check(events)?;
+        let Some(intensity) = &events.intensity else {
+            return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
+        };
+        let Some(&first) = events.t.first() else { return Ok(()) };
+        let mut present = match self.source {
+            Source::Frames { .. } => return Err(problem!("event at {first} us: this stream was begun with frames")),
+            Source::Events { present } => present,
+            Source::Unknown => {
+                self.next = first;
+                first
+            }
+        };
+        for k in 0..events.len() {
+            if events.t[k] > present {
+                present = events.t[k];
+                if present > self.next {
+                    self.sample_until(present, out);
+                }
+            }
+            if intensity.present[k]
+                && let Some(channel) = self.channels.of(events.x[k], events.y[k])
+            {
+                self.held[channel / BLOCK][channel % BLOCK] = f32::from(intensity.ticks[k]);
+                self.changed[channel / BLOCK] = true;
+                self.quiet = false;
+            }
+        }
+        self.source = Source::Events { present };
+        if self.begun {
+            self.rule.pass(present, out);
+        }
+        Ok(())
+    }
+
+    fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
+        if self.steady && self.begun && (t - self.last - self.period).abs() * 2 > self.period {
+            let (since, period) = (ms(t - self.last), ms(self.period));
+            return Err(problem!(
+                "frame at {t} us, {since} ms after the last: frames must come every period_ms, {period}"
+            ));
+        }
+        self.channels.load(t, values, &mut self.held, &mut self.changed)?;
+        self.source.frame(t)?;
+        self.sample(t, out);
+        Ok(())
+    }
+
+    fn advance(&mut self, t: i64, out: &mut Vec<Spike>) {
+        let t = t.clamp(-(FARTHEST as i64), FARTHEST as i64);
+        match &mut self.source {
+            Source::Unknown => return,
+            Source::Events { present } => {
+                *present = t.max(*present);
+                self.sample_until(t, out);
+            }
+            Source::Frames { open } => *open = t.max(*open),
+        }
+        if self.begun {
+            self.rule.pass(t, out);
+        }
+    }
+
+    fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64> {
+        // Rounded up, so that a spike that is due exactly after the latency is in.
+        let latency = (self.latency_ms * 1000.0).ceil() as i64;
+        let end = match self.source {
+            Source::Unknown => return None,
+            Source::Events { present } => present + self.period + latency,
+            Source::Frames { open } => open - 1 + latency,
+        };
+        self.advance(end + 1, out);
+        Some(ms(end))
+    }
+}

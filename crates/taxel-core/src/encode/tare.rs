@@ -1,0 +1,190 @@
+//! What taxels read at rest: of one board, on one day.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Array, Events, Result, problem};
+
+/// The rest of each taxel: the mean by time of its held values over a stretch at rest.
+///
+/// Take it with the board's noise floor at 0, else a taxel's rest is known no better than the floor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Tare {
+    /// The sensor.
+    pub array: Array,
+    /// By place (`row * columns + column`), in the sensor's unit; `None` where a taxel was never heard of.
+    pub rest: Vec<Option<f64>>,
+    /// The stretch at rest begins, us.
+    pub start_us: i64,
+    /// It ends, us.
+    pub stop_us: i64,
+    /// Which board, which day.
+    #[serde(default)]
+    pub note: String,
+}
+
+impl Tare {
+    /// Checks that there is one rest a place, all finite.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the taxel.
+    pub fn check(&self) -> Result<()> {
+        let (rows, columns) = (self.array.rows, self.array.columns);
+        if self.rest.len() != self.array.len() {
+            return Err(problem!("tare: {} rests for {rows} x {columns} taxels: must be one each", self.rest.len()));
+        }
+        if self.start_us >= self.stop_us {
+            return Err(problem!("tare from {} to {} us: start must lie before stop", self.start_us, self.stop_us));
+        }
+        match self.rest.iter().position(|rest| rest.is_some_and(|r| !r.is_finite())) {
+            Some(place) => Err(problem!("tare: rest of taxel {place} is not finite")),
+            None => Ok(()),
+        }
+    }
+
+    /// Reads a tare from JSON.
+    ///
+    /// # Errors
+    ///
+    /// `Format` where it is no tare, `Problem` where its parts do not fit.
+    pub fn from_json(json: &str) -> Result<Self> {
+        let tare: Self = serde_json::from_str(json).map_err(|e| crate::Error::Format(format!("tare: {e}")))?;
+        tare.check()?;
+        Ok(tare)
+    }
+
+    /// The tare as JSON.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        // Rests were checked to be finite, and nothing else in here can fail to be written.
+        serde_json::to_string(self).unwrap_or_default()
+    }
+}
+
+/// Takes a tare from what comes.
+pub struct TareBuilder {
+    array: Array,
+    start: Option<i64>,
+    present: i64,
+    taxels: Vec<Held>,
+}
+
+/// One taxel's held value, and its integral over time since the start.
+#[derive(Clone, Copy, Default)]
+struct Held {
+    value: f64,
+    /// Since when it holds, us; `None` before it is heard.
+    since: Option<i64>,
+    /// value times us.
+    area: f64,
+    /// us.
+    time: f64,
+}
+
+impl Held {
+    fn hold_until(&mut self, t: i64) {
+        if let Some(since) = self.since {
+            let time = (t - since).max(0) as f64;
+            self.area += self.value * time;
+            self.time += time;
+            self.since = Some(t.max(since));
+        }
+    }
+
+    fn take(&mut self, t: i64, value: f64) {
+        self.hold_until(t);
+        self.value = value;
+        self.since = Some(self.since.map_or(t, |since| since.max(t)));
+    }
+}
+
+impl TareBuilder {
+    /// Begins at `start` us, or with what comes first; values that came before still hold at the start.
+    #[must_use]
+    pub fn new(array: &Array, start: Option<i64>) -> Self {
+        Self { taxels: vec![Held::default(); array.len()], array: array.clone(), start, present: i64::MIN }
+    }
+
+    /// When the stretch begins, us; `None` while nothing came and no start was given.
+    #[must_use]
+    pub fn start(&self) -> Option<i64> {
+        self.start
+    }
+
+    /// Takes the next events.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where events have no intensities or are another sensor's.
+    pub fn push_events(&mut self, events: &Events) -> Result<()> {
+        let (rows, columns) = (events.array.rows, events.array.columns);
+        if (rows, columns) != (self.array.rows, self.array.columns) {
+            let (own_rows, own_columns) = (self.array.rows, self.array.columns);
+            return Err(problem!("events of {rows} x {columns} taxels: the tare is of {own_rows} x {own_columns}"));
+        }
+        events.check()?;
+        let Some(intensity) = &events.intensity else {
+            return Err(problem!("events without intensities: a tare needs the held values"));
+        };
+        for k in 0..events.len() {
+            self.present = events.t[k].max(self.present);
+            let start = *self.start.get_or_insert(self.present);
+            if intensity.present[k] {
+                let taxel = &mut self.taxels[self.array.index(events.x[k], events.y[k])];
+                taxel.take(self.present.max(start), f64::from(intensity.ticks[k]));
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes the next picture, at `t` us.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the picture has another size, holds NaN or comes out of order.
+    pub fn push_frame(&mut self, t: i64, values: &[f32]) -> Result<()> {
+        if values.len() != self.taxels.len() {
+            return Err(problem!("frame at {t} us: {} values, must be {}", values.len(), self.taxels.len()));
+        }
+        if t < self.present {
+            return Err(problem!("frame at {t} us after {} us: times ascend", self.present));
+        }
+        if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
+            return Err(problem!("frame at {t} us holds {bad}: values must be finite"));
+        }
+        self.present = t;
+        let start = *self.start.get_or_insert(t);
+        for (taxel, &value) in self.taxels.iter_mut().zip(values) {
+            taxel.take(t.max(start), f64::from(value));
+        }
+        Ok(())
+    }
+
+    /// The tare up to `stop` us; nothing later than that may have come.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where nothing was heard, the stretch is empty, or something later came.
+    pub fn finish(mut self, stop: i64, note: &str) -> Result<Tare> {
+        let Some(start) = self.start else { return Err(problem!("tare: nothing was heard")) };
+        if stop <= start {
+            return Err(problem!("tare from {start} to {stop} us: start must lie before stop"));
+        }
+        if stop < self.present {
+            return Err(problem!("tare to {stop} us: something came at {} us, after it", self.present));
+        }
+        for taxel in &mut self.taxels {
+            taxel.hold_until(stop);
+        }
+        let exists = |place: usize| self.array.exists.as_ref().is_none_or(|e| e[place]);
+        let rest: Vec<Option<f64>> = (0..)
+            .zip(&self.taxels)
+            .map(|(place, taxel)| (taxel.time > 0.0 && exists(place)).then(|| taxel.area / taxel.time))
+            .collect();
+        if rest.iter().all(Option::is_none) {
+            return Err(problem!("tare from {start} to {stop} us: nothing was heard"));
+        }
+        Ok(Tare { rest, array: self.array, start_us: start, stop_us: stop, note: note.to_owned() })
+    }
+}

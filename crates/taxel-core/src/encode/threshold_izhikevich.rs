@@ -1,0 +1,313 @@
+//! A threshold and two phasic Izhikevich neurons: one hears the thresholded signal, one its inverse (thesis 3.4.3, 6.5.1).
+
+use serde::{Deserialize, Serialize};
+
+use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
+use super::{Stream, check_levels, micros, ms, sort_from};
+use crate::{Array, Result, Spike};
+
+/// A threshold and a pair of Izhikevich neurons: +1 about 16 or 20 ms after a taxel came to a level, -1 after it left.
+///
+/// `v' = 0.04 v^2 + 5 v + 140 - u + I`, `u' = a (b v - u)`; from 30 mV `v` goes to `c` and `u` up by `d` (Izhikevich
+/// 2003). Forward Euler in f64, both equations from the old state, in steps of 0.1 ms: the step is part of the
+/// definition, as latency depends on it. Steps count from the first sample; a spike has the time of its step's end.
+/// The ON neuron's input is on while value >= level (f32), the OFF neuron's while not; samples are held. Chatter
+/// within some 10 ms vanishes, a gap in the signal delays the next spike: both belong to the phasic model.
+/// Trains: `taxel * levels + level`, signed.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ThresholdIzhikevich {
+    /// Levels in the sensor's unit, ascending.
+    pub levels: Vec<f64>,
+    /// Which of the two published parameter sets; default that of 6.5.1.
+    #[serde(default)]
+    pub published: Published,
+    /// The state in which the neurons begin; default settled.
+    #[serde(default)]
+    pub begin: Begin,
+    /// How often events are sampled, ms; default 0.1, the step.
+    #[serde(default = "super::stamp_period")]
+    pub period_ms: f64,
+}
+
+/// The published parameter sets; both have b = 0.25, c = -65 mV, d = 6.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Published {
+    /// Thesis 3.4.3: a = 0.02, I = 0.5; latency 20.2 ms.
+    #[serde(rename = "3.4.3")]
+    Curvature,
+    /// Thesis 6.5.1: a = 0.005, I = 0.6; latency 15.8 ms.
+    #[default]
+    #[serde(rename = "6.5.1")]
+    Gait,
+}
+
+impl Published {
+    /// From the input's step to the spike of a settled neuron, ms.
+    #[must_use]
+    pub fn latency_ms(self) -> f64 {
+        match self {
+            Published::Curvature => 20.2,
+            Published::Gait => 15.8,
+        }
+    }
+}
+
+/// How Izhikevich neurons begin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Begin {
+    /// As if the first sample had always been: silent until something changes.
+    #[default]
+    Settled,
+    /// At rest without input: what is on at the first sample fires once, as does the OFF neuron of each idle channel.
+    Rest,
+}
+
+impl ThresholdIzhikevich {
+    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        self.check()?;
+        let pairs = Pairs::new(self, Channels::new(array).len());
+        Ok(Box::new(Sampled::new(pairs, array, self.period_ms, self.latency_ms())?))
+    }
+
+    pub(super) fn latency_ms(&self) -> f64 {
+        self.published.latency_ms()
+    }
+
+    pub(super) fn trains(&self, channels: usize) -> usize {
+        channels * self.levels.len()
+    }
+
+    pub(super) fn check(&self) -> Result<()> {
+        check_levels(&self.levels)?;
+        micros("period_ms", self.period_ms).map(drop)
+    }
+}
+
+/// One step, us.
+const STEP: i64 = 100;
+const B: f64 = 0.25;
+const C: f64 = -65.0;
+const D: f64 = 6.0;
+const PEAK: f64 = 30.0;
+
+/// One of the two models.
+#[derive(Clone, Copy)]
+struct Model {
+    a: f64,
+    gain: f64,
+    /// Step, ms.
+    dt: f64,
+}
+
+impl Model {
+    fn published(which: Published) -> Self {
+        let (a, gain) = match which {
+            Published::Curvature => (0.02, 0.5),
+            Published::Gait => (0.005, 0.6),
+        };
+        Self { a, gain, dt: 0.1 }
+    }
+
+    /// Where v and u come to rest without input: the lower root of 0.04 v^2 + (5 - b) v + 140.
+    fn rest() -> (f64, f64) {
+        let linear = 5.0 - B;
+        let v = (-linear - (linear * linear - 4.0 * 0.04 * 140.0).sqrt()) / (2.0 * 0.04);
+        (v, B * v)
+    }
+
+    #[inline(always)]
+    fn step(self, v: f64, u: f64, input: f64) -> (f64, f64) {
+        (v + self.dt * (0.04 * v * v + 5.0 * v + 140.0 - u + input), u + self.dt * self.a * (B * v - u))
+    }
+
+    /// The state that steps with this input do not change any more, or the last of 10^6 steps.
+    fn settled(self, input: f64) -> (f64, f64) {
+        let (mut v, mut u) = Self::rest();
+        for _ in 0..1_000_000 {
+            let (next_v, next_u) = self.step(v, u, input);
+            if (next_v, next_u) == (v, u) {
+                break;
+            }
+            (v, u) = if next_v >= PEAK { (C, next_u + D) } else { (next_v, next_u) };
+        }
+        (v, u)
+    }
+}
+
+/// Neurons that are stepped together.
+const LANES: usize = 8;
+
+#[derive(Clone)]
+struct Neurons {
+    v: [f64; LANES],
+    u: [f64; LANES],
+    input: [f64; LANES],
+    /// Whether a step with this input changes nothing at all: then it is left out.
+    still: bool,
+}
+
+impl Neurons {
+    /// Takes `steps` steps; tells `fired` each spike's step and lane.
+    fn run(&mut self, model: Model, steps: i64, mut fired: impl FnMut(i64, usize)) {
+        if self.still || steps <= 0 {
+            return;
+        }
+        let input = self.input;
+        let (mut v, mut u) = (self.v, self.u);
+        let mut before = (v, u);
+        for step in 0..steps {
+            before = (v, u);
+            for lane in 0..LANES {
+                (v[lane], u[lane]) = model.step(before.0[lane], before.1[lane], input[lane]);
+            }
+            if v.iter().fold(false, |any, &v| any | (v >= PEAK)) {
+                for lane in 0..LANES {
+                    if v[lane] >= PEAK {
+                        v[lane] = C;
+                        u[lane] += D;
+                        fired(step, lane);
+                    }
+                }
+            }
+        }
+        self.still = before == (v, u);
+        (self.v, self.u) = (v, u);
+    }
+
+    fn set(&mut self, lane: usize, input: f64) {
+        if self.input[lane] != input {
+            self.input[lane] = input;
+            self.still = false;
+        }
+    }
+}
+
+struct Pairs {
+    model: Model,
+    begin: Begin,
+    channels: usize,
+    levels: Vec<f32>,
+    /// Whether each train's taxel is at its level; the last eight are filled up.
+    on: Vec<[bool; LANES]>,
+    rises: Vec<Neurons>,
+    falls: Vec<Neurons>,
+    /// The start of the next step, us.
+    next: i64,
+    /// Spikes of steps that began before the present and end after it.
+    ahead: Vec<Spike>,
+}
+
+impl Pairs {
+    fn new(parameters: &ThresholdIzhikevich, channels: usize) -> Self {
+        let (v, u) = Model::rest();
+        let neurons = Neurons { v: [v; LANES], u: [u; LANES], input: [0.0; LANES], still: false };
+        let groups = (channels * parameters.levels.len()).div_ceil(LANES);
+        Self {
+            model: Model::published(parameters.published),
+            begin: parameters.begin,
+            channels,
+            levels: parameters.levels.iter().map(|&l| l as f32).collect(),
+            on: vec![[false; LANES]; groups],
+            rises: vec![neurons.clone(); groups],
+            falls: vec![neurons; groups],
+            next: 0,
+            ahead: vec![],
+        }
+    }
+
+    fn hear(&mut self, held: &[Block], changed: impl Fn(usize) -> bool) {
+        let (levels, gain) = (self.levels.len(), self.model.gain);
+        for block in (0..held.len()).filter(|&b| changed(b)) {
+            for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
+                let value = held[block][channel % BLOCK];
+                for (level, &at) in self.levels.iter().enumerate() {
+                    let train = channel * levels + level;
+                    let (group, lane) = (train / LANES, train % LANES);
+                    let on = value >= at;
+                    if self.on[group][lane] != on {
+                        self.on[group][lane] = on;
+                        self.rises[group].set(lane, if on { gain } else { 0.0 });
+                        self.falls[group].set(lane, if on { 0.0 } else { gain });
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes all steps that begin before `t`.
+    fn step_until(&mut self, t: i64) {
+        let steps = (t - self.next + STEP - 1).div_euclid(STEP);
+        if steps <= 0 {
+            return;
+        }
+        let first_end = self.next + STEP;
+        let ahead = &mut self.ahead;
+        for (neurons, value) in [(&mut self.rises, 1.0), (&mut self.falls, -1.0)] {
+            for (group, eight) in neurons.iter_mut().enumerate() {
+                eight.run(self.model, steps, |step, lane| {
+                    let train = (group * LANES + lane) as u32;
+                    ahead.push(Spike { t: ms(first_end + step * STEP), train, value });
+                });
+            }
+        }
+        self.next += steps * STEP;
+    }
+
+    /// Hands on what is due by `t`, inclusive or not.
+    fn hand_on(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
+        let (from, end) = (out.len(), ms(t));
+        self.ahead.retain(|&spike| {
+            let due = spike.t < end || (at_too && spike.t == end);
+            if due {
+                out.push(spike);
+            }
+            !due
+        });
+        sort_from(out, from);
+    }
+}
+
+impl Rule for Pairs {
+    fn trains(&self) -> usize {
+        self.channels * self.levels.len()
+    }
+
+    fn begin(&mut self, t: i64, held: &[Block], _out: &mut Vec<Spike>) {
+        self.next = t;
+        for falls in &mut self.falls {
+            falls.input = [self.model.gain; LANES];
+        }
+        self.hear(held, |_| true);
+        // Lanes beyond the last train hear nothing and stay at rest.
+        let used = self.trains() % LANES;
+        if used > 0
+            && let Some(last) = self.falls.last_mut()
+        {
+            last.input[used..].fill(0.0);
+        }
+        if self.begin == Begin::Settled {
+            let (on, off) = (self.model.settled(self.model.gain), self.model.settled(0.0));
+            for neurons in self.rises.iter_mut().chain(&mut self.falls) {
+                for lane in 0..LANES {
+                    (neurons.v[lane], neurons.u[lane]) = if neurons.input[lane] > 0.0 { on } else { off };
+                }
+            }
+        }
+    }
+
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+        self.hear(held, |block| changed[block]);
+        self.hand_on(t, true, out);
+    }
+
+    fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
+        self.step_until(t);
+        self.hand_on(t, false, out);
+    }
+
+    fn idle(&self) -> bool {
+        self.ahead.is_empty() && self.rises.iter().chain(&self.falls).all(|n| n.still)
+    }
+}
