@@ -1,6 +1,7 @@
 """Touch as events: from the bytes of a tactile array to decisions that say when."""
 
 from taxel import detect, metrics
+from taxel import encode, metrics
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel.array import Array
 from taxel.detections import Detections
@@ -8,6 +9,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
+from taxel.tare import Tare
 
 __version__ = "0.1.0"
 
@@ -24,5 +26,7 @@ __all__ = [
     "SceneError",
     "SpikeTrains",
     "detect",
+    "Tare",
+    "encode",
     "metrics",
 ]

@@ -21,7 +21,7 @@ pub use running_range::{FirstWindow, RunningRange};
 pub use tare::{Tare, TareBuilder};
 pub use threshold_izhikevich::{Begin, Published, ThresholdIzhikevich};
 
-use crate::{Array, Error, Events, Frames, Intensities, Result, Spike, SpikeTrains, Stop, problem};
+use crate::{Array, Error, Events, Frames, Result, Spike, SpikeTrains, Stop, problem};
 
 /// An encoder at work: takes what comes, in order of time, and hands on spikes as soon as they are certain.
 ///
@@ -188,7 +188,7 @@ impl Encoder {
         } else {
             for begin in (0..events.len()).step_by(PIECE) {
                 stop.check()?;
-                stream.push_events(&piece(events, begin..events.len().min(begin + PIECE)), &mut out)?;
+                stream.push_events(&events.piece(begin..events.len().min(begin + PIECE)), &mut out)?;
             }
         }
         collect(stream, out, events.t.first().copied())
@@ -226,21 +226,6 @@ fn collect(mut stream: Box<dyn Stream>, mut out: Vec<Spike>, first: Option<i64>)
     let start = first.map_or(0.0, ms);
     let end = stream.finish(&mut out).unwrap_or(start);
     SpikeTrains::from_spikes(&out, stream.trains(), stream.signed(), start, end)
-}
-
-fn piece(events: &Events, range: std::ops::Range<usize>) -> Events {
-    Events {
-        array: events.array.clone(),
-        t: events.t[range.clone()].to_vec(),
-        x: events.x[range.clone()].to_vec(),
-        y: events.y[range.clone()].to_vec(),
-        p: events.p[range.clone()].to_vec(),
-        intensity: events
-            .intensity
-            .as_ref()
-            .map(|i| Intensities { ticks: i.ticks[range.clone()].to_vec(), present: i.present[range].to_vec() }),
-        markers: vec![],
-    }
 }
 
 /// Names the parameter that serde could not read: it says only what is wrong with it.

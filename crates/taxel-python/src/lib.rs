@@ -6,6 +6,7 @@ mod errors;
 mod knock;
 
 mod detect;
+mod encode;
 mod neuron;
 mod nouns;
 mod recording;
@@ -19,6 +20,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     knock::register(module)?;
     nouns::register(module)?;
     detect::register(module)?;
+    encode::register(module)?;
     neuron::register(module)?;
     recording::register(module)?;
     Ok(())

@@ -292,6 +292,9 @@ mod tests {
             Ok(())
         }
         fn advance(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
+        fn finish(&mut self, _out: &mut Vec<Spike>) -> Option<f64> {
+            None
+        }
     }
 
     fn array() -> Array {

@@ -31,6 +31,10 @@ impl Tare {
     /// `Problem`, naming the taxel.
     pub fn check(&self) -> Result<()> {
         let (rows, columns) = (self.array.rows, self.array.columns);
+        Array::new(rows, columns, self.array.pitch_mm, &self.array.name)?;
+        if self.array.exists.as_ref().is_some_and(|e| e.len() != self.array.len()) {
+            return Err(problem!("tare: exists must have {rows} x {columns} entries"));
+        }
         if self.rest.len() != self.array.len() {
             return Err(problem!("tare: {} rests for {rows} x {columns} taxels: must be one each", self.rest.len()));
         }

@@ -1,0 +1,205 @@
+"""What all encoders have in common."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import json
+from typing import Any, ClassVar, Self
+
+from taxel import _core
+from taxel._arguments import parameters
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.spikes import SpikeTrains
+from taxel.tare import Tare
+
+__all__ = ["Encoder", "EncoderStream"]
+
+
+class Encoder:
+    """Turn events or frames into spike trains; the common part of all encoders.
+
+    An encoder holds its parameters under their own names and nothing else. Two are equal where their parameters are.
+
+    Examples
+    --------
+    >>> from taxel.encode import ChangeEvents
+    >>> encoder = Encoder.from_json('{"name": "change_events", "bits": 3}')
+    >>> encoder == ChangeEvents(bits=3)
+    True
+    """
+
+    name: ClassVar[str]
+    _by_name: ClassVar[dict[str, type[Encoder]]] = {}
+
+    def __init_subclass__(cls) -> None:
+        Encoder._by_name[cls.name] = cls
+
+    def _check(self) -> None:
+        _core.check_encoder(self._json())
+
+    def _parameters(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in inspect.signature(type(self)).parameters}
+
+    def _json(self) -> str:
+        return parameters({"name": self.name} | {name: _plain(value) for name, value in self._parameters().items()})
+
+    def to_json(self) -> str:
+        """Return the encoder as JSON: an object with its name and all parameters."""
+        return _core.check_encoder(self._json())
+
+    @staticmethod
+    def from_json(text: str) -> Encoder:
+        """Return the encoder that the JSON names; what is left out has its default.
+
+        Raises
+        ------
+        ProblemError : an unknown name or parameter, or a value that makes no sense
+        """
+        if not isinstance(text, str):
+            raise ProblemError(f"encoder is {text!r}: must be JSON text")
+        values = json.loads(_core.check_encoder(text))
+        return Encoder._by_name[values.pop("name")]._from_parameters(values)
+
+    @classmethod
+    def _from_parameters(cls, values: dict[str, Any]) -> Self:
+        return cls(**values)
+
+    def trains(self, array: Array) -> int:
+        """Return on how many trains the encoder speaks for an array; signed ones count once."""
+        return _core.encoder_about(self._json(), _array(array)._parts())[0]
+
+    @property
+    def signed(self) -> bool:
+        """Whether spikes carry a signed value, so that a neuron hears each train as two, ON and OFF."""
+        return _core.encoder_about(self._json(), Array(1, 1)._parts())[1]
+
+    @property
+    def latency_ms(self) -> float:
+        """How much later than the touch itself a spike comes, ms: what the encoder's own rule costs."""
+        return _core.encoder_about(self._json(), Array(1, 1)._parts())[2]
+
+    def encode(self, x: Events | Frames) -> SpikeTrains:
+        """Return the spikes of a whole recording.
+
+        Parameters
+        ----------
+        x : Events or Frames
+            Events need their intensities: they are read as held values. Channels are the existing taxels, in the order
+            of their index.
+
+        Returns
+        -------
+        SpikeTrains
+            The window begins with the first stamp; it ends the latency (and, of events, one period) after the last,
+            with the last values held until then.
+
+        Raises
+        ------
+        ProblemError : neither events nor frames, or events without intensities
+        """
+        if isinstance(x, Events):
+            return SpikeTrains._from_parts(_core.encode_events(self._json(), x._parts()))
+        frames = _frames(x)
+        parts = frames.array._parts(), frames.t, frames.values.reshape(-1)
+        return SpikeTrains._from_parts(_core.encode_frames(self._json(), *parts))
+
+    def stream(self, array: Array | None = None) -> EncoderStream:
+        """Begin to encode pieces: the same spikes as of the whole, wherever it is cut.
+
+        Parameters
+        ----------
+        array : Array, optional
+            The sensor; that of the first piece where it is left out.
+        """
+        return EncoderStream(self, array)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Encoder):
+            return NotImplemented
+        return self.to_json() == other.to_json()
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        defaults = {name: p.default for name, p in inspect.signature(type(self)).parameters.items()}
+        told = (
+            f"{name}={v!r}" for name, v in self._parameters().items() if v is not defaults[name] and v != defaults[name]
+        )
+        return f"{type(self).__name__}({', '.join(told)})"
+
+
+class EncoderStream:
+    """Encode events or frames piece by piece, as `Encoder.stream` begins it.
+
+    Every call returns the spikes that became certain by it, with the window from where the last call ended. A stamp of
+    events is over when a later one comes, `advance` moves time on or `finish` ends it.
+
+    Examples
+    --------
+    >>> from taxel.encode import LevelCrossing
+    >>> stream = LevelCrossing([10.0]).stream(Array(1, 1))
+    >>> stream.push(Frames([[[0.0]], [[12.0]]], [0, 1000]))
+    SpikeTrains(1 trains, 1 spikes, signed, 0 to 1 ms)
+    """
+
+    def __init__(self, encoder: Encoder, array: Array | None = None) -> None:
+        self.encoder = encoder
+        self._parameters = encoder._json()
+        self._core: _core.EncoderStream | None = None
+        if array is not None:
+            self._begin(array)
+
+    def _begin(self, array: Array) -> _core.EncoderStream:
+        if self._core is None:
+            self._core = _core.EncoderStream(self._parameters, _array(array)._parts())
+        return self._core
+
+    def push(self, x: Events | Frames) -> SpikeTrains:
+        """Take the next events or frames; one stream takes either, never both.
+
+        Raises
+        ------
+        ProblemError : neither, another array's, events without intensities, or frames out of order
+        """
+        if isinstance(x, Events):
+            return SpikeTrains._from_parts(self._begin(x.array).push_events(x._parts()))
+        frames = _frames(x)
+        parts = frames.array._parts(), frames.t, frames.values.reshape(-1)
+        return SpikeTrains._from_parts(self._begin(frames.array).push_frames(*parts))
+
+    def advance(self, t_us: int) -> SpikeTrains:
+        """Say that nothing will come any more before `t_us` (exclusive); an earlier time changes nothing."""
+        if isinstance(t_us, bool) or int(t_us) != t_us or not -(2**60) <= t_us <= 2**60:
+            raise ProblemError(f"t_us is {t_us!r}: must be a whole number of us")
+        return self._told(None if self._core is None else self._core.advance(int(t_us)))
+
+    def finish(self) -> SpikeTrains:
+        """Say that nothing more will come; the last values are held for the latency, so that all spikes come out."""
+        return self._told(None if self._core is None else self._core.finish())
+
+    def _told(self, parts: tuple[Any, ...] | None) -> SpikeTrains:
+        return SpikeTrains.from_lists([]) if parts is None else SpikeTrains._from_parts(parts)
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, Tare):
+        return json.loads(value.to_json())
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return dataclasses.asdict(value)
+    return value
+
+
+def _array(array: Array) -> Array:
+    if not isinstance(array, Array):
+        raise ProblemError(f"array is {array!r}: must be a taxel.Array")
+    return array
+
+
+def _frames(x: object) -> Frames:
+    if not isinstance(x, Frames):
+        raise ProblemError(f"{type(x).__name__}: encoders take taxel.Events or taxel.Frames")
+    return x

@@ -1,0 +1,64 @@
+"""Change events with a noise floor and 1 to 10 bits."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from taxel.encode._encoder import Encoder
+
+__all__ = ["ChangeEvents"]
+
+
+class ChangeEvents(Encoder):
+    """Say how far each taxel moved since its last event, in units of the noise floor; +-(2^bits - 1) at most.
+
+    One signed train a taxel. The first sample is the first previous value and gives no spike. Reckoned in float32.
+
+    Parameters
+    ----------
+    noise_floor : float, in the sensor's unit, above 0
+        The smallest change that counts; theta_0 of equation 5.7. 3 ticks in the board's fast presets.
+    bits : int, 1 to 10
+        Bits an event (figure 5.7); 1 tells rise from fall.
+    previous : {"last_sent", "last_sample"}
+        What a sample is compared with: the value at the last event, or the last sample, as 4.3 words it.
+    rounding : {"truncate", "floor"}
+        "truncate": towards zero, and an event only where the change is above the noise floor. "floor": 5.7 as printed,
+        by which any fall, however small, is -1.
+    period_ms : float, ms, whole us
+        How often events are sampled; the step of the wire's stamps loses nothing.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    Thesis 5.5.2, equation 5.7.
+
+    Examples
+    --------
+    >>> from taxel import Frames
+    >>> frames = Frames([[[50.0]], [[58.0]], [[57.0]]], [0, 200, 400], unit="ticks")
+    >>> spikes = ChangeEvents(bits=4).encode(frames)
+    >>> spikes.times, spikes.values
+    (array([0.2]), array([2.], dtype=float32))
+    """
+
+    name = "change_events"
+
+    def __init__(
+        self,
+        *,
+        noise_floor: float = 3.0,
+        bits: int = 1,
+        previous: Literal["last_sent", "last_sample"] = "last_sent",
+        rounding: Literal["truncate", "floor"] = "truncate",
+        period_ms: float = 0.1,
+    ) -> None:
+        self.noise_floor = noise_floor
+        self.bits = bits
+        self.previous = previous
+        self.rounding = rounding
+        self.period_ms = period_ms
+        self._check()

@@ -1,0 +1,64 @@
+"""A threshold and a pair of phasic Izhikevich neurons."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from taxel.encode._encoder import Encoder
+
+__all__ = ["ThresholdIzhikevich"]
+
+
+class ThresholdIzhikevich(Encoder):
+    """Say with two Izhikevich neurons a level where a taxel came to it (+1) and where it left it (-1).
+
+    One neuron hears the thresholded signal, one its inverse; each fires once for each step of its input, and chatter
+    within some 10 ms vanishes. Trains: ``taxel * len(levels) + level``, signed.
+
+    Parameters
+    ----------
+    levels : sequence of float, ascending
+        In the sensor's unit; the thesis has one, 0.4 V.
+    published : {"6.5.1", "3.4.3"}
+        Which published parameter set: a = 0.005, I = 0.6 (6.5.1, latency 15.8 ms) or a = 0.02, I = 0.5 (3.4.3, latency
+        20.2 ms); b = 0.25, c = -65 mV, d = 6 in both.
+    begin : {"settled", "rest"}
+        As if the first sample had always been; or at rest without input, where all that is on at the first sample, and
+        the OFF neuron of each idle channel, fires once.
+    period_ms : float, ms, whole us
+        How often events are sampled.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    Thesis 3.4.3 and 6.5.1; Izhikevich (2003), IEEE Trans. Neural Networks 14:1569. Forward Euler in float64, both
+    equations from the old state, in steps of 0.1 ms that count from the first sample: the step is part of the
+    definition, as the latency depends on it. A spike has the time of its step's end.
+
+    Examples
+    --------
+    >>> from taxel import Frames
+    >>> frames = Frames([[[0.0]], [[1.0]], [[1.0]]], [0, 10_000, 50_000], unit="V")
+    >>> ThresholdIzhikevich([0.4]).encode(frames)[0]
+    array([25.8])
+    """
+
+    name = "threshold_izhikevich"
+
+    def __init__(
+        self,
+        levels: Sequence[float],
+        *,
+        published: Literal["6.5.1", "3.4.3"] = "6.5.1",
+        begin: Literal["settled", "rest"] = "settled",
+        period_ms: float = 0.1,
+    ) -> None:
+        self.levels = levels
+        self.published = published
+        self.begin = begin
+        self.period_ms = period_ms
+        self._check()

@@ -1,0 +1,152 @@
+"""What taxels read at rest: of one board, on one day."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._core import FormatError, ProblemError
+from taxel._files import write_whole
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+
+__all__ = ["Tare"]
+
+
+class Tare:
+    """Hold the rest of each taxel: the mean by time of its held values over a stretch at rest.
+
+    Made by `Tare.take`, `Tare.load` or `Tare.from_json`. Take it with the board's noise floor at 0, else a rest is
+    known no better than the floor.
+
+    Attributes
+    ----------
+    array : Array
+    rest : float64, shape (rows, columns), in the sensor's unit
+        NaN where a taxel was never heard of.
+    start_us, stop_us : int, us
+        The stretch.
+    note : str
+        Which board, which day.
+
+    Examples
+    --------
+    >>> frames = Frames([[[50.0]], [[53.0]], [[53.0]]], [0, 1000, 3000], unit="ticks")
+    >>> tare = Tare.take(frames)
+    >>> tare
+    Tare(1 of 1 taxels, 0 to 3000 us)
+    >>> tare.rest
+    array([[52.]])
+    """
+
+    array: Array
+    rest: NDArray[np.float64]
+    start_us: int
+    stop_us: int
+    note: str
+
+    def __init__(self) -> None:
+        raise ProblemError("a tare is taken (Tare.take) or loaded (Tare.load), not built")
+
+    @classmethod
+    def take(
+        cls, x: Events | Frames, *, start_us: int | None = None, stop_us: int | None = None, note: str = ""
+    ) -> Tare:
+        """Take the mean by time of each taxel's held values.
+
+        Parameters
+        ----------
+        x : Events or Frames
+            Events need their intensities.
+        start_us, stop_us : int, us, optional
+            The stretch at rest, its end exclusive; from the first stamp to the last where left out. What came before
+            it still holds at its start.
+        note : str
+            Which board, which day.
+
+        Raises
+        ------
+        ProblemError : events without intensities, or a stretch in which nothing was heard
+        """
+        for name, value in (("start_us", start_us), ("stop_us", stop_us)):
+            if value is not None and (isinstance(value, bool) or not isinstance(value, int | np.integer)):
+                raise ProblemError(f"{name} is {value!r}: must be a whole number of us")
+        if not isinstance(note, str):
+            raise ProblemError(f"note is {note!r}: must be a text")
+        window = None if start_us is None else int(start_us), None if stop_us is None else int(stop_us)
+        if isinstance(x, Events):
+            return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
+        if isinstance(x, Frames):
+            parts = x.array._parts(), x.t, x.values.reshape(-1)
+            return cls.from_json(_core.tare_of_frames(*parts, *window, note))
+        raise ProblemError(f"{type(x).__name__}: a tare is taken from taxel.Events or taxel.Frames")
+
+    @classmethod
+    def from_json(cls, text: str) -> Tare:
+        """Return the tare that `to_json` wrote.
+
+        Raises
+        ------
+        FormatError : no tare
+        ProblemError : a tare whose parts do not fit
+        """
+        if not isinstance(text, str):
+            raise ProblemError(f"tare is {text!r}: must be JSON text")
+        values: dict[str, Any] = json.loads(_core.check_tare(text))
+        tare = cls.__new__(cls)
+        geometry = values["array"]
+        parts = (geometry[name] for name in ("rows", "columns", "pitch_mm", "name"))
+        tare.array = Array._from_parts((*parts, geometry.get("exists")))
+        tare.rest = np.array([np.nan if r is None else r for r in values["rest"]]).reshape(tare.array.shape)
+        tare.rest.setflags(write=False)
+        tare.start_us, tare.stop_us, tare.note = values["start_us"], values["stop_us"], values["note"]
+        return tare
+
+    def to_json(self) -> str:
+        """Return the tare as JSON."""
+        rows, columns, pitch_mm, name, exists = self.array._parts()
+        geometry = {"rows": rows, "columns": columns, "pitch_mm": pitch_mm, "name": name, "exists": exists}
+        rest = [None if np.isnan(r) else float(r) for r in self.rest.ravel()]
+        window = {"start_us": self.start_us, "stop_us": self.stop_us}
+        return _core.check_tare(json.dumps({"array": geometry, "rest": rest, **window, "note": self.note}))
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write the tare to a JSON file, whole or not at all.
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        """
+        return write_whole(path, lambda file: file.write(self.to_json().encode()), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Tare:
+        """Read a tare from the file that `save` wrote.
+
+        Raises
+        ------
+        FormatError : no tare (names the file)
+        """
+        try:
+            return cls.from_json(Path(path).read_text(encoding="utf-8"))
+        except (_core.Error, UnicodeDecodeError) as error:
+            raise FormatError(f"{path}: {error}") from None
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Tare):
+            return NotImplemented
+        return self.to_json() == other.to_json()
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        heard = int(np.count_nonzero(~np.isnan(self.rest)))
+        note = f", {self.note}" if self.note else ""
+        return f"Tare({heard} of {self.array.taxels} taxels, {self.start_us} to {self.stop_us} us{note})"
