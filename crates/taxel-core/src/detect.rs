@@ -1,10 +1,12 @@
 //! Spikes to detections, and their score.
 
 mod frame_clock;
+mod readout;
 mod score;
 mod stream;
 
 pub use frame_clock::FrameClock;
+pub use readout::{Readout, TrainedNeuron};
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, match_in_order, score};
 pub use stream::ReadoutStream;
 

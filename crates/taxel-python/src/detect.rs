@@ -1,12 +1,16 @@
 //! Scoring and readouts for Python.
 
+use std::sync::{Mutex, MutexGuard};
+
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::detect::{Detection, Reference, Spread, score as score_core};
+use taxel_core::detect::{Detection, Readout, ReadoutStream as CoreStream, Reference, Spread, score as score_core};
+use taxel_core::encode::Tare;
+use taxel_core::problem;
 
-use crate::convert::{array, slice};
+use crate::convert::{ArrayParts, EventsIn, array, slice, to_array, to_events};
 use crate::enter::enter;
-use crate::errors::ProblemError;
+use crate::errors::{ProblemError, core};
 
 /// Detections as Python hands them over: labels, t and known in us, slope in mV/ms.
 pub(crate) type DetectionsIn<'py> =
@@ -22,6 +26,18 @@ pub(crate) fn to_detections((labels, t, known, slope): DetectionsIn<'_>) -> PyRe
     }
     let columns = labels.into_iter().zip(t).zip(known).zip(slope);
     Ok(columns.map(|(((label, &t), &known), &slope)| Detection { label, t, known, slope }).collect())
+}
+
+/// Detections as Python gets them: the same parts.
+type DetectionsOut<'py> =
+    (Vec<String>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
+
+fn from_detections(py: Python<'_>, found: Vec<Detection>) -> DetectionsOut<'_> {
+    let t = found.iter().map(|d| d.t).collect();
+    let known = found.iter().map(|d| d.known).collect();
+    let slope = found.iter().map(|d| d.slope).collect();
+    let labels = found.into_iter().map(|d| d.label).collect();
+    (labels, array(py, t), array(py, known), array(py, slope))
 }
 
 /// One label's tally: label, pairs as two columns, missed, false, false within a window, errors and delays in ms.
@@ -89,8 +105,127 @@ fn spread(values: PyReadonlyArray1<'_, f64>) -> PyResult<(f64, f64, f64, f64, f6
     Ok((mean, sd, median, low, high))
 }
 
+/// Checks a readout's parts; gives the text of its file.
+#[pyfunction]
+fn make_readout(parts: &str) -> PyResult<String> {
+    let readout: Readout = serde_json::from_str(parts).map_err(|e| core(problem!("readout: {e}")))?;
+    readout.check().map_err(core)?;
+    Ok(readout.to_json())
+}
+
+/// Checks the text of a readout's file; gives it with every default filled in.
+#[pyfunction]
+fn check_readout(text: &str) -> PyResult<String> {
+    Ok(Readout::from_json(text).map_err(core)?.to_json())
+}
+
+fn parse(readout: &str, tare: Option<&str>) -> PyResult<(Readout, Option<Tare>)> {
+    let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
+    Ok((Readout::from_json(readout).map_err(core)?, tare))
+}
+
+/// What a readout says of a whole recording of events.
+#[pyfunction]
+fn readout_run_events<'py>(
+    py: Python<'py>,
+    readout: &str,
+    events: EventsIn<'py>,
+    frame_us: f64,
+    tare: Option<&str>,
+) -> PyResult<DetectionsOut<'py>> {
+    let ((readout, tare), events) = (parse(readout, tare)?, to_events(events)?);
+    let found = enter(py, |stop| readout.run_events(&events, frame_us, tare.as_ref(), stop))?;
+    Ok(from_detections(py, found))
+}
+
+/// What a readout says of pictures, one after the other in `values`, at `t` us.
+#[pyfunction]
+fn readout_run_frames<'py>(
+    py: Python<'py>,
+    readout: &str,
+    array: ArrayParts,
+    t: PyReadonlyArray1<'py, i64>,
+    values: PyReadonlyArray1<'py, f32>,
+    frame_us: Option<f64>,
+    tare: Option<&str>,
+) -> PyResult<DetectionsOut<'py>> {
+    let ((readout, tare), array) = (parse(readout, tare)?, to_array(array)?);
+    let (t, values) = (slice("t", &t)?, slice("values", &values)?);
+    let found = enter(py, |stop| readout.run_pictures(&array, t, values, frame_us, tare.as_ref(), stop))?;
+    Ok(from_detections(py, found))
+}
+
+/// A readout at work.
+#[pyclass(frozen)]
+struct ReadoutStream(Mutex<CoreStream>);
+
+impl ReadoutStream {
+    fn lock(&self) -> MutexGuard<'_, CoreStream> {
+        // A panic inside is reported by the door; the stream after it is no worse than after an error.
+        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl ReadoutStream {
+    #[new]
+    fn new(readout: &str, array: ArrayParts, frame_us: f64, tare: Option<&str>) -> PyResult<Self> {
+        let ((readout, tare), array) = (parse(readout, tare)?, to_array(array)?);
+        Ok(Self(Mutex::new(readout.stream(&array, frame_us, tare.as_ref()).map_err(core)?)))
+    }
+
+    fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<DetectionsOut<'py>> {
+        let events = to_events(events)?;
+        let mut found = vec![];
+        enter(py, |_| self.lock().push_events(&events, &mut found))?;
+        Ok(from_detections(py, found))
+    }
+
+    fn push_frames<'py>(
+        &self,
+        py: Python<'py>,
+        array: ArrayParts,
+        t: PyReadonlyArray1<'py, i64>,
+        values: PyReadonlyArray1<'py, f32>,
+    ) -> PyResult<DetectionsOut<'py>> {
+        let array = to_array(array)?;
+        let (t, values) = (slice("t", &t)?, slice("values", &values)?);
+        let found = enter(py, |stop| self.lock().push_pictures(&array, t, values, stop))?;
+        Ok(from_detections(py, found))
+    }
+
+    fn advance<'py>(&self, py: Python<'py>, t: i64) -> PyResult<DetectionsOut<'py>> {
+        let mut found = vec![];
+        enter(py, |_| self.lock().advance(t, &mut found))?;
+        Ok(from_detections(py, found))
+    }
+
+    /// Up to where everything has been said, us.
+    #[getter]
+    fn now(&self) -> Option<i64> {
+        self.lock().now()
+    }
+
+    /// How many events came late.
+    #[getter]
+    fn late(&self) -> u64 {
+        self.lock().late()
+    }
+
+    /// Each neuron's potential now, mV.
+    #[getter]
+    fn potentials(&self) -> Vec<(String, f64)> {
+        self.lock().potentials().map(|(label, mv)| (label.to_owned(), mv)).collect()
+    }
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(check_detections, module)?)?;
     module.add_function(wrap_pyfunction!(score, module)?)?;
-    module.add_function(wrap_pyfunction!(spread, module)?)
+    module.add_function(wrap_pyfunction!(spread, module)?)?;
+    module.add_function(wrap_pyfunction!(make_readout, module)?)?;
+    module.add_function(wrap_pyfunction!(check_readout, module)?)?;
+    module.add_function(wrap_pyfunction!(readout_run_events, module)?)?;
+    module.add_function(wrap_pyfunction!(readout_run_frames, module)?)?;
+    module.add_class::<ReadoutStream>()
 }

@@ -1,9 +1,9 @@
 //! The way from events to detections, piece by piece: the same detections live and from a recording.
 
-use crate::detect::{Detection, FrameClock};
+use crate::detect::{Detection, FrameClock, TrainedNeuron};
 use crate::encode::Stream;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike};
-use crate::{Array, Events, Frames, Result, Spike, Stop, problem};
+use crate::{Array, Events, Result, Spike, Stop, problem};
 
 /// How many events go through the stream between two looks at [`Stop`].
 const PIECE: usize = 65_536;
@@ -41,38 +41,24 @@ struct Voice {
 }
 
 impl ReadoutStream {
-    /// A readout of an encoder at work and neurons with names: label, parameters, weights (mV), trained delay (ms).
-    ///
-    /// `threshold` is the factor on every threshold. `Readout::stream` makes the same from a readout.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` where a neuron has not one weight a train (ON and OFF apart where the encoder's spikes are signed).
-    pub fn new(
+    pub(super) fn new(
         encoder: Box<dyn Stream>,
         array: Array,
         clock: FrameClock,
         threshold: f64,
-        neurons: impl Iterator<Item = (String, Neuron, Vec<f64>, f64)>,
-    ) -> Result<Self> {
-        let inputs = encoder.trains() * if encoder.signed() { 2 } else { 1 };
+        neurons: impl Iterator<Item = (String, TrainedNeuron)>,
+    ) -> Self {
         let latency_ms = encoder.latency_ms();
-        let voices = neurons
-            .map(|(label, neuron, weights, delay_ms)| {
-                if weights.len() != inputs {
-                    return Err(problem!(
-                        "{label}: {} weights, the encoder has {inputs} trains on an array of {} x {} taxels: must be \
-                         one each",
-                        weights.len(),
-                        array.rows,
-                        array.columns
-                    ));
-                }
-                let offset_ms = latency_ms + delay_ms;
-                Ok(Voice { label, neuron, weights, threshold, offset_ms, stream: None, crossings: vec![] })
-            })
-            .collect::<Result<_>>()?;
-        Ok(Self { encoder, array, voices, clock, now: None, waiting: vec![], late: 0 })
+        let voices = neurons.map(|(label, one)| Voice {
+            label,
+            offset_ms: latency_ms + one.delay_ms,
+            neuron: one.neuron,
+            weights: one.weights,
+            threshold,
+            stream: None,
+            crossings: vec![],
+        });
+        Self { voices: voices.collect(), encoder, array, clock, now: None, waiting: vec![], late: 0 }
     }
 
     /// Takes the next events; adds what is certain now to `out`.
@@ -152,36 +138,44 @@ impl ReadoutStream {
         self.voices.iter().map(|v| (v.label.as_str(), v.stream.as_ref().map_or(0.0, NeuronStream::potential)))
     }
 
-    /// The whole of `events`, then silence until `until` us.
+    /// Takes many events, and looks at `stop` now and then.
     ///
     /// # Errors
     ///
     /// As [`push_events`](Self::push_events); `Interrupted` where `stop` says so.
-    pub fn run_events(mut self, events: &Events, until: i64, stop: Stop<'_>) -> Result<Vec<Detection>> {
+    pub fn push_recording(&mut self, events: &Events, stop: Stop<'_>) -> Result<Vec<Detection>> {
         let mut out = Vec::new();
         for from in (0..events.len()).step_by(PIECE) {
             stop.check()?;
             self.push_events(&events.piece(from..(from + PIECE).min(events.len())), &mut out)?;
         }
-        self.advance(until, &mut out)?;
         Ok(out)
     }
 
-    /// The whole of `frames`, then silence until `until` us.
+    /// Takes whole pictures, one after the other in `values`, at `t` us.
     ///
     /// # Errors
     ///
-    /// As [`push_frame`](Self::push_frame); `Interrupted` where `stop` says so.
-    pub fn run_frames(mut self, frames: &Frames, until: i64, stop: Stop<'_>) -> Result<Vec<Detection>> {
-        self.check_shape(&frames.array)?;
+    /// As [`push_frame`](Self::push_frame), and where they come from another array; `Interrupted` where `stop` says so.
+    pub fn push_pictures(
+        &mut self,
+        array: &Array,
+        t: &[i64],
+        values: &[f32],
+        stop: Stop<'_>,
+    ) -> Result<Vec<Detection>> {
+        self.check_shape(array)?;
+        if values.len() != t.len() * array.len() {
+            let (n, taxels) = (t.len(), array.len());
+            return Err(problem!("frames: {} values for {n} pictures of {taxels} taxels", values.len()));
+        }
         let mut out = Vec::new();
-        for (k, &t) in frames.t.iter().enumerate() {
+        for (k, (&t, picture)) in t.iter().zip(values.chunks_exact(array.len())).enumerate() {
             if k % 256 == 0 {
                 stop.check()?;
             }
-            self.push_frame(t, frames.picture(k), &mut out)?;
+            self.push_frame(t, picture, &mut out)?;
         }
-        self.advance(until, &mut out)?;
         Ok(out)
     }
 
@@ -310,9 +304,10 @@ mod tests {
             array(),
             FrameClock::new(period_us).unwrap(),
             0.9,
-            neurons.into_iter().map(|(label, w, delay)| (label.to_owned(), neuron.clone(), w, delay)),
+            neurons.into_iter().map(|(label, weights, delay_ms)| {
+                (label.to_owned(), TrainedNeuron { neuron: neuron.clone(), weights, delay_ms })
+            }),
         )
-        .unwrap()
     }
 
     /// Events with the stamps of 192 us frames, some frames full of them, some silences long.
@@ -344,12 +339,18 @@ mod tests {
         all
     }
 
+    fn run(mut stream: ReadoutStream, events: &Events, end: i64) -> Vec<Detection> {
+        let mut found = stream.push_recording(events, Stop::never()).unwrap();
+        stream.advance(end, &mut found).unwrap();
+        found
+    }
+
     #[test]
     fn pieces_and_moves_of_time_change_nothing() {
         for (seed, neuron) in neurons().into_iter().cycle().take(60).enumerate() {
             let events = events(seed as u64, 400);
             let end = events.t[399] + 100_000;
-            let whole = stream(&neuron, 0.0, 192.0).run_events(&events, end, Stop::never()).unwrap();
+            let whole = run(stream(&neuron, 0.0, 192.0), &events, end);
             assert!(whole.len() > 10, "something must be said to compare");
 
             let mut random = StdRng::seed_from_u64(1000 + seed as u64);
@@ -380,7 +381,7 @@ mod tests {
         for (seed, neuron) in neurons().iter().enumerate() {
             let events = events(seed as u64, 2000);
             let end = events.t[1999] + 100_000;
-            let found = stream(neuron, 1.25, 192.0).run_events(&events, end, Stop::never()).unwrap();
+            let found = run(stream(neuron, 1.25, 192.0), &events, end);
             for d in found {
                 let offset_us = if d.label == "contact" { 1450 } else { 1750 };
                 let crossing = d.t + offset_us;
@@ -395,8 +396,8 @@ mod tests {
         let neuron = Neuron { tau: 2.0, ..Neuron::default() };
         let events = events(5, 300);
         let end = events.t[299] + 100_000;
-        let plain = stream(&neuron, 0.0, 192.0).run_events(&events, end, Stop::never()).unwrap();
-        let later = stream(&neuron, 7.5, 192.0).run_events(&events, end, Stop::never()).unwrap();
+        let plain = run(stream(&neuron, 0.0, 192.0), &events, end);
+        let later = run(stream(&neuron, 7.5, 192.0), &events, end);
         assert_eq!(plain.len(), later.len());
         for (a, b) in plain.iter().zip(&later) {
             assert_eq!((a.t - 7500, a.known, a.slope), (b.t, b.known, b.slope));
@@ -440,12 +441,14 @@ mod tests {
     #[test]
     fn pictures_are_known_at_the_end_of_their_own_frames() {
         let neuron = Neuron { tau: 2.0, ..Neuron::default() };
-        let mut frames = Frames { array: array(), t: vec![], values: vec![], unit: "counts".into() };
+        let (mut t, mut values) = (vec![], vec![]);
         for k in 0..200 {
-            frames.t.push(7 + 2000 * k);
-            frames.values.extend([f32::from(u8::from(k % 40 == 3)), 0.0, 0.0, 0.0]);
+            t.push(7 + 2000 * k);
+            values.extend([f32::from(u8::from(k % 40 == 3)), 0.0, 0.0, 0.0]);
         }
-        let found = stream(&neuron, 0.0, 2000.0).run_frames(&frames, 500_000, Stop::never()).unwrap();
+        let mut live = stream(&neuron, 0.0, 2000.0);
+        let mut found = live.push_pictures(&array(), &t, &values, Stop::never()).unwrap();
+        live.advance(500_000, &mut found).unwrap();
         assert_eq!(found.len(), 5);
         for (d, k) in found.iter().zip([3, 43, 83, 123, 163]) {
             assert_eq!((d.label.as_str(), d.known), ("contact", 7 + 2000 * (k + 1)));
@@ -466,10 +469,5 @@ mod tests {
         let mut far = events(1, 1);
         far.t[0] = 1 << 60;
         assert!(live.push_events(&far, &mut out).is_err());
-        let few = [("contact".to_owned(), neuron, vec![1.0; 4], 0.0)];
-        let clock = FrameClock::new(192.0).unwrap();
-        let short = ReadoutStream::new(Box::new(Plain { latency_ms: 0.0 }), array(), clock, 1.0, few.into_iter());
-        let said = short.err().unwrap().to_string();
-        assert!(said.starts_with("contact: 4 weights, the encoder has 8 trains"), "{said}");
     }
 }

@@ -1,0 +1,359 @@
+//! Trained neurons with names, and the encoder that they were trained behind.
+
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use crate::detect::{Detection, FrameClock, ReadoutStream};
+use crate::encode::{Encoder, Tare};
+use crate::neuron::{AfterSpike, Neuron, Time};
+use crate::{Array, Error, Events, Result, Stop, problem};
+
+/// What a readout's file says that it is.
+const FORMAT: &str = "taxel readout";
+
+/// The version of that file which is written, and the only one so far.
+const VERSION: u64 = 1;
+
+/// How long time moves on after the last event or picture of a recording, us: longer than what was heard can keep a
+/// potential rising (the slowest neuron of Table 6.2 peaks after 190 ms).
+const SILENCE_US: i64 = 1_000_000;
+
+/// A neuron with the weights it was trained to.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainedNeuron {
+    /// Its parameters.
+    pub neuron: Neuron,
+    /// How much later than the event it was trained to fire, the encoder's latency apart, ms.
+    #[serde(default)]
+    pub delay_ms: f64,
+    /// One a train of the encoder, mV; where its spikes are signed first all ON trains, then all OFF.
+    pub weights: Vec<f64>,
+}
+
+/// Trained neurons with names, the encoder that they were trained behind, and how they were trained.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Readout {
+    /// With its parameters. A tare belongs to a board and a day: where the encoder needs one it can be given later.
+    pub encoder: Encoder,
+    /// The sensor; `None` where any will do whose number of trains fits.
+    #[serde(default)]
+    pub array: Option<Array>,
+    /// Grid or continuous, as the neurons were trained; neurons of another time are refused.
+    pub time: Time,
+    /// What remained after a spike, as the neurons were trained; others are refused.
+    pub after_spike: AfterSpike,
+    /// A factor on every threshold after training: below 1 the neurons fire on less.
+    ///
+    /// Reading: the thesis has none. 6.3.2 objects that a threshold below the trained one is crossed earlier than
+    /// intended; that price is paid for inputs a little weaker than the weakest trained one, which only just touches it.
+    #[serde(default = "one")]
+    pub run_threshold: f64,
+    /// By label.
+    pub neurons: BTreeMap<String, TrainedNeuron>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl Readout {
+    /// Checks that parts make sense and belong together.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the part.
+    pub fn check(&self) -> Result<()> {
+        self.encoder.check()?;
+        if !(self.run_threshold.is_finite() && self.run_threshold > 0.0) {
+            return Err(problem!("run_threshold is {}: must be above 0 and finite", self.run_threshold));
+        }
+        if self.neurons.is_empty() {
+            return Err(problem!("readout without a neuron: needs one or more"));
+        }
+        for (label, one) in &self.neurons {
+            if label.trim().is_empty() {
+                return Err(problem!("a neuron without a name: must have a label"));
+            }
+            one.neuron.check().map_err(|e| at(label, e))?;
+            if one.neuron.time != self.time {
+                let (its, mine) = (word(&one.neuron.time), word(&self.time));
+                return Err(problem!("{label}: trained for time {its}, this readout is for time {mine}"));
+            }
+            if one.neuron.after_spike != self.after_spike {
+                let (its, mine) = (word(&one.neuron.after_spike), word(&self.after_spike));
+                return Err(problem!("{label}: trained for after_spike {its}, this readout is for after_spike {mine}"));
+            }
+            if !(0.0..=60_000.0).contains(&one.delay_ms) {
+                return Err(problem!("{label}: delay_ms is {}: must lie between 0 and 60000", one.delay_ms));
+            }
+            if let Some(n) = one.weights.iter().position(|w| !w.is_finite()) {
+                return Err(problem!("{label}: weights[{n}] is {}: must be finite", one.weights[n]));
+            }
+            if let Some(array) = &self.array {
+                self.check_weights(label, one, array)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn check_weights(&self, label: &str, one: &TrainedNeuron, array: &Array) -> Result<()> {
+        let inputs = self.encoder.trains(array) * if self.encoder.signed() { 2 } else { 1 };
+        if one.weights.len() == inputs {
+            return Ok(());
+        }
+        let (rows, columns, signed) = (array.rows, array.columns, self.encoder.signed());
+        Err(problem!(
+            "{label}: {} weights, the encoder speaks on {inputs} trains{} for {rows} x {columns} taxels: must be one each",
+            one.weights.len(),
+            if signed { ", ON and OFF," } else { "" }
+        ))
+    }
+
+    /// Reads a readout from the text of its file and checks it.
+    ///
+    /// # Errors
+    ///
+    /// `Format` where the text is no readout, one of a version that is not known, or holds parts that make no sense.
+    pub fn from_json(text: &str) -> Result<Self> {
+        let format = |said: String| Error::Format(said);
+        let mut value: Value = serde_json::from_str(text).map_err(|e| format(format!("readout: not JSON: {e}")))?;
+        let Some(object) = value.as_object_mut() else {
+            return Err(format("readout: not a JSON object".to_owned()));
+        };
+        match object.remove("format") {
+            Some(Value::String(name)) if name == FORMAT => {}
+            Some(other) => return Err(format(format!("readout: format is {other}, must be \"{FORMAT}\""))),
+            None => return Err(format(format!("readout: does not say \"format\": \"{FORMAT}\", so it is none"))),
+        }
+        match object.remove("version") {
+            Some(version) if version.as_u64() == Some(VERSION) => {}
+            Some(version) => {
+                return Err(format(format!("readout: version {version}, this taxel reads version {VERSION} only")));
+            }
+            None => return Err(format(format!("readout: says no version, must be {VERSION}"))),
+        }
+        // The encoder names its own parameter that is wrong; serde would only say what.
+        if let Some(encoder) = object.get("encoder") {
+            Encoder::from_json(&encoder.to_string()).map_err(|e| format(format!("readout: {e}")))?;
+        }
+        let readout: Self = serde_json::from_value(value).map_err(|e| format(format!("readout: {e}")))?;
+        readout.check().map_err(|e| format(format!("readout: {e}")))?;
+        Ok(readout)
+    }
+
+    /// The readout as the text of its file: every number comes back as it was.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        #[derive(Serialize)]
+        struct File<'a> {
+            format: &'a str,
+            version: u64,
+            #[serde(flatten)]
+            readout: &'a Readout,
+        }
+        // Numbers were checked to be finite, and nothing else in here can fail to be written.
+        serde_json::to_string_pretty(&File { format: FORMAT, version: VERSION, readout: self }).unwrap_or_default()
+    }
+
+    /// Starts to listen to an array whose frames last `frame_us`.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the array is not the one that the readout was trained on, a tare is needed and not there, or the
+    /// period makes no sense.
+    pub fn stream(&self, array: &Array, frame_us: f64, tare: Option<&Tare>) -> Result<ReadoutStream> {
+        self.check()?;
+        if let Some(mine) = &self.array
+            && (mine.rows, mine.columns, &mine.exists) != (array.rows, array.columns, &array.exists)
+        {
+            return Err(problem!(
+                "array {} of {} x {} taxels: the readout was trained on {}, {} x {}{}",
+                array.name,
+                array.rows,
+                array.columns,
+                mine.name,
+                mine.rows,
+                mine.columns,
+                if mine.exists == array.exists { "" } else { ", of which others exist" }
+            ));
+        }
+        for (label, one) in &self.neurons {
+            self.check_weights(label, one, array)?;
+        }
+        let encoder = tare.map_or_else(|| self.encoder.clone(), |tare| self.encoder.with_tare(tare));
+        let neurons = self.neurons.iter().map(|(label, one)| (label.clone(), one.clone()));
+        let (encoder, clock) = (encoder.stream(array)?, FrameClock::new(frame_us)?);
+        Ok(ReadoutStream::new(encoder, array.clone(), clock, self.run_threshold, neurons))
+    }
+
+    /// What is said of a whole recording of events, and of a second of silence after it.
+    ///
+    /// # Errors
+    ///
+    /// As [`Readout::stream`] and [`ReadoutStream::push_events`]; `Interrupted` where asked to stop.
+    pub fn run_events(
+        &self,
+        events: &Events,
+        frame_us: f64,
+        tare: Option<&Tare>,
+        stop: Stop<'_>,
+    ) -> Result<Vec<Detection>> {
+        let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
+        let mut stream = self.stream(&events.array, frame_us, tare)?;
+        let mut found = stream.push_recording(events, stop)?;
+        stream.advance(last.saturating_add(SILENCE_US), &mut found)?;
+        Ok(found)
+    }
+
+    /// What is said of whole pictures, one after the other in `values`, at `t` us, and of a second after them in which
+    /// the last one stays. Frames last `frame_us`, or as long as pictures mostly lie apart.
+    ///
+    /// # Errors
+    ///
+    /// As [`Readout::stream`] and [`ReadoutStream::push_frame`]; `Interrupted` where asked to stop.
+    pub fn run_pictures(
+        &self,
+        array: &Array,
+        t: &[i64],
+        values: &[f32],
+        frame_us: Option<f64>,
+        tare: Option<&Tare>,
+        stop: Stop<'_>,
+    ) -> Result<Vec<Detection>> {
+        let frame_us = match frame_us {
+            Some(given) => given,
+            None => usual_distance(t)?,
+        };
+        let last = t.last().copied().unwrap_or(0);
+        let mut stream = self.stream(array, frame_us, tare)?;
+        let mut found = stream.push_pictures(array, t, values, stop)?;
+        stream.advance(last.saturating_add(SILENCE_US), &mut found)?;
+        Ok(found)
+    }
+}
+
+/// The median distance of pictures, us.
+fn usual_distance(t: &[i64]) -> Result<f64> {
+    let mut apart: Vec<u64> = t.windows(2).map(|w| w[1].abs_diff(w[0])).collect();
+    if apart.is_empty() {
+        return Err(problem!("{} picture(s) do not say how long a frame lasts: give frame_us", t.len()));
+    }
+    let middle = apart.len() / 2;
+    Ok(*apart.select_nth_unstable(middle).1 as f64)
+}
+
+fn at(label: &str, error: Error) -> Error {
+    if let Error::Problem(text) = error { problem!("{label}: {text}") } else { error }
+}
+
+/// An option's word, as it stands in JSON.
+fn word(option: &impl Serialize) -> String {
+    serde_json::to_string(option).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::encode::ContactArea;
+
+    fn readout() -> Readout {
+        let neuron = Neuron { tau: 0.5, time: Time::Grid, step_ms: 0.192, ..Neuron::default() };
+        let one = |delay_ms, first: f64| TrainedNeuron {
+            neuron: neuron.clone(),
+            delay_ms,
+            weights: (0..10).map(|k| first / f64::from(k + 3)).collect(),
+        };
+        Readout {
+            encoder: Encoder::ContactArea(ContactArea::default()),
+            array: Some(Array::thesis()),
+            time: Time::Grid,
+            after_spike: AfterSpike::Keep,
+            run_threshold: 0.9,
+            neurons: [("contact".to_owned(), one(0.2, 3.0)), ("lift".to_owned(), one(0.5, -0.1))].into(),
+        }
+    }
+
+    #[test]
+    fn a_file_gives_every_number_back() {
+        let mut readout = readout();
+        let weights = &mut readout.neurons.get_mut("lift").unwrap().weights;
+        // Numbers that a careless reader of decimals gets wrong by the last bit.
+        weights[..6].copy_from_slice(&[
+            0.1 + 0.2,
+            1.0 / 3.0,
+            5e-324,
+            -2.2250738585072014e-308,
+            1.7976931348623157e308,
+            1e23,
+        ]);
+        let again = Readout::from_json(&readout.to_json()).unwrap();
+        assert_eq!(again, readout);
+        for (a, b) in again.neurons["lift"].weights.iter().zip(&readout.neurons["lift"].weights) {
+            assert_eq!(a.to_bits(), b.to_bits());
+        }
+        assert!(readout.to_json().starts_with("{\n  \"format\": \"taxel readout\",\n  \"version\": 1,"));
+    }
+
+    #[test]
+    fn files_that_are_no_readout_are_refused_by_name() {
+        let good = readout().to_json();
+        let cases = [
+            ("", "readout: not JSON"),
+            ("[]", "readout: not a JSON object"),
+            ("{}", "readout: does not say \"format\": \"taxel readout\", so it is none"),
+            (&good.replace("taxel readout", "other"), "readout: format is \"other\", must be \"taxel readout\""),
+            (&good.replace("\"version\": 1,", ""), "readout: says no version, must be 1"),
+            (
+                &good.replace("\"version\": 1,", "\"version\": 2,"),
+                "readout: version 2, this taxel reads version 1 only",
+            ),
+            (&good.replace("\"run_threshold\"", "\"threshold\""), "readout: unknown field `threshold`"),
+            (&good.replace("\"neurons\"", "\"neuron\""), "readout: unknown field `neuron`"),
+            (&good.replace("contact_area", "contact_are"), "readout: encoder contact_are: must be one of"),
+            (&good.replace("\"noise_floor\": 3.0", "\"noise_floor\": -3.0"), "readout: noise_floor is -3"),
+            (&good.replace("\"run_threshold\": 0.9", "\"run_threshold\": 0"), "readout: run_threshold is 0"),
+            (&good.replacen("\"time\": \"grid\"", "\"time\": \"continuous\"", 1), "trained for time \"grid\""),
+            (&good.replacen("\"after_spike\": \"keep\"", "\"after_spike\": \"reset\"", 1), "trained for after_spike"),
+            (&good.replacen("\"delay_ms\": 0.2", "\"delay_ms\": -0.2", 1), "contact: delay_ms is -0.2"),
+            (&good.replacen("\"tau\": 0.5", "\"tau\": 0", 1), "contact: tau is 0"),
+            (&good.replacen("1.0,", "", 1), "contact: 9 weights, the encoder speaks on 10 trains for 64 x 64"),
+        ];
+        for (text, said) in cases {
+            let error = Readout::from_json(text).unwrap_err();
+            assert!(matches!(error, Error::Format(_)), "{said}");
+            assert!(error.to_string().contains(said), "{error}, not {said}");
+            assert!(!error.to_string().contains('\n'));
+        }
+    }
+
+    #[test]
+    fn a_readout_refuses_neurons_that_were_trained_otherwise() {
+        let mut other = readout();
+        other.neurons.get_mut("lift").unwrap().neuron.after_spike = AfterSpike::Reset;
+        let said = other.check().unwrap_err().to_string();
+        assert_eq!(said, "lift: trained for after_spike \"reset\", this readout is for after_spike \"keep\"");
+        let mut other = readout();
+        other.neurons.get_mut("lift").unwrap().neuron.time = Time::Continuous;
+        assert!(other.check().unwrap_err().to_string().starts_with("lift: trained for time \"continuous\""));
+        let mut other = readout();
+        other.neurons.clear();
+        assert!(other.check().is_err());
+    }
+
+    #[test]
+    fn another_array_and_a_missing_tare_are_refused() {
+        let array = Array::new(63, 64, 2.67, "other").unwrap();
+        let said = readout().stream(&array, 192.0, None).err().unwrap().to_string();
+        assert!(said.starts_with("array other of 63 x 64 taxels: the readout was trained on thesis"), "{said}");
+        let said = readout().stream(&Array::thesis(), 192.0, None).err().unwrap().to_string();
+        assert!(said.contains("tare"), "{said}");
+        // Without an array of its own a readout listens to any whose trains are as many.
+        let tare =
+            Tare { array: array.clone(), rest: vec![Some(0.0); 63 * 64], start_us: 0, stop_us: 1, note: String::new() };
+        assert!(Readout { array: None, ..readout() }.stream(&array, 192.0, Some(&tare)).is_ok());
+    }
+}
