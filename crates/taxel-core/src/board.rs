@@ -4,9 +4,12 @@
 //! host, emulator and logic agree. It has no clock of its own: each frame moves its time on.
 
 mod scan;
+mod session;
 
 use scan::Lfsr;
 use serde::{Deserialize, Serialize};
+
+pub use session::session;
 
 use crate::wire::registers::Registers;
 use crate::wire::{Command, CommandReader, WORD_BYTES, Word};

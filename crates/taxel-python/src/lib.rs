@@ -10,6 +10,7 @@ mod encode;
 mod neuron;
 mod nouns;
 mod recording;
+mod simulate;
 
 use pyo3::prelude::*;
 
@@ -23,5 +24,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     encode::register(module)?;
     neuron::register(module)?;
     recording::register(module)?;
+    simulate::register(module)?;
     Ok(())
 }

@@ -30,6 +30,20 @@ pub enum Kind {
     Pictures,
 }
 
+impl Kind {
+    /// As it is written in JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::First => "first",
+            Self::Bounce => "bounce",
+            Self::Hand => "hand",
+            Self::Rest => "rest",
+            Self::Pictures => "pictures",
+        }
+    }
+}
+
 /// One touch: from the moment when force leaves zero to that when it returns there.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contact {

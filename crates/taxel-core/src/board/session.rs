@@ -1,0 +1,117 @@
+//! A board from reset to stop, as the demo and `taxel emulate` use it: it arms, is tared, starts, and stops.
+
+use super::Board;
+use crate::wire::{Command, Registers};
+use crate::{Result, Stop, problem};
+
+/// The commands of a session of `frames` frames, and before which frame each comes.
+///
+/// The first frame arms the board ([`Board::arm`]). For the tare the noise floor is 0, so that every taxel tells its rest
+/// again and again; `tare_ms` later come the floor of `registers` and the start marker, before the last frame the stop.
+///
+/// # Errors
+///
+/// `Problem` where the tare is not between 0 and a minute, or does not leave two frames.
+pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(u64, Command)>> {
+    if !(0.0..=60_000.0).contains(&tare_ms) {
+        return Err(problem!("tare of {tare_ms} ms: must be 0 to 60000"));
+    }
+    let start = 1 + (tare_ms * 1e3 / registers.frame_us()).ceil() as u64;
+    if frames < start + 2 {
+        return Err(problem!("{frames} frames: arming, a tare of {tare_ms} ms, start and stop need {}", start + 2));
+    }
+    let write = |register: u8, registers: Registers| Command { register, value: registers.word(register) };
+    let mut commands = vec![];
+    if start > 1 {
+        commands.push((1, write(5, Registers { noise_floor: 0, ..*registers })));
+        commands.push((start, write(5, *registers)));
+    }
+    commands.push((start, write(7, Registers { record: true, ..*registers })));
+    commands.push((frames - 1, write(7, Registers { record: false, ..*registers })));
+    Ok(commands)
+}
+
+impl Board {
+    /// Scans the first frame for nobody: at reset all previous values are 0, and every taxel would be sent.
+    ///
+    /// # Errors
+    ///
+    /// As [`Board::frame`].
+    pub fn arm(&mut self, ticks: &[u16]) -> Result<()> {
+        self.frame(ticks, |_| true)
+    }
+
+    /// Scans frame after frame as fast as it goes, until `touch` has no more of them.
+    ///
+    /// `touch` writes the trip times of a frame; `commands` come before the frames that they name.
+    ///
+    /// # Errors
+    ///
+    /// As [`Board::frame`]; `Interrupted` where asked to stop.
+    pub fn play(
+        &mut self,
+        mut touch: impl FnMut(&mut [u16]) -> Result<bool>,
+        commands: &[(u64, Command)],
+        mut sink: impl FnMut(&[u8]) -> bool,
+        stop: Stop<'_>,
+    ) -> Result<()> {
+        let mut ticks = vec![0; self.values.len()];
+        let mut commands = commands.iter().peekable();
+        while touch(&mut ticks)? {
+            stop.check()?;
+            while let Some((_, command)) = commands.next_if(|(frame, _)| *frame <= self.counts.frames) {
+                self.command(&command.to_bytes());
+            }
+            self.frame(&ticks, &mut sink)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Array;
+
+    #[test]
+    fn the_board_arms_tares_starts_and_stops() {
+        let registers = Registers { noise_floor: 3, ..Registers::default() };
+        let commands = session(&registers, 1.0, 12).unwrap();
+        let mut board = Board::new(registers, &Array::thesis()).unwrap();
+        board.arm(&[50; 4096]).unwrap();
+        let (mut frame, mut words) = (0, [0; 12]);
+        let last = std::cell::Cell::new(0);
+        let touch = |ticks: &mut [u16]| {
+            // A taxel that moves by one tick a frame: only a floor of 0 shows it.
+            frame += 1;
+            ticks.fill(50);
+            ticks[9] += frame as u16 % 2;
+            last.set(frame);
+            Ok(frame < 12)
+        };
+        let sink = |datagram: &[u8]| {
+            words[last.get()] += datagram.len() / 5;
+            true
+        };
+        board.play(touch, &commands, sink, Stop::never()).unwrap();
+        // Six frames of 192 us for the tare; then a start, silence, a stop.
+        assert_eq!(words, [0, 2, 2, 2, 2, 2, 2, 1, 0, 0, 0, 1]);
+        assert_eq!(board.registers().noise_floor, 3);
+        assert!(!board.registers().record);
+    }
+
+    #[test]
+    fn without_a_tare_the_second_frame_starts() {
+        let commands = session(&Registers::default(), 0.0, 10).unwrap();
+        assert_eq!(commands.iter().map(|(frame, c)| (*frame, c.register)).collect::<Vec<_>>(), [(1, 7), (9, 7)]);
+    }
+
+    #[test]
+    fn a_session_that_cannot_be_is_refused() {
+        for wrong in [-1.0, f64::NAN, 1e9] {
+            assert!(session(&Registers::default(), wrong, 1 << 40).is_err());
+        }
+        assert!(session(&Registers::default(), 50.0, 262).unwrap_err().to_string().contains("need 264"));
+        assert!(session(&Registers::default(), 50.0, 264).is_ok());
+    }
+}

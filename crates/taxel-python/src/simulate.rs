@@ -1,0 +1,197 @@
+//! Simulated touch, and the board that feels it, as fast as it goes.
+
+use std::net::SocketAddr;
+use std::sync::Mutex;
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use taxel_core::board::{Board, session};
+use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor, Stage, Taxels};
+use taxel_core::wire::{Decoder, Registers};
+use taxel_core::{Array, Error, Events, Result, Stop, problem};
+use taxel_live::emulate::{Emulator, Options, Report};
+
+use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
+use crate::enter::enter;
+use crate::errors::core;
+
+/// An act as Python hands it over: silence in ms, a scene as JSON, or pictures with their period in us.
+#[derive(FromPyObject)]
+pub(crate) enum ActIn<'py> {
+    Silence(f64),
+    Ball(String),
+    Pictures(PyReadonlyArray1<'py, f32>, f64),
+}
+
+fn scene(json: &str) -> Result<Scene> {
+    serde_json::from_str(json).map_err(|error| Error::Scene(format!("scene: {error}")))
+}
+
+fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
+    acts.into_iter()
+        .map(|act| {
+            Ok(match act {
+                ActIn::Silence(ms) => Act::Silence { ms },
+                ActIn::Ball(json) => Act::Ball(scene(&json).map_err(core)?),
+                ActIn::Pictures(values, period_us) => {
+                    Act::Pictures(Pictures { values: slice("values", &values)?.to_vec(), period_us })
+                }
+            })
+        })
+        .collect()
+}
+
+/// Acts and board, ready to be played.
+fn ready(array: &Array, registers: Registers, sensor: &str, seed: u64, acts: &[Act]) -> Result<Stage> {
+    let sensor: Sensor = serde_json::from_str(sensor).map_err(|error| Error::Scene(format!("sensor: {error}")))?;
+    registers.check(array)?;
+    Stage::new(array, Taxels::new(&sensor, array.len(), registers.ramp, seed)?, registers.frame_us(), acts)
+}
+
+/// Touches as Python gets them: kind, start and stop in us, speed in m/s, peak force in N.
+type ContactsOut = Vec<(String, f64, f64, f64, f64)>;
+
+/// Depth in mm and force in N at even steps, and touches.
+type MotionOut<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>, ContactsOut);
+
+fn from_contacts(contacts: &[Contact]) -> ContactsOut {
+    contacts.iter().map(|c| (c.kind.name().to_owned(), c.start_us, c.stop_us, c.speed_m_s, c.peak_n)).collect()
+}
+
+/// Draws a scene; gives its parameters as JSON.
+#[pyfunction]
+fn draw_scene(parts: ArrayParts, seed: u64, index: u32, left_to_rest: bool) -> PyResult<String> {
+    let scene = Scene::draw(&to_array(parts)?, seed, index, left_to_rest).map_err(core)?;
+    serde_json::to_string(&scene).map_err(|error| core(Error::Scene(error.to_string())))
+}
+
+/// Works a scene out: depth in mm and force in N at even steps, and its touches.
+#[pyfunction]
+fn motion<'py>(py: Python<'py>, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
+    let motion = enter(py, |_| Motion::of(&scene(json)?, step_us))?;
+    let contacts = from_contacts(&motion.contacts);
+    Ok((array(py, motion.depth_mm), array(py, motion.force_n), contacts))
+}
+
+/// Works acts out without playing them: touches in us of the board's clock, force in N by frame.
+#[pyfunction]
+fn truth<'py>(
+    py: Python<'py>,
+    parts: ArrayParts,
+    preset: &str,
+    acts: Vec<ActIn<'py>>,
+) -> PyResult<(ContactsOut, Bound<'py, PyArray1<f32>>)> {
+    let (sensor_array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
+    let stage = enter(py, |_| ready(&sensor_array, registers, "{}", 0, &acts))?;
+    Ok((from_contacts(stage.contacts()), array(py, stage.force_n())))
+}
+
+/// Plays acts to a board that arms, is tared and starts; gives what a host decodes of its datagrams, and how many they
+/// were, with their words.
+#[pyfunction]
+fn play<'py>(
+    py: Python<'py>,
+    parts: ArrayParts,
+    preset: &str,
+    sensor: &str,
+    seed: u64,
+    acts: Vec<ActIn<'py>>,
+    tare_ms: f64,
+) -> PyResult<(EventsOut<'py>, u64, u64)> {
+    let (array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
+    let (events, datagrams, words) = enter(py, |stop| {
+        let mut stage = ready(&array, registers, sensor, seed, &acts)?;
+        let commands = session(&registers, tare_ms, stage.frames() as u64)?;
+        let mut board = Board::new(registers, &array)?;
+        let mut decoder = Decoder::new(array.clone());
+        let mut events = Events::empty(array.clone());
+        let (mut datagrams, mut words) = (0_u64, 0_u64);
+        let hear = |datagram: &[u8]| {
+            decoder.push_into(datagram, None, &mut events);
+            decoder.end_of_datagram_into(&mut events);
+            datagrams += 1;
+            words += datagram.len() as u64 / 5;
+            true
+        };
+        let mut first = vec![0; array.len()];
+        stage.frame(&mut first)?;
+        board.arm(&first)?;
+        board.play(|ticks| stage.frame(ticks), &commands, hear, stop)?;
+        Ok::<_, Error>((events, datagrams, words))
+    })?;
+    Ok((from_events(py, events), datagrams, words))
+}
+
+/// Plays acts to a board that arms, is tared and starts, in real time, and sends its datagrams to `to`; gives the report.
+///
+/// `control` is where the board takes commands by TCP; `begun` hears that address once the board is ready, `watch` a
+/// report, as JSON, ten times a second. What either raises ends the play.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+fn emulate(
+    py: Python<'_>,
+    to: &str,
+    parts: ArrayParts,
+    preset: &str,
+    sensor: &str,
+    seed: u64,
+    acts: Vec<ActIn<'_>>,
+    tare_ms: f64,
+    control: Option<&str>,
+    begun: Py<PyAny>,
+    watch: Py<PyAny>,
+) -> PyResult<String> {
+    let (array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
+    let (to, control) = (address(to)?, control.map(address).transpose()?);
+    let raised: Mutex<Option<PyErr>> = Mutex::new(None);
+    let tell = |callback: &Py<PyAny>, text: Option<String>| {
+        if let Err(error) = Python::attach(|py| callback.call1(py, (text,)).map(drop))
+            && let Ok(mut slot) = raised.lock()
+        {
+            slot.get_or_insert(error);
+        }
+    };
+    let report = enter(py, |stop| {
+        let mut stage = ready(&array, registers, sensor, seed, &acts)?;
+        let commands = session(&registers, tare_ms, stage.frames() as u64)?;
+        let mut board = Board::new(registers, &array)?;
+        let mut first = vec![0; array.len()];
+        stage.frame(&mut first)?;
+        board.arm(&first)?;
+        let options = Options { control, commands, ..Options::to(to) };
+        let mut emulator = Emulator::open(board, &array, options)?;
+        tell(&begun, emulator.control_address().map(|a| a.to_string()));
+        let mut failed = Ok(());
+        let mut touch = |ticks: &mut [u16]| {
+            stage.frame(ticks).unwrap_or_else(|error| {
+                failed = Err(error);
+                false
+            })
+        };
+        let ends = || stop.asked() || raised.lock().is_ok_and(|slot| slot.is_some());
+        let report = emulator.run(&mut touch, |report| tell(&watch, Some(json(report))), Stop::when(&ends))?;
+        failed?;
+        Ok::<_, taxel_live::Error>(json(&report))
+    })?;
+    match raised.into_inner() {
+        Ok(Some(error)) => Err(error),
+        _ => Ok(report),
+    }
+}
+
+fn address(text: &str) -> PyResult<SocketAddr> {
+    text.parse().map_err(|_| core(problem!("address {text:?}: must be an IP address and a port, as 127.0.0.1:5208")))
+}
+
+fn json(report: &Report) -> String {
+    // Whole and finite numbers only: nothing in it can fail to be written.
+    serde_json::to_string(report).unwrap_or_default()
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(draw_scene, module)?)?;
+    module.add_function(wrap_pyfunction!(motion, module)?)?;
+    module.add_function(wrap_pyfunction!(truth, module)?)?;
+    module.add_function(wrap_pyfunction!(play, module)?)?;
+    module.add_function(wrap_pyfunction!(emulate, module)?)
+}

@@ -1,0 +1,204 @@
+"""The emulated board that feels acts: as fast as it goes, or in real time over UDP."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._arguments import number, parameters, text, whole
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence, _thesis
+
+__all__ = ["EmulatorReport", "Played", "emulate", "play", "truth"]
+
+
+class Played(NamedTuple):
+    """What a host decoded of a board's datagrams."""
+
+    events: Events
+    """All of them: the tare's, then from the start marker on what the scenes made."""
+    datagrams: int
+    words: int
+    """Of five bytes each."""
+
+
+@dataclass(frozen=True)
+class EmulatorReport:
+    """What an emulated board has done so far."""
+
+    frames: int
+    board_seconds: float
+    """By the board's own clock."""
+    seconds: float
+    """By the host's: larger where the machine cannot hold the board's rate."""
+    changes: int
+    datagrams: int
+    bytes: int
+    dropped: int
+    """Changes that found the board's queue full."""
+    late_frames: int
+    """Sent more than a frame after their end."""
+    late_us: Mapping[str, float]
+    """How long after its end a frame was sent: p50, p99, max; empty at the beginning."""
+
+    @classmethod
+    def _from_json(cls, said: str) -> EmulatorReport:
+        report = json.loads(said)
+        board, sent, late = report["board"], report["sent"], report["late"]
+        names = {"p50": "p50_ns", "p90": "p90_ns", "p99": "p99_ns", "max": "max_ns"}
+        return cls(
+            frames=board["frames"],
+            board_seconds=report["board_seconds"],
+            seconds=report["seconds"],
+            changes=board["changes"],
+            datagrams=sent["datagrams"],
+            bytes=sent["bytes"],
+            dropped=board["dropped"],
+            late_frames=report["late_frames"],
+            late_us={name: late[field] / 1000.0 for name, field in names.items() if late.get(field) is not None},
+        )
+
+
+def truth(
+    acts: Sequence[Act], *, preset: str = "5.2 kHz", array: Array | None = None
+) -> tuple[list[Contact], NDArray[np.float32]]:
+    """Return what really happens in acts: the touches by the board's clock (us from its first frame), force (N) by frame.
+
+    Parameters
+    ----------
+    acts : sequence of Scene, Silence, Pictures
+    preset : str
+        The board's registers: "5.2 kHz", "2 kHz" or "20.8 kHz".
+    array : Array, optional
+        The thesis' 64 x 64 taxels where it is left out.
+
+    Raises
+    ------
+    SceneError : an act that cannot be played (names it)
+
+    Examples
+    --------
+    >>> contacts, force = truth([Silence(100.0), Scene.draw(seed=1)])
+    >>> round(contacts[0].start_us), float(force[:520].max())
+    (343413, 0.0)
+    """
+    contacts, force = _core.truth(_thesis(array)._parts(), text("preset", preset), _parts(acts, _thesis(array)))
+    return [Contact(*contact) for contact in contacts], force
+
+
+def play(
+    acts: Sequence[Act],
+    *,
+    seed: int,
+    preset: str = "5.2 kHz",
+    tare_ms: float = 50.0,
+    array: Array | None = None,
+    sensor: Mapping[str, float] | None = None,
+) -> Played:
+    """Let an emulated board feel acts, as fast as it goes, and decode its datagrams.
+
+    The board arms after its first frame, is tared with a noise floor of 0 for `tare_ms`, then takes the preset's floor
+    and marks a start; before the last frame it marks a stop.
+
+    Parameters
+    ----------
+    acts : sequence of Scene, Silence, Pictures
+        The first should be a Silence longer than the tare.
+    seed : int, 0 or more
+        Draws the taxels' spread and the noise.
+    preset, array
+        As in `truth`.
+    tare_ms : float, 0 to 60000
+    sensor : mapping, optional
+        What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm, gain_spread,
+        offset_mv, noise_ticks.
+
+    Raises
+    ------
+    SceneError : an act or a sensor that makes no sense
+    ProblemError : acts too short for the tare
+
+    Examples
+    --------
+    >>> played = play([Silence(60.0)], seed=1)
+    >>> played.events.markers
+    [Marker(t=50300, start=True), Marker(t=59700, start=False)]
+    """
+    parts = _parts(acts, _thesis(array))
+    events, datagrams, words = _core.play(
+        _thesis(array)._parts(),
+        text("preset", preset),
+        parameters(dict(sensor or {})),
+        whole("seed", seed, 0),
+        parts,
+        number("tare_ms", tare_ms),
+    )
+    return Played(Events._from_parts(events), datagrams, words)
+
+
+def emulate(
+    to: str,
+    acts: Sequence[Act],
+    *,
+    seed: int,
+    preset: str = "5.2 kHz",
+    tare_ms: float = 50.0,
+    array: Array | None = None,
+    sensor: Mapping[str, float] | None = None,
+    control: str | None = None,
+    begun: Callable[[str | None], None] = lambda _: None,
+    watch: Callable[[EmulatorReport], None] = lambda _: None,
+) -> EmulatorReport:
+    """Let an emulated board feel acts in real time, and send its datagrams by UDP.
+
+    Parameters
+    ----------
+    to : str
+        Address and port, as "127.0.0.1:5208".
+    acts, seed, preset, tare_ms, array, sensor
+        As in `play`.
+    control : str, optional
+        Address and port where the board takes commands by TCP; port 0 finds a free one.
+    begun : function, optional
+        Called with the address of `control` just before the first frame.
+    watch : function, optional
+        Called with a report ten times a second.
+
+    Returns
+    -------
+    EmulatorReport : also how late frames were, which is where a machine shows that it cannot hold the board's rate
+
+    Raises
+    ------
+    As in `play`; OSError where a socket cannot be had.
+    """
+    report = _core.emulate(
+        text("to", to),
+        _thesis(array)._parts(),
+        text("preset", preset),
+        parameters(dict(sensor or {})),
+        whole("seed", seed, 0),
+        _parts(acts, _thesis(array)),
+        number("tare_ms", tare_ms),
+        None if control is None else text("control", control),
+        begun,
+        lambda said: watch(EmulatorReport._from_json(said)),
+    )
+    return EmulatorReport._from_json(report)
+
+
+def _parts(acts: Sequence[Act], array: Array) -> list[Any]:
+    for n, act in enumerate(acts):
+        if not isinstance(act, Silence | Scene | Pictures):
+            raise ProblemError(f"act {n} is {act!r}: must be a Scene, Silence or Pictures")
+        if isinstance(act, Pictures) and act.values.shape[1:] != array.shape:
+            raise ProblemError(f"act {n}: pictures of shape {act.values.shape[1:]}, the array has {array.shape}")
+    return [act._part() for act in acts]
