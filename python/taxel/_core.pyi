@@ -1,5 +1,6 @@
 """The compiled part of taxel."""
 
+from collections.abc import Callable
 from os import PathLike
 from typing import Any
 
@@ -115,3 +116,27 @@ def tare_of_frames(
     note: str,
 ) -> str: ...
 def check_tare(tare: str) -> str: ...
+
+# simulate: scenes and reports as JSON; acts as ms of silence, a scene, or pictures with their period in us
+
+_Act = float | str | tuple[NDArray[np.float32], float]
+_Contacts = list[tuple[str, float, float, float, float]]
+
+def draw_scene(parts: tuple[Any, ...], seed: int, index: int, left_to_rest: bool) -> str: ...
+def motion(json: str, step_us: float) -> tuple[NDArray[np.float32], NDArray[np.float32], _Contacts]: ...
+def truth(parts: tuple[Any, ...], preset: str, acts: list[_Act]) -> tuple[_Contacts, NDArray[np.float32]]: ...
+def play(
+    parts: tuple[Any, ...], preset: str, sensor: str, seed: int, acts: list[_Act], tare_ms: float
+) -> tuple[tuple[Any, ...], int, int]: ...
+def emulate(
+    to: str,
+    parts: tuple[Any, ...],
+    preset: str,
+    sensor: str,
+    seed: int,
+    acts: list[_Act],
+    tare_ms: float,
+    control: str | None,
+    begun: Callable[[str | None], object],
+    watch: Callable[[str], object],
+) -> str: ...

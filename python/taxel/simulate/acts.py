@@ -75,7 +75,7 @@ class Scene:
     --------
     >>> scene = Scene.draw(seed=1)
     >>> scene
-    Scene(ball of 34 mm and 36 g from 104 mm, caught after 4 impacts)
+    Scene(ball of 35 mm and 36 g from 196 mm, caught after 4 impacts)
     >>> [contact.kind for contact in scene.motion().contacts]
     ['first', 'bounce', 'bounce', 'bounce', 'hand']
     """
@@ -102,7 +102,7 @@ class Scene:
         return cls(json.loads(_core.draw_scene(parts, seed, index, flag("left_to_rest", left_to_rest))))
 
     def replace(self, **changes: Any) -> Scene:
-        """Return the scene with some parameters changed; a mapping changes some of a part, as ``foam={"dashpot_ms": 0}``."""
+        """Return the scene with parameters changed; a mapping changes some of a part, as ``foam={"dashpot_ms": 0}``."""
         unknown = [name for name in changes if name not in self.parameters]
         if unknown:
             raise ProblemError(f"{unknown[0]}: a scene has {', '.join(self.parameters)}")
@@ -128,10 +128,7 @@ class Scene:
 
     def __repr__(self) -> str:
         ball, ending = self.parameters["ball"], self.parameters["ending"]
-        if "caught" in ending:
-            end = f"caught after {ending['caught']['after']} impacts"
-        else:
-            end = "left to rest"
+        end = f"caught after {ending['caught']['after']} impacts" if "caught" in ending else "left to rest"
         drop = self.parameters["drop_mm"]
         return f"Scene(ball of {ball['radius_mm']:.0f} mm and {ball['mass_g']:g} g from {drop:.0f} mm, {end})"
 
