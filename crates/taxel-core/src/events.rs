@@ -75,6 +75,19 @@ impl Events {
         }
     }
 
+    /// Forgets all events and markers but keeps the columns' memory, to be filled again.
+    pub fn clear(&mut self) {
+        self.t.clear();
+        self.x.clear();
+        self.y.clear();
+        self.p.clear();
+        self.markers.clear();
+        if let Some(intensity) = &mut self.intensity {
+            intensity.ticks.clear();
+            intensity.present.clear();
+        }
+    }
+
     /// Checks that columns are equally long and that every event lies on the array.
     ///
     /// # Errors

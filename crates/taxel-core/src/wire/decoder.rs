@@ -1,9 +1,16 @@
 //! Bytes to events, as they come: finds its place after damage, unwraps time, pairs intensities, counts every loss.
 
+mod blocks;
+
+use std::mem::MaybeUninit;
+
 use serde::{Deserialize, Serialize};
 
+pub use blocks::Instructions;
+use blocks::{BLOCK_WORDS, State};
+
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
-use crate::{Array, Events, Intensities, Marker};
+use crate::{Array, Events, Intensities, Marker, Result, problem};
 
 /// How far a stamp may lie behind the latest time and still be a step back (reordered datagrams), in stamps: 0.1 s.
 /// Reading: any other lies ahead, so silences up to 6.45 s are right from the stamps alone.
@@ -112,6 +119,7 @@ struct Change {
 #[derive(Debug, Clone)]
 pub struct Decoder {
     array: Array,
+    instructions: Instructions,
     /// The bytes of a word that is not complete.
     partial: [u8; WORD_BYTES],
     have: usize,
@@ -129,6 +137,7 @@ impl Decoder {
     pub fn new(array: Array) -> Self {
         Self {
             array,
+            instructions: Instructions::best(),
             partial: [0; WORD_BYTES],
             have: 0,
             clock: Clock::default(),
@@ -155,6 +164,19 @@ impl Decoder {
         self
     }
 
+    /// Uses other vector instructions than the machine's best, for tests and measurements: the events are the same.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where this machine does not have them.
+    pub fn instructions(mut self, instructions: Instructions) -> Result<Self> {
+        if !instructions.present() {
+            return Err(problem!("instructions {instructions:?}: this machine does not have them"));
+        }
+        self.instructions = instructions;
+        Ok(self)
+    }
+
     /// The sensor.
     #[must_use]
     pub fn array(&self) -> &Array {
@@ -176,25 +198,53 @@ impl Decoder {
         events
     }
 
-    /// As [`Self::push`], into columns that are used again: appends.
+    /// As [`Self::push`], into columns that are used again ([`Events::clear`]): appends.
     pub fn push_into(&mut self, bytes: &[u8], arrived: Option<i64>, out: &mut Events) {
-        for &byte in bytes {
-            if byte & FIRST != 0 {
-                self.give_up_partial();
-            } else if self.have == 0 {
-                self.counts.bytes += 1;
-                self.counts.skipped += 1;
-                continue;
-            }
-            self.partial[self.have] = byte;
-            self.have += 1;
-            if self.have == WORD_BYTES {
-                self.have = 0;
-                self.counts.bytes += WORD_BYTES as u64;
-                self.counts.words += 1;
-                self.word(Word::from_bytes(self.partial), arrived, out);
-            }
+        let (before, most) = (out.len(), self.most_rows(bytes.len()));
+        let paired = out.intensity.is_some();
+        let mut intensity = out.intensity.take().unwrap_or_default();
+        let rows_to_come = before + most - intensity.ticks.len();
+        out.t.reserve(most);
+        out.x.reserve(most);
+        out.y.reserve(most);
+        out.p.reserve(most);
+        intensity.ticks.reserve(rows_to_come);
+        intensity.present.reserve(rows_to_come);
+        let skip = before - intensity.ticks.len();
+        let room = Room {
+            t: &mut out.t.spare_capacity_mut()[..most],
+            x: &mut out.x.spare_capacity_mut()[..most],
+            y: &mut out.y.spare_capacity_mut()[..most],
+            p: &mut out.p.spare_capacity_mut()[..most],
+            ticks: &mut intensity.ticks.spare_capacity_mut()[skip..skip + most],
+            present: &mut intensity.present.spare_capacity_mut()[skip..skip + most],
+        };
+        let filled = self.fill(bytes, arrived, room, paired, &mut out.markers);
+        let after = before + filled.rows;
+        // SAFETY: `fill` has written the first `rows` entries of t, x, y and p, which begin at `before`, and the
+        // capacity was reserved above.
+        unsafe {
+            out.t.set_len(after);
+            out.x.set_len(after);
+            out.y.set_len(after);
+            out.p.set_len(after);
         }
+        if filled.paired {
+            intensity.ticks.resize(before, 0);
+            intensity.present.resize(before, false);
+            // SAFETY: as above; with `paired`, `fill` has written the first `rows` entries of ticks and present too.
+            unsafe {
+                intensity.ticks.set_len(after);
+                intensity.present.set_len(after);
+            }
+            out.intensity = Some(intensity);
+        }
+    }
+
+    /// How many rows the next `bytes` bytes can give at most.
+    #[must_use]
+    pub fn most_rows(&self, bytes: usize) -> usize {
+        (self.have + bytes) / WORD_BYTES + 1
     }
 
     /// Says that a datagram ends here: a change whose intensity has not come has none.
@@ -231,6 +281,102 @@ impl Decoder {
         }
     }
 
+    /// As [`Self::push`], into columns that the caller lays out; `paired` says whether the columns of intensities are
+    /// to be written before the first intensity comes, and markers are appended.
+    ///
+    /// # Panics
+    ///
+    /// Where a column has fewer entries than [`Self::most_rows`] asks for.
+    pub fn fill(
+        &mut self,
+        bytes: &[u8],
+        arrived: Option<i64>,
+        room: Room<'_>,
+        paired: bool,
+        markers: &mut Vec<Marker>,
+    ) -> Filled {
+        assert!(room.len() >= self.most_rows(bytes.len()), "columns have room for {} rows", room.len());
+        let mut sheet = Sheet { room, rows: 0, paired, open: false };
+        if let Some(change) = self.waiting.take() {
+            sheet.change(change);
+        }
+        let mut at = 0;
+        while self.have > 0 && at < bytes.len() {
+            self.byte(bytes[at], arrived, &mut sheet, markers);
+            at += 1;
+        }
+        while at < bytes.len() {
+            at += self.blocks(&bytes[at..], arrived, &mut sheet);
+            // An odd number, so that pairs that lie across the blocks' edges come to lie inside.
+            let mut words = if self.ready(arrived) { BLOCK_WORDS - 1 } else { 1 };
+            while words > 0 && at < bytes.len() {
+                match bytes[at..].first_chunk::<WORD_BYTES>() {
+                    Some(word) if is_whole(*word) => {
+                        self.counts.bytes += WORD_BYTES as u64;
+                        self.counts.words += 1;
+                        self.word(Word::from_bytes(*word), arrived, &mut sheet, markers);
+                        at += WORD_BYTES;
+                    }
+                    _ => {
+                        // Damage, or the end: byte by byte to the next place.
+                        self.byte(bytes[at], arrived, &mut sheet, markers);
+                        at += 1;
+                        while self.have > 0 && at < bytes.len() {
+                            self.byte(bytes[at], arrived, &mut sheet, markers);
+                            at += 1;
+                        }
+                    }
+                }
+                words -= 1;
+            }
+        }
+        if sheet.open {
+            self.waiting = Some(sheet.take_last());
+        }
+        Filled { rows: sheet.rows, paired: sheet.paired }
+    }
+
+    /// Whether stamps alone unwrap what comes: a first one is known, and this arrival has been reckoned with.
+    fn ready(&self, arrived: Option<i64>) -> bool {
+        self.clock.latest.is_some() && self.clock.heard == arrived
+    }
+
+    /// Decodes as many plain blocks as lie ahead; gives how many bytes they had.
+    fn blocks(&mut self, bytes: &[u8], arrived: Option<i64>, sheet: &mut Sheet<'_>) -> usize {
+        if self.by_taxel.is_some() || self.held.is_some() || self.clock.heard != arrived {
+            return 0;
+        }
+        let Some(latest) = self.clock.latest else { return 0 };
+        let mut state = State { latest, intensities: 0, unpaired: 0 };
+        let before = sheet.rows;
+        let done = self.instructions.blocks(bytes, self.array.columns, self.array.rows, &mut state, sheet);
+        self.clock.latest = Some(state.latest);
+        self.counts.bytes += done as u64;
+        self.counts.words += (done / WORD_BYTES) as u64;
+        self.counts.changes += (sheet.rows - before) as u64;
+        self.counts.intensities += state.intensities;
+        self.counts.unpaired += state.unpaired;
+        done
+    }
+
+    fn byte(&mut self, byte: u8, arrived: Option<i64>, sheet: &mut Sheet<'_>, markers: &mut Vec<Marker>) {
+        if byte & FIRST != 0 {
+            self.give_up_partial();
+        } else if self.have == 0 {
+            self.counts.bytes += 1;
+            self.counts.skipped += 1;
+            return;
+        }
+        self.partial[self.have] = byte;
+        self.have += 1;
+        if self.have == WORD_BYTES {
+            self.have = 0;
+            self.counts.bytes += WORD_BYTES as u64;
+            self.counts.words += 1;
+            self.word(Word::from_bytes(self.partial), arrived, sheet, markers);
+        }
+    }
+
     fn give_up_partial(&mut self) {
         self.counts.bytes += self.have as u64;
         self.counts.skipped += self.have as u64;
@@ -238,15 +384,15 @@ impl Decoder {
         self.have = 0;
     }
 
-    fn word(&mut self, word: Word, arrived: Option<i64>, out: &mut Events) {
-        let before = self.waiting.take();
-        let mut intensity = None;
+    #[inline]
+    fn word(&mut self, word: Word, arrived: Option<i64>, sheet: &mut Sheet<'_>, markers: &mut Vec<Marker>) {
+        let open = std::mem::take(&mut sheet.open);
         match word {
             Word::Contradictory => self.counts.contradictory += 1,
             Word::Marker { stamp, start } => {
                 self.counts.markers += 1;
                 let t = self.time(stamp, arrived);
-                out.markers.push(Marker { t, start });
+                markers.push(Marker { t, start });
             }
             Word::Change { x, y, .. } | Word::Intensity { x, y, .. }
                 if u16::from(x) >= self.array.columns || u16::from(y) >= self.array.rows =>
@@ -258,7 +404,7 @@ impl Decoder {
                 let change = Change { t: self.time(stamp, arrived), x: x.into(), y: y.into(), p };
                 match &mut self.by_taxel {
                     Some(by_taxel) => by_taxel.change(change),
-                    None => self.waiting = Some(change),
+                    None => sheet.change(change),
                 }
             }
             Word::Intensity { ticks, x, y, p } => {
@@ -267,22 +413,17 @@ impl Decoder {
                 let ticks = match &mut self.held {
                     None => ticks,
                     Some(held) => {
-                        let value =
-                            if p { held[taxel].saturating_add(ticks) } else { held[taxel].saturating_sub(ticks) };
-                        held[taxel] = value;
-                        value
+                        let before = held[taxel];
+                        held[taxel] = if p { before.saturating_add(ticks) } else { before.saturating_sub(ticks) };
+                        held[taxel]
                     }
                 };
                 let paired = match &mut self.by_taxel {
                     Some(by_taxel) => by_taxel.intensity(taxel, ticks),
-                    None => before.is_some_and(|c| (c.x, c.y) == (x, y)),
+                    None => open && sheet.pair(ticks, x, y),
                 };
                 *(if paired { &mut self.counts.intensities } else { &mut self.counts.unpaired }) += 1;
-                intensity = paired.then_some(ticks);
             }
-        }
-        if let Some(change) = before {
-            append(out, change, intensity);
         }
     }
 
@@ -291,6 +432,128 @@ impl Decoder {
         let (time, back) = self.clock.unwrap(stamp, arrived);
         self.counts.back += u64::from(back);
         time * STAMP_US
+    }
+}
+
+/// Whether five bytes are a word: the first byte's top bit set, no other's.
+fn is_whole(b: [u8; WORD_BYTES]) -> bool {
+    b[0] & FIRST != 0 && (b[1] | b[2] | b[3] | b[4]) & FIRST == 0
+}
+
+/// Columns to be filled; all equally long.
+#[derive(Debug)]
+pub struct Room<'a> {
+    t: &'a mut [MaybeUninit<i64>],
+    x: &'a mut [MaybeUninit<u16>],
+    y: &'a mut [MaybeUninit<u16>],
+    p: &'a mut [MaybeUninit<bool>],
+    ticks: &'a mut [MaybeUninit<u16>],
+    present: &'a mut [MaybeUninit<bool>],
+}
+
+impl<'a> Room<'a> {
+    /// Room in the given columns; polarity and presence become 0 or 1.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where they are not equally long.
+    pub fn new(t: &'a mut [i64], [x, y, ticks]: [&'a mut [u16]; 3], [p, present]: [&'a mut [u8]; 2]) -> Result<Self> {
+        if [x.len(), y.len(), ticks.len(), p.len(), present.len()].iter().any(|&n| n != t.len()) {
+            return Err(problem!("columns to fill must be equally long"));
+        }
+        // SAFETY: the decoder writes whole values only, never leaves an entry uninitialised, and a bool that it writes
+        // is a byte of 0 or 1; sizes and alignments are those of the given types.
+        unsafe {
+            Ok(Self { t: open(t), x: open(x), y: open(y), p: open(p), ticks: open(ticks), present: open(present) })
+        }
+    }
+
+    fn len(&self) -> usize {
+        self.t.len()
+    }
+}
+
+/// The same entries, to be written only.
+///
+/// # Safety
+///
+/// `U` must have the size and alignment of `T`, and whoever writes must write valid `U` that are valid `T` too.
+unsafe fn open<T, U>(column: &mut [T]) -> &mut [MaybeUninit<U>] {
+    // SAFETY: the caller's promise; length and lifetime are the slice's own.
+    unsafe { std::slice::from_raw_parts_mut(column.as_mut_ptr().cast(), column.len()) }
+}
+
+/// What [`Decoder::fill`] wrote.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Filled {
+    /// Rows.
+    pub rows: usize,
+    /// Whether the columns of intensities were written too; else no event has one.
+    pub paired: bool,
+}
+
+/// Columns as they fill: the first `rows` entries of t, x, y, p are written, and with `paired` those of ticks, present.
+pub(crate) struct Sheet<'a> {
+    pub(crate) room: Room<'a>,
+    pub(crate) rows: usize,
+    pub(crate) paired: bool,
+    /// The last row's intensity may be the next word.
+    pub(crate) open: bool,
+}
+
+impl Sheet<'_> {
+    #[inline]
+    fn change(&mut self, change: Change) {
+        let k = self.rows;
+        self.room.t[k].write(change.t);
+        self.room.x[k].write(change.x);
+        self.room.y[k].write(change.y);
+        self.room.p[k].write(change.p);
+        if self.paired {
+            self.room.ticks[k].write(0);
+            self.room.present[k].write(false);
+        }
+        self.rows = k + 1;
+        self.open = true;
+    }
+
+    /// Gives the last row its intensity, if it is of that taxel.
+    #[inline]
+    fn pair(&mut self, ticks: u16, x: u16, y: u16) -> bool {
+        if self.last_taxel() != (x, y) {
+            return false;
+        }
+        self.begin_pairs();
+        let k = self.rows - 1;
+        self.room.ticks[k].write(ticks);
+        self.room.present[k].write(true);
+        true
+    }
+
+    /// Column and row of the last row; there must be one.
+    #[inline]
+    pub(crate) fn last_taxel(&self) -> (u16, u16) {
+        let k = self.rows - 1;
+        // SAFETY: rows below `rows` are written.
+        unsafe { (self.room.x[k].assume_init(), self.room.y[k].assume_init()) }
+    }
+
+    /// Writes "none" for the rows so far, before the first intensity.
+    #[inline]
+    pub(crate) fn begin_pairs(&mut self) {
+        if !self.paired {
+            self.room.ticks[..self.rows].fill(MaybeUninit::new(0));
+            self.room.present[..self.rows].fill(MaybeUninit::new(false));
+            self.paired = true;
+        }
+    }
+
+    fn take_last(&mut self) -> Change {
+        self.rows -= 1;
+        let k = self.rows;
+        let Room { t, x, y, p, .. } = &self.room;
+        // SAFETY: the row was written; now it is free again.
+        unsafe { Change { t: t[k].assume_init(), x: x[k].assume_init(), y: y[k].assume_init(), p: p[k].assume_init() } }
     }
 }
 
@@ -357,6 +620,8 @@ impl ByTaxel {
 
 #[cfg(test)]
 mod tests {
+    use rand::{Rng, SeedableRng, rngs::StdRng, seq::IndexedRandom};
+
     use super::*;
 
     fn change(stamp: u16, x: u8, y: u8) -> Word {
@@ -536,5 +801,158 @@ mod tests {
                 assert_eq!(c.words, kinds);
             }
         }
+    }
+
+    /// A stream of runs: clean changes, pairs, a mix, stamps that jump or fall, rare kinds, damage.
+    fn stream(random: &mut StdRng, words: usize) -> Vec<u8> {
+        let mut bytes = vec![];
+        let mut stamp: u16 = random.random();
+        let mut last = (0, 0);
+        while bytes.len() < 5 * words {
+            let run = random.random_range(1..200);
+            let (style, quiet) = (random.random_range(0..9), random.random_bool(0.5));
+            let top = *[8, 63, 64].choose(random).unwrap();
+            for k in 0..run {
+                stamp = match style {
+                    5 => stamp.wrapping_add(random.random()),
+                    6 if random.random_bool(0.1) => stamp.wrapping_sub(random.random_range(0..1010)),
+                    _ if quiet => stamp,
+                    _ => stamp.wrapping_add(random.random_range(0..3)),
+                };
+                let p = random.random();
+                let intensity = match style {
+                    0 | 5 | 6 => false,
+                    1 | 2 => k % 2 == 1,
+                    _ => random.random(),
+                };
+                if !intensity || random.random_bool(0.05) {
+                    last = (random.random_range(0..top), random.random_range(0..top));
+                }
+                let (x, y) = last;
+                let mut word = if intensity {
+                    Word::Intensity { ticks: random.random(), x, y, p }
+                } else {
+                    Word::Change { stamp, x, y, p }
+                }
+                .to_bytes();
+                word[0] |= random.random::<u8>() & 0x14 & if style == 0 { 0xff } else { 0x10 };
+                word[3] |= random.random::<u8>() & 0x40;
+                match random.random_range(0..if style < 7 { 2000 } else { 30 }) {
+                    0 => word[0] |= 0x08,
+                    1 => word[0] |= 0x28,
+                    2 => word[random.random_range(0..5)] ^= 0x80,
+                    3 => bytes.truncate(bytes.len() - bytes.len().min(random.random_range(1..7))),
+                    4 => bytes.extend((0..random.random_range(1..7)).map(|_| random.random::<u8>())),
+                    _ => {}
+                }
+                bytes.extend(word);
+            }
+        }
+        bytes
+    }
+
+    /// Decodes in pieces of at most `longest` bytes; arrivals are given where `heard` is.
+    fn pieces(mut decoder: Decoder, bytes: &[u8], longest: usize, heard: bool, seed: u64) -> (Events, Counts) {
+        let mut random = StdRng::seed_from_u64(seed);
+        let mut events = Events::empty(decoder.array().clone());
+        let (mut rest, mut now) = (bytes, 0);
+        while !rest.is_empty() {
+            let (piece, after) = rest.split_at(random.random_range(0..=longest.min(rest.len())));
+            decoder.push_into(piece, heard.then_some(now), &mut events);
+            now += if random.random_bool(0.02) { random.random_range(0..20_000_000) } else { 0 };
+            rest = after;
+        }
+        decoder.finish_into(&mut events);
+        events.check().unwrap();
+        (events, *decoder.counts())
+    }
+
+    #[test]
+    fn every_set_of_instructions_decodes_alike() {
+        let mut random = StdRng::seed_from_u64(11);
+        let mut seen = (0, 0);
+        for round in 0..400 {
+            let side = *[8, 40, 63, 64, 200].choose(&mut random).unwrap();
+            let decoder = Decoder::new(Array::new(side, 64, 1.0, "array").unwrap());
+            let bytes = stream(&mut random, 3000);
+            let (longest, heard) = (*[7, 300, 1400, 100_000].choose(&mut random).unwrap(), random.random());
+            let with = |set| pieces(decoder.clone().instructions(set).unwrap(), &bytes, longest, heard, round);
+            let (events, counts) = with(Instructions::Scalar);
+            seen.0 += counts.changes;
+            seen.1 += counts.intensities;
+            for set in Instructions::ALL.into_iter().filter(|set| set.present()) {
+                let (other, others) = with(set);
+                assert!(other == events, "{set:?}, round {round}: other events");
+                assert_eq!(others, counts, "{set:?}, round {round}");
+            }
+        }
+        assert!(seen.0 > 400_000 && seen.1 > 100_000, "streams that say little: {seen:?}");
+    }
+
+    #[test]
+    fn a_cut_changes_nothing() {
+        let mut random = StdRng::seed_from_u64(12);
+        for round in 0..100 {
+            let bytes = stream(&mut random, 500);
+            for pairing in [Pairing::Direct, Pairing::Taxel] {
+                for differences in [false, true] {
+                    let decoder = Decoder::new(Array::thesis()).pairing(pairing).differences(differences);
+                    let whole = pieces(decoder.clone(), &bytes, bytes.len(), false, round);
+                    assert!(pieces(decoder, &bytes, 40, false, round) == whole, "round {round}, {pairing:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn columns_filled_again_hold_the_same() {
+        let mut random = StdRng::seed_from_u64(13);
+        let mut columns = Events::empty(Array::thesis());
+        for _ in 0..20 {
+            let bytes = stream(&mut random, 300);
+            let fresh = Decoder::new(Array::thesis()).push(&bytes, None);
+            columns.clear();
+            Decoder::new(Array::thesis()).push_into(&bytes, None, &mut columns);
+            assert_eq!((&columns.t, &columns.x, &columns.y), (&fresh.t, &fresh.x, &fresh.y));
+            assert_eq!((&columns.p, intensities(&columns)), (&fresh.p, intensities(&fresh)));
+        }
+    }
+
+    /// 10^9 random bytes; minutes without optimisation, seconds with.
+    #[test]
+    #[ignore = "long; run by make slow"]
+    fn a_thousand_million_random_bytes_neither_panic_nor_grow() {
+        let mut random = StdRng::seed_from_u64(14);
+        let mut decoders = Instructions::ALL.map(|set| {
+            let decoder = Decoder::new(Array::new(50, 60, 1.0, "array").unwrap());
+            if set.present() { decoder.instructions(set).unwrap() } else { decoder }
+        });
+        let mut columns = Events::empty(decoders[0].array().clone());
+        let mut bytes = vec![0; 1_000_000];
+        let mut memory = 0;
+        for round in 0..1000 {
+            random.fill(&mut bytes[..]);
+            if round % 2 == 1 {
+                // Bytes that are nearly words reach further into the decoder.
+                for (k, byte) in bytes.iter_mut().enumerate() {
+                    *byte = if k % 5 == 0 { *byte | 0x80 } else { *byte & 0x7f } ^ (u8::from(k % 977 == 0) << 7);
+                }
+            }
+            for decoder in &mut decoders {
+                columns.clear();
+                decoder.push_into(&bytes, (round % 3 == 0).then_some(round), &mut columns);
+            }
+            if round == 10 {
+                memory = columns.t.capacity();
+            }
+        }
+        assert_eq!(columns.t.capacity(), memory, "columns grew");
+        let counts = decoders.map(|mut d| {
+            d.finish();
+            *d.counts()
+        });
+        assert!(counts.iter().all(|c| c == &counts[0]));
+        assert_eq!(counts[0].bytes, 1_000_000_000);
+        assert_eq!(counts[0].bytes, 5 * counts[0].words + counts[0].skipped);
     }
 }

@@ -1,0 +1,199 @@
+//! Blocks of 32 words with AVX-512 (F, BW, VL, VBMI, VBMI2) and BMI2.
+
+use std::arch::x86_64::*;
+
+use super::{FARTHEST_AHEAD, State, indices, value};
+use crate::wire::decoder::Sheet;
+use crate::wire::v1::{STAMP_US, WORD_BYTES};
+
+const WORDS: usize = 32;
+const BYTES: usize = WORDS * WORD_BYTES;
+
+/// A block lies in three registers: bytes 0 to 63, 64 to 127, and 96 to 159. A word's bytes are fetched from the first
+/// two at once, then from the third for the words that reach beyond 127.
+struct Fetch {
+    front: [u8; 64],
+    back: [u8; 64],
+    /// Which of the 64 bytes come from the front, and from the back.
+    from_front: u64,
+    from_back: u64,
+}
+
+impl Fetch {
+    const fn new(bytes: [Option<u8>; 2]) -> Self {
+        const NONE: u8 = 0xff;
+        let front = indices(bytes, 0, 128, NONE);
+        let tail: [u8; 64] = indices(bytes, 96, 64, NONE);
+        let (mut from_front, mut from_back) = (0, 0);
+        let mut k = 0;
+        while k < 64 {
+            if front[k] != NONE {
+                from_front |= 1 << k;
+            } else if tail[k] != NONE {
+                from_back |= 1 << k;
+            }
+            k += 1;
+        }
+        Self { front, back: tail, from_front, from_back }
+    }
+}
+
+/// Lanes of 16 bits: the value's low 14 bits in two sevens; row and column; the first byte.
+static LOW: Fetch = Fetch::new([Some(2), Some(1)]);
+static PLACE: Fetch = Fetch::new([Some(3), Some(4)]);
+static HEAD: Fetch = Fetch::new([Some(0), None]);
+
+/// For each 16-bit lane the one below it, and the one above it.
+static ONE_UP: [u8; 64] = shifted(-1);
+static ONE_DOWN: [u8; 64] = shifted(1);
+
+const fn shifted(by: i32) -> [u8; 64] {
+    let mut lanes = [0; 64];
+    let mut k = 0;
+    while k < WORDS {
+        lanes[2 * k] = ((k as i32 + by) & 31) as u8;
+        k += 1;
+    }
+    lanes
+}
+
+/// See [`super::Instructions::blocks`].
+///
+/// # Safety
+///
+/// The machine must have the features below, and each column of `sheet.room` at least `sheet.rows + bytes.len() / 5`
+/// entries.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+pub(super) unsafe fn blocks(bytes: &[u8], columns: u16, rows: u16, state: &mut State, sheet: &mut Sheet<'_>) -> usize {
+    // The index tables are read as whole registers.
+    // SAFETY: each is 64 bytes long.
+    let table = |t: &[u8; 64]| unsafe { _mm512_loadu_si512(t.as_ptr().cast()) };
+    let (low_front, low_back) = (table(&LOW.front), table(&LOW.back));
+    let (place_front, place_back) = (table(&PLACE.front), table(&PLACE.back));
+    let (head_front, head_back) = (table(&HEAD.front), table(&HEAD.back));
+    let sevens = _mm512_set1_epi16(i16::from_le_bytes([1, 128]));
+    let (last_column, last_row) =
+        (_mm512_set1_epi16(columns.min(64) as i16 - 1), _mm512_set1_epi16(rows.min(64) as i16 - 1));
+    let (one_up, one_down) = (table(&ONE_UP), table(&ONE_DOWN));
+
+    let mut at = 0;
+    while at + BYTES <= bytes.len() {
+        // SAFETY: `at + 160 <= bytes.len()`, and the loads end at 64, 128 and 160.
+        let (a, b, c) = unsafe {
+            let block = bytes.as_ptr().add(at);
+            (
+                _mm512_loadu_si512(block.cast()),
+                _mm512_loadu_si512(block.add(64).cast()),
+                _mm512_loadu_si512(block.add(96).cast()),
+            )
+        };
+        let low = _mm512_maskz_permutex2var_epi8(LOW.from_front, a, low_front, b);
+        let low = _mm512_mask_permutexvar_epi8(low, LOW.from_back, low_back, c);
+        let place = _mm512_maskz_permutex2var_epi8(PLACE.from_front, a, place_front, b);
+        let place = _mm512_mask_permutexvar_epi8(place, PLACE.from_back, place_back, c);
+        let head = _mm512_maskz_permutex2var_epi8(HEAD.from_front, a, head_front, b);
+        let head = _mm512_mask_permutexvar_epi8(head, HEAD.from_back, head_back, c);
+
+        // In place: top bits of first bytes only. No marker, and so no contradictory kind.
+        let in_place = _mm512_test_epi16_mask(head, _mm512_set1_epi16(0x80)) == u32::MAX
+            && _mm512_movepi8_mask(_mm512_or_si512(low, place)) == 0;
+        let markers = _mm512_test_epi16_mask(head, _mm512_set1_epi16(0x08));
+        let place = _mm512_and_si512(place, _mm512_set1_epi16(0x3f3f));
+        let x = _mm512_and_si512(place, _mm512_set1_epi16(0x3f));
+        let y = _mm512_srli_epi16::<8>(place);
+        let outside = _mm512_cmpgt_epi16_mask(x, last_column) | _mm512_cmpgt_epi16_mask(y, last_row);
+        if !in_place || markers | outside != 0 {
+            break;
+        }
+        let values = _mm512_or_si512(_mm512_maddubs_epi16(sevens, low), _mm512_slli_epi16::<14>(head));
+        let intensities = _mm512_test_epi16_mask(head, _mm512_set1_epi16(0x20));
+        let polarity = _mm512_test_epi16_mask(head, _mm512_set1_epi16(0x40));
+        let changes = !intensities;
+        let count = changes.count_ones() as usize;
+
+        // Rows are the changes, in order.
+        let (stamps, xs, ys, ps);
+        if intensities == 0 {
+            (stamps, xs, ys, ps) = (values, x, y, polarity);
+        } else {
+            stamps = _mm512_maskz_compress_epi16(changes, values);
+            xs = _mm512_maskz_compress_epi16(changes, x);
+            ys = _mm512_maskz_compress_epi16(changes, y);
+            ps = _pext_u32(polarity, changes);
+        }
+        // Stamps ahead of the latest time that do not fall are each ahead of the one before.
+        let base = state.latest as u16;
+        let ahead = _mm512_sub_epi16(stamps, _mm512_set1_epi16(base as i16));
+        let before = _mm512_maskz_permutexvar_epi16(u32::MAX << 1, one_up, ahead);
+        let none = if count == WORDS { 0 } else { u32::MAX << count };
+        let rising = _mm512_cmpge_epu16_mask(ahead, before) | none;
+        let farthest = if count == 0 {
+            0
+        } else {
+            let last = 31 - changes.leading_zeros() as usize;
+            value(bytes, at + WORD_BYTES * last).wrapping_sub(base)
+        };
+        if rising != u32::MAX || farthest > FARTHEST_AHEAD {
+            break;
+        }
+
+        let first = sheet.rows;
+        if intensities != 0 {
+            // An intensity is paired where the word before it is a change of the same taxel.
+            let place_before = _mm512_permutexvar_epi16(one_up, place);
+            let same = _mm512_cmpeq_epi16_mask(place, place_before) & !1;
+            let mut paired = intensities & (changes << 1) & same;
+            let taxel = (u16::from(bytes[at + 3] & 0x3f), u16::from(bytes[at + 4] & 0x3f));
+            if intensities & 1 != 0 && sheet.open && sheet.last_taxel() == taxel {
+                paired |= 1;
+            }
+            if paired != 0 {
+                sheet.begin_pairs();
+                if paired & 1 != 0 {
+                    sheet.room.ticks[first - 1].write(value(bytes, at));
+                    sheet.room.present[first - 1].write(true);
+                }
+            }
+            if sheet.paired {
+                let next = _mm512_maskz_permutexvar_epi16(paired >> 1, one_down, values);
+                let ticks = _mm512_maskz_compress_epi16(changes, next);
+                let present = _mm256_maskz_set1_epi8(_pext_u32(paired >> 1, changes), 1);
+                // SAFETY: at least 32 words are left, so 32 rows fit after `first`.
+                unsafe {
+                    _mm512_storeu_si512(sheet.room.ticks.as_mut_ptr().add(first).cast(), ticks);
+                    _mm256_storeu_si256(sheet.room.present.as_mut_ptr().add(first).cast(), present);
+                }
+            }
+            let found = u64::from(paired.count_ones());
+            state.intensities += found;
+            state.unpaired += u64::from(intensities.count_ones()) - found;
+        } else if sheet.paired {
+            // SAFETY: as above.
+            unsafe {
+                _mm512_storeu_si512(sheet.room.ticks.as_mut_ptr().add(first).cast(), _mm512_setzero_si512());
+                _mm256_storeu_si256(sheet.room.present.as_mut_ptr().add(first).cast(), _mm256_setzero_si256());
+            }
+        }
+        let start = _mm512_set1_epi64(state.latest * STAMP_US);
+        let time = |ahead: __m128i| {
+            let ahead = _mm512_cvtepu16_epi64(ahead);
+            _mm512_add_epi64(start, _mm512_mul_epu32(ahead, _mm512_set1_epi64(STAMP_US)))
+        };
+        // SAFETY: as above. What lies beyond the block's changes is written again by later rows, or never read.
+        unsafe {
+            let t = sheet.room.t.as_mut_ptr().add(first).cast::<i64>();
+            _mm512_storeu_si512(t.cast(), time(_mm512_castsi512_si128(ahead)));
+            _mm512_storeu_si512(t.add(8).cast(), time(_mm512_extracti32x4_epi32::<1>(ahead)));
+            _mm512_storeu_si512(t.add(16).cast(), time(_mm512_extracti32x4_epi32::<2>(ahead)));
+            _mm512_storeu_si512(t.add(24).cast(), time(_mm512_extracti32x4_epi32::<3>(ahead)));
+            _mm512_storeu_si512(sheet.room.x.as_mut_ptr().add(first).cast(), xs);
+            _mm512_storeu_si512(sheet.room.y.as_mut_ptr().add(first).cast(), ys);
+            _mm256_storeu_si256(sheet.room.p.as_mut_ptr().add(first).cast(), _mm256_maskz_set1_epi8(ps, 1));
+        }
+        sheet.rows = first + count;
+        sheet.open = changes >> 31 == 1;
+        state.latest += i64::from(farthest);
+        at += BYTES;
+    }
+    at
+}
