@@ -2,6 +2,7 @@
 
 from taxel import detect, metrics
 from taxel import encode, metrics
+from taxel import detect, device, metrics, wire
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel.array import Array
 from taxel.detections import Detections
@@ -28,5 +29,7 @@ __all__ = [
     "detect",
     "Tare",
     "encode",
+    "device",
     "metrics",
+    "wire",
 ]

@@ -11,6 +11,7 @@ mod neuron;
 mod nouns;
 mod recording;
 mod simulate;
+mod wire;
 
 use pyo3::prelude::*;
 
@@ -25,5 +26,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     neuron::register(module)?;
     recording::register(module)?;
     simulate::register(module)?;
+    wire::register(module)?;
     Ok(())
 }

@@ -219,9 +219,9 @@ impl Decoder {
             ticks: &mut intensity.ticks.spare_capacity_mut()[skip..skip + most],
             present: &mut intensity.present.spare_capacity_mut()[skip..skip + most],
         };
-        let filled = self.fill(bytes, arrived, room, paired, &mut out.markers);
+        let filled = self.fill_columns(bytes, arrived, room, paired, &mut out.markers);
         let after = before + filled.rows;
-        // SAFETY: `fill` has written the first `rows` entries of t, x, y and p, which begin at `before`, and the
+        // SAFETY: `fill_columns` has written the first `rows` entries of t, x, y and p, which begin at `before`, and the
         // capacity was reserved above.
         unsafe {
             out.t.set_len(after);
@@ -232,7 +232,7 @@ impl Decoder {
         if filled.paired {
             intensity.ticks.resize(before, 0);
             intensity.present.resize(before, false);
-            // SAFETY: as above; with `paired`, `fill` has written the first `rows` entries of ticks and present too.
+            // SAFETY: as above; with `paired`, it has written the first `rows` entries of ticks and present too.
             unsafe {
                 intensity.ticks.set_len(after);
                 intensity.present.set_len(after);
@@ -284,9 +284,9 @@ impl Decoder {
     /// As [`Self::push`], into columns that the caller lays out; `paired` says whether the columns of intensities are
     /// to be written before the first intensity comes, and markers are appended.
     ///
-    /// # Panics
+    /// # Errors
     ///
-    /// Where a column has fewer entries than [`Self::most_rows`] asks for.
+    /// `Problem` where a column has fewer entries than [`Self::most_rows`] asks for; then nothing was read.
     pub fn fill(
         &mut self,
         bytes: &[u8],
@@ -294,8 +294,22 @@ impl Decoder {
         room: Room<'_>,
         paired: bool,
         markers: &mut Vec<Marker>,
+    ) -> Result<Filled> {
+        let most = self.most_rows(bytes.len());
+        if room.len() < most {
+            return Err(problem!("columns have room for {} rows: {} bytes may need {most}", room.len(), bytes.len()));
+        }
+        Ok(self.fill_columns(bytes, arrived, room, paired, markers))
+    }
+
+    fn fill_columns(
+        &mut self,
+        bytes: &[u8],
+        arrived: Option<i64>,
+        room: Room<'_>,
+        paired: bool,
+        markers: &mut Vec<Marker>,
     ) -> Filled {
-        assert!(room.len() >= self.most_rows(bytes.len()), "columns have room for {} rows", room.len());
         let mut sheet = Sheet { room, rows: 0, paired, open: false };
         if let Some(change) = self.waiting.take() {
             sheet.change(change);

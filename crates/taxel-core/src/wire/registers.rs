@@ -196,28 +196,33 @@ impl Registers {
             return Err(Refusal { register, rule: 4, text });
         }
         let mut next = *self;
-        let bit = |n: u32| value >> n & 1 == 1;
-        match register {
-            0 => {
-                next.random_lines = bit(0);
-                next.mechanoreceptor = bit(1);
-                next.invert_comparator = bit(2);
-                next.frame_sync = bit(3);
-            }
-            1 => next.line_period = value,
-            2 => next.line_read = value,
-            3 => (next.step_period, next.step_read) = (value as u16, (value >> 16) as u16),
-            4 => next.ramp = value as u16,
-            5 => (next.noise_floor, next.lines) = ((value >> 8) as u8, (value >> 16 & 0x3f) as u8 + 1),
-            7 => next.record = bit(16),
-            _ => {}
-        }
+        next.store(register, value);
         next.rules(register, array).map_err(|mut refusal| {
             refusal.text = format!("{}; the board keeps {}", refusal.text, self.shown(register));
             refusal
         })?;
         *self = next;
         Ok(())
+    }
+
+    /// Sets a register's fields, whatever the rules say.
+    fn store(&mut self, register: u8, value: u32) {
+        let bit = |n: u32| value >> n & 1 == 1;
+        match register {
+            0 => {
+                self.random_lines = bit(0);
+                self.mechanoreceptor = bit(1);
+                self.invert_comparator = bit(2);
+                self.frame_sync = bit(3);
+            }
+            1 => self.line_period = value,
+            2 => self.line_read = value,
+            3 => (self.step_period, self.step_read) = (value as u16, (value >> 16) as u16),
+            4 => self.ramp = value as u16,
+            5 => (self.noise_floor, self.lines) = ((value >> 8) as u8, (value >> 16 & 0x3f) as u8 + 1),
+            7 => self.record = bit(16),
+            _ => {}
+        }
     }
 
     /// Checks all rules.
@@ -353,21 +358,40 @@ impl Registers {
     ///
     /// # Errors
     ///
-    /// `Problem` where there is no such field; `Device` with the rule where the value breaks one.
+    /// As [`Self::set_all`].
     pub fn set(&mut self, name: &str, value: u32, array: &Array) -> Result<()> {
-        let Some(field) = FIELDS.iter().find(|f| f.name == name || f.manual == name) else {
-            let names: Vec<_> = FIELDS.iter().map(|f| f.name).collect();
-            return Err(problem!("register {name:?}: there are {}", names.join(", ")));
-        };
-        // Of the two names, only the manual's `nrows` counts lines less one.
-        let stored = if name == "lines" { value.wrapping_sub(1) } else { value };
-        if stored > field.mask {
-            let (low, high) = if name == "lines" { (1, 64) } else { (0, field.mask) };
-            return Err(Error::Device(format!("{name} {value} does not fit: must be {low} to {high} (rule 4)")));
+        self.set_all(&[(name, value)], array)
+    }
+
+    /// Sets fields by their names or the manual's, in the registers' own units; the rules must hold once all are set.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where there is no such field; `Device` with the rule that would be broken. Then nothing has changed.
+    pub fn set_all(&mut self, fields: &[(impl AsRef<str>, u32)], array: &Array) -> Result<()> {
+        let mut next = *self;
+        for (name, value) in fields {
+            let (name, value) = (name.as_ref(), *value);
+            if name == "channels" {
+                next.channels = value.min(u32::from(u8::MAX)) as u8;
+                continue;
+            }
+            let Some(field) = FIELDS.iter().find(|f| f.name == name || f.manual == name) else {
+                let names: Vec<_> = FIELDS.iter().map(|f| f.name).collect();
+                return Err(problem!("register {name:?}: there are {}, channels", names.join(", ")));
+            };
+            // Of the two names, only the manual's `nrows` counts lines less one.
+            let stored = if name == "lines" { value.wrapping_sub(1) } else { value };
+            if stored > field.mask {
+                let (low, high) = if name == "lines" { (1, 64) } else { (0, field.mask) };
+                return Err(Error::Device(format!("{name} {value} does not fit: must be {low} to {high} (rule 4)")));
+            }
+            let rest = next.word(field.register) & !(field.mask << field.shift);
+            next.store(field.register, rest | stored << field.shift);
         }
-        let rest = self.word(field.register) & !(field.mask << field.shift);
-        let command = Command { register: field.register, value: rest | stored << field.shift };
-        self.write(command, array).map_err(Error::from)
+        next.check(array)?;
+        *self = next;
+        Ok(())
     }
 
     fn shown(&self, register: u8) -> String {

@@ -1,0 +1,271 @@
+//! The wire and the board: bytes, commands, registers.
+
+use numpy::{PyReadonlyArray1, PyReadwriteArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use taxel_core::board::{Board, IntensityWord, Previous};
+use taxel_core::wire::{self, Command, Counts, Decoder, Pairing, Registers, Room, STAMP_US};
+use taxel_core::{Error, Marker};
+
+use crate::convert::{ArrayParts, EventsIn, EventsOut, from_events, slice, to_array, to_events};
+use crate::enter::enter;
+use crate::errors::{ProblemError, core};
+
+/// Bytes between two looks at Ctrl-C: some milliseconds of work.
+const PIECE: usize = 16 << 20;
+
+fn json<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> PyResult<T> {
+    serde_json::from_str(text).map_err(|error| ProblemError::new_err(format!("{name}: {error}")))
+}
+
+fn to_json<T: serde::Serialize>(value: &T) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|error| ProblemError::new_err(error.to_string()))
+}
+
+/// Columns to fill: t, x, y, ticks, and p, present as bytes.
+type ColumnsIn<'py> = (
+    PyReadwriteArray1<'py, i64>,
+    PyReadwriteArray1<'py, u16>,
+    PyReadwriteArray1<'py, u16>,
+    PyReadwriteArray1<'py, u16>,
+    PyReadwriteArray1<'py, u8>,
+    PyReadwriteArray1<'py, u8>,
+);
+
+/// How many rows were filled, whether ticks were, and the markers on the way.
+type FilledOut = (usize, bool, Vec<(i64, bool)>);
+
+/// Turns bytes into events as they come.
+#[pyclass(module = "taxel._core")]
+struct WireDecoder(Decoder);
+
+#[pymethods]
+impl WireDecoder {
+    #[new]
+    fn new(array: ArrayParts, pairing: &str, differences: bool) -> PyResult<Self> {
+        let pairing: Pairing = json("pairing", &format!("{pairing:?}"))?;
+        Ok(Self(Decoder::new(to_array(array)?).pairing(pairing).differences(differences)))
+    }
+
+    /// How many rows the next bytes can give at most.
+    fn most_rows(&self, bytes: usize) -> usize {
+        self.0.most_rows(bytes)
+    }
+
+    /// Fills columns from their first row on; returns rows, whether ticks were written, markers.
+    fn fill(
+        &mut self,
+        py: Python<'_>,
+        data: PyReadonlyArray1<'_, u8>,
+        arrived: Option<i64>,
+        columns: ColumnsIn<'_>,
+    ) -> PyResult<FilledOut> {
+        let data = slice("data", &data)?;
+        let (mut t, mut x, mut y, mut ticks, mut p, mut present) = columns;
+        let contiguous = |_| ProblemError::new_err("columns must be contiguous");
+        let t = t.as_slice_mut().map_err(contiguous)?;
+        let x = x.as_slice_mut().map_err(contiguous)?;
+        let y = y.as_slice_mut().map_err(contiguous)?;
+        let ticks = ticks.as_slice_mut().map_err(contiguous)?;
+        let p = p.as_slice_mut().map_err(contiguous)?;
+        let present = present.as_slice_mut().map_err(contiguous)?;
+        let room = [x.len(), y.len(), ticks.len(), p.len(), present.len()].into_iter().fold(t.len(), usize::min);
+        let most = self.0.most_rows(data.len());
+        if room < most {
+            let text = format!("columns have room for {room} rows: {} bytes may need {most}", data.len());
+            return Err(ProblemError::new_err(text));
+        }
+        let decoder = &mut self.0;
+        let (rows, paired, markers) = enter(py, |stop| {
+            let (mut rows, mut paired, mut markers): (usize, bool, Vec<Marker>) = (0, false, vec![]);
+            for piece in data.chunks(PIECE) {
+                stop.check()?;
+                let room = Room::new(
+                    &mut t[rows..room],
+                    [&mut x[rows..room], &mut y[rows..room], &mut ticks[rows..room]],
+                    [&mut p[rows..room], &mut present[rows..room]],
+                )?;
+                let filled = decoder.fill(piece, arrived, room, paired, &mut markers)?;
+                if filled.paired && !paired {
+                    ticks[..rows].fill(0);
+                    present[..rows].fill(0);
+                }
+                paired = filled.paired;
+                rows += filled.rows;
+            }
+            Ok::<_, Error>((rows, paired, markers))
+        })?;
+        Ok((rows, paired, markers.iter().map(|m| (m.t, m.start)).collect()))
+    }
+
+    /// Releases the change that waits for its intensity.
+    fn end_of_datagram<'py>(&mut self, py: Python<'py>) -> EventsOut<'py> {
+        from_events(py, self.0.end_of_datagram())
+    }
+
+    /// Ends the stream; returns the rest.
+    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<EventsOut<'py>> {
+        let decoder = &mut self.0;
+        let events = enter(py, |_| Ok::<_, Error>(decoder.finish()))?;
+        Ok(from_events(py, events))
+    }
+
+    /// The counts, in the order of `wire_count_names`.
+    fn counts(&self) -> [u64; 11] {
+        let Counts { bytes, words, skipped, short, changes, intensities, .. } = *self.0.counts();
+        let Counts { unpaired, markers, contradictory, outside, back, .. } = *self.0.counts();
+        [bytes, words, skipped, short, changes, intensities, unpaired, markers, contradictory, outside, back]
+    }
+}
+
+/// Events as bytes.
+#[pyfunction]
+fn wire_encode<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'py, PyBytes>> {
+    let events = to_events(events)?;
+    let bytes = enter(py, |_| wire::encode(&events))?;
+    Ok(PyBytes::new(py, &bytes))
+}
+
+/// A command's five bytes.
+#[pyfunction]
+fn command_bytes(py: Python<'_>, register: u8, value: u32) -> PyResult<Bound<'_, PyBytes>> {
+    Ok(PyBytes::new(py, &Command::new(register, value).map_err(core)?.to_bytes()))
+}
+
+/// Register and value of a command's five bytes.
+#[pyfunction]
+fn command_read(data: PyReadonlyArray1<'_, u8>) -> PyResult<(u8, u32)> {
+    let data = slice("data", &data)?;
+    let bytes = data
+        .try_into()
+        .map_err(|_| crate::errors::FormatError::new_err(format!("command of {} bytes: must be 5", data.len())))?;
+    let command = Command::from_bytes(bytes).map_err(core)?;
+    Ok((command.register, command.value))
+}
+
+/// The presets' names.
+#[pyfunction]
+fn registers_presets() -> Vec<&'static str> {
+    wire::registers::PRESETS.iter().map(|(name, _)| *name).collect()
+}
+
+/// A preset, as JSON.
+#[pyfunction]
+fn registers_preset(name: &str) -> PyResult<String> {
+    to_json(&Registers::preset(name).map_err(core)?)
+}
+
+/// Sets fields by name, in the registers' own units; returns the new set as JSON.
+///
+/// All are set before the rules are checked, so that their order does not matter.
+#[pyfunction]
+fn registers_with(registers: &str, fields: Vec<(String, u32)>, array: ArrayParts) -> PyResult<String> {
+    let mut registers: Registers = json("registers", registers)?;
+    registers.set_all(&fields, &to_array(array)?).map_err(core)?;
+    to_json(&registers)
+}
+
+/// Checks all rules; returns the warnings.
+#[pyfunction]
+fn registers_check(registers: &str, array: ArrayParts) -> PyResult<Vec<String>> {
+    let registers: Registers = json("registers", registers)?;
+    registers.check(&to_array(array)?).map_err(core)?;
+    Ok(registers.warnings())
+}
+
+/// The eight 32-bit registers, and a frame's length in us.
+#[pyfunction]
+fn registers_words(registers: &str) -> PyResult<(Vec<u32>, f64)> {
+    let registers: Registers = json("registers", registers)?;
+    Ok(((0..8).map(|n| registers.word(n)).collect(), registers.frame_us()))
+}
+
+/// The writes that lead from one set to another.
+#[pyfunction]
+fn registers_commands(source: &str, target: &str, array: ArrayParts) -> PyResult<Vec<(u8, u32)>> {
+    let (from, to): (Registers, Registers) = (json("registers", source)?, json("registers", target)?);
+    let commands = from.commands_to(&to, &to_array(array)?).map_err(core)?;
+    Ok(commands.into_iter().map(|c| (c.register, c.value)).collect())
+}
+
+/// The emulated board.
+#[pyclass(module = "taxel._core")]
+struct WireBoard(Board);
+
+#[pymethods]
+impl WireBoard {
+    #[new]
+    fn new(registers: &str, array: ArrayParts, previous: &str, intensity: &str, queue: usize) -> PyResult<Self> {
+        let registers: Registers = json("registers", registers)?;
+        let previous: Previous = json("previous", &format!("{previous:?}"))?;
+        let intensity: IntensityWord = json("intensity", &format!("{intensity:?}"))?;
+        let board = Board::new(registers, &to_array(array)?).map_err(core)?;
+        Ok(Self(board.previous(previous).intensity(intensity).queue(queue)))
+    }
+
+    fn greeting(&self) -> String {
+        self.0.greeting()
+    }
+
+    fn registers(&self) -> PyResult<String> {
+        to_json(self.0.registers())
+    }
+
+    fn time_us(&self) -> f64 {
+        self.0.time_us()
+    }
+
+    /// Takes command bytes; returns status lines.
+    fn command(&mut self, data: PyReadonlyArray1<'_, u8>) -> PyResult<String> {
+        Ok(self.0.command(slice("data", &data)?))
+    }
+
+    fn record(&mut self, start: bool) {
+        self.0.record(start);
+    }
+
+    fn faults(&mut self) -> String {
+        self.0.faults()
+    }
+
+    /// Scans one frame; returns the datagrams, of which the sink takes at most so many.
+    fn frame<'py>(
+        &mut self,
+        py: Python<'py>,
+        ticks: PyReadonlyArray1<'py, u16>,
+        most: usize,
+    ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
+        let (ticks, board, mut sent) = (slice("ticks", &ticks)?, &mut self.0, vec![]);
+        let datagrams = enter(py, move |_| {
+            board.frame(ticks, |datagram| {
+                let room = sent.len() < most;
+                if room {
+                    sent.push(datagram.to_vec());
+                }
+                room
+            })?;
+            Ok::<_, Error>(sent)
+        })?;
+        Ok(datagrams.iter().map(|d| PyBytes::new(py, d)).collect())
+    }
+
+    /// The counts as JSON.
+    fn counts(&self) -> PyResult<String> {
+        to_json(self.0.counts())
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<WireDecoder>()?;
+    module.add_class::<WireBoard>()?;
+    module.add("WIRE_STAMP_US", STAMP_US)?;
+    module.add_function(wrap_pyfunction!(wire_encode, module)?)?;
+    module.add_function(wrap_pyfunction!(command_bytes, module)?)?;
+    module.add_function(wrap_pyfunction!(command_read, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_presets, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_preset, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_with, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_check, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_words, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_commands, module)?)
+}

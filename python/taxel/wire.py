@@ -1,0 +1,553 @@
+"""Bytes to events and back: the board's wire, version 1 (thesis, Appendix 1, sections 3 to 5)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._arguments import flag, instance, number, shown, text, whole
+from taxel._core import DeviceError, ProblemError
+from taxel.array import Array
+from taxel.events import Events
+
+__all__ = ["PRESETS", "Columns", "Command", "Counts", "Decoder", "Registers", "decode", "encode"]
+
+#: The names that `Registers.preset` knows.
+PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
+
+#: The board's own array (thesis, chapter 4): the default of everything here.
+_THESIS = Array(64, 64, pitch_mm=2.67, name="thesis 64x64")
+
+_PAIRINGS = ("direct", "taxel")
+
+
+def _bytes(data: object) -> NDArray[np.uint8]:
+    """Return the bytes of anything with a contiguous buffer, without a copy."""
+    if isinstance(data, np.ndarray) and data.dtype != np.uint8:
+        raise ProblemError(f"data is an array of {data.dtype}: must be bytes or uint8")
+    try:
+        view = memoryview(data)  # type: ignore[arg-type]
+        return np.frombuffer(view.cast("B"), np.uint8) if view.nbytes else np.empty(0, np.uint8)
+    except (TypeError, ValueError, BufferError):
+        raise ProblemError(f"data is {shown(data)}: must be bytes, or anything with a contiguous buffer") from None
+
+
+def encode(events: Events) -> bytes:
+    """Write events as bytes: each change, its intensity next to it, markers before the first event not earlier.
+
+    Parameters
+    ----------
+    events : Events
+        On columns and rows 0 to 63.
+
+    Returns
+    -------
+    bytes, 5 a change, 5 an intensity, 5 a marker
+
+    Raises
+    ------
+    ProblemError : a column or row above 63, which version 1 cannot say
+
+    Notes
+    -----
+    Table 5.4. Version 1 holds times to 100 us, cut down as the board counts, and modulo 6.5536 s: a reader gets back
+    whole silences of up to 6.45 s.
+
+    Examples
+    --------
+    >>> events = Events([500], [3], [4], [True], array=Array(64, 64), intensity=[40])
+    >>> encode(events).hex(" ", 5)
+    'c000050304 e000280304'
+    """
+    return _core.wire_encode(instance("events", events, Events)._parts())
+
+
+def decode(
+    data: Any,
+    *,
+    array: Array | None = None,
+    pairing: Literal["direct", "taxel"] = "direct",
+    differences: bool = False,
+) -> Events:
+    """Read a whole stream of bytes; see `Decoder`, which also counts what is dropped.
+
+    Parameters
+    ----------
+    data : bytes, or anything with a contiguous buffer
+    array : Array, optional
+        The sensor; the thesis' 64 x 64 where it is left out.
+    pairing : {"direct", "taxel"}
+    differences : bool
+
+    Returns
+    -------
+    Events
+
+    Raises
+    ------
+    ProblemError : an argument that makes no sense; damage in the bytes is no error
+
+    Examples
+    --------
+    >>> decode(bytes.fromhex("c000050304 e000280304"))
+    Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+    """
+    decoder = Decoder(array=array, pairing=pairing, differences=differences)
+    events = decoder.push(data)
+    rest = decoder.finish()
+    if pairing == "taxel":
+        rest.markers = events.markers
+        return rest
+    return decoder._joined(events, rest)
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Say what a decoder saw, and all that it dropped, by cause.
+
+    The sums close at any time: ``bytes == 5 * words + skipped``, and ``words == changes + intensities + unpaired +
+    markers + contradictory + outside``. The bytes of a word that is not complete count when it is, or is given up.
+
+    Parameters
+    ----------
+    bytes, words : int
+        Bytes read, and complete words.
+    skipped : int
+        Bytes that belong to no complete word.
+    short : int
+        Events cut off by the next first byte, or by the end.
+    changes : int
+        Changes on the array: the rows of `Events`.
+    intensities, unpaired : int
+        Intensities that found their change, and those that did not.
+    markers : int
+        Starts and stops.
+    contradictory : int
+        Words that say intensity and marker at once.
+    outside : int
+        Changes and intensities outside the array.
+    back : int
+        Changes and markers behind the latest time, which are kept.
+    """
+
+    bytes: int
+    words: int
+    skipped: int
+    short: int
+    changes: int
+    intensities: int
+    unpaired: int
+    markers: int
+    contradictory: int
+    outside: int
+    back: int
+
+
+class Columns:
+    """Keep memory for decoded events, to be filled again and again (`Decoder.push_into`).
+
+    Fresh memory costs more than decoding: the first write to each page is a call of the kernel.
+
+    Parameters
+    ----------
+    rows : int, 1 or more
+        How many events there is room for; ``len(data) // 5 + 2`` is enough for `data`.
+
+    Raises
+    ------
+    ProblemError : no whole number, or below 1
+
+    Examples
+    --------
+    >>> columns, decoder = Columns(1000), Decoder()
+    >>> decoder.push_into(columns, bytes.fromhex("c000050304 c000060304"))
+    Events(1 events, 500 to 500 us, 64 x 64 taxels, no intensities)
+    """
+
+    def __init__(self, rows: int) -> None:
+        n = whole("rows", rows, 1, 2**48)
+        try:
+            self.t = np.empty(n, np.int64)
+            self.x = np.empty(n, np.uint16)
+            self.y = np.empty(n, np.uint16)
+            self.intensity = np.empty(n, np.uint16)
+            self.p = np.empty(n, np.bool_)
+            self.present = np.empty(n, np.bool_)
+        except MemoryError:
+            raise ProblemError(f"rows is {n}: there is no memory for so many") from None
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"Columns(room for {len(self)} events)"
+
+    def _parts(self) -> tuple[NDArray[Any], ...]:
+        p, present = self.p.view(np.uint8), self.present.view(np.uint8)
+        return self.t, self.x, self.y, self.intensity, p, present
+
+
+class Decoder:
+    """Turn bytes into events as they come: the same events wherever the bytes are cut.
+
+    Damage is never an error: the decoder finds its place at the next first byte and counts what it skipped
+    (`counts`). A change waits for the next word, which may be its intensity, for the end of its datagram
+    (`end_of_datagram`) or of the stream (`finish`), and no longer.
+
+    Parameters
+    ----------
+    array : Array, optional
+        The sensor; the thesis' 64 x 64 where it is left out. Events outside it are counted and dropped.
+    pairing : {"direct", "taxel"}
+        Which change an intensity belongs to. "direct": the word before it, if that is a change of the same taxel.
+        "taxel": the latest change of that taxel that has none yet, for boards that order otherwise; all events then
+        wait for `finish`, so it is for whole recordings.
+    differences : bool
+        Whether intensities are differences from the last value sent (the panel's "delta intensity"), which bytes do
+        not show. They are then added up from 0, so that `Events` hold values; right from the board's reset on and
+        until an intensity is lost.
+
+    Raises
+    ------
+    ProblemError : an argument that makes no sense
+
+    Notes
+    -----
+    Table 5.4. Time is unwrapped into 64 bits: a stamp up to 0.1 s behind the latest time is a step back (counted,
+    kept), any other lies ahead, so silences of up to 6.45 s are right. Arrival times tell how long a longer one was.
+
+    Examples
+    --------
+    >>> decoder = Decoder()
+    >>> decoder.push(bytes.fromhex("c000050304 e00028"))
+    Events(0 events, no time, 64 x 64 taxels, no intensities)
+    >>> decoder.push(bytes.fromhex("0304"))
+    Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+    >>> decoder.finish()
+    Events(0 events, no time, 64 x 64 taxels, no intensities)
+    >>> decoder.counts.words, decoder.counts.skipped
+    (2, 0)
+    """
+
+    def __init__(
+        self,
+        *,
+        array: Array | None = None,
+        pairing: Literal["direct", "taxel"] = "direct",
+        differences: bool = False,
+    ) -> None:
+        self.array = _THESIS if array is None else instance("array", array, Array)
+        text("pairing", pairing, _PAIRINGS)
+        self._core = _core.WireDecoder(self.array._parts(), pairing, flag("differences", differences))
+
+    def push(self, data: Any, arrived: int | None = None) -> Events:
+        """Take the next bytes; return the events that they complete.
+
+        Parameters
+        ----------
+        data : bytes, or anything with a contiguous buffer
+        arrived : int, us, optional
+            The host's clock when the bytes came. It chooses the wrap of the 16-bit time after a silence of more than
+            6.45 s.
+
+        Returns
+        -------
+        Events
+
+        Raises
+        ------
+        ProblemError : `data` is not bytes, or `arrived` not a whole number
+        """
+        data = _bytes(data)
+        columns = Columns(self._core.most_rows(len(data)))
+        events = self.push_into(columns, data, arrived)
+        n = len(events)
+        # Give back what no event needed: half of it where every change has an intensity.
+        for name in ("t", "x", "y", "p", "intensity", "present"):
+            column = getattr(columns, name)
+            if getattr(events, name) is not None:
+                setattr(events, name, None)
+                column.resize(n, refcheck=False)
+                setattr(events, name, column)
+        return events
+
+    def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
+        """Take the next bytes into memory that is used again; return the events as views of it.
+
+        The events are good until the columns are filled again: copy what is to be kept.
+
+        Parameters
+        ----------
+        columns : Columns
+            With room for ``len(data) // 5 + 2`` events.
+        data : bytes, or anything with a contiguous buffer
+        arrived : int, us, optional
+            As in `push`.
+
+        Returns
+        -------
+        Events
+
+        Raises
+        ------
+        ProblemError : too little room, or as `push`
+        """
+        data = _bytes(data)
+        when = None if arrived is None else whole("arrived", arrived)
+        rows, paired, markers = self._core.fill(data, when, instance("columns", columns, Columns)._parts())
+        return Events._unchecked(
+            columns.t[:rows],
+            columns.x[:rows],
+            columns.y[:rows],
+            columns.p[:rows],
+            self.array,
+            columns.intensity[:rows] if paired else None,
+            columns.present[:rows] if paired else None,
+            tuple(markers),
+        )
+
+    def end_of_datagram(self) -> Events:
+        """Say that a datagram ends here; return the change that waited for its intensity, if there is one."""
+        return Events._from_parts(self._core.end_of_datagram(), self.array)
+
+    def finish(self) -> Events:
+        """End the stream; return the rest. The decoder is then as new, but for its counts."""
+        return Events._from_parts(self._core.finish(), self.array)
+
+    @property
+    def counts(self) -> Counts:
+        """What was seen and dropped so far."""
+        return Counts(*self._core.counts())
+
+    def _joined(self, events: Events, rest: Events) -> Events:
+        """Return events with the one that waited."""
+        if not len(rest):
+            return events
+        parts = [np.concatenate([getattr(events, name), getattr(rest, name)]) for name in ("t", "x", "y", "p")]
+        pairs: tuple[Any, Any] = (None, None)
+        if events.intensity is not None:
+            none = np.zeros(len(rest), np.uint16)
+            pairs = (
+                np.concatenate([events.intensity, none]),
+                np.concatenate([events.present, none.astype(np.bool_)]),
+            )
+        return Events._unchecked(parts[0], parts[1], parts[2], parts[3], self.array, *pairs, events.markers)
+
+    def __repr__(self) -> str:
+        c = self.counts
+        return (
+            f"Decoder({self.array.rows} x {self.array.columns} taxels, {c.changes} events, {c.skipped} bytes skipped)"
+        )
+
+
+@dataclass(frozen=True)
+class Command:
+    """Set one of the board's 32-bit registers: five bytes on the serial line (Table 5.1).
+
+    Parameters
+    ----------
+    register : int, 0 to 7
+    value : int, 0 to 2**32 - 1
+        The whole register.
+
+    Raises
+    ------
+    ProblemError : out of these ranges
+
+    Examples
+    --------
+    >>> Command(1, 300).to_bytes().hex()
+    '900000012c'
+    >>> Command.from_bytes(bytes.fromhex("900000012c"))
+    Command(register=1, value=300)
+    """
+
+    register: int
+    value: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "register", whole("register", self.register, 0, 7))
+        object.__setattr__(self, "value", whole("value", self.value, 0, 2**32 - 1))
+
+    def to_bytes(self) -> bytes:
+        """Return the five bytes."""
+        return _core.command_bytes(self.register, self.value)
+
+    @classmethod
+    def from_bytes(cls, data: Any) -> Command:
+        """Read five bytes.
+
+        Raises
+        ------
+        FormatError : not five bytes, or a top bit out of place (names the byte)
+        """
+        return cls(*_core.command_read(_bytes(data)))
+
+
+#: Fields in units of 10 ns in the registers, in us here.
+_TIMES = ("line_period", "line_read", "step_period", "step_read")
+_FLAGS = ("random_lines", "mechanoreceptor", "invert_comparator", "frame_sync", "record")
+_MANUAL = {
+    "use_rand_row": "random_lines",
+    "comparator_mode": "mechanoreceptor",
+    "use_frame_sync": "frame_sync",
+    "row_change_period": "line_period",
+    "row_read_duration": "line_read",
+    "col_change_period": "step_period",
+    "col_read_duration": "step_read",
+    "ramp_time": "ramp",
+    "nrows": "lines",
+}
+
+
+class Registers:
+    """Hold what the board's registers say; a set that breaks a rule cannot be made.
+
+    "Line" is the driven line, the outer step of the scan; "step" the inner one, the multiplexer's. The manual's names
+    (`row_change_period`, `ramp_time`, `nrows` ...) are aliases, in the manual's units (10 ns, ticks, lines less one).
+
+    Parameters
+    ----------
+    line_period, line_read : float, us
+        Time from one driven line to the next, and the part of it in which the line is read.
+    step_period, step_read : float, us
+        Time from one multiplexer step to the next, and the part of it in which the channels are read.
+    ramp : int, ticks of 1/300 us
+        How long the ramp rises.
+    noise_floor : int, ticks
+        A difference above it makes an event.
+    lines : int, 1 to 64
+        Driven lines.
+    random_lines, mechanoreceptor, invert_comparator, frame_sync, record : bool
+    channels : {16, 64}
+        Of the converter: the board's build, not a register. A line has 4 steps with 16, one with 64.
+    array : Array, optional
+        The sensor; the thesis' 64 x 64 where it is left out.
+
+    Raises
+    ------
+    DeviceError : a rule is broken (says which, with the numbers)
+    ProblemError : no such field, a value that is no number, a time that is no multiple of 0.01 us
+
+    Notes
+    -----
+    Table 5.5; what is left out is as in the preset "5.2 kHz", which the board holds at reset.
+
+    Examples
+    --------
+    >>> fast = Registers.preset("5.2 kHz")
+    >>> fast.frame_us, fast.line_period, fast.row_change_period
+    (192.0, 3.0, 300)
+    >>> [command.register for command in fast.commands_to(Registers.preset("2 kHz"))]
+    [1, 2, 3, 4, 5]
+    >>> fast.replace(line_read=3.2)
+    Traceback (most recent call last):
+    taxel.DeviceError: line_read 3.20 us is longer than line_period 3.00 us (rule 1)
+    """
+
+    _held: dict[str, Any]
+
+    def __init__(self, *, array: Array | None = None, **fields: float) -> None:
+        self._set(json.loads(_core.registers_preset(PRESETS[0])), fields, array)
+
+    def _set(self, held: dict[str, Any], fields: dict[str, float], array: Array | None) -> None:
+        sensor = _THESIS if array is None else instance("array", array, Array)
+        raw = [(name, _raw(name, value)) for name, value in fields.items()]
+        self._held = json.loads(_core.registers_with(json.dumps(held), raw, sensor._parts()))
+        self.array = sensor
+
+    @classmethod
+    def preset(cls, name: str, *, array: Array | None = None) -> Registers:
+        """Return one of `PRESETS`.
+
+        Raises
+        ------
+        ProblemError : no such preset (names those that there are)
+        DeviceError : the array has fewer lines than the preset drives
+        """
+        registers = cls.__new__(cls)
+        registers._set(json.loads(_core.registers_preset(text("preset", name))), {}, array)
+        return registers
+
+    def replace(self, **fields: float) -> Registers:
+        """Return a set with some fields changed, by taxel's names or the manual's.
+
+        Raises
+        ------
+        DeviceError, ProblemError : as for a new set
+        """
+        registers = Registers.__new__(Registers)
+        registers._set(self._held, fields, self.array)
+        return registers
+
+    @property
+    def frame_us(self) -> float:
+        """A frame's length, us: lines times line period."""
+        return _core.registers_words(self._json())[1]
+
+    @property
+    def words(self) -> tuple[int, ...]:
+        """The eight 32-bit registers, REG0 first."""
+        return tuple(_core.registers_words(self._json())[0])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is allowed but hardly meant (rules 5 and 6), a line each."""
+        return tuple(_core.registers_check(self._json(), self.array._parts()))
+
+    def commands_to(self, target: Registers) -> list[Command]:
+        """Return the writes that lead from this set to another, in an order in which none is refused on the way.
+
+        `record` stays as it is: starting a recording is a command of its own.
+
+        Raises
+        ------
+        DeviceError : the sets are for boards with different channels
+        """
+        other = instance("target", target, Registers)
+        commands = _core.registers_commands(self._json(), other._json(), self.array._parts())
+        return [Command(register, value) for register, value in commands]
+
+    def _json(self) -> str:
+        return json.dumps(self._held)
+
+    def __getattr__(self, name: str) -> Any:
+        held = self.__dict__.get("_held", {})
+        if name in held:
+            return held[name] / 100 if name in _TIMES else held[name]
+        if name in _MANUAL and held:
+            value = held[_MANUAL[name]]
+            return value - 1 if name == "nrows" else int(value)
+        raise AttributeError(f"Registers have no {name!r}")
+
+    def __dir__(self) -> Sequence[str]:
+        return [*super().__dir__(), *self._held, *_MANUAL]
+
+    def __eq__(self, other: object) -> bool:
+        return self._held == other._held if isinstance(other, Registers) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        fields = (f"{name}={getattr(self, name)}" for name in self._held)
+        return f"Registers({', '.join(fields)})"
+
+
+def _raw(name: str, value: object) -> int:
+    """Return a field's value in the register's own unit."""
+    if name in _TIMES:
+        units = number(name, value) * 100
+        if not abs(units - np.rint(units)) < 1e-6:
+            raise ProblemError(f"{name} is {shown(value)} us: must be a whole multiple of 0.01 us")
+        if not 0 <= units < 2**32:
+            raise DeviceError(f"{name} {shown(value)} us does not fit its bits (rule 4)")
+        return int(np.rint(units))
+    if _MANUAL.get(name, name) in _FLAGS:
+        return int(flag(name, bool(value) if isinstance(value, int) and value in (0, 1) else value))
+    return whole(name, value, 0, 2**32 - 1)
