@@ -3,8 +3,10 @@
 from taxel import detect, metrics
 from taxel import encode, metrics
 from taxel import detect, device, metrics, wire
+from taxel import detect, encode, metrics
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel.array import Array
+from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
@@ -24,10 +26,11 @@ __all__ = [
     "Frames",
     "Neuron",
     "ProblemError",
+    "Readout",
     "SceneError",
     "SpikeTrains",
-    "detect",
     "Tare",
+    "detect",
     "encode",
     "device",
     "metrics",

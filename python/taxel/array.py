@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -104,6 +105,15 @@ class Array:
         rows, columns, pitch_mm, name, exists = parts
         grid = None if exists is None else np.array(exists).reshape(rows, columns)
         return cls(rows, columns, pitch_mm, grid, name)
+
+    def _geometry(self) -> dict[str, Any]:
+        """Return what JSON holds of an array."""
+        return dict(zip(("rows", "columns", "pitch_mm", "name", "exists"), self._parts(), strict=True))
+
+    @classmethod
+    def _from_geometry(cls, geometry: dict[str, Any]) -> Array:
+        parts = (geometry[name] for name in ("rows", "columns", "pitch_mm", "name"))
+        return cls._from_parts((*parts, geometry.get("exists")))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Array):

@@ -101,9 +101,7 @@ class Tare:
             raise ProblemError(f"tare is {text!r}: must be JSON text")
         values: dict[str, Any] = json.loads(_core.check_tare(text))
         tare = cls.__new__(cls)
-        geometry = values["array"]
-        parts = (geometry[name] for name in ("rows", "columns", "pitch_mm", "name"))
-        tare.array = Array._from_parts((*parts, geometry.get("exists")))
+        tare.array = Array._from_geometry(values["array"])
         tare.rest = np.array([np.nan if r is None else r for r in values["rest"]]).reshape(tare.array.shape)
         tare.rest.setflags(write=False)
         tare.start_us, tare.stop_us, tare.note = values["start_us"], values["stop_us"], values["note"]
@@ -111,11 +109,11 @@ class Tare:
 
     def to_json(self) -> str:
         """Return the tare as JSON."""
-        rows, columns, pitch_mm, name, exists = self.array._parts()
-        geometry = {"rows": rows, "columns": columns, "pitch_mm": pitch_mm, "name": name, "exists": exists}
         rest = [None if np.isnan(r) else float(r) for r in self.rest.ravel()]
         window = {"start_us": self.start_us, "stop_us": self.stop_us}
-        return _core.check_tare(json.dumps({"array": geometry, "rest": rest, **window, "note": self.note}))
+        return _core.check_tare(
+            json.dumps({"array": self.array._geometry(), "rest": rest, **window, "note": self.note})
+        )
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the tare to a JSON file, whole or not at all.

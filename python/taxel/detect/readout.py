@@ -1,0 +1,399 @@
+"""Trained neurons with names, and the encoder that they were trained behind."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._arguments import floats, instance, number, parameters, shown, text, whole
+from taxel._arguments import path as checked_path
+from taxel._core import FormatError, ProblemError
+from taxel._files import write_whole
+from taxel.array import Array
+from taxel.detections import Detections
+from taxel.encode import Encoder
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.neuron import Neuron
+from taxel.tare import Tare
+
+__all__ = ["Learner", "Readout", "ReadoutStream", "TrainedNeuron", "run"]
+
+#: The length of the board's frames at reset, us (its 5.2 kHz preset).
+FRAME_US = 192.0
+
+
+class Learner(Protocol):
+    """What a readout needs of a fitted learner."""
+
+    neuron_: Neuron
+    weights_: NDArray[np.float64]
+
+
+class TrainedNeuron(NamedTuple):
+    """A neuron with the weights (mV) it was trained to, and how much later than the event it fires (ms)."""
+
+    neuron: Neuron
+    weights: NDArray[np.float64]
+    delay_ms: float = 0.0
+
+
+class Readout:
+    """Hold trained neurons with names, and the encoder that they were trained behind.
+
+    Parameters
+    ----------
+    encoder : Encoder
+        With its parameters: they belong to the readout. A tare belongs to a board and a day and may be given later.
+    neurons : mapping of str to a fitted learner, or to (Neuron, weights) or (Neuron, weights, delay in ms)
+        By label. All of the same `time` and `after_spike`; others are refused. Weights in mV, one a train of the
+        encoder; where its spikes are signed first all ON trains, then all OFF (`SpikeTrains.split_by_sign`).
+    array : Array, optional
+        The sensor that it was trained on, the only one it then listens to. Left out, any will do that gives as many
+        trains.
+    delay_ms : float, or mapping of str to float, ms, 0 or more
+        How much later than the event the neurons were trained to fire, the encoder's latency apart: target = event +
+        latency + delay. A detection's `t` takes both off again.
+    run_threshold : float, above 0
+        A factor on every threshold after training; below 1 the neurons fire on less, and earlier.
+
+    Raises
+    ------
+    ProblemError : parts that make no sense or do not belong together (names the label)
+
+    Notes
+    -----
+    Reading: the thesis has no `run_threshold`, and 6.3.2 objects that a threshold below the trained one is crossed
+    earlier than intended. That price is paid for events a little weaker than the weakest trained one.
+
+    Examples
+    --------
+    >>> from taxel import Array, Frames, Neuron
+    >>> from taxel.encode import LevelCrossing
+    >>> encoder = LevelCrossing([10.0])
+    >>> readout = Readout(encoder, {"contact": (Neuron(tau=2.0), [1.0, 0.0]), "lift": (Neuron(tau=2.0), [0.0, 1.0])})
+    >>> readout
+    Readout(contact, lift; LevelCrossing(levels=[10.0]); continuous, keep)
+    >>> frames = Frames([[[v]] for v in (0.0, 0.0, 20.0, 20.0, 20.0, 0.0, 0.0)], range(0, 70_000, 10_000))
+    >>> run(readout, frames)
+    Detections(2: contact 1, lift 1; 20979 to 50979 us)
+    """
+
+    def __init__(
+        self,
+        encoder: Encoder,
+        neurons: Mapping[str, Learner | TrainedNeuron | tuple[Any, ...]],
+        *,
+        array: Array | None = None,
+        delay_ms: float | Mapping[str, float] = 0.0,
+        run_threshold: float = 1.0,
+    ) -> None:
+        instance("encoder", encoder, Encoder)
+        if not isinstance(neurons, Mapping) or not neurons:
+            raise ProblemError(f"neurons is {shown(neurons)}: must be trained neurons by label, one or more")
+        trained = {text("label", label): _trained(label, one, delay_ms) for label, one in neurons.items()}
+        first = next(iter(trained.values())).neuron
+        self._text = _core.make_readout(
+            parameters(
+                {
+                    "encoder": json.loads(encoder.to_json()),
+                    "array": None if array is None else instance("array", array, Array)._geometry(),
+                    "time": first.time,
+                    "after_spike": first.after_spike,
+                    "run_threshold": number("run_threshold", run_threshold),
+                    "neurons": {
+                        label: {
+                            "neuron": json.loads(one.neuron._json()),
+                            "delay_ms": one.delay_ms,
+                            "weights": one.weights,
+                        }
+                        for label, one in trained.items()
+                    },
+                }
+            )
+        )
+        self._parts: dict[str, Any] = json.loads(self._text)
+
+    @classmethod
+    def _from_text(cls, text: str) -> Readout:
+        readout = cls.__new__(cls)
+        readout._text = _core.check_readout(text)
+        readout._parts = json.loads(readout._text)
+        return readout
+
+    @property
+    def encoder(self) -> Encoder:
+        """The encoder with its parameters."""
+        return Encoder.from_json(json.dumps(self._parts["encoder"]))
+
+    @property
+    def array(self) -> Array | None:
+        """The sensor, or None where any will do."""
+        geometry = self._parts["array"]
+        return None if geometry is None else Array._from_geometry(geometry)
+
+    @property
+    def neurons(self) -> dict[str, TrainedNeuron]:
+        """The trained neurons by label."""
+        return {
+            label: TrainedNeuron(Neuron(**one["neuron"]), np.array(one["weights"], np.float64), one["delay_ms"])
+            for label, one in self._parts["neurons"].items()
+        }
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What it can say."""
+        return tuple(self._parts["neurons"])
+
+    @property
+    def time(self) -> str:
+        """For which time the neurons were trained: "grid" or "continuous"."""
+        return str(self._parts["time"])
+
+    @property
+    def after_spike(self) -> str:
+        """With what remaining after a spike the neurons were trained: "keep", "ignore" or "reset"."""
+        return str(self._parts["after_spike"])
+
+    @property
+    def run_threshold(self) -> float:
+        """The factor on every threshold after training."""
+        return float(self._parts["run_threshold"])
+
+    def to_json(self) -> str:
+        """Return the text of its file."""
+        return self._text
+
+    @classmethod
+    def from_json(cls, text: str) -> Readout:
+        """Return the readout that `to_json` wrote.
+
+        Raises
+        ------
+        FormatError : no readout, one of another version, or parts that make no sense
+        """
+        if not isinstance(text, str):
+            raise ProblemError(f"text is {shown(text)}: must be the text of a readout")
+        return cls._from_text(text)
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write the readout to a JSON file, whole or not at all, and return its path.
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        """
+        return write_whole(path, lambda file: file.write(self._text.encode() + b"\n"), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Readout:
+        """Read a readout from the file that `save` wrote: the same to the last bit.
+
+        Raises
+        ------
+        FormatError : no readout, or one of another version (names the file)
+        FileNotFoundError : no such file
+        """
+        try:
+            return cls._from_text(Path(checked_path("path", path)).read_text(encoding="utf-8"))
+        except UnicodeDecodeError:
+            raise FormatError(f"{path}: not text, so no readout") from None
+        except FormatError as error:
+            raise FormatError(f"{path}: {error}") from None
+
+    def stream(
+        self, array: Array | None = None, *, frame_us: float = FRAME_US, tare: Tare | None = None
+    ) -> ReadoutStream:
+        """Begin to listen: the same detections as of the whole, wherever the input is cut.
+
+        Parameters
+        ----------
+        array : Array, optional
+            The sensor; the readout's own where it is left out, or else that of the first piece.
+        frame_us : float, us
+            How long the board's frame (or a picture) lasts; 192 is the board at reset.
+        tare : Tare, optional
+            The taxels' rest, where the encoder needs one and has none.
+
+        Raises
+        ------
+        ProblemError : another array than it was trained on, or a tare that is missing
+        """
+        return ReadoutStream(self, array, frame_us=frame_us, tare=tare)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Readout):
+            return NotImplemented
+        return self._parts == other._parts
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        array = self.array
+        taxels = "" if array is None else f" on {array.rows} x {array.columns} taxels"
+        threshold = "" if self.run_threshold == 1.0 else f", threshold x {self.run_threshold:g}"
+        return (
+            f"Readout({', '.join(self.labels)}; {self.encoder!r}{taxels}; {self.time}, {self.after_spike}{threshold})"
+        )
+
+
+class ReadoutStream:
+    """Read out events or frames piece by piece, as `Readout.stream` begins it.
+
+    Every call returns the detections that became certain by it.
+
+    Examples
+    --------
+    >>> from taxel import Array, Frames, Neuron
+    >>> from taxel.encode import LevelCrossing
+    >>> readout = Readout(LevelCrossing([10.0]), {"contact": (Neuron(tau=2.0), [1.0, 0.0])})
+    >>> stream = readout.stream(Array(1, 1), frame_us=10_000)
+    >>> stream.push(Frames([[[0.0]], [[12.0]]], [0, 10_000]))
+    Detections(none)
+    >>> stream.advance(20_000)
+    Detections(1: contact 1; 10979 to 10979 us)
+    """
+
+    def __init__(
+        self, readout: Readout, array: Array | None = None, *, frame_us: float = FRAME_US, tare: Tare | None = None
+    ) -> None:
+        self._text = instance("readout", readout, Readout).to_json()
+        self._frame_us = number("frame_us", frame_us)
+        self._tare = _tare(tare)
+        self._core: _core.ReadoutStream | None = None
+        array = readout.array if array is None else array
+        if array is not None:
+            self._begin(array)
+
+    def _begin(self, array: Array) -> _core.ReadoutStream:
+        if self._core is None:
+            parts = instance("array", array, Array)._parts()
+            self._core = _core.ReadoutStream(self._text, parts, self._frame_us, self._tare)
+        return self._core
+
+    def push(self, x: Events | Frames) -> Detections:
+        """Take the next events or frames; one stream takes either, never both.
+
+        An event that is earlier than what came before counts as coming now, and is counted as `late`.
+
+        Raises
+        ------
+        ProblemError : neither, another array's, events without intensities where the encoder reads them, frames out of
+            order
+        """
+        if isinstance(x, Events):
+            return Detections._from_parts(self._begin(x.array).push_events(x._parts()))
+        if isinstance(x, Frames):
+            parts = x.array._parts(), x.t, x.values.reshape(-1)
+            return Detections._from_parts(self._begin(x.array).push_frames(*parts))
+        raise ProblemError(f"x is {shown(x)}: a readout listens to taxel.Events or taxel.Frames")
+
+    def advance(self, t_us: int) -> Detections:
+        """Say that nothing will come any more before `t_us` (us of the board); an earlier time changes nothing."""
+        t = whole("t_us", t_us, -(2**52), 2**52)
+        return Detections([], [], []) if self._core is None else Detections._from_parts(self._core.advance(t))
+
+    @property
+    def now_us(self) -> int | None:
+        """Up to where everything has been said, us; None before anything came."""
+        return None if self._core is None else self._core.now
+
+    @property
+    def late(self) -> int:
+        """How many events came later than others with a later time, or later than time was moved on."""
+        return 0 if self._core is None else self._core.late
+
+    @property
+    def potentials(self) -> dict[str, float]:
+        """Each neuron's potential now, mV."""
+        return {} if self._core is None else dict(self._core.potentials)
+
+
+def run(
+    readout: Readout,
+    source: Events | Frames | Any,
+    *,
+    frame_us: float | None = None,
+    tare: Tare | None = None,
+) -> Detections:
+    """Return what a readout says of a whole recording: the same as it would have said live.
+
+    Time moves on for a second of silence after the end, so that what was heard last is said too.
+
+    Parameters
+    ----------
+    readout : Readout
+    source : Recording, Events or Frames
+    frame_us : float, us, optional
+        How long the board's frame lasts, at whose end a crossing is `known`. Left out: what the recording's registers
+        say; of frames, their median distance; else 192, the board at reset.
+    tare : Tare, optional
+        The taxels' rest, where the encoder needs one and has none.
+
+    Returns
+    -------
+    Detections
+        In the order in which they could be said.
+
+    Raises
+    ------
+    ProblemError : another array than the readout was trained on, a tare that is missing, events without intensities
+        where the encoder reads them
+
+    Examples
+    --------
+    >>> from taxel import Frames, Neuron
+    >>> from taxel.encode import LevelCrossing
+    >>> readout = Readout(LevelCrossing([10.0]), {"contact": (Neuron(tau=2.0), [1.0, 0.0], 0.5)})
+    >>> found = run(readout, Frames([[[0.0]], [[12.0]], [[12.0]]], [0, 10_000, 20_000]))
+    >>> found.t, found.known
+    (array([10479]), array([20000]))
+    """
+    text = instance("readout", readout, Readout).to_json()
+    period = None if frame_us is None else number("frame_us", frame_us)
+    rest = _tare(tare)
+    if not isinstance(source, Events | Frames):
+        source, registers = _opened(source)
+        if period is None and registers:
+            period = registers["lines"] * registers["line_period"] / 100.0
+    if isinstance(source, Events):
+        period = FRAME_US if period is None else period
+        return Detections._from_parts(_core.readout_run_events(text, source._parts(), period, rest))
+    parts = source.array._parts(), source.t, source.values.reshape(-1)
+    return Detections._from_parts(_core.readout_run_frames(text, *parts, period, rest))
+
+
+def _opened(source: Any) -> tuple[Events | Frames, dict[str, Any] | None]:
+    """Return what a recording holds, and the board's registers."""
+    if not hasattr(source, "has_events"):
+        raise ProblemError(f"source is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
+    return source.events if source.has_events else source.frames(), source.registers
+
+
+def _tare(tare: Tare | None) -> str | None:
+    return None if tare is None else instance("tare", tare, Tare).to_json()
+
+
+def _trained(label: str, one: Any, delay_ms: float | Mapping[str, float]) -> TrainedNeuron:
+    """Return a neuron with weights and delay, given a learner or a tuple."""
+    if isinstance(delay_ms, Mapping):
+        if label not in delay_ms:
+            raise ProblemError(f"delay_ms: there is none for {label!r}")
+        delay_ms = delay_ms[label]
+    if isinstance(one, tuple) and len(one) in (2, 3):
+        neuron, weights, *its_delay = one
+        delay = its_delay[0] if its_delay else delay_ms
+    elif hasattr(one, "weights_") and hasattr(one, "neuron_"):
+        neuron, weights, delay = one.neuron_, one.weights_, delay_ms
+    else:
+        said = "is not fitted" if hasattr(one, "fit") else "must be a fitted learner, or (Neuron, weights)"
+        raise ProblemError(f"{label}: {shown(one)} {said}")
+    instance(f"{label}: neuron", neuron, Neuron)
+    return TrainedNeuron(neuron, floats(f"{label}: weights", weights), number(f"{label}: delay_ms", delay))
