@@ -16,6 +16,9 @@ pub enum Error {
         /// What the operating system said.
         source: std::io::Error,
     },
+    /// A detection that could not be handed on.
+    #[error("detections: {0}")]
+    Sink(std::io::Error),
     /// A socket that could not be opened or used.
     #[error("{place}: {source}")]
     Socket {

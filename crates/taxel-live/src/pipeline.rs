@@ -95,12 +95,29 @@ pub struct Said {
 /// Takes detections in the thread that made them; what it does there, the next detection waits for.
 pub trait Sink: Send {
     /// One was said.
-    fn take(&mut self, said: &Said);
+    ///
+    /// # Errors
+    ///
+    /// Where it cannot be handed on: then the whole way ends.
+    fn take(&mut self, said: &Said) -> std::io::Result<()>;
 }
 
-impl<F: FnMut(&Said) + Send> Sink for F {
-    fn take(&mut self, said: &Said) {
-        self(said);
+impl<F: FnMut(&Said) -> std::io::Result<()> + Send> Sink for F {
+    fn take(&mut self, said: &Said) -> std::io::Result<()> {
+        self(said)
+    }
+}
+
+/// Writes each detection as a line of JSON.
+#[derive(Debug)]
+pub struct Lines<W>(pub W);
+
+impl<W: std::io::Write + Send> Sink for Lines<W> {
+    fn take(&mut self, said: &Said) -> std::io::Result<()> {
+        let mut line = serde_json::to_vec(said)?;
+        line.push(b'\n');
+        self.0.write_all(&line)?;
+        self.0.flush()
     }
 }
 

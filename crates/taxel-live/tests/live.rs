@@ -108,6 +108,9 @@ impl Stream for EveryEvent {
         Ok(())
     }
     fn advance(&mut self, _: i64, _: &mut Vec<Spike>) {}
+    fn finish(&mut self, _: &mut Vec<Spike>) -> Option<f64> {
+        None
+    }
 }
 
 /// Speaks after 40 events within `tau` ms, which is how slowly its kernel rises.
@@ -157,9 +160,7 @@ fn recorded(path: &Scratch) -> (Events, Vec<Detection>) {
         .expect("sound chunks");
     decoder.finish_into(&mut events);
     let said = reader.remarks(Stop::never()).expect("sound chunks").0.detections;
-    let said =
-        said.into_iter().map(|(_, d)| Detection { label: d.label, t: d.t_us, known: d.known_us, slope: d.slope });
-    (events, said.collect())
+    (events, said.into_iter().map(|(_, d)| d).collect())
 }
 
 #[test]
@@ -196,8 +197,10 @@ fn what_is_said_live_is_what_the_recording_says() {
     let path = Scratch::new("said.mcap");
     let heard = Arc::new(Mutex::new(Vec::<Said>::new()));
     let sink = Arc::clone(&heard);
-    let sinks: Vec<Box<dyn taxel_live::pipeline::Sink>> =
-        vec![Box::new(move |said: &Said| sink.lock().expect("sound").push(said.clone()))];
+    let sinks: Vec<Box<dyn taxel_live::pipeline::Sink>> = vec![Box::new(move |said: &Said| {
+        sink.lock().expect("sound").push(said.clone());
+        Ok(())
+    })];
     let ear = Ear::Reading(Box::new(readout(20.0, Duration::ZERO)));
     let live = Live::start(ANY, options(Some(&path)), ear, sinks).expect("a port and a file");
     // Quiet at the end, so that all is said before the stop.

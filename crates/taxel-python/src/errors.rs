@@ -33,6 +33,10 @@ pub(crate) fn live(error: LiveError) -> PyErr {
         // OSError picks its own subclass by errno: FileNotFoundError, PermissionError ...
         LiveError::File { path, source } => os_error(source, path.display().to_string()),
         LiveError::Socket { place, source } => os_error(source, place),
+        // What a caller's own function raised is raised again.
+        LiveError::Sink(source) => {
+            source.downcast::<PyErr>().unwrap_or_else(|source| os_error(source, "detections".to_owned()))
+        }
     }
 }
 

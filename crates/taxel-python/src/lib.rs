@@ -7,6 +7,7 @@ mod knock;
 
 mod detect;
 mod encode;
+mod live;
 mod neuron;
 mod nouns;
 mod recording;
@@ -23,6 +24,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     nouns::register(module)?;
     detect::register(module)?;
     encode::register(module)?;
+    live::register(module)?;
     neuron::register(module)?;
     recording::register(module)?;
     simulate::register(module)?;

@@ -9,6 +9,7 @@ use taxel_core::{Events, Result};
 
 use super::handover::{Taken, append};
 use super::{Options, Said, Shared, Sink};
+use crate::Error;
 use crate::recording::now_ns;
 
 /// Makes the readout from the events of a stretch at rest, and that stretch (us).
@@ -117,7 +118,7 @@ impl Reader {
             let said_ns = now_ns();
             let offset = shared.board().counters.offset;
             let said = Said { said: offset.map_or(detection.known, |o| o.board_us(said_ns)), detection, said_ns };
-            self.sinks.iter_mut().for_each(|sink| sink.take(&said));
+            self.sinks.iter_mut().try_for_each(|sink| sink.take(&said)).map_err(Error::Sink)?;
             if let Some(recorder) = &shared.recorder {
                 recorder.detection(&said)?;
             }
