@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 use crossbeam_channel as channel;
 use serde::Serialize;
 use taxel_core::detect::Detection;
+use taxel_core::encode::Tare;
 use taxel_core::wire::{self, Decoder, Registers};
 use taxel_core::{Array, Marker};
 
@@ -28,7 +29,7 @@ use crate::latency::{Latencies, Quantiles};
 use crate::recording::Compression;
 use crate::{Error, Result};
 use handover::Handover;
-pub use read::{AfterTare, Ear};
+pub use read::Ear;
 use recorder::Recorder;
 
 /// How many detections wait for [`Live::next`]; more are counted and lost to it, not to the sinks.
@@ -183,6 +184,7 @@ struct Board {
     said_latency: Latencies,
     markers: Vec<Marker>,
     picture: Vec<u16>,
+    tare: Option<Tare>,
     failed: Option<Error>,
 }
 
@@ -230,6 +232,13 @@ impl Live {
             return Err(taxel_core::problem!("readout_events is 0: must be 1 or more").into());
         }
         options.registers.check(&options.array)?;
+        match &ear {
+            Ear::Taring(stretch_us, _) if *stretch_us <= 0 => {
+                return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
+            }
+            Ear::Taring(_, readout) => readout.check()?,
+            Ear::Deaf | Ear::Reading(_) => {}
+        }
         // The socket first: where the port is taken no empty file is left behind.
         let receiver = Receiver::bind(address, options.capture)?;
         let recorder =
@@ -315,6 +324,12 @@ impl Live {
     #[must_use]
     pub fn picture(&self) -> Vec<u16> {
         self.shared.board().picture.clone()
+    }
+
+    /// The tare that was taken, once it is complete.
+    #[must_use]
+    pub fn tare(&self) -> Option<Tare> {
+        self.shared.board().tare.clone()
     }
 
     /// The starts and stops that came since this was asked last.

@@ -8,14 +8,14 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use taxel_core::board::Board;
-use taxel_core::detect::{Detection, FrameClock, ReadoutStream};
-use taxel_core::encode::Stream;
-use taxel_core::neuron::Neuron;
+use taxel_core::detect::{Detection, Readout, TrainedNeuron};
+use taxel_core::encode::Encoder;
+use taxel_core::neuron::{Neuron, Time};
 use taxel_core::wire::{Command, Decoder, Registers};
-use taxel_core::{Array, Events, Result, Spike, Stop};
+use taxel_core::{Array, Events, Stop};
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{self, Emulator, Report, Touch};
-use taxel_live::pipeline::{Ear, Live, Options, Record, Said, Summary};
+use taxel_live::pipeline::{Ear, Live, Options, Record, Said, Sink, Summary};
 use taxel_live::recording::{Compression, Reader, Topic};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -84,47 +84,32 @@ fn emulate(to: SocketAddr, real_time: bool, mut touch: impl Touch) -> Report {
     emulator.run(&mut touch, |_| {}, Stop::never()).expect("sent")
 }
 
-/// Every event is a spike of train 0; `slow` makes it take so long for each piece.
-struct EveryEvent {
-    slow: Duration,
-}
-
-impl Stream for EveryEvent {
-    fn trains(&self) -> usize {
-        1
-    }
-    fn signed(&self) -> bool {
-        false
-    }
-    fn latency_ms(&self) -> f64 {
-        0.0
-    }
-    fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()> {
-        std::thread::sleep(self.slow);
-        out.extend(events.t.iter().map(|&t| Spike { t: t as f64 / 1000.0, train: 0, value: 1.0 }));
-        Ok(())
-    }
-    fn push_frame(&mut self, _: i64, _: &[f32], _: &mut Vec<Spike>) -> Result<()> {
-        Ok(())
-    }
-    fn advance(&mut self, _: i64, _: &mut Vec<Spike>) {}
-    fn finish(&mut self, _: &mut Vec<Spike>) -> Option<f64> {
-        None
-    }
-}
-
-/// Speaks after 40 events within `tau` ms, which is how slowly its kernel rises.
-fn readout(tau: f64, slow: Duration) -> ReadoutStream {
-    let clock = FrameClock::new(192.0).expect("a frame");
+/// Hears every event and speaks after some forty within `tau` ms, which is how slowly its kernel rises.
+fn readout(tau: f64) -> Readout {
     let neuron = Neuron { tau, refractory: 15.0, theta_0: 0.4, ..Neuron::default() };
-    let neurons = std::iter::once(("touch".to_owned(), neuron, vec![0.03], 0.0));
-    ReadoutStream::new(Box::new(EveryEvent { slow }), Array::thesis(), clock, 1.0, neurons).expect("one weight")
+    let one = TrainedNeuron { delay_ms: 0.0, weights: vec![0.03; 2 * 4096], neuron };
+    of(r#"{"name": "change_events"}"#, one)
+}
+
+fn of(encoder: &str, one: TrainedNeuron) -> Readout {
+    Readout {
+        encoder: Encoder::from_json(encoder).expect("an encoder"),
+        array: None,
+        time: Time::Continuous,
+        after_spike: one.neuron.after_spike,
+        run_threshold: 1.0,
+        neurons: [("touch".to_owned(), one)].into(),
+    }
+}
+
+fn reading(readout: &Readout) -> Ear {
+    Ear::Reading(Box::new(readout.stream(&Array::thesis(), 192.0, None).expect("a sound readout")))
 }
 
 fn options(record: Option<&Scratch>) -> Options {
     let record = record.map(|s| Record { path: s.0.clone(), compression: Compression::Lz4, overwrite: false });
-    // A loaded machine may hold frames back for longer than 5 frames: here no event may come late.
-    Options { record, guard_frames: 1000.0, ..Options::new(Array::thesis()) }
+    // A machine too slow for real time holds frames back: here the host's clock moves nothing on, so no event is late.
+    Options { record, guard_frames: 1e9, ..Options::new(Array::thesis()) }
 }
 
 fn wait_for(live: &Live, what: impl Fn(&Live) -> bool) {
@@ -197,14 +182,12 @@ fn what_is_said_live_is_what_the_recording_says() {
     let path = Scratch::new("said.mcap");
     let heard = Arc::new(Mutex::new(Vec::<Said>::new()));
     let sink = Arc::clone(&heard);
-    let sinks: Vec<Box<dyn taxel_live::pipeline::Sink>> = vec![Box::new(move |said: &Said| {
+    let sinks: Vec<Box<dyn Sink>> = vec![Box::new(move |said: &Said| {
         sink.lock().expect("sound").push(said.clone());
         Ok(())
     })];
-    let ear = Ear::Reading(Box::new(readout(20.0, Duration::ZERO)));
-    let live = Live::start(ANY, options(Some(&path)), ear, sinks).expect("a port and a file");
-    // Quiet at the end, so that all is said before the stop.
-    let report = emulate(live.address(), true, presses(5000, 3000));
+    let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), sinks).expect("a port and a file");
+    let report = emulate(live.address(), true, presses(4000, 4000));
     let mut queued = vec![];
     while let Some(said) = live.next(Duration::from_millis(500)).expect("a sound way") {
         queued.push(said);
@@ -218,7 +201,9 @@ fn what_is_said_live_is_what_the_recording_says() {
     let live_said: Vec<Detection> = heard.iter().map(|s| s.detection.clone()).collect();
     let (events, said) = recorded(&path);
     assert_eq!(said, live_said, "the recording keeps what was said");
-    let again = readout(20.0, Duration::ZERO).run_events(&events, 5000 * 192, Stop::never()).expect("a sound readout");
+    let mut again = readout(2.0).run_events(&events, 192.0, None, Stop::never()).expect("a sound readout");
+    // Nothing moved the time on after the last event, and what it would have led to was not said.
+    again.retain(|d| Some(&d.t) < events.t.last());
     assert_eq!(again, live_said);
     assert!(again.len() > 5, "the presses are heard: {}", again.len());
     // By the host's clock less the offset no detection can be said before it was known, but for the clocks' estimate.
@@ -227,19 +212,14 @@ fn what_is_said_live_is_what_the_recording_says() {
 
 #[test]
 fn in_silence_time_moves_on_by_the_hosts_clock() {
-    let live = Live::start(
-        ANY,
-        Options { guard_frames: 5.0, ..options(None) },
-        Ear::Reading(Box::new(readout(20.0, Duration::ZERO))),
-        vec![],
-    )
-    .expect("a port");
-    // The board's first frame is all that ever comes; the potential crosses some ms after it.
-    emulate(live.address(), true, |ticks: &mut [u16]| {
-        let first = ticks[0] == 0;
-        ticks.fill(0);
-        ticks[..40].fill(20);
-        first
+    let live = Live::start(ANY, Options { guard_frames: 5.0, ..options(None) }, reading(&readout(20.0)), vec![])
+        .expect("a port");
+    // Two frames are all that ever comes; the potential crosses some ms after them.
+    let mut frames = 0;
+    emulate(live.address(), true, move |ticks: &mut [u16]| {
+        frames += 1;
+        ticks[..40].fill(20 * frames);
+        frames <= 2
     });
     let said = live.next(Duration::from_secs(30)).expect("a sound way").expect("it is said though nothing follows");
     assert!(said.detection.t > 1000, "the kernel takes its time: {said:?}");
@@ -296,9 +276,12 @@ fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
 #[test]
 fn a_slow_readout_loses_events_where_they_are_counted_and_the_recording_loses_none() {
     let path = Scratch::new("slow.mcap");
-    let ear = Ear::Reading(Box::new(readout(20.0, Duration::from_millis(50))));
-    let live =
-        Live::start(ANY, Options { readout_events: 1000, ..options(Some(&path)) }, ear, vec![]).expect("started");
+    let slow: Box<dyn Sink> = Box::new(|_: &Said| {
+        std::thread::sleep(Duration::from_millis(50));
+        Ok(())
+    });
+    let options = Options { readout_events: 1000, ..options(Some(&path)) };
+    let live = Live::start(ANY, options, reading(&readout(20.0)), vec![slow]).expect("started");
     let report = emulate(live.address(), false, presses(3000, 3000));
     let summary = live.stop().expect("a sound way");
     assert_closed(&summary, &report);
@@ -347,27 +330,38 @@ fn a_stop_ends_also_while_datagrams_pour_in() {
 }
 
 #[test]
-fn a_tare_is_made_of_the_stretch_before_the_start_marker() {
-    let stretch = Arc::new(Mutex::new(None));
-    let theirs = Arc::clone(&stretch);
-    let after = Box::new(move |events: &Events, range: std::ops::Range<i64>| {
-        *theirs.lock().expect("sound") = Some((events.len(), range));
-        Ok(readout(1.0, Duration::ZERO))
-    });
-    let live = Live::start(ANY, options(None), Ear::Taring(1_000_000, after), vec![]).expect("a port");
+fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_what_follows() {
+    let mut weights = vec![0.0; 10];
+    weights[0] = 3.0;
+    let neuron = Neuron { tau: 0.5, refractory: 15.0, ..Neuron::default() };
+    let readout = of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, weights });
+    let path = Scratch::new("tare.mcap");
+    let ear = Ear::Taring(1_000_000, Box::new(readout.clone()));
+    let live = Live::start(ANY, options(Some(&path)), ear, vec![]).expect("a port");
     wait_for(&live, |live| live.counters().taring);
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
     let commands = vec![(260, Command::new(7, 1 << 16).expect("a command"))];
     let options = emulate::Options { commands, ..emulate::Options::to(live.address()) };
     let mut emulator = Emulator::open(board, &array, options).expect("a socket");
-    let report = emulator.run(&mut presses(1000, 0), |_| {}, Stop::never()).expect("sent");
-    wait_for(&live, |live| !live.counters().taring);
-    assert_eq!(live.take_markers().iter().map(|m| (m.t, m.start)).collect::<Vec<_>>(), [(260 * 192 / 100 * 100, true)]);
+    let (mut quiet, mut pressed) = (presses(300, 0), presses(1500, 1000));
+    let mut touch = move |ticks: &mut [u16]| quiet.frame(ticks) || pressed.frame(ticks);
+    let report = emulator.run(&mut touch, |_| {}, Stop::never()).expect("sent");
+    let mut said = vec![];
+    while let Some(next) = live.next(Duration::from_millis(500)).expect("a sound way") {
+        said.push(next.detection);
+    }
+    let start = 260 * 192 / 100 * 100;
+    assert_eq!(live.take_markers().iter().map(|m| (m.t, m.start)).collect::<Vec<_>>(), [(start, true)]);
+    let tare = live.tare().expect("taken");
+    assert!(!live.counters().taring);
     let summary = live.stop().expect("a sound way");
     assert_closed(&summary, &report);
-    assert_eq!(*stretch.lock().expect("sound"), Some((4096, 0..260 * 192 / 100 * 100)));
-    assert_eq!(summary.counters.detections, 0, "what the first frame tells of every taxel is not said");
+    assert_eq!((tare.start_us, tare.stop_us), (0, start));
+    assert!(tare.rest.iter().all(|&rest| rest == Some(20.0)));
+    assert_eq!(said.len(), 5, "a press each 208 frames of 1000");
+    let again = readout.run_events(&recorded(&path).0, 192.0, Some(&tare), Stop::never()).expect("a sound readout");
+    assert_eq!(again, said);
 }
 
 #[test]

@@ -4,26 +4,24 @@ use std::ops::Range;
 use std::sync::atomic::Ordering;
 
 use crossbeam_channel::Sender;
-use taxel_core::detect::{Detection, ReadoutStream};
-use taxel_core::{Events, Result};
+use taxel_core::Events;
+use taxel_core::detect::{Detection, Readout, ReadoutStream};
+use taxel_core::encode::TareBuilder;
 
 use super::handover::{Taken, append};
 use super::{Options, Said, Shared, Sink};
 use crate::Error;
 use crate::recording::now_ns;
 
-/// Makes the readout from the events of a stretch at rest, and that stretch (us).
-pub type AfterTare = Box<dyn FnOnce(&Events, Range<i64>) -> Result<ReadoutStream> + Send>;
-
 /// Who listens to the events.
 pub enum Ear {
     /// Nobody: capture and record only.
     Deaf,
-    /// A readout.
+    /// A readout at work.
     Reading(Box<ReadoutStream>),
-    /// A readout that first needs a tare: from the first event on for so long (us of the board's clock), or until the
+    /// A readout that first takes a tare: from the first event on for so long (us of the board's clock), or until the
     /// board marks a start.
-    Taring(i64, AfterTare),
+    Taring(i64, Box<Readout>),
 }
 
 pub(super) struct Reader {
@@ -32,6 +30,7 @@ pub(super) struct Reader {
     say: Sender<Said>,
     found: Vec<Detection>,
     events: Events,
+    frame_us: f64,
 }
 
 enum State {
@@ -39,7 +38,7 @@ enum State {
     /// What was heard of the stretch so far.
     Taring {
         stretch_us: i64,
-        after: AfterTare,
+        readout: Box<Readout>,
         heard: Box<Events>,
     },
     /// Between the two, and after an error.
@@ -52,9 +51,9 @@ impl Reader {
         let state = match ear {
             Ear::Deaf => State::Idle,
             Ear::Reading(stream) => State::Reading(stream),
-            Ear::Taring(stretch_us, after) => State::Taring { stretch_us, after, heard: Box::new(events.clone()) },
+            Ear::Taring(stretch_us, readout) => State::Taring { stretch_us, readout, heard: Box::new(events.clone()) },
         };
-        Self { state, sinks, say, found: vec![], events }
+        Self { state, sinks, say, found: vec![], events, frame_us: options.registers.frame_us() }
     }
 
     pub(super) fn run(mut self, shared: &Shared) {
@@ -98,17 +97,24 @@ impl Reader {
         self.say_all(shared)
     }
 
-    /// The tare is complete: makes the readout, which hears all that came, so that it knows what taxels hold.
+    /// The stretch at rest is over: makes the readout, which hears all that came, so that it knows what taxels hold.
     fn begin(&mut self, shared: &Shared, stretch: Range<i64>) -> crate::Result<()> {
-        let State::Taring { after, heard, .. } = std::mem::replace(&mut self.state, State::Idle) else { return Ok(()) };
-        let end = stretch.end;
-        let mut stream = Box::new(after(&heard, stretch)?);
+        let State::Taring { readout, heard, .. } = std::mem::replace(&mut self.state, State::Idle) else {
+            return Ok(());
+        };
+        let inside = heard.t.iter().position(|&t| t >= stretch.end).unwrap_or(heard.len());
+        let mut builder = TareBuilder::new(&heard.array, Some(stretch.start));
+        builder.push_events(&heard.piece(0..inside))?;
+        let tare = builder.finish(stretch.end, "taken live")?;
+        let mut stream = Box::new(readout.stream(&heard.array, self.frame_us, Some(&tare))?);
         stream.push_events(&heard, &mut self.found)?;
-        stream.advance(end, &mut self.found)?;
+        stream.advance(stretch.end, &mut self.found)?;
         // What is said of the rest itself is not meant: a board that was just reset tells of every taxel.
-        self.found.retain(|d| d.known >= end);
+        self.found.retain(|d| d.known >= stretch.end);
         self.state = State::Reading(stream);
-        shared.board().counters.taring = false;
+        let mut board = shared.board();
+        board.counters.taring = false;
+        board.tare = Some(tare);
         Ok(())
     }
 
