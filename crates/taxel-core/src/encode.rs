@@ -244,7 +244,7 @@ fn said(value: &Value, error: &serde_json::Error) -> Error {
         if let Err(error) = serde_json::from_value::<Encoder>(alone)
             && !error.to_string().starts_with("missing field")
         {
-            return if error.to_string().starts_with("unknown field") {
+            return if error.to_string().starts_with(&format!("unknown field `{key}`")) {
                 problem!("encoder {name}: {error}")
             } else {
                 problem!("encoder {name}: {key}: {error}")

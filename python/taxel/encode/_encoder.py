@@ -7,6 +7,8 @@ import inspect
 import json
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
 from taxel import _core
 from taxel._arguments import parameters
 from taxel._core import ProblemError
@@ -173,7 +175,7 @@ class EncoderStream:
 
     def advance(self, t_us: int) -> SpikeTrains:
         """Say that nothing will come any more before `t_us` (exclusive); an earlier time changes nothing."""
-        if isinstance(t_us, bool) or int(t_us) != t_us or not -(2**60) <= t_us <= 2**60:
+        if isinstance(t_us, bool) or not isinstance(t_us, int | np.integer) or not -(2**60) <= t_us <= 2**60:
             raise ProblemError(f"t_us is {t_us!r}: must be a whole number of us")
         return self._told(None if self._core is None else self._core.advance(int(t_us)))
 

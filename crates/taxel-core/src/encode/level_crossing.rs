@@ -290,24 +290,28 @@ impl Rule for Crossings {
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
         let Some(mut window) = self.window.take() else { return self.cross(t, held, changed, out) };
         let everything = vec![true; held.len()];
-        if let Some(first) = window.first_full(t) {
+        let first = window.first_full(t);
+        if let Some(first) = &first {
             self.scale(&first.ranges);
-            if let Some((begin, later)) = first.samples.split_first() {
-                self.settle(begin.0, &begin.1, out);
-                for (at, held) in later {
+            for (k, (at, held)) in first.samples.iter().enumerate() {
+                if k == 0 {
+                    self.settle(*at, held, out);
+                } else {
                     self.pass(*at, out);
                     self.cross(*at, held, &everything, out);
                 }
-                self.pass(t, out);
-                self.cross(t, held, &everything, out);
-            } else {
-                self.settle(t, held, out);
             }
-        } else if let Some(ranges) = window.renewed(t) {
-            self.scale(&ranges);
-            self.cross(t, held, &everything, out);
-        } else if window.is_full() {
-            self.cross(t, held, changed, out);
+            self.pass(t, out);
+        }
+        let ranges = window.renewed(t);
+        if let Some(ranges) = &ranges {
+            self.scale(ranges);
+        }
+        match first {
+            Some(first) if first.samples.is_empty() => self.settle(t, held, out),
+            None if !window.is_full() => {}
+            None if ranges.is_none() => self.cross(t, held, changed, out),
+            _ => self.cross(t, held, &everything, out),
         }
         window.take(t, held);
         self.window = Some(window);

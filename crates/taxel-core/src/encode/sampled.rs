@@ -297,14 +297,12 @@ impl<R: Rule> Stream for Sampled<R> {
     }
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
-        if self.steady && self.begun && (t - self.last - self.period).abs() * 2 > self.period {
+        self.source.frame(t)?;
+        if self.steady && self.begun && 2 * (t - self.last - self.period).abs() > self.period {
             let (since, period) = (ms(t - self.last), ms(self.period));
-            return Err(problem!(
-                "frame at {t} us, {since} ms after the last: frames must come every period_ms, {period}"
-            ));
+            return Err(problem!("frame at {t} us, {since} ms after the last: must come every period_ms, {period}"));
         }
         self.channels.load(t, values, &mut self.held, &mut self.changed)?;
-        self.source.frame(t)?;
         self.sample(t, out);
         Ok(())
     }

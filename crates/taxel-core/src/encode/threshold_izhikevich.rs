@@ -311,3 +311,78 @@ impl Rule for Pairs {
         self.ahead.is_empty() && self.rises.iter().chain(&self.falls).all(|n| n.still)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Time from an input that comes to the resting neuron to its spike, ms.
+    fn latency(which: Published, gain: Option<f64>, dt: f64) -> Option<f64> {
+        let published = Model::published(which);
+        let model = Model { dt, gain: gain.unwrap_or(published.gain), ..published };
+        let (v, u) = Model::rest();
+        let mut neurons = Neurons { v: [v; LANES], u: [u; LANES], input: [model.gain; LANES], still: false };
+        let mut spikes = vec![];
+        neurons.run(model, (500.0 / dt) as i64, |step, lane| spikes.push((step, lane)));
+        assert!(spikes.len() <= LANES || gain.is_some(), "phasic: one spike a step of the input");
+        spikes.first().map(|&(step, _)| (step + 1) as f64 * dt)
+    }
+
+    #[test]
+    fn latencies_are_the_known_ones_at_every_step() {
+        for (which, known) in [
+            (Published::Curvature, [(1.0, 23.0), (0.2, 20.6), (0.1, 20.2), (0.05, 20.05), (0.01, 19.92)]),
+            (Published::Gait, [(1.0, 18.0), (0.2, 16.2), (0.1, 15.8), (0.05, 15.7), (0.01, 15.53)]),
+        ] {
+            for (dt, wanted) in known {
+                let got = latency(which, None, dt).unwrap();
+                assert!((got - wanted).abs() < 1e-9, "{which:?} at {dt} ms: {got} against {wanted}");
+            }
+            let stated = latency(which, None, 0.1).unwrap();
+            assert!((stated - which.latency_ms()).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn weak_inputs_come_late_or_never() {
+        assert_eq!(latency(Published::Curvature, Some(0.3), 0.1), None);
+        assert!(latency(Published::Curvature, Some(0.4), 0.1).unwrap() > 23.0);
+    }
+
+    #[test]
+    fn settled_neurons_are_fixed_points_so_that_leaving_steps_out_is_exact() {
+        for which in [Published::Curvature, Published::Gait] {
+            let model = Model::published(which);
+            for input in [0.0, model.gain] {
+                let (v, u) = model.settled(input);
+                assert_eq!(model.step(v, u, input), (v, u), "{which:?}, input {input}");
+            }
+        }
+    }
+
+    #[test]
+    fn groups_that_are_left_out_while_still_spike_as_single_steps_do() {
+        let model = Model::published(Published::Gait);
+        let (v, u) = model.settled(0.0);
+        let mut grouped = Neurons { v: [v; LANES], u: [u; LANES], input: [0.0; LANES], still: false };
+        let mut plain: Vec<(f64, f64)> = vec![(v, u); LANES];
+        let (mut got, mut wanted) = (vec![], vec![]);
+        for (begin, lane, input) in [(0, 0, 0.0), (400, 3, 0.6), (900, 5, 0.6), (1000, 3, 0.0), (90_000, 0, 0.6)] {
+            grouped.set(lane, input);
+            let steps = if begin < 90_000 { 500 } else { 1000 };
+            grouped.run(model, steps, |step, lane| got.push((begin + step, lane)));
+            for step in 0..steps {
+                for (lane, (v, u)) in plain.iter_mut().enumerate() {
+                    (*v, *u) = model.step(*v, *u, grouped.input[lane]);
+                    if *v >= PEAK {
+                        (*v, *u) = (C, *u + D);
+                        wanted.push((begin + step, lane));
+                    }
+                }
+            }
+            assert_eq!(grouped.v.to_vec(), plain.iter().map(|s| s.0).collect::<Vec<_>>());
+        }
+        assert_eq!(got, wanted);
+        assert_eq!(got.len(), 3);
+    }
+}

@@ -1,0 +1,162 @@
+"""The encoders once more, plainly from their equations: one channel, one sample at a time, slow.
+
+Each takes times in whole us and values of shape (samples, channels), and gives spikes as (t us, train, value).
+"""
+
+import numpy as np
+
+TICK_SHIFT = 0.5
+
+
+def change_events(t, values, noise_floor=3.0, bits=1, previous="last_sent", rounding="truncate"):
+    """Equation 5.7 on float32 samples."""
+    values, floor, most = np.asarray(values, np.float32), np.float32(noise_floor), 2**bits - 1
+    spikes = []
+    for channel in range(values.shape[1]):
+        last = values[0, channel]
+        for at, value in zip(t[1:], values[1:, channel], strict=True):
+            u = np.float32(value - last)
+            if rounding == "truncate":
+                units = int(np.trunc(u / floor)) if abs(u) > floor else 0
+            else:
+                units = int(np.floor(u / floor))
+            if units:
+                spikes.append((at, channel, max(-most, min(most, units))))
+            if units or previous == "last_sample":
+                last = value
+    return sorted(spikes)
+
+
+def level_crossing(t, values, levels, end, release=lambda level: level, hold=0, tonic=None, tonic_level=None):
+    """Crossings with release, hold and tonic spikes up to `end`; hold and tonic in us."""
+    values = np.asarray(values, np.float32)
+    channels, spikes = values.shape[1], []
+    for channel in range(channels):
+        for k, level in enumerate(levels):
+            states = []  # (since, above)
+            above = bool(values[0, channel] >= np.float32(level))
+            states.append((t[0], above))
+            for at, value in zip(t[1:], values[1:, channel], strict=True):
+                now = bool(value >= np.float32(release(level) if above else level))
+                if now != above:
+                    states.append((at, now))
+                    above = now
+            said, told = states[0][1], [(t[0], states[0][1])]
+            untils = [since for since, _ in states[2:]] + [end + 1] if len(states) > 1 else []
+            for (since, state), until in zip(states[1:], untils, strict=True):
+                if state != said and until - since >= hold and since + hold <= end:
+                    said = state
+                    told.append((since + hold, state))
+                    spikes.append((since + hold, channel * len(levels) + k, 1 if state else -1))
+            if tonic is not None and level == (levels[0] if tonic_level is None else tonic_level):
+                for (since, state), until in zip(told, [s[0] for s in told[1:]] + [end + 1], strict=True):
+                    if state:
+                        train = channels * len(levels) + channel
+                        spikes += [(at, train, 1) for at in range(since, until, tonic)]
+    return sorted(spikes)
+
+
+def running_range(t, values, low, high, window, renew):
+    """Low and high at each sample by percentiles of the past window (us); NaN until the first is full."""
+    t, ranges = np.asarray(t), []
+    for at in t:
+        j = (at - t[0] - window) // renew
+        if j < 0:
+            ranges.append(np.full((2, values.shape[1]), np.nan))
+            continue
+        end = t[0] + window + j * renew
+        past = values[(t >= end - window) & (t < end)].astype(np.float64)
+        ranges.append(np.percentile(past, [low, high], axis=0) if len(past) else ranges[-1])
+    return np.array(ranges)
+
+
+def izhikevich(inputs, a, gain, dt=0.1, start="settled"):
+    """Steps in which one neuron spikes; `inputs` is 0 or 1 a step. Forward Euler, both equations from the old state."""
+    b, c, d = 0.25, -65.0, 6.0
+    v = (-(5 - b) - ((5 - b) * (5 - b) - 4 * 0.04 * 140) ** 0.5) / (2 * 0.04)
+    u = b * v
+    if start == "settled":
+        for _ in range(1_000_000):
+            old = v, u
+            v, u = _step(v, u, a, b, gain * inputs[0], dt)
+            if v >= 30:
+                v, u = c, u + d
+            elif (v, u) == old:
+                break
+    fired = []
+    for k, on in enumerate(inputs):
+        v, u = _step(v, u, a, b, gain * on, dt)
+        if v >= 30:
+            fired.append(k)
+            v, u = c, u + d
+    return fired
+
+
+def _step(v, u, a, b, current, dt):
+    return v + dt * (0.04 * v * v + 5.0 * v + 140.0 - u + current), u + dt * a * (b * v - u)
+
+
+PUBLISHED = {"3.4.3": (0.02, 0.5), "6.5.1": (0.005, 0.6)}
+
+
+def threshold_izhikevich(t, values, levels, end, published="6.5.1", start="settled"):
+    """Hold samples over 0.1 ms steps from the first; spikes at their step's end, up to `end`."""
+    values, (a, gain) = np.asarray(values, np.float32), PUBLISHED[published]
+    steps = np.arange(t[0], end + 1, 100)
+    held = np.searchsorted(t, steps, side="right") - 1
+    spikes = []
+    for channel in range(values.shape[1]):
+        for k, level in enumerate(levels):
+            on = (values[held, channel] >= np.float32(level)).astype(float)
+            for sign, inputs in ((1, on), (-1, 1 - on)):
+                for step in izhikevich(inputs, a, gain, start=start):
+                    at = t[0] + 100 * (step + 1)
+                    if at <= end:
+                        spikes.append((at, channel * len(levels) + k, sign))
+    return sorted(spikes)
+
+
+def fa1(t, values, alpha=0.7, a=20.0, b=0.05, decay="sample", theta_0=None, largest=150.0, period_ms=1.0):
+    """Equations 5.1 to 5.5."""
+    rho = np.maximum(np.asarray(values, np.float64), 0.0) ** alpha  # 5.1
+    base = largest**alpha / 1024 if theta_0 is None else theta_0
+    fall = b * base if decay == "sample" else b * period_ms * base
+    spikes = []
+    for channel in range(rho.shape[1]):
+        u, theta, s = 0.0, base, 0
+        for k in range(1, len(rho)):
+            if s:  # 5.5
+                theta = theta + period_ms * a * base
+            elif theta > base:
+                theta = theta - fall
+            else:
+                theta = base
+            u += rho[k, channel] - rho[k - 1, channel]  # 5.2, 5.3
+            s = 1 if u > theta else -1 if u < -theta else 0  # 5.4
+            if s:
+                u = 0.0
+                spikes.append((t[k], channel, s))
+    return sorted(spikes)
+
+
+def contact_area(t, pictures, rest, floor=3.0, levels=(2, 4, 8, 16, 32)):
+    """Rises and falls of the number of loaded taxels with a loaded neighbour; `rest` is NaN where unknown."""
+    before, spikes = 0, []
+    for at, picture in zip(t, pictures, strict=True):
+        loaded = np.nan_to_num(picture - rest, nan=-np.inf) >= floor + TICK_SHIFT
+        wide = np.pad(loaded, 1)
+        rows, columns = loaded.shape
+        beside = sum(
+            wide[1 + dy : 1 + dy + rows, 1 + dx : 1 + dx + columns].astype(int)
+            for dy in (-1, 0, 1)
+            for dx in (-1, 0, 1)
+            if (dy, dx) != (0, 0)
+        )
+        area = int((loaded & (beside > 0)).sum())
+        for k, level in enumerate(levels):
+            if before < level <= area:
+                spikes.append((at, k, 1))
+            if area < level <= before:
+                spikes.append((at, len(levels) + k, 1))
+        before = area
+    return sorted(spikes)

@@ -1,0 +1,42 @@
+"""Scenes for the encoders, and spikes as the oracles give them."""
+
+import numpy as np
+
+from taxel import Array, Events, Frames, Tare
+
+
+def spikes_of(trains):
+    """Spikes as sorted (t us, train, value)."""
+    times, numbers = trains.to_numpy()
+    values = np.ones(len(times)) if trains.values is None else trains.values
+    return sorted(zip(np.rint(times * 1000).astype(int).tolist(), numbers.tolist(), values.tolist(), strict=True))
+
+
+def frames_of(t, values, array=None):
+    """Frames of channels in one row."""
+    values = np.asarray(values, np.float32)
+    return Frames(values[:, None, :], t, unit="ticks", array=array or Array(1, values.shape[1]))
+
+
+def wander(rng, samples=300, channels=5, ticks=True):
+    """Values that wander, rest and jump."""
+    moves = rng.choice([0.0, 0.0, 1.0, -1.0, 4.0, -4.0, 30.0, -30.0], (samples, channels))
+    values = np.clip(60 + np.cumsum(moves * (rng.random((samples, channels)) < 0.4), axis=0), 0, 150)
+    return values if ticks else values * 0.731
+
+
+def touch(rng, array, n=300, absent=0.3, late=0.0):
+    """Events of taxels that go up and down: several a stamp, silences, some without an intensity, some late."""
+    steps = rng.choice([0, 100, 200, 1500, 30_000], n, p=[0.6, 0.2, 0.14, 0.05, 0.01])
+    t = 1_234_500 + np.cumsum(steps)
+    behind = rng.random(n) < late
+    t[behind] -= 100 * rng.integers(1, 20, behind.sum())
+    x, y = rng.integers(0, array.columns, n), rng.integers(0, array.rows, n)
+    ticks = np.clip(rng.normal(60, 12, n), 0, 150).astype(np.uint16)
+    return Events(t, x, y, rng.random(n) > 0.5, array=array, intensity=ticks, present=rng.random(n) > absent)
+
+
+def rest(array, ticks=55):
+    """A tare of an array whose taxels all rest at the same value."""
+    pictures = np.full((2, array.rows, array.columns), ticks, np.float32)
+    return Tare.take(Frames(pictures, [0, 1000], unit="ticks", array=array))

@@ -1,0 +1,353 @@
+"""Laws that every encoder keeps: pieces, shifts, permutations, masks, names."""
+
+import inspect
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Events, Frames
+from taxel.encode import (
+    FA1,
+    ChangeEvents,
+    ContactArea,
+    Encoder,
+    LevelCrossing,
+    RunningRange,
+    ThresholdIzhikevich,
+)
+
+from .scenes import frames_of, rest, spikes_of, touch, wander
+
+ARRAY = Array(3, 4)
+
+#: One of each, with the options that hold time back.
+ENCODERS = {
+    "change": ChangeEvents(bits=4),
+    "change, last sample": ChangeEvents(previous="last_sample", rounding="floor", period_ms=0.3),
+    "crossing": LevelCrossing([50.0, 60.0, 70.0], release_share=0.9),
+    "crossing that holds": LevelCrossing([55.0, 65.0], hold_ms=0.3, tonic_ms=0.7, tonic_level=65.0),
+    "crossing on the running range": LevelCrossing(
+        [0.3, 0.6], hold_ms=0.2, tonic_ms=1.1, running_range=RunningRange(window_s=0.02, renew_s=0.005)
+    ),
+    "crossing, first window by itself": LevelCrossing(
+        [0.3, 0.6], running_range=RunningRange(window_s=0.02, renew_s=0.005, first_window="itself")
+    ),
+    "pair": ThresholdIzhikevich([50.0, 60.0]),
+    "pair, 3.4.3": ThresholdIzhikevich([60.0], published="3.4.3", begin="rest", period_ms=0.25),
+    "FA-1": FA1(period_ms=0.5),
+    "FA-1 by ms": FA1(period_ms=0.2, decay="ms", theta_0=0.3),
+    "area": ContactArea(tare=rest(ARRAY), levels=[1, 2, 4, 8]),
+}
+each_encoder = pytest.mark.parametrize("encoder", ENCODERS.values(), ids=ENCODERS)
+SAMPLED = {name: encoder for name, encoder in ENCODERS.items() if name != "area"}
+each_sampled_encoder = pytest.mark.parametrize("encoder", SAMPLED.values(), ids=SAMPLED)
+#: The first window read by itself comes late by definition.
+PROMPT = {name: encoder for name, encoder in ENCODERS.items() if "by itself" not in name}
+seeds = st.integers(0, 2**32 - 1)
+
+
+def in_pieces(encoder, pieces, moves):
+    """All spikes of a stream, in the order in which they came; `moves` says where time is moved on before a piece."""
+    stream, spikes = encoder.stream(), []
+    for k, piece in enumerate(pieces):
+        if k in moves:
+            spikes += spikes_of(stream.advance(moves[k]))
+        spikes += spikes_of(stream.push(piece))
+    return spikes + spikes_of(stream.finish())
+
+
+@each_encoder
+@settings(max_examples=25, deadline=None)
+@given(seed=seeds, cuts=st.sets(st.integers(1, 299), max_size=12), late=st.sampled_from([0.0, 0.1]))
+def test_events_in_pieces_give_the_spikes_of_the_whole(encoder, seed, cuts, late):
+    rng = np.random.default_rng(seed)
+    events = touch(rng, ARRAY, late=late)
+    edges = [0, *sorted(cuts), len(events)]
+    pieces = [events[a:b] for a, b in pairwise(edges)]
+    latest = np.maximum.accumulate(events.t)
+    # Time may be moved on up to the next stamp, or up to the latest one where the next is late.
+    moves = {
+        k: int(rng.integers(latest[a - 1], max(latest[a - 1], events.t[a]) + 1))
+        for k, a in enumerate(edges[:-1])
+        if k > 0 and rng.random() < 0.7
+    }
+    whole = encoder.encode(events)
+    assert sorted(in_pieces(encoder, pieces, moves)) == spikes_of(whole)
+
+
+@each_encoder
+@settings(max_examples=15, deadline=None)
+@given(seed=seeds, cuts=st.sets(st.integers(1, 199), max_size=12))
+def test_frames_in_pieces_give_the_spikes_of_the_whole(encoder, seed, cuts):
+    rng = np.random.default_rng(seed)
+    period = round(1000 * getattr(encoder, "period_ms", 0.192))
+    frames = Frames(wander(rng, 200, 12).reshape(200, 3, 4), 700 + np.arange(200) * period, unit="ticks", array=ARRAY)
+    edges = [0, *sorted(cuts), len(frames)]
+    pieces = [frames[a:b] for a, b in pairwise(edges)]
+    moves = {
+        k: int(frames.t[a - 1] + rng.integers(0, period + 1))
+        for k, a in enumerate(edges[:-1])
+        if k > 0 and rng.random() < 0.7
+    }
+    whole = encoder.encode(frames)
+    assert sorted(in_pieces(encoder, pieces, moves)) == spikes_of(whole)
+
+
+@pytest.mark.parametrize("encoder", PROMPT.values(), ids=PROMPT)
+@settings(max_examples=10, deadline=None)
+@given(seed=seeds)
+def test_a_stream_speaks_in_order_and_never_of_what_it_called_over(encoder, seed):
+    events, stream = touch(np.random.default_rng(seed), ARRAY), encoder.stream(ARRAY)
+    over = -np.inf
+    for k in range(0, len(events), 7):
+        piece = stream.push(events[k : k + 7])
+        assert piece.start <= piece.stop
+        assert (piece.times * 1000 >= over - 1e-6).all()
+        over = events.t[min(k + 6, len(events) - 1)]
+        assert (piece.times * 1000 <= over + 1e-6).all()
+
+
+@each_encoder
+@settings(max_examples=10, deadline=None)
+@given(seed=seeds, shift=st.sampled_from([-(10**12), -7, 1, 193, 10**9]))
+def test_a_shift_in_time_shifts_the_spikes(encoder, seed, shift):
+    events = touch(np.random.default_rng(seed), ARRAY)
+    shifted = events[:]
+    shifted.t = events.t + shift
+    wanted = [(t + shift, train, value) for t, train, value in spikes_of(encoder.encode(events))]
+    assert spikes_of(encoder.encode(shifted)) == wanted
+
+
+@each_sampled_encoder
+def test_events_read_as_held_values_are_frames_of_these(encoder):
+    events = touch(np.random.default_rng(11), ARRAY)
+    spikes = encoder.encode(events)
+    period = round(encoder.period_ms * 1000)
+    frames = events.held(period, stop=int(spikes.stop * 1000 - 1000 * encoder.latency_ms) + 1)
+    frames.values[0] = events[events.t == events.t[0]].held(1).values[0]
+    assert spikes_of(encoder.encode(frames)) == [
+        s for s in spikes_of(spikes) if s[0] <= frames.t[-1] + 1000 * encoder.latency_ms
+    ]
+
+
+@each_sampled_encoder
+def test_permuted_taxels_give_permuted_trains(encoder):
+    rng = np.random.default_rng(12)
+    period = round(encoder.period_ms * 1000)
+    t, values, order = np.arange(300) * period, wander(rng, 300, 130), rng.permutation(130)
+    plain, permuted = encoder.encode(frames_of(t, values)), encoder.encode(frames_of(t, values[:, order]))
+    levels = len(getattr(encoder, "levels", [0]))
+    crossings = (order[:, None] * levels + np.arange(levels)).ravel()
+    tonic = 130 * levels + order if getattr(encoder, "tonic_ms", None) else []
+    assert spikes_of(permuted) == spikes_of(plain.select(np.concatenate([crossings, tonic]).astype(int)))
+
+
+def test_the_contact_area_of_a_mirrored_or_turned_array_is_the_same():
+    rng = np.random.default_rng(13)
+    pictures, t = wander(rng, 200, 12).reshape(200, 3, 4), np.arange(200) * 192
+    wanted = spikes_of(ENCODERS["area"].encode(Frames(pictures, t)))
+    assert wanted
+    assert spikes_of(ENCODERS["area"].encode(Frames(pictures[:, ::-1, ::-1], t))) == wanted
+    turned = ContactArea(tare=rest(Array(4, 3)), levels=[1, 2, 4, 8])
+    assert spikes_of(turned.encode(Frames(pictures.transpose(0, 2, 1), t))) == wanted
+
+
+@each_encoder
+def test_taxels_that_do_not_exist_have_no_train_and_are_not_heard(encoder):
+    rng = np.random.default_rng(14)
+    exists = rng.random((3, 4)) < 0.6
+    masked = Array(3, 4, exists=exists)
+    events = touch(rng, ARRAY)
+    there = exists[events.y, events.x]
+    some = Events(
+        events.t, events.x, events.y, events.p, array=masked, intensity=events.intensity, present=events.present
+    )
+    if encoder.name == "contact_area":
+        encoder = ContactArea(tare=rest(masked), levels=encoder.levels)
+        only = some[there]
+        assert spikes_of(encoder.encode(some)) == spikes_of(encoder.encode(only))
+        return
+    taxels = np.flatnonzero(exists)
+    levels = len(getattr(encoder, "levels", [0]))
+    trains = (taxels[:, None] * levels + np.arange(levels)).ravel()
+    tonic = 12 * levels + taxels if getattr(encoder, "tonic_ms", None) else []
+    assert encoder.trains(masked) == len(trains) + len(tonic)
+    wanted = encoder.encode(events).select(np.concatenate([trains, tonic]).astype(int))
+    assert spikes_of(encoder.encode(some)) == spikes_of(wanted)
+
+
+@each_encoder
+def test_the_caller_s_arrays_stay_as_they_are(encoder):
+    events = touch(np.random.default_rng(15), ARRAY)
+    before = events[:].to_numpy().copy()
+    encoder.encode(events)
+    assert np.array_equal(events.to_numpy(), before)
+
+
+@each_encoder
+def test_an_encoder_comes_back_from_json(encoder):
+    again = Encoder.from_json(encoder.to_json())
+    assert type(again) is type(encoder)
+    assert again == encoder
+    assert again.to_json() == encoder.to_json()
+    assert again != ChangeEvents(bits=9)
+    assert (again == 5) is False
+
+
+@each_encoder
+def test_an_encoder_says_its_trains_as_its_spikes_have_them(encoder):
+    spikes = encoder.encode(touch(np.random.default_rng(16), ARRAY))
+    assert (encoder.trains(ARRAY), encoder.signed) == (len(spikes), spikes.signed)
+
+
+@pytest.mark.parametrize("kind", [ChangeEvents, LevelCrossing, ThresholdIzhikevich, FA1, ContactArea])
+def test_the_defaults_shown_in_python_are_those_of_the_compiled_part(kind):
+    needed = {"levels": [1.0]} if inspect.signature(kind).parameters.get("levels", None) is not None else {}
+    if kind is ContactArea:
+        needed = {}
+    from_rust = json.loads(taxel._core.check_encoder(json.dumps({"name": kind.name} | needed)))
+    assert json.loads(kind(**needed).to_json()) == from_rust
+
+
+def test_the_defaults_of_the_running_range_are_those_of_the_compiled_part():
+    text = '{"name": "level_crossing", "levels": [0.5], "running_range": {}}'
+    assert Encoder.from_json(text) == LevelCrossing([0.5], running_range=RunningRange())
+
+
+def test_nothing_in_gives_nothing_out():
+    empty = Events([], [], [], [], array=ARRAY, intensity=[])
+    for encoder in ENCODERS.values():
+        for nothing in (empty, Frames(np.empty((0, 3, 4)), [])):
+            spikes = encoder.encode(nothing)
+            assert (len(spikes), len(spikes.times)) == (encoder.trains(ARRAY), 0)
+        stream = encoder.stream()
+        assert len(stream.advance(10**9).times) == 0
+        assert len(stream.push(empty).times) == 0
+        assert len(stream.finish().times) == 0
+
+
+def test_a_long_silence_costs_no_time_once_nothing_can_come():
+    """36 years of silence, which no encoder may step through."""
+    year = 365 * 86_400 * 10**6
+    for name in ("change", "crossing", "FA-1", "area"):
+        stream = ENCODERS[name].stream(ARRAY)
+        stream.push(touch(np.random.default_rng(17), ARRAY))
+        stream.advance(36 * year)
+        stream.push(Events([36 * year + 5], [0], [0], [1], array=ARRAY, intensity=[150]))
+        assert stream.finish().stop >= 36 * year / 1000
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: ChangeEvents(noise_floor=0), "noise_floor is 0"),
+        (lambda: ChangeEvents(noise_floor=float("nan")), "noise_floor is nan"),
+        (lambda: ChangeEvents(noise_floor="3"), "noise_floor: invalid type"),
+        (lambda: ChangeEvents(bits=0), "bits is 0: must be 1 to 10"),
+        (lambda: ChangeEvents(bits=11), "bits is 11"),
+        (lambda: ChangeEvents(bits=2.5), "bits: invalid type"),
+        (lambda: ChangeEvents(bits=-1), "bits: invalid value"),
+        (lambda: ChangeEvents(previous="last"), "previous: unknown variant `last`, expected `last_sent`"),
+        (lambda: ChangeEvents(rounding=None), "rounding: "),
+        (lambda: ChangeEvents(period_ms=0), "period_ms is 0"),
+        (lambda: ChangeEvents(period_ms=0.00025), "period_ms is 0.00025: must be a whole number of us"),
+        (lambda: ChangeEvents(period_ms=1e300), "period_ms is "),
+        (lambda: LevelCrossing([]), "levels: must hold"),
+        (lambda: LevelCrossing(5.0), "levels: invalid type"),
+        (lambda: LevelCrossing([1.0, 1.0]), "levels: 1 after 1, must ascend"),
+        (lambda: LevelCrossing([2.0, float("inf")]), r"levels\[1\] is inf"),
+        (lambda: LevelCrossing([1e300]), "levels hold"),
+        (lambda: LevelCrossing([1.0], release_share=0), "release_share is 0"),
+        (lambda: LevelCrossing([1.0], release_share=1.01), "release_share is 1.01"),
+        (lambda: LevelCrossing([-1.0, 1.0], release_share=0.7), "use release_by"),
+        (lambda: LevelCrossing([1.0], release_by=-1), "release_by is -1"),
+        (lambda: LevelCrossing([1.0], release_by=1, release_share=1), "give one of them"),
+        (lambda: LevelCrossing([1.0], hold_ms=-1), "hold_ms is -1"),
+        (lambda: LevelCrossing([1.0], tonic_ms=0), "tonic_ms is 0"),
+        (lambda: LevelCrossing([1.0], tonic_level=1.0), "without tonic_ms"),
+        (lambda: LevelCrossing([1.0], tonic_ms=5, tonic_level=2.0), "tonic_level is 2: must be one of"),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(low=95, high=10)), "running_range from 95 to 10"),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(high=101)), "within 0 to 100 percent"),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(window_s=0)), "running_range window_s"),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(renew_s=-1)), "running_range renew_s"),
+        (lambda: LevelCrossing([1.0], running_range={"loud": 1}), "running_range: unknown field `loud`"),
+        (lambda: LevelCrossing([1.0], running_range=5), "running_range: invalid type"),
+        (lambda: ThresholdIzhikevich([1.0], published="6.5.2"), "published: unknown variant"),
+        (lambda: ThresholdIzhikevich([1.0], begin="now"), "begin: unknown variant"),
+        (lambda: ThresholdIzhikevich([3.0, 2.0]), "levels: 2 after 3"),
+        (lambda: FA1(alpha=0), "alpha is 0"),
+        (lambda: FA1(alpha=5), "alpha is 5"),
+        (lambda: FA1(a=-1), "a is -1"),
+        (lambda: FA1(b=-1), "b is -1"),
+        (lambda: FA1(theta_0=-1), "theta_0 is -1"),
+        (lambda: FA1(range=0), "range is 0"),
+        (lambda: FA1(range=1, theta_0=1), "theta_0 and range: give one"),
+        (lambda: FA1(decay="s"), "decay: unknown variant"),
+        (lambda: ContactArea(noise_floor=-1), "noise_floor is -1"),
+        (lambda: ContactArea(levels=[]), "levels: must hold"),
+        (lambda: ContactArea(levels=[0, 2]), r"levels are \[0, 2\]"),
+        (lambda: ContactArea(levels=[2, 2]), r"levels are \[2, 2\]"),
+        (lambda: ContactArea(levels=[2.5]), "levels: invalid type"),
+        (lambda: ContactArea(tare=5), "tare: invalid type"),
+        (lambda: ContactArea().encode(Frames(np.zeros((1, 3, 4)), [0])), "without a tare"),
+        (lambda: ContactArea().stream(ARRAY), "without a tare"),
+        (lambda: ENCODERS["area"].encode(Frames(np.zeros((1, 4, 3)), [0])), "tare of 3 x 4 taxels"),
+        (lambda: Encoder.from_json("{"), "encoder: not JSON"),
+        (lambda: Encoder.from_json("[]"), r"encoder is \[\]: must be an object"),
+        (lambda: Encoder.from_json("{}"), "without a name: must be one of change_events"),
+        (lambda: Encoder.from_json('{"name": "sa1"}'), "encoder sa1: must be one of"),
+        (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), "encoder fa1: unknown field `tau`"),
+        (lambda: Encoder.from_json('{"name": "level_crossing"}'), "missing field `levels`"),
+        (lambda: Encoder.from_json(None), "must be JSON text"),
+        (lambda: FA1().encode([1, 2]), "list: encoders take"),
+        (lambda: FA1().stream(5), "array is 5"),
+        (lambda: FA1().trains(None), "array is None"),
+        (lambda: FA1().stream().push("x"), "str: encoders take"),
+        (lambda: FA1().stream().advance(1.5), "t_us is 1.5"),
+        (lambda: FA1().stream().advance("x"), "t_us is 'x'"),
+        (lambda: FA1().stream().advance(2**62), "t_us is "),
+    ],
+)
+def test_nonsense_gets_one_clear_line(call, said):
+    with pytest.raises(taxel.ProblemError, match=said) as error:
+        call()
+    assert "\n" not in str(error.value)
+
+
+@each_encoder
+def test_what_cannot_be_encoded_is_refused(encoder):
+    def refuses(said, *pieces):
+        stream = encoder.stream(ARRAY)
+        for piece in pieces[:-1]:
+            stream.push(piece)
+        with pytest.raises(taxel.ProblemError, match=said):
+            stream.push(pieces[-1])
+
+    heard = Events([5], [0], [0], [1], array=ARRAY, intensity=[5])
+    picture = Frames(np.zeros((1, 3, 4)), [0], array=ARRAY)
+    refuses("without intensities", Events([5], [0], [0], [1], array=ARRAY))
+    refuses("begun with events", heard, picture)
+    refuses("begun with frames", picture, heard)
+    refuses("times ascend", picture, picture)
+    refuses("begun for .* 3 x 4", Events([5], [0], [0], [1], array=Array(4, 4), intensity=[5]))
+    refuses("begun for 3 x 4", Frames(np.zeros((1, 4, 4)), [0]))
+    refuses("values must be finite", Frames(np.full((1, 3, 4), np.nan), [0], array=ARRAY))
+    refuses("too far from 0", Events([2**62], [0], [0], [1], array=ARRAY, intensity=[5]))
+    refuses("too far from 0", Frames(np.zeros((1, 3, 4)), [-(2**62)], array=ARRAY))
+
+
+def test_fa1_refuses_frames_that_do_not_come_at_its_period():
+    with pytest.raises(taxel.ProblemError, match=r"5 ms after the last: must come every period_ms, 1"):
+        FA1().encode(frames_of([0, 1000, 6000], np.zeros((3, 1))))
+    FA1(period_ms=0.192).encode(frames_of([0, 100, 300, 500, 700], np.zeros((5, 1))))
+
+
+def test_readable_names():
+    assert repr(LevelCrossing([5.0], hold_ms=10)) == "LevelCrossing(levels=[5.0], hold_ms=10)"
+    assert repr(FA1()) == "FA1()"
+    assert repr(ENCODERS["area"]) == "ContactArea(levels=[1, 2, 4, 8], tare=Tare(12 of 12 taxels, 0 to 1000 us))"

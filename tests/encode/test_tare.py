@@ -1,0 +1,104 @@
+"""The rest of taxels."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Events, Frames, Tare
+
+from .scenes import touch
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), start=st.sampled_from([None, 0, 1_234_567, 1_240_000]))
+def test_a_rest_is_the_mean_by_time_of_the_held_value(seed, start):
+    rng = np.random.default_rng(seed)
+    array = Array(3, 4)
+    events = touch(rng, array, 100)
+    stop = int(events.t[-1]) + 777
+    tare = Tare.take(events, start_us=start, stop_us=stop)
+    begin = int(events.t[0]) if start is None else start
+    for y in range(3):
+        for x in range(4):
+            at = events.present & (events.x == x) & (events.y == y)
+            edges = np.maximum(np.append(events.t[at], stop), begin)
+            time = np.diff(edges)
+            if time.sum() == 0:
+                assert np.isnan(tare.rest[y, x])
+            else:
+                assert tare.rest[y, x] == pytest.approx((events.intensity[at] * time).sum() / time.sum())
+
+
+def test_frames_and_events_of_the_same_values_have_the_same_rest():
+    array = Array(2, 2)
+    events = touch(np.random.default_rng(1), array, 200, absent=0.0)
+    first = max(int(events.t[(events.x == x) & (events.y == y)][0]) for x in (0, 1) for y in (0, 1))
+    stop = int(events.t[-1])
+    frames = events.held(100, stop=stop)
+    by_events = Tare.take(events, start_us=first, stop_us=stop)
+    by_frames = Tare.take(frames, start_us=first, stop_us=stop)
+    assert np.allclose(by_events.rest, by_frames.rest, rtol=1e-12)
+
+
+def test_a_saved_tare_comes_back(tmp_path):
+    array = Array(4, 4, 2.67, np.eye(4, dtype=bool), "odd")
+    tare = Tare.take(touch(np.random.default_rng(2), array, 20), note="board 3, 1 May")
+    place = tare.save(tmp_path / "rest.json")
+    again = Tare.load(place)
+    assert again == tare
+    assert again.array == array
+    assert again.note == "board 3, 1 May"
+    assert np.array_equal(again.rest, tare.rest, equal_nan=True)
+    assert np.isnan(again.rest[~array.exists]).all()
+    with pytest.raises(FileExistsError):
+        tare.save(place)
+    tare.save(place, overwrite=True)
+
+
+def test_a_taxel_that_does_not_exist_has_no_rest():
+    array = Array(1, 2, exists=np.array([[True, False]]))
+    tare = Tare.take(Frames(np.ones((2, 1, 2)), [0, 100], array=array))
+    assert np.array_equal(tare.rest, [[1.0, np.nan]], equal_nan=True)
+    assert repr(tare) == "Tare(1 of 1 taxels, 0 to 100 us)"
+
+
+EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[5, 6])
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: Tare.take(5), "int: a tare is taken from"),
+        (lambda: Tare.take(EVENTS, start_us=1.5), "start_us is 1.5"),
+        (lambda: Tare.take(EVENTS, stop_us=True), "stop_us is True"),
+        (lambda: Tare.take(EVENTS, start_us=900, stop_us=900), "start must lie before stop"),
+        (lambda: Tare.take(EVENTS, stop_us=-5), "nothing was heard"),
+        (lambda: Tare.take(EVENTS, note=3), "note is 3"),
+        (lambda: Tare.take(Events([0], [0], [0], [1], array=Array(1, 1))), "without intensities"),
+        (lambda: Tare.take(Frames(np.full((2, 1, 1), np.nan), [0, 1])), "values must be finite"),
+        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must lie before stop|nothing was heard"),
+        (Tare, "is taken"),
+        (lambda: Tare.from_json(5), "must be JSON text"),
+        (lambda: Tare.from_json("[1"), "tare: "),
+        (lambda: Tare.from_json('{"rest": []}'), "tare: missing field"),
+        (
+            lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace("[5.0]", "[5.0, 6.0]")),
+            "2 rests for 1 x 1 taxels",
+        ),
+    ],
+)
+def test_nonsense_gets_one_clear_line(call, said):
+    with pytest.raises(taxel.Error, match=said) as error:
+        call()
+    assert "\n" not in str(error.value)
+
+
+def test_a_file_that_is_no_tare_is_named(tmp_path):
+    place = tmp_path / "x.json"
+    place.write_bytes(b"\xff\xfe")
+    with pytest.raises(taxel.FormatError, match=r"x\.json"):
+        Tare.load(place)
+    with pytest.raises(FileNotFoundError):
+        Tare.load(tmp_path / "none.json")
