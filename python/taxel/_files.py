@@ -5,14 +5,12 @@ from __future__ import annotations
 import errno
 import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from taxel._arguments import flag
-from taxel._arguments import path as checked_path
-
-__all__ = ["write_whole"]
+__all__ = ["whole_file", "write_whole"]
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object], *, overwrite: bool = False) -> Path:
@@ -34,18 +32,35 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object
     FileExistsError : the file is there already and `overwrite` is false
     OSError : the folder is missing, the disk is full ...
     """
-    place = Path(checked_path("path", path))
-    overwrite = flag("overwrite", overwrite)
+    with whole_file(path, overwrite=overwrite) as part, part.open("wb") as file:
+        write(file)
+        file.flush()
+        os.fsync(file.fileno())
+    return Path(path)
+
+
+@contextmanager
+def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iterator[Path]:
+    """Give a place beside the file to write to; move what is there to `path` when the block ends without an error.
+
+    Raises
+    ------
+    FileExistsError : the file is there already and `overwrite` is false
+    OSError : the folder is missing, the disk is full ...
+    """
+    place = Path(path)
     if not overwrite and os.path.lexists(place):
         raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
     if not place.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "no such folder", str(place.parent))
-    handle, name = tempfile.mkstemp(prefix=f".{place.name}.", dir=place.parent)
     try:
-        with os.fdopen(handle, "wb") as file:
-            write(file)
-            file.flush()
-            os.fsync(file.fileno())
+        handle, name = tempfile.mkstemp(prefix=f".{place.name}.", dir=place.parent)
+    except OSError as error:
+        error.filename = str(place)
+        raise
+    os.close(handle)
+    try:
+        yield Path(name)
         os.chmod(name, 0o666 & ~_umask())
         if overwrite:
             os.replace(name, place)
@@ -58,7 +73,6 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object
         if isinstance(error, OSError):
             error.filename, error.filename2 = str(place), None
         raise
-    return place
 
 
 def _umask() -> int:

@@ -60,6 +60,17 @@ class Array:
             exists.setflags(write=False)
             object.__setattr__(self, "exists", exists)
 
+    @classmethod
+    def thesis(cls) -> Array:
+        """Return the thesis' array: 64 x 64 taxels, 2.67 mm apart (chapter 4).
+
+        Examples
+        --------
+        >>> Array.thesis()
+        Array(thesis 64x64: 64 rows x 64 columns, 4096 taxels, 2.67 mm apart)
+        """
+        return cls(64, 64, 2.67, name="thesis 64x64")
+
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns."""

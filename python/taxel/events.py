@@ -77,6 +77,9 @@ class Events:
             self.intensity = column("intensity", intensity, np.uint16)
             all_of_them = np.ones(len(self.intensity), np.bool_)
             self.present = all_of_them if present is None else column("present", present, np.bool_)
+            if len(self.present) == len(self.intensity) and not self.present.all():
+                # What did not come has no value, so equal events have equal columns.
+                self.intensity = np.where(self.present, self.intensity, np.uint16(0))
         elif present is not None:
             raise ProblemError("present without intensity: give both or neither")
         self.markers = _markers(markers)

@@ -18,7 +18,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use taxel_core::Array;
-use taxel_core::wire::Registers;
+use taxel_core::wire::{self, Registers};
 
 pub use lsa::{LsaWriter, numbered, read_lsa};
 pub use mcap_reader::{Decoded, Ending, Message, Reader, Rebuilt, Remarks};
@@ -102,8 +102,11 @@ pub struct Counts {
     pub dropped_by_kernel: u64,
     /// Datagrams that taxel dropped, its own queue being full.
     pub dropped_by_queue: u64,
-    /// What the decoder could not use of the bytes that came, by cause.
+    /// What the decoder could not use of the bytes that came, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
+    /// What the recording that this one was converted from said.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub converted: Option<String>,
 }
 
 impl Counts {
@@ -130,8 +133,26 @@ impl Counts {
         if !damage.is_empty() {
             line = format!("{line}; in the bytes that came: {}", damage.join(", "));
         }
+        if let Some(said) = &self.converted {
+            line = format!("converted from a recording that says: {said}");
+        }
         line
     }
+}
+
+/// What a decoder could not use, by cause, as recordings keep it.
+#[must_use]
+pub fn damage(counts: &wire::Counts) -> BTreeMap<String, u64> {
+    [
+        ("bytes_skipped", counts.skipped),
+        ("short_events", counts.short),
+        ("contradictory_kinds", counts.contradictory),
+        ("outside_the_array", counts.outside),
+        ("unpaired_intensities", counts.unpaired),
+        ("steps_back_in_time", counts.back),
+    ]
+    .map(|(cause, n)| (cause.to_owned(), n))
+    .into()
 }
 
 /// Something written down while recording.

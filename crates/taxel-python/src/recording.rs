@@ -9,9 +9,10 @@ use pyo3::types::PyBytes;
 use serde_json::json;
 use taxel_core::detect::Detection;
 use taxel_core::{Marker, Stop, wire};
+use taxel_live::clock::BoardClock;
 use taxel_live::recording::{Counts, Header, LsaWriter, Options, Reader, Topic, Writer, numbered};
 
-use crate::convert::{EventsOut, array, from_events, slice};
+use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core};
 
@@ -121,17 +122,17 @@ impl RecordingWriter {
         Ok(Self { writer: Mutex::new(Some(writer)) })
     }
 
-    /// Keeps datagrams: arrival ns, number, where each begins in `bytes` (and where the last ends), bytes.
+    /// Keeps datagrams: arrival ns, number, where each begins in `payload` (and where the last ends), bytes.
     fn datagrams(
         &self,
         py: Python<'_>,
         arrived_ns: PyReadonlyArray1<'_, i64>,
         number: PyReadonlyArray1<'_, u64>,
         offsets: PyReadonlyArray1<'_, i64>,
-        bytes: PyReadonlyArray1<'_, u8>,
+        payload: PyReadonlyArray1<'_, u8>,
     ) -> PyResult<()> {
         let (arrived_ns, number) = (slice("arrived_ns", &arrived_ns)?, slice("number", &number)?);
-        let (offsets, bytes) = (slice("offsets", &offsets)?, slice("bytes", &bytes)?);
+        let (offsets, bytes) = (slice("offsets", &offsets)?, slice("payload", &payload)?);
         if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
             let n = arrived_ns.len();
             return Err(ProblemError::new_err(format!("{n} arrivals: need {n} numbers and {} offsets", n + 1)));
@@ -151,8 +152,8 @@ impl RecordingWriter {
     }
 
     /// Keeps one datagram.
-    fn datagram(&self, py: Python<'_>, arrived_ns: i64, number: u64, bytes: &[u8]) -> PyResult<()> {
-        self.with(py, |writer| writer.datagram(arrived_ns, number, bytes))
+    fn datagram(&self, py: Python<'_>, arrived_ns: i64, number: u64, payload: &[u8]) -> PyResult<()> {
+        self.with(py, |writer| writer.datagram(arrived_ns, number, payload))
     }
 
     /// Keeps a note.
@@ -216,15 +217,70 @@ fn recording_verdict(counts: &str) -> PyResult<String> {
     Ok(from_json::<Counts>("counts", counts)?.verdict())
 }
 
+/// What of a decoder's counts is damage: JSON in and out.
+#[pyfunction]
+fn recording_damage(counts: &str) -> PyResult<String> {
+    Ok(json!(taxel_live::recording::damage(&from_json("counts", counts)?)).to_string())
+}
+
 /// Writes raw bytes as a complete `.lsa` with its `.lss`.
 #[pyfunction]
-fn write_lsa(py: Python<'_>, path: PathBuf, bytes: &Bound<'_, PyBytes>, overwrite: bool) -> PyResult<()> {
-    let bytes = bytes.as_bytes();
+fn write_lsa(py: Python<'_>, path: PathBuf, payload: &Bound<'_, PyBytes>, overwrite: bool) -> PyResult<()> {
+    let bytes = payload.as_bytes();
     enter(py, |_| {
         let mut writer = LsaWriter::create(&path, overwrite)?;
         writer.bytes(bytes)?;
         writer.finish()
     })
+}
+
+/// Bytes, events, counts as JSON, whether the `.lss` is there.
+type LsaOut<'py> = (Bound<'py, PyArray1<u8>>, EventsOut<'py>, String, bool);
+
+/// Reads a `.lsa` and decodes it.
+#[pyfunction]
+fn read_lsa<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    sensor: ArrayParts,
+    pairing: &str,
+    differences: bool,
+) -> PyResult<LsaOut<'py>> {
+    let sensor = to_array(sensor)?;
+    let pairing: wire::Pairing = from_json("pairing", &json!(pairing).to_string())?;
+    let (bytes, events, counts, complete) = enter(py, |stop| -> taxel_live::Result<_> {
+        let (bytes, complete) = taxel_live::recording::read_lsa(&path)?;
+        let mut decoder = wire::Decoder::new(sensor.clone()).pairing(pairing).differences(differences);
+        let mut events = taxel_core::Events::empty(sensor);
+        for piece in bytes.chunks(PIECE) {
+            stop.check()?;
+            decoder.push_into(piece, None, &mut events);
+        }
+        decoder.finish_into(&mut events);
+        Ok((bytes, events, *decoder.counts(), complete))
+    })?;
+    Ok((array(py, bytes), from_events(py, events), json!(counts).to_string(), complete))
+}
+
+/// Between two looks at Ctrl-C.
+const PIECE: usize = 1 << 22;
+
+/// The line between the board's clock and the host's: a board time (us), the host's then (ns), drift (ppm).
+#[pyfunction]
+fn board_clock(
+    py: Python<'_>,
+    board_us: PyReadonlyArray1<'_, i64>,
+    arrived_ns: PyReadonlyArray1<'_, i64>,
+) -> PyResult<Option<(i64, i64, f64)>> {
+    let (board_us, arrived_ns) = (slice("board_us", &board_us)?, slice("arrived_ns", &arrived_ns)?);
+    let mut clock = BoardClock::default();
+    enter(py, |_| {
+        for (&board, &arrived) in board_us.iter().zip(arrived_ns) {
+            clock.note(board, arrived);
+        }
+        Ok::<_, taxel_core::Error>(())
+    })?;
+    Ok(clock.offset().map(|o| (o.board_us, o.host_ns, o.drift_ppm)))
 }
 
 /// The name of a recording in automatic mode: the index appended to the name.
@@ -237,6 +293,9 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<RecordingReader>()?;
     module.add_class::<RecordingWriter>()?;
     module.add_function(wrap_pyfunction!(recording_verdict, module)?)?;
+    module.add_function(wrap_pyfunction!(recording_damage, module)?)?;
+    module.add_function(wrap_pyfunction!(read_lsa, module)?)?;
+    module.add_function(wrap_pyfunction!(board_clock, module)?)?;
     module.add_function(wrap_pyfunction!(write_lsa, module)?)?;
     module.add_function(wrap_pyfunction!(numbered_path, module)?)
 }

@@ -1,6 +1,5 @@
 //! The two kinds of file that a [`Live`](super::Live) records to.
 
-use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -126,20 +125,13 @@ impl Recorder {
 
 /// What was lost, as recordings keep it.
 pub(super) fn losses(counters: &Counters) -> recording::Counts {
-    let (capture, wire) = (&counters.capture, &counters.wire);
-    let causes = [
-        ("bytes_skipped", wire.skipped),
-        ("short_events", wire.short),
-        ("contradictory_kinds", wire.contradictory),
-        ("outside_the_array", wire.outside),
-        ("unpaired_intensities", wire.unpaired),
-        ("steps_back_in_time", wire.back),
-    ];
+    let capture = &counters.capture;
     recording::Counts {
         received: capture.datagrams,
         recorded: counters.decoded,
         dropped_by_kernel: capture.dropped_by_kernel,
         dropped_by_queue: capture.dropped_by_queue,
-        decoder: causes.iter().map(|(name, n)| ((*name).to_owned(), *n)).collect::<BTreeMap<_, _>>(),
+        decoder: recording::damage(&counters.wire),
+        converted: None,
     }
 }

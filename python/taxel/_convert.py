@@ -1,0 +1,305 @@
+"""From one kind of recording to another: lossless where the target can hold it, else what it cannot is said."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core, wire
+from taxel._arguments import flag, path, shown, text
+from taxel._core import ProblemError
+from taxel._files import whole_file, write_whole
+from taxel._tables import array_said, write_csv, write_npz
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recording import Datagrams, Recording, _Source, open_recording, period_us
+
+__all__ = ["KINDS", "convert"]
+
+#: What can be written.
+KINDS = (".mcap", ".lsa", ".npz", ".csv")
+
+#: Events a datagram at most, as the board sends them: 1400 bytes.
+_DATAGRAM_BYTES = 1400
+
+#: Pictures a second that a converted file shows to viewers.
+_PICTURES_HZ = 10
+
+#: The board's stamps: their unit and how far they count.
+_STAMP_US, _TURN_US = 100, 6_553_600
+
+
+def convert(
+    source: Recording | Events | Frames | str | os.PathLike[str],
+    target: str | os.PathLike[str],
+    *,
+    frames_hz: float | None = None,
+    compression: str = "none",
+    overwrite: bool = False,
+) -> list[str]:
+    """Write a recording as another kind of file, named by the target's ending.
+
+    Parameters
+    ----------
+    source : Recording, Events, Frames or path
+    target : path ending in .mcap, .lsa, .npz or .csv
+    frames_hz : float, optional
+        Write pictures at this rate (.npz, .csv) instead of events.
+    compression : {"none", "lz4", "zstd"}
+        Of a .mcap.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Returns
+    -------
+    list of str
+        What the source holds and the target cannot, one line each; empty where nothing is lost.
+
+    Raises
+    ------
+    ProblemError : another ending, or something that the target cannot hold at all (pictures in a .mcap)
+    FormatError : a source that is no recording
+    OSError : a target that exists, a folder that does not, a full disk ...
+
+    Examples
+    --------
+    >>> import pathlib, tempfile, taxel
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> events = taxel.Events([0, 192], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    >>> taxel.convert(events, folder / "two.npz")
+    []
+    >>> taxel.convert(folder / "two.npz", folder / "two.csv")
+    ['the sensor (8 x 8 taxels, 1 mm apart, "array")']
+    >>> taxel.convert(folder / "two.npz", folder / "two.mcap")
+    ['times finer than 100 us']
+    """
+    place = Path(path("target", target))
+    kind = place.suffix.lower()
+    if kind not in KINDS:
+        raise ProblemError(f"{place}: ends in {kind or 'nothing'!r}; must be {', '.join(KINDS)}")
+    text("compression", compression, ("none", "lz4", "zstd"))
+    if not flag("overwrite", overwrite) and os.path.lexists(place):
+        raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
+    if isinstance(source, str | os.PathLike):
+        source = open_recording(source)
+    if not isinstance(source, Recording | Events | Frames):
+        raise ProblemError(f"source is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
+    recording = source if isinstance(source, Recording) else None
+    table = _table(source, frames_hz)
+    if kind in (".npz", ".csv"):
+        about, lost = _about(recording)
+        if kind == ".npz":
+            write_whole(place, lambda file: write_npz(file, table, about), overwrite=overwrite)
+            return lost
+        write_whole(place, lambda file: write_csv(file, table), overwrite=overwrite)
+        return lost + _not_in_csv(table, about)
+    if isinstance(table, Frames):
+        raise ProblemError(f"{place}: a {kind} holds events and no pictures; write pictures to .npz or .csv")
+    # Of a slice the bytes are not known: they are made of its events.
+    origin = None if recording is None or recording.is_slice else recording._source
+    if kind == ".lsa":
+        raw = None if origin is None else origin.payload
+        payload, lost = (raw.tobytes(), []) if raw is not None else _encoded(table)
+        _core.write_lsa(place, payload, overwrite)
+        return lost + _not_in_lsa(table, recording)
+    with whole_file(place, overwrite=overwrite) as part:
+        return _write_mcap(part, table, recording, origin, compression)
+
+
+def _table(source: Recording | Events | Frames, frames_hz: float | None) -> Events | Frames:
+    """Return what is to be written."""
+    if isinstance(source, Recording):
+        return source.events if frames_hz is None and source.has_events else source.frames(frames_hz)
+    if frames_hz is None:
+        return source
+    if isinstance(source, Frames):
+        raise ProblemError("frames_hz: pictures keep their own times; open the file and ask it for frames(rate_hz)")
+    return source.held(period_us("frames_hz", frames_hz))
+
+
+def _about(recording: Recording | None) -> tuple[dict[str, Any], list[str]]:
+    """Return what stands beside a table, as JSON holds it, and what is lost without datagrams."""
+    if recording is None:
+        return {}, []
+    found = recording.detections
+    about = {
+        "source": recording.source or recording.path.name,
+        "registers": recording.registers,
+        "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in recording.notes],
+        "detections": [
+            [0, str(label), int(t), int(known), None if np.isnan(slope) else float(slope)]
+            for label, t, known, slope in zip(found.label, found.t, found.known, found.slope, strict=True)
+        ],
+        "counts": recording.counts,
+        "verdict": recording.verdict,
+    }
+    lost = {"mcap": ["raw datagrams with their arrival times"], "lsa": ["raw bytes (words that are no events)"]}
+    return about, lost.get(recording.kind, [])
+
+
+def _sensor(table: Events | Frames) -> str:
+    array = table.array
+    some = "" if array.exists is None else f", {array.taxels} exist"
+    return f'the sensor ({array.rows} x {array.columns} taxels{some}, {array.pitch_mm:g} mm apart, "{array.name}")'
+
+
+def _not_in_csv(table: Events | Frames, about: dict[str, Any]) -> list[str]:
+    lost = [_sensor(table)]
+    if isinstance(table, Frames):
+        lost += [f"the unit ({table.unit})"] * (table.unit != "counts")
+    else:
+        lost += [f"{len(table.markers)} markers of start and stop"] * bool(table.markers)
+    return lost + _remarks(about)
+
+
+def _not_in_lsa(table: Events, recording: Recording | None) -> list[str]:
+    lost = [_sensor(table)] * (table.array != type(table.array).thesis())
+    if recording is not None and recording.kind == "mcap":
+        lost.append("arrival times, and where datagrams begin")
+    return lost + _remarks(_about(recording)[0])
+
+
+def _remarks(about: dict[str, Any]) -> list[str]:
+    names = ("notes", "detections", "registers")
+    return [f"{len(about[n])} {n}" if n != "registers" else "the board's registers" for n in names if about.get(n)]
+
+
+def _encoded(events: Events) -> tuple[bytes, list[str]]:
+    """Return events as the board's bytes, and what those cannot hold."""
+    times = np.concatenate([events.t, np.array([at for at, _ in events.markers], np.int64)])
+    lost = ["times finer than 100 us"] if (times % _STAMP_US).any() else []
+    return wire.encode(events), lost
+
+
+def _write_mcap(
+    part: Path, events: Events, recording: Recording | None, origin: _Source | None, compression: str
+) -> list[str]:
+    """Write the live format: the datagrams as they came, or made of raw bytes or of events."""
+    lost: list[str] = []
+    first_us = 0
+    datagrams = None if origin is None else origin.datagrams
+    if origin is not None and datagrams is not None:
+        first_us = origin.origin_us
+    elif origin is not None and origin.payload is not None:
+        datagrams = _cut(origin.payload, None)
+    else:
+        payload, lost = _encoded(events)
+        datagrams = _cut(np.frombuffer(payload, np.uint8), events)
+        # The first stamp shows its time modulo one turn of the counter; the turns before it are kept apart.
+        first_us = int(datagrams.arrived_ns[0]) // 1000 // _TURN_US * _TURN_US if len(datagrams) else 0
+    # Before 1970 there is no time of the host: board times are moved there as a whole.
+    earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
+    arrived = datagrams.arrived_ns - min(0, earliest)
+    registers = None if recording is None else recording.registers
+    header = {
+        "array": array_said(events.array),
+        "registers": registers,
+        "difference": origin is not None and origin.differences,
+        "origin_us": first_us,
+        "source": "events" if recording is None else recording.source or recording.path.name,
+        "started_ns": int(arrived[0]) if len(arrived) else 0,
+    }
+    writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
+    writer.datagrams(arrived, datagrams.number, datagrams.offsets, datagrams.payload)
+    _add_remarks(writer, events, recording, registers)
+    writer.finish(json.dumps(_counts(recording, len(datagrams))))
+    again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)
+    if (len(again), again.intensity is None) != (len(events), events.intensity is None):
+        lost.append(f"the pairing of intensities ({len(again)} events when paired directly)")
+    elif ((again.t != events.t // _STAMP_US * _STAMP_US) & (again.t != events.t)).any():
+        lost.append("the order of times that step back by more than 0.1 s")
+    return lost
+
+
+def _add_remarks(writer: Any, events: Events, recording: Recording | None, registers: dict[str, Any] | None) -> None:
+    clock = None if recording is None else recording.clock
+
+    def at_ns(t: int) -> int:
+        return int(clock.host_ns(t)) if clock is not None and len(clock.board_us) else t * 1000
+
+    for t, start in events.markers:
+        writer.marker(max(0, at_ns(t)), t, start)
+    if events.intensity is not None and len(events):
+        ramp = int(registers["ramp"]) if registers else int(events.intensity.max()) or 1
+        pictures = events.held(1_000_000 // _PICTURES_HZ)
+        for t, picture in zip(pictures.t.tolist(), pictures.values, strict=True):
+            ticks = picture.astype(np.uint16).ravel()
+            writer.picture(max(0, at_ns(t)), t, events.array.columns, ticks, ramp)
+    if recording is None:
+        return
+    for note in recording.notes:
+        writer.note(note.at_ns, note.t, note.text)
+    for at, values in recording.register_changes:
+        writer.registers(at, json.dumps(values))
+    found = recording.detections
+    for label, t, known, slope in zip(found.label, found.t.tolist(), found.known.tolist(), found.slope, strict=True):
+        writer.detection(max(0, at_ns(known)), str(label), t, known, float(slope))
+
+
+def _counts(recording: Recording | None, datagrams: int) -> dict[str, Any]:
+    """Return the counts of a recording in the words of the live format."""
+    if recording is None:
+        return {"received": datagrams}
+    counts = recording.counts
+    known = {name: counts.get(name) or 0 for name in ("dropped_by_kernel", "dropped_by_queue", "received")}
+    decoder = counts.get("decoder")
+    damage = json.loads(_core.recording_damage(json.dumps(decoder))) if decoder else {}
+    return {**known, "decoder": damage, "converted": recording.verdict}
+
+
+def _cut(raw: NDArray[np.uint8], events: Events | None) -> Datagrams:
+    """Cut raw bytes into datagrams, never between a change and its intensity.
+
+    The wire has no arrival times, so each datagram gets the board's time of its first stamp: what a reader needs to
+    unwrap time as it was before. It looks at times within half a turn, so a datagram is never longer than a second.
+    """
+    first = np.append(raw, np.uint8(0x80)) & 0x80 != 0
+    begins = np.flatnonzero(first[:-1])
+    ends = np.flatnonzero(first)[1:]
+    # Whole words that show a time: a change or a marker, not an intensity (Z2).
+    begins = begins[(ends - begins >= 5) & (raw[begins] & 0x20 == 0)]
+    at = _stamps(raw, begins) if events is None else _times(raw, begins, events)
+    # Steps back do not count: arrivals never step back.
+    at = np.maximum.accumulate(at) if len(at) else at
+    offsets, arrived = [0], []
+    while offsets[-1] < len(raw):
+        begin = offsets[-1]
+        k = int(np.searchsorted(begins, begin))
+        now = int(at[min(k, len(at) - 1)]) if len(at) else 0
+        late = int(np.searchsorted(at, now + 1_000_000, side="right")) if k < len(at) else len(at)
+        fits = int(np.searchsorted(begins, begin + _DATAGRAM_BYTES, side="right")) - 1
+        if begin + _DATAGRAM_BYTES >= len(raw):
+            fits = len(begins)
+        last = min(late, fits)
+        end = int(begins[last]) if last < len(begins) else len(raw)
+        if not begin < end <= begin + _DATAGRAM_BYTES:
+            end = min(begin + _DATAGRAM_BYTES, len(raw))
+        offsets.append(end)
+        arrived.append(now * 1000)
+    number = np.arange(len(arrived), dtype=np.uint64)
+    return Datagrams(np.array(arrived, np.int64), number, np.array(offsets, np.int64), np.ascontiguousarray(raw))
+
+
+def _stamps(raw: NDArray[np.uint8], begins: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the times of words (us) as their stamps alone show them."""
+    word = [raw[begins + k].astype(np.int64) for k in range(3)]
+    stamp = (word[0] & 3) << 14 | (word[1] & 0x7F) << 7 | word[2] & 0x7F
+    step = np.diff(stamp, prepend=stamp[:1]) % 65_536
+    # As the decoder reads it: up to 0.1 s behind is a step back.
+    step[step >= 64_536] -= 65_536
+    first = int(stamp[0]) if len(stamp) else 0
+    return np.asarray((first + np.cumsum(step)) * _STAMP_US)
+
+
+def _times(raw: NDArray[np.uint8], begins: NDArray[np.int64], events: Events) -> NDArray[np.int64]:
+    """Return the times of words (us) that were made of events."""
+    marker = raw[begins] & 0x08 != 0
+    at = np.empty(len(begins), np.int64)
+    at[~marker], at[marker] = events.t, [t for t, _ in events.markers]
+    return at

@@ -1,0 +1,239 @@
+"""Tables of events or pictures: .csv and .npz.
+
+A .csv is either ``t_us,x,y,p[,intensity]`` (an empty intensity is one that did not come), or ``t_us`` and a column a
+taxel, named ``x3y5``. A .npz holds the same columns as arrays, and beside them, as JSON in ``about``, what a .csv
+cannot hold: the sensor, registers, notes, detections and what was lost.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import re
+import zipfile
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import FormatError, ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+
+__all__ = ["array_said", "read_csv", "read_npz", "write_csv", "write_npz"]
+
+_EVENTS = ("t_us", "x", "y", "p")
+_TAXEL = re.compile(r"x(\d+)y(\d+)")
+
+
+def array_said(array: Array) -> dict[str, Any]:
+    """Return a sensor as files describe it."""
+    exists = None if array.exists is None else [bool(e) for e in array.exists.ravel()]
+    said: dict[str, Any] = {"rows": array.rows, "columns": array.columns, "pitch_mm": array.pitch_mm}
+    said["name"] = array.name
+    return said if exists is None else {**said, "exists": exists}
+
+
+def write_npz(file: BinaryIO, table: Events | Frames, about: dict[str, Any]) -> None:
+    """Write a .npz."""
+    said = json.dumps({"array": array_said(table.array), **about})
+    if isinstance(table, Events):
+        columns: dict[str, Any] = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
+        if table.intensity is not None:
+            columns |= {"intensity": table.intensity, "present": table.present}
+        columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
+    else:
+        columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
+    np.savez_compressed(file, about=np.array(said), **columns)
+
+
+def read_npz(path: Path, array: Array | None) -> tuple[Events | Frames, dict[str, Any]]:
+    """Read a .npz of ours, or one with the columns ``t x y p`` or ``values t``."""
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            columns = {name: file[name] for name in file.files}
+    except (zipfile.BadZipFile, ValueError, EOFError, KeyError, NotImplementedError) as error:
+        raise FormatError(f"{path}: a .npz that cannot be unpacked ({_line(error)}); write it again") from None
+    try:
+        about = json.loads(str(columns.get("about", "{}")))
+        sensor = array
+        if sensor is None and "array" in about:
+            said = about["array"]
+            parts = (said["rows"], said["columns"], said["pitch_mm"], said["name"], said.get("exists"))
+            sensor = Array._from_parts(parts)
+    except (ValueError, KeyError, TypeError, ProblemError) as error:
+        raise FormatError(f"{path}, array about: {_line(error)}; must be JSON as taxel writes it") from None
+    try:
+        if "values" in columns and "t" in columns:
+            unit = str(columns.get("unit", "counts"))
+            return Frames(columns["values"], columns["t"], unit=unit, array=sensor), about
+        missing = [name for name in ("t", "x", "y", "p") if name not in columns]
+        if missing:
+            names = ", ".join(columns) or "nothing"
+            raise FormatError(
+                f"{path}: holds {names}: {missing[0]} is missing; must be t, x, y, p (events) or values, t (pictures)"
+            )
+        t, x, y, p = (columns[name] for name in ("t", "x", "y", "p"))
+        markers = [(int(at), bool(start)) for at, start in columns.get("markers", np.empty((0, 2)))]
+        extra = {name: columns[name] for name in ("intensity", "present") if name in columns}
+        return Events(t, x, y, p, array=sensor or _around(x, y), markers=markers, **extra), about
+    except (ProblemError, ValueError, TypeError) as error:
+        raise FormatError(f"{path}: {_line(error)}") from None
+
+
+def write_csv(file: BinaryIO, table: Events | Frames) -> None:
+    """Write a .csv."""
+    if isinstance(table, Frames):
+        places = _places(table.array)
+        names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])
+        file.write(names.encode() + b"\n")
+        for t, picture in zip(table.t, table.values, strict=True):
+            # repr of a float32 is the shortest text that gives it back.
+            values = (_shortest(picture[y, x]) for x, y in places)
+            file.write(",".join([str(t), *values]).encode() + b"\n")
+        return
+    columns = [table.t, table.x, table.y, table.p.astype(np.uint8)]
+    file.write(b"t_us,x,y,p" + b",intensity" * (table.intensity is not None) + b"\n")
+    block = 1 << 16
+    for k in range(0, len(table), block):
+        rows = [column[k : k + block].astype(str) for column in columns]
+        if table.intensity is not None and table.present is not None:
+            ticks = table.intensity[k : k + block].astype(str)
+            rows.append(np.where(table.present[k : k + block], ticks, ""))
+        file.write("\n".join(map(",".join, zip(*(r.tolist() for r in rows), strict=True))).encode() + b"\n")
+
+
+def read_csv(path: Path, array: Array | None) -> tuple[Events | Frames, dict[str, Any]]:
+    """Read a .csv of events or of pictures."""
+    raw = path.read_bytes().replace(b"\r\n", b"\n").removeprefix(b"\xef\xbb\xbf")
+    head, _, body = raw.partition(b"\n")
+    try:
+        names = [name.strip() for name in head.decode().split(",")]
+    except UnicodeDecodeError:
+        names = []
+    if not names or names[0] != "t_us" or len(names) < 2:
+        said = repr(head[:40].decode("utf-8", "replace"))
+        raise FormatError(f"{path}, line 1: {said}: must be t_us,x,y,p[,intensity], or t_us and a column a taxel")
+    if tuple(names[:4]) == _EVENTS:
+        if names[4:] not in ([], ["intensity"]):
+            raise FormatError(f"{path}, line 1: {names[4]!r} after p: only intensity may follow")
+        return _csv_events(path, names, body, array), {}
+    repeated = [name for name in names if names.count(name) > 1]
+    if repeated:
+        raise FormatError(f"{path}, line 1: column {repeated[0]!r} stands there twice")
+    return _csv_frames(path, names, body, array), {}
+
+
+def _csv_events(path: Path, names: list[str], body: bytes, array: Array | None) -> Events:
+    if len(names) == 5:
+        # An empty intensity is one that did not come; -1 stands for it while numbers are read.
+        body = re.sub(rb",[ \t]*(?=\n|$)", b",-1", body)
+    table = _numbers(path, names, body, np.int64)
+    t, x, y, p = table[:, :4].T
+    _within(path, "p", p, 0, 1)
+    for name, column in (("x", x), ("y", y)):
+        _within(path, name, column, 0, 65_535)
+    extra: dict[str, Any] = {}
+    if len(names) == 5:
+        ticks = table[:, 4]
+        _within(path, "intensity", ticks, -1, 65_535)
+        extra = {"intensity": np.maximum(ticks, 0), "present": ticks >= 0}
+    try:
+        return Events(t, x, y, p.astype(bool), array=array or _around(x, y), **extra)
+    except ProblemError as error:
+        raise FormatError(f"{path}: {error}") from None
+
+
+def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) -> Frames:
+    table = _numbers(path, names, body, np.float64)
+    found = [_TAXEL.fullmatch(name) for name in names[1:]]
+    if all(found):
+        places = [(int(m[1]), int(m[2])) for m in found if m is not None]
+    elif any(found):
+        odd = next(name for name, m in zip(names[1:], found, strict=True) if m is None)
+        raise FormatError(f"{path}, line 1: column {odd!r} among taxels: must be named like x3y5")
+    else:
+        shape = (1, len(names) - 1) if array is None else array.shape
+        if shape[0] * shape[1] != len(names) - 1:
+            raise FormatError(
+                f"{path}, line 1: {len(names) - 1} columns for an array of {shape[0]} x {shape[1]} taxels"
+            )
+        places = [(k % shape[1], k // shape[1]) for k in range(len(names) - 1)]
+    x, y = np.array(places).T
+    if array is None:
+        rows, columns = int(y.max()) + 1, int(x.max()) + 1
+        if rows * columns > max(1 << 16, 4 * len(places)):
+            raise FormatError(f"{path}, line 1: {len(places)} columns for {rows} x {columns} taxels: most are missing")
+        exists = np.zeros((rows, columns), bool)
+        exists[y, x] = True
+        array = Array(rows, columns, exists=None if exists.all() else exists)
+    elif x.max() >= array.columns or y.max() >= array.rows:
+        k = int(np.flatnonzero((x >= array.columns) | (y >= array.rows))[0])
+        raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {array.rows} x {array.columns} taxels")
+    values = np.zeros((len(table), *array.shape), np.float32)
+    values[:, y, x] = table[:, 1:]
+    try:
+        return Frames(values, table[:, 0], array=array)
+    except ProblemError as error:
+        raise FormatError(f"{path}: {error}") from None
+
+
+def _numbers(path: Path, names: list[str], body: bytes, dtype: type[Any]) -> NDArray[Any]:
+    """Read the rows below the names; the error names line and column."""
+    if not body.strip():
+        return np.empty((0, len(names)), dtype)
+    try:
+        table = np.loadtxt(io.BytesIO(body), dtype=dtype, delimiter=",", comments=None, ndmin=2)
+    except (ValueError, OverflowError) as error:
+        place = re.search(r"at row (\d+)(?:, column (\d+))?", str(error))
+        where = "" if place is None else f", line {_line_number(body, int(place[1]))}"
+        if place is not None and place[2] is not None and int(place[2]) <= len(names):
+            where += f", column {names[int(place[2]) - 1]}"
+        said = re.sub(r" at row .*|; use `usecols`.*", "", str(error).split("\n", maxsplit=1)[0])
+        raise FormatError(f"{path}{where}: {said}; must be {len(names)} numbers a line") from None
+    if table.shape[1] != len(names):
+        raise FormatError(f"{path}, line 2: {table.shape[1]} numbers below {len(names)} names")
+    return table
+
+
+def _line_number(body: bytes, row: int) -> int:
+    """Return the line of the file that holds a row of numbers; empty lines are no rows."""
+    rows = -1
+    for k, line in enumerate(body.split(b"\n")):
+        rows += bool(line.strip())
+        if rows == row:
+            return k + 2
+    return row + 2
+
+
+def _within(path: Path, name: str, column: NDArray[Any], low: int, high: int) -> None:
+    wrong = np.flatnonzero((column < low) | (column > high))
+    if len(wrong):
+        k = int(wrong[0])
+        raise FormatError(f"{path}, line {k + 2}, column {name}: is {column[k]}; must be {max(0, low)} to {high}")
+
+
+def _around(x: NDArray[Any], y: NDArray[Any]) -> Array:
+    """Return the thesis' array, or a larger one where events lie outside it."""
+    thesis = Array.thesis()
+    if not len(x):
+        return thesis
+    rows, columns = max(thesis.rows, int(y.max()) + 1), max(thesis.columns, int(x.max()) + 1)
+    return thesis if (rows, columns) == thesis.shape else Array(rows, columns)
+
+
+def _places(array: Array) -> list[tuple[int, int]]:
+    """Return column and row of each taxel that exists, row by row."""
+    exists = np.ones(array.shape, bool) if array.exists is None else array.exists
+    return [(int(x), int(y)) for y, x in np.argwhere(exists)]
+
+
+def _shortest(value: np.float32) -> str:
+    text = str(value)
+    return text.removesuffix(".0")
+
+
+def _line(error: BaseException) -> str:
+    return str(error).split("\n", maxsplit=1)[0]

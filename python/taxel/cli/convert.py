@@ -1,0 +1,39 @@
+"""``taxel convert``: from one kind of recording to another."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from taxel.cli import app
+
+__all__ = ["convert"]
+
+
+@app.command()
+def convert(
+    source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
+    target: Annotated[Path, typer.Argument(help="The new file; its ending says the kind.")],
+    frames: Annotated[
+        float | None, typer.Option(metavar="HZ", help="Write pictures at this rate (.npz, .csv) instead of events.")
+    ] = None,
+    compression: Annotated[str, typer.Option(help="Of a .mcap: none, lz4 or zstd.")] = "none",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target where it exists.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Write a recording as another kind of file: lossless where the target can hold it, else it says what it cannot.
+
+    Example: taxel convert walk.mcap walk.csv
+    """
+    import taxel  # noqa: PLC0415  the command line starts quickly
+
+    lost = taxel.convert(source, target, frames_hz=frames, compression=compression, overwrite=overwrite)
+    if as_json:
+        typer.echo(json.dumps({"source": str(source), "target": str(target), "lost": lost}))
+        return
+    typer.echo(f"written to {target}")
+    for what in lost:
+        typer.echo(f"  a {target.suffix} cannot hold: {what}")

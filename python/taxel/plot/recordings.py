@@ -1,0 +1,63 @@
+"""Pictures of whole recordings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from taxel._health import Health
+    from taxel.recording import Recording
+
+__all__ = ["health_map", "overview"]
+
+_COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}
+
+
+def overview(recording: Recording) -> Figure:
+    """Draw events a second (or the sum of pressure) over time, and the activity of each taxel."""
+    from taxel._health import health  # noqa: PLC0415  health draws itself here
+
+    figure, (over, where) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(2, 1), layout="constrained")
+    if recording.has_events:
+        events = recording.events
+        t = events.t / 1e6
+        span = (float(t.min()), float(t.max())) if len(events) else (0.0, 1.0)
+        bins = np.linspace(span[0], max(span[1], span[0] + 1e-4), 201)
+        width = bins[1] - bins[0]
+        for on, colour, name in ((True, "#c44e52", "rises"), (False, "#4c72b0", "falls")):
+            rate = np.histogram(t[events.p == on], bins)[0] / width
+            over.stairs(rate, bins, color=colour, label=name)
+        over.set_ylabel("events/s")
+        over.legend(loc="upper right")
+        found = health(events)
+    else:
+        frames = recording.frames()
+        over.plot(frames.t / 1e6, frames.total, color="black", linewidth=0.8)
+        over.set_ylabel(f"sum of taxels ({frames.unit})")
+        found = health(frames)
+    for note in recording.notes:
+        if note.t is not None:
+            over.axvline(note.t / 1e6, color="grey", linestyle=":", linewidth=0.8)
+    over.set(xlabel="board time (s)", title=recording.path.name)
+    health_map(found, where)
+    return figure
+
+
+def health_map(health: Health, ax: Axes | None = None) -> Axes:
+    """Draw the activity of each taxel, with those marked that are dead, stuck or noisy."""
+    ax = ax or plt.subplots(figsize=(5, 4.4), layout="constrained")[1]
+    image = ax.imshow(np.log10(1.0 + health.activity), origin="upper", cmap="Greys", interpolation="nearest")
+    ax.figure.colorbar(image, ax=ax, label="log10 (1 + events)")
+    for name, places in health.named().items():
+        if places:
+            x, y = np.array(places).T
+            ax.scatter(x, y, marker="s", s=14, facecolors="none", edgecolors=_COLOURS[name], label=f"{name} ({len(x)})")
+    if ax.get_legend_handles_labels()[0]:
+        ax.legend(loc="upper right", fontsize="small")
+    ax.set(xlabel="x (column)", ylabel="y (row)")
+    return ax
