@@ -1,10 +1,6 @@
 """Touch as events: from the bytes of a tactile array to decisions that say when."""
 
-from taxel import detect, metrics
-from taxel import encode, metrics
-from taxel import detect, device, metrics, wire
-from taxel import detect, encode, metrics
-from taxel import detect, encode, metrics
+from taxel import detect, device, encode, metrics, wire
 from taxel._convert import convert
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel._health import Health, health
@@ -36,22 +32,16 @@ __all__ = [
     "Note",
     "ProblemError",
     "Readout",
-    "SceneError",
-    "SpikeTrains",
-    "Tare",
-    "detect",
-    "encode",
-    "device",
-    "metrics",
-    "wire",
     "Recording",
     "SceneError",
     "SpikeTrains",
     "Tare",
     "convert",
     "detect",
+    "device",
     "encode",
     "health",
     "metrics",
     "open",
+    "wire",
 ]

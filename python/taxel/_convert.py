@@ -130,7 +130,7 @@ def _about(recording: Recording | None) -> tuple[dict[str, Any], list[str]]:
     found = recording.detections
     about = {
         "source": recording.source or recording.path.name,
-        "registers": recording.registers,
+        "registers": recording._source.registers,
         "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in recording.notes],
         "detections": [
             [0, str(label), int(t), int(known), None if np.isnan(slope) else float(slope)]
@@ -196,7 +196,7 @@ def _write_mcap(
     # Before 1970 there is no time of the host: board times are moved there as a whole.
     earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
     arrived = datagrams.arrived_ns - min(0, earliest)
-    registers = None if recording is None else recording.registers
+    registers = None if recording is None else recording._source.registers
     header = {
         "array": array_said(events.array),
         "registers": registers,
@@ -235,7 +235,7 @@ def _add_remarks(writer: Any, events: Events, recording: Recording | None, regis
         return
     for note in recording.notes:
         writer.note(note.at_ns, note.t, note.text)
-    for at, values in recording.register_changes:
+    for at, values in recording._source.register_changes:
         writer.registers(at, json.dumps(values))
     found = recording.detections
     for label, t, known, slope in zip(found.label, found.t.tolist(), found.known.tolist(), found.slope, strict=True):

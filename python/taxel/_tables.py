@@ -94,7 +94,7 @@ def write_csv(file: BinaryIO, table: Events | Frames) -> None:
             values = (_shortest(picture[y, x]) for x, y in places)
             file.write(",".join([str(t), *values]).encode() + b"\n")
         return
-    columns = [table.t, table.x, table.y, table.p.astype(np.uint8)]
+    columns: list[NDArray[Any]] = [table.t, table.x, table.y, table.p.astype(np.uint8)]
     file.write(b"t_us,x,y,p" + b",intensity" * (table.intensity is not None) + b"\n")
     block = 1 << 16
     for k in range(0, len(table), block):

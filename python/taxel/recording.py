@@ -22,6 +22,7 @@ from taxel.array import Array
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.wire import Registers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -266,14 +267,15 @@ class Recording:
         return found if self._window is None else found.between(*self._window)
 
     @cached_property
-    def registers(self) -> dict[str, Any] | None:
-        """What the board's registers held at the beginning, by name; None where the file does not say."""
-        return self._source.registers
+    def registers(self) -> Registers | None:
+        """What the board's registers held at the beginning; None where the file does not say."""
+        held = self._source.registers
+        return None if held is None else Registers._of(held, self.array)
 
-    @property
-    def register_changes(self) -> tuple[tuple[int, dict[str, Any]], ...]:
+    @cached_property
+    def register_changes(self) -> tuple[tuple[int, Registers], ...]:
         """The registers as they were set while recording, each with the host's time (ns since 1970)."""
-        return self._source.register_changes
+        return tuple((at, Registers._of(held, self.array)) for at, held in self._source.register_changes)
 
     @cached_property
     def clock(self) -> Clock | None:

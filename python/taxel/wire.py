@@ -475,6 +475,13 @@ class Registers:
         registers._set(json.loads(_core.registers_preset(text("preset", name))), {}, array)
         return registers
 
+    @classmethod
+    def _of(cls, held: dict[str, Any], array: Array) -> Registers:
+        """Return the set that a file or a board holds, in the registers' own units."""
+        registers = cls.__new__(cls)
+        registers._set(held, {}, array)
+        return registers
+
     def replace(self, **fields: float) -> Registers:
         """Return a set with some fields changed, by taxel's names or the manual's.
 

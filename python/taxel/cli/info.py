@@ -95,7 +95,7 @@ def about(recording: Recording) -> dict[str, Any]:
     return said | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
-        "registers": recording.registers,
+        "registers": None if recording.registers is None else json.loads(recording.registers._json()),
         "taxels": health(table).named(),
         "counts": recording.counts,
         "truncated": recording.truncated,
