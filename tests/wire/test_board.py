@@ -1,0 +1,123 @@
+"""The emulated board against the reference's section 3, read slowly (oracle.py)."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import wire
+from taxel.device import NOT_RETURNED, Board
+from taxel.wire import Command, Registers
+
+from . import oracle
+
+
+def frames(rng, taxels, count):
+    """Yield trip times that drift, jump, stick and trip never."""
+    ticks = rng.integers(0, 40, taxels)
+    for _ in range(count):
+        ticks = np.clip(ticks + rng.integers(-4, 5, taxels), 0, 200)
+        touched = rng.random(taxels) < rng.choice([0.0, 0.02, 1.0])
+        ticks[touched] = rng.integers(0, 300, int(touched.sum()))
+        shown = ticks.copy()
+        shown[rng.random(taxels) < 0.01] = NOT_RETURNED
+        yield shown.astype(np.uint16)
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.sampled_from([(64, 64), (16, 8), (64, 5)]),
+    previous=st.sampled_from(["last_sent", "last_sample"]),
+    intensity=st.sampled_from(["value", "difference"]),
+    fields=st.fixed_dictionaries(
+        {
+            "random_lines": st.booleans(),
+            "frame_sync": st.booleans(),
+            "noise_floor": st.integers(0, 12),
+            "line_period": st.sampled_from([3.0, 700.0]),
+        }
+    ),
+    channels=st.sampled_from([16, 64]),
+    queue=st.sampled_from([16_384, 3000, 301, 1]),
+    most=st.sampled_from([None, 0, 1, 5]),
+)
+def test_the_board_sends_what_the_reference_says(seed, shape, previous, intensity, fields, channels, queue, most):
+    rng = np.random.default_rng(seed)
+    array = taxel.Array(*shape)
+    preset = {"step_period": 0.75, "line_read": 3.0}
+    registers = Registers(array=array, lines=int(rng.integers(1, shape[1] + 1)), channels=channels, **preset, **fields)
+    options = {"previous": previous, "intensity": intensity, "queue": queue}
+    board = Board(registers, array, **options)
+    slow = oracle.Board(registers, columns=shape[1], rows=shape[0], **options)
+    for k, ticks in enumerate(frames(rng, array.taxels, 6)):
+        taken = most if most is None or k % 2 else 10**6
+        expected = slow.frame(ticks, 10**9 if taken is None else taken)
+        assert board.frame(ticks, most=taken) == expected
+        if k == 2:
+            board.record(True)
+            slow.mark(True)
+    counts = board.counts
+    assert (counts["dropped"], counts["not_returned"]) == (slow.dropped, slow.not_returned)
+    assert counts["frames"] == 6
+
+
+def test_without_loss_the_decoder_gives_back_what_the_board_held():
+    rng, board, decoder = np.random.default_rng(3), Board(Registers(noise_floor=0)), wire.Decoder()
+    held = np.zeros(4096, int)
+    for ticks in frames(rng, 4096, 20):
+        for datagram in board.frame(ticks.reshape(64, 64)):
+            events = taxel.Events.from_numpy(decoder.push(datagram).to_numpy(), decoder.array)
+            held[decoder.array.index(events.x, events.y)] = events.intensity
+            assert len(datagram) <= 1400
+            assert len(datagram) % 10 == 0
+        known = ticks != NOT_RETURNED
+        assert (held[known] == np.minimum(ticks, 150)[known]).all()
+    assert decoder.counts.changes == board.counts["changes"]
+
+
+def test_registers_are_taken_over_at_a_frames_edge():
+    board = Board()
+    for command in Registers().commands_to(Registers.preset("2 kHz")):
+        board.command(command.to_bytes())
+    assert board.time_us == 0
+    board.frame(np.zeros(4096, np.uint16))
+    assert board.time_us == pytest.approx(499.84)
+
+
+def test_read_back_and_damage_on_the_serial_line():
+    board = Board()
+    assert board.greeting == "taxel-board v1 64x64 16ch\n"
+    good = Command(6, 3).to_bytes()
+    assert board.command(b"\x01" + good[:2] + good) == "ok REG3=0x0037004B\n"
+    assert (board.faults(), board.faults()) == ("fault command 3\n", "")
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: Board().frame(np.zeros(7, np.uint16)), "frame of 7 trip times: the array has 4096 taxels"),
+        (lambda: Board().frame(np.full(4096, -1)), "ticks[0] is -1: must be a whole number that fits uint16"),
+        (lambda: Board().frame(None), "ticks"),
+        (lambda: Board().frame(np.zeros(4096), most="all"), "most is 'all'"),
+        (lambda: Board().record("yes"), "start is 'yes': must be True or False"),
+        (lambda: Board().command("text"), "data is 'text': must be bytes"),
+        (lambda: Board(7), "registers is 7: must be a taxel.Registers"),
+        (lambda: Board(array=7), "array is 7: must be a taxel.Array"),
+        (lambda: Board(array=taxel.Array(65, 64)), "array of 65 x 64 taxels: the board scans up to 64 x 64"),
+        (lambda: Board(previous="mean"), "previous is 'mean': must be one of 'last_sent', 'last_sample'"),
+        (lambda: Board(intensity=1), "intensity is 1"),
+        (lambda: Board(queue=-1), "queue is -1"),
+    ],
+)
+def test_nonsense_is_refused_in_one_line(call, text):
+    with pytest.raises(taxel.ProblemError) as error:
+        call()
+    assert text in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_preset_for_more_lines_than_the_array_has_is_refused():
+    with pytest.raises(taxel.DeviceError, match="64 lines: the array has 8 columns to drive"):
+        Board(array=taxel.Array(8, 8))

@@ -1,0 +1,263 @@
+"""The wire's bytes and events: vectors, laws, and an obvious decoder as oracle."""
+
+import json
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import wire
+
+from . import oracle
+
+DATA = Path(__file__).parent.parent / "data" / "wire"
+VECTORS = sorted(DATA.glob("*.json"))
+
+
+def rows(events):
+    """Return events as the oracle has them: [t, x, y, p, intensity or None]."""
+    none = np.zeros(len(events), bool)
+    intensity, present = (none, none) if events.intensity is None else (events.intensity, events.present)
+    columns = (events.t, events.x, events.y, events.p, intensity, present)
+    return [[*row[:4], row[4] if row[5] else None] for row in zip(*(c.tolist() for c in columns), strict=True)]
+
+
+def decode(pieces, *, columns=64, rows=64, pairing="direct", differences=False):
+    """Decode pieces as the oracle does, by `Decoder`."""
+    array = taxel.Array(rows, columns)
+    decoder, parts = wire.Decoder(array=array, pairing=pairing, differences=differences), []
+    for data, arrived, end in pieces:
+        parts.append(decoder.push(data, arrived))
+        if end:
+            parts.append(decoder.end_of_datagram())
+    parts.append(decoder.finish())
+    return meaning(parts, decoder)
+
+
+def meaning(parts, decoder):
+    events = [row for part in parts for row in rows(part)]
+    markers = [list(marker) for part in parts for marker in part.markers]
+    return oracle.Meaning(events, markers, vars(decoder.counts))
+
+
+def closes(counts):
+    kinds = ("changes", "intensities", "unpaired", "markers", "contradictory", "outside")
+    return counts["bytes"] == 5 * counts["words"] + counts["skipped"] and counts["words"] == sum(
+        counts[kind] for kind in kinds
+    )
+
+
+@pytest.mark.parametrize("path", VECTORS, ids=lambda path: path.stem)
+def test_a_vector_means_what_its_json_says(path):
+    said, data, pieces = json.loads(path.read_text()), path.with_suffix(".bin").read_bytes(), []
+    for length, arrived, end in said["pieces"]:
+        pieces.append((data[:length], arrived, end))
+        data = data[length:]
+    assert not data
+    options = {key: said[key] for key in ("columns", "rows", "pairing", "differences")}
+    expected = oracle.Meaning(said["events"], said["markers"], said["counts"])
+    assert decode(pieces, **options) == expected
+    assert oracle.decode(pieces, **options) == expected
+
+
+def test_there_are_vectors():
+    assert len(VECTORS) >= 16
+
+
+words = st.builds(
+    oracle.word,
+    st.sampled_from(["change", "change", "change", "intensity", "intensity", "marker", "contradictory"]),
+    st.one_of(st.integers(0, 65_535), st.integers(0, 3)),
+    st.integers(0, 63) | st.integers(0, 2),
+    st.integers(0, 63) | st.integers(0, 2),
+    st.booleans(),
+    unused=st.integers(0, 15),
+)
+streams = st.lists(words | st.binary(max_size=7), max_size=60).map(b"".join)
+sensors = st.sampled_from([{}, {"columns": 3, "rows": 2}, {"columns": 40, "rows": 80}])
+ways = st.fixed_dictionaries({"pairing": st.sampled_from(["direct", "taxel"]), "differences": st.booleans()})
+
+
+@given(data=streams, sensor=sensors, way=ways)
+def test_any_bytes_mean_what_the_reference_says_and_the_sums_close(data, sensor, way):
+    found = decode([(data, None, False)], **sensor, **way)
+    assert found == oracle.decode([(data, None, False)], **sensor, **way)
+    assert found.counts["bytes"] == len(data)
+    assert closes(found.counts)
+
+
+@given(
+    data=streams,
+    cuts=st.lists(
+        st.tuples(st.integers(0, 300), st.none() | st.integers(0, 10**8), st.booleans()),
+        max_size=8,
+    ),
+    way=ways,
+)
+def test_datagrams_and_arrivals_mean_what_the_reference_says(data, cuts, way):
+    cuts = sorted(cuts, key=lambda cut: cut[0])
+    places = [0, *(min(place, len(data)) for place, _, _ in cuts), len(data)]
+    ends = [*((arrived, end) for _, arrived, end in cuts), (None, False)]
+    pieces = [(data[a:b], *end) for (a, b), end in zip(pairwise(places), ends, strict=True)]
+    assert decode(pieces, **way) == oracle.decode(pieces, **way)
+
+
+@given(data=streams, cuts=st.sets(st.integers(0, 300)), way=ways, arrived=st.none() | st.integers(0, 10**9))
+def test_a_cut_in_the_bytes_changes_nothing(data, cuts, way, arrived):
+    places = [0, *sorted(min(cut, len(data)) for cut in cuts), len(data)]
+    pieces = [(data[a:b], arrived, False) for a, b in pairwise(places)]
+    assert decode(pieces, **way) == decode([(data, arrived, False)], **way)
+
+
+def random_stream(rng, words):
+    """Long runs of changes, of pairs, of a mix, with rare damage: what the block decoders meet."""
+    out, stamp = [], int(rng.integers(65_536))
+    while len(out) < words:
+        style, rise = rng.integers(4), rng.random() < 0.5
+        for _ in range(rng.integers(1, 150)):
+            stamp += int(rng.integers(0, 3)) if rise else 0
+            if style == 3 and rng.random() < 0.02:
+                stamp += int(rng.integers(-1100, 66_000))
+            x, y, p = int(rng.integers(64)), int(rng.integers(64)), bool(rng.integers(2))
+            out.append(oracle.word("change", stamp % 65_536, x, y, p, unused=int(rng.integers(16))))
+            if style == 1 or (style > 1 and rng.random() < 0.5):
+                out.append(oracle.word("intensity", int(rng.integers(65_536)), x, y ^ int(rng.random() < 0.02), p))
+            if style == 3 and rng.random() < 0.01:
+                out.append(rng.bytes(rng.integers(1, 8)))
+    return b"".join(out)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_long_streams_mean_what_the_reference_says(seed):
+    rng = np.random.default_rng(seed)
+    data = random_stream(rng, 4000)
+    sensor = {"columns": 64, "rows": int(rng.choice([64, 63, 200]))}
+    whole = decode([(data, None, False)], **sensor)
+    assert whole == oracle.decode([(data, None, False)], **sensor)
+    assert closes(whole.counts)
+    decoder = wire.Decoder(array=taxel.Array(sensor["rows"], 64))
+    columns, parts, at = wire.Columns(2000), [], 0
+    while at < len(data):
+        step = int(rng.integers(1, 3000))
+        filled = decoder.push_into(columns, data[at : at + step])
+        parts.append(filled[slice(0, len(filled))])
+        parts[-1] = oracle.Meaning(rows(filled), list(filled.markers))
+        at += step
+    parts.append(oracle.Meaning(rows(decoder.finish())))
+    assert [row for part in parts for row in part.events] == whole.events
+    assert [list(m) for part in parts for m in part.markers] == whole.markers
+    assert vars(decoder.counts) == whole.counts
+
+
+events = st.integers(0, 40).flatmap(
+    lambda n: st.tuples(
+        st.lists(st.integers(0, 64_000), min_size=n, max_size=n),
+        st.lists(st.tuples(st.integers(0, 63), st.integers(0, 63), st.booleans()), min_size=n, max_size=n),
+        st.lists(st.none() | st.integers(0, 65_535), min_size=n, max_size=n),
+        st.lists(st.booleans(), max_size=3),
+    )
+)
+
+
+@given(drawn=events)
+def test_events_come_back_from_their_bytes(drawn):
+    steps, taxels, ticks, marks = drawn
+    t = 100 * np.cumsum(np.array(steps, np.int64))
+    x, y, p = (list(column) for column in zip(*taxels, strict=True)) if taxels else ([], [], [])
+    # Markers stand at times of events, so that no silence is longer than the clock can tell.
+    markers = [(int(t[0]) if len(t) else 0, mark) for mark in marks]
+    wraps = 6_553_600 * (markers[0][0] // 6_553_600 if markers else (int(t[0]) // 6_553_600 if len(t) else 0))
+    pairs = {}
+    if any(tick is not None for tick in ticks):
+        pairs = {"intensity": [tick or 0 for tick in ticks], "present": [tick is not None for tick in ticks]}
+    given_events = taxel.Events(t - wraps, x, y, p, array=taxel.Array(64, 64, name="a"), markers=markers, **pairs)
+    given_events.markers = tuple((at - wraps, mark) for at, mark in markers)
+    assert wire.decode(wire.encode(given_events), array=given_events.array) == given_events
+
+
+def test_times_are_cut_down_to_whole_stamps():
+    events = taxel.Events([0, 99, 100, 250], [0] * 4, [0] * 4, [True] * 4, array=taxel.Array(64, 64))
+    assert wire.decode(wire.encode(events)).t.tolist() == [0, 0, 100, 200]
+
+
+def test_bytes_come_from_any_buffer_and_stay_as_they_are():
+    data = oracle.word("change", 7, 1, 2) * 3
+    expected = wire.decode(data)
+    mutable = bytearray(data)
+    for same in (mutable, memoryview(data), np.frombuffer(data, np.uint8)):
+        assert wire.decode(same) == expected
+    assert mutable == data
+    assert len(wire.decode(b"")) == 0
+
+
+def test_an_end_of_stream_begins_anew_but_counts_on():
+    decoder = wire.Decoder()
+    for _ in range(2):
+        assert len(decoder.push(oracle.word("change", 60_000, 1, 1))) == 0
+        assert decoder.finish().t.tolist() == [6_000_000]
+    assert decoder.counts.words == 2
+
+
+def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
+    data = oracle.word("marker", 1) + oracle.word("change", 2, 1, 1) + oracle.word("change", 2, 2, 2)
+    data += oracle.word("intensity", 9, 1, 1)
+    events = wire.decode(data, pairing="taxel")
+    assert (events.markers, events.intensity.tolist(), events.present.tolist()) == (
+        ((100, True),),
+        [9, 0],
+        [True, False],
+    )
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: wire.decode("text"), "data is 'text': must be bytes, or anything with a contiguous buffer"),
+        (lambda: wire.decode([1, 2]), r"data is \[1, 2\]: must be bytes"),
+        (lambda: wire.decode(None), "data is None: must be bytes"),
+        (lambda: wire.decode(np.zeros(3)), "data is an array of float64: must be bytes or uint8"),
+        (lambda: wire.decode(memoryview(b"abcdef")[::2]), "must be bytes, or anything with a contiguous buffer"),
+        (lambda: wire.decode(b"", array=64), "array is 64: must be a taxel.Array"),
+        (lambda: wire.decode(b"", pairing="near"), "pairing is 'near': must be one of 'direct', 'taxel'"),
+        (lambda: wire.Decoder(pairing=None), "pairing is None"),
+        (lambda: wire.Decoder(differences=1), "differences is 1: must be True or False"),
+        (lambda: wire.Decoder().push(b"", arrived="now"), "arrived is 'now': must be a whole number"),
+        (lambda: wire.Decoder().push(b"", arrived=0.5), "arrived is 0.5: must be a whole number"),
+        (lambda: wire.Decoder().push(b"", arrived=2**63), "arrived is 9223372036854775808: must be a whole number"),
+        (lambda: wire.Decoder().push_into(None, b""), "columns is None: must be a taxel.Columns"),
+        (lambda: wire.Decoder().push_into(wire.Columns(2), bytes(15)), "room for 2 rows: 15 bytes may need 4"),
+        (lambda: wire.Columns(0), "rows is 0: must be a whole number from 1"),
+        (lambda: wire.Columns(2**48), "there is no memory for so many"),
+        (lambda: wire.Columns("many"), "rows is 'many'"),
+        (lambda: wire.encode(b""), "events is b'': must be a taxel.Events"),
+        (
+            lambda: wire.encode(taxel.Events([0], [64], [0], [True], array=taxel.Array(1, 65))),
+            "event 0: taxel x=64, y=0: version 1 of the wire holds columns and rows 0 to 63",
+        ),
+    ],
+)
+def test_nonsense_is_refused_in_one_line(call, text):
+    with pytest.raises(taxel.ProblemError, match=text) as error:
+        call()
+    assert "\n" not in str(error.value)
+
+
+def test_a_column_made_short_or_scattered_is_refused():
+    columns = wire.Columns(10)
+    columns.x = columns.x[::2]
+    with pytest.raises(taxel.ProblemError, match="columns must be contiguous"):
+        wire.Decoder().push_into(columns, b"")
+    columns = wire.Columns(10)
+    columns.y = columns.y[:1]
+    with pytest.raises(taxel.ProblemError, match="columns have room for 1 rows"):
+        wire.Decoder().push_into(columns, bytes(10))
+
+
+@settings(max_examples=20)
+@given(data=st.binary(max_size=3000))
+def test_random_bytes_are_never_an_error(data):
+    assert decode([(data, None, False)]) == oracle.decode([(data, None, False)])

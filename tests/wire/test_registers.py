@@ -1,0 +1,142 @@
+"""Commands and registers: presets, rules, order of writes."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import taxel
+from taxel import wire
+from taxel.wire import Command, Registers
+
+#: The reference's table: row_change, row_read, col_change, col_read, ramp_time, nrows, frames/s.
+TABLE = {
+    "5.2 kHz": (300, 300, 75, 55, 150, 63, 5208.33),
+    "2 kHz": (781, 780, 195, 175, 510, 63, 2000.64),
+    "20.8 kHz": (75, 75, 75, 55, 150, 63, 20_833.3),
+}
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_a_preset_is_the_references(name):
+    r = Registers.preset(name)
+    timing = (r.row_change_period, r.row_read_duration, r.col_change_period, r.col_read_duration)
+    assert (*timing, r.ramp_time, r.nrows) == TABLE[name][:-1]
+    assert 1e6 / r.frame_us == pytest.approx(TABLE[name][-1], rel=1e-5)
+    assert r.noise_floor == (10 if name == "2 kHz" else 3)
+    assert r.warnings == ()
+    assert r.frame_sync
+    assert not (r.random_lines)
+    assert not (r.record)
+    assert not (r.invert_comparator)
+    assert not (r.mechanoreceptor)
+
+
+def test_presets_are_named_and_the_first_is_the_default():
+    assert tuple(TABLE) == wire.PRESETS
+    assert Registers() == Registers.preset("5.2 kHz")
+
+
+def test_words_lie_as_table_5_5_says():
+    r = Registers(random_lines=True, noise_floor=7, lines=33, record=True)
+    assert r.words == (0b1001, 300, 300, 55 << 16 | 75, 150, 7 << 8 | 32 << 16, 0, 1 << 16)
+
+
+@given(register=st.integers(0, 7), value=st.integers(0, 2**32 - 1))
+def test_a_command_is_table_5_1_and_comes_back(register, value):
+    tops = sum((value >> (8 * k + 7) & 1) << k for k in range(4))
+    sevens = [value >> 8 * k & 0x7F for k in (3, 2, 1, 0)]
+    command = Command(register, value)
+    assert command.to_bytes() == bytes([0x80 | register << 4 | tops, *sevens])
+    assert Command.from_bytes(command.to_bytes()) == command
+
+
+@given(
+    names=st.tuples(st.sampled_from(["5.2 kHz", "2 kHz"]), st.sampled_from(["5.2 kHz", "2 kHz"])),
+    floor=st.integers(0, 255),
+)
+def test_writes_lead_to_the_target_and_none_is_refused_on_the_way(names, floor):
+    start, target = Registers.preset(names[0]), Registers.preset(names[1]).replace(noise_floor=floor)
+    board = taxel.device.Board(start)
+    for command in start.commands_to(target):
+        assert board.command(command.to_bytes()) == f"ok REG{command.register}=0x{command.value:08X}\n"
+    assert board.registers == target
+
+
+def test_a_wrong_order_is_refused_half_way():
+    board = taxel.device.Board(Registers.preset("5.2 kHz"))
+    slow = Registers.preset("2 kHz")
+    assert board.command(Command(4, slow.words[4]).to_bytes()) == "bad REG4 rule 3\n"
+    assert board.command(Command(3, slow.words[3]).to_bytes()) == "bad REG3 rule 2\n"
+    assert board.command(Command(2, slow.words[2]).to_bytes()) == "bad REG2 rule 1\n"
+    assert board.registers == Registers.preset("5.2 kHz")
+
+
+@pytest.mark.parametrize(
+    ("fields", "text"),
+    [
+        ({"line_read": 3.2}, r"line_read 3.20 us is longer than line_period 3.00 us \(rule 1\)"),
+        ({"step_read": 0.8}, r"step_read 0.80 us is longer than step_period 0.75 us \(rule 1\)"),
+        ({"col_change_period": 76}, r"4 x step_period 0.76 us is longer than line_read 3.00 us \(rule 2\)"),
+        ({"ramp": 165}, r"ramp 165 ticks is not shorter than step_read 0.55 us = 165 ticks \(rule 3\)"),
+        ({"ramp": 0}, r"ramp is 0: must be 1 or more \(rule 4\)"),
+        ({"lines": 65}, r"lines 65 does not fit: must be 1 to 64 \(rule 4\)"),
+        ({"lines": 0}, r"lines 0 does not fit: must be 1 to 64 \(rule 4\)"),
+        ({"noise_floor": 256}, r"noise_floor 256 does not fit: must be 0 to 255 \(rule 4\)"),
+        ({"line_period": 1e9}, r"line_period 1000000000.0 us does not fit its bits \(rule 4\)"),
+        ({"channels": 32}, "32 channels: the converter has 16 or 64"),
+        ({"array": taxel.Array(64, 8)}, r"64 lines: the array has 8 columns to drive \(rule 4\)"),
+    ],
+)
+def test_a_broken_rule_is_named_with_its_numbers(fields, text):
+    with pytest.raises(taxel.DeviceError, match=text):
+        Registers(**fields)
+
+
+def test_rules_5_and_6_only_warn():
+    (settling,) = Registers(step_read=0.6).warnings
+    assert settling.endswith("(rule 5)")
+    (floor,) = Registers(noise_floor=150).warnings
+    assert floor.endswith("(rule 6)")
+
+
+def test_the_manuals_names_are_aliases_in_its_own_units():
+    assert Registers(row_change_period=400, nrows=31) == Registers(line_period=4.0, lines=32)
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: Registers(speed=1), 'register "speed": there are random_lines, '),
+        (lambda: Registers(line_period=3.001), "line_period is 3.001 us: must be a whole multiple of 0.01 us"),
+        (lambda: Registers(line_period="slow"), "line_period is 'slow': must be a number"),
+        (lambda: Registers(line_period=float("nan")), "line_period is nan us"),
+        (lambda: Registers(ramp=1.5), "ramp is 1.5: must be a whole number"),
+        (lambda: Registers(ramp=-1), "ramp is -1: must be a whole number"),
+        (lambda: Registers(frame_sync="yes"), "frame_sync is 'yes': must be True or False"),
+        (lambda: Registers(array=3), "array is 3: must be a taxel.Array"),
+        (lambda: Registers.preset("fast"), 'preset "fast": there are "5.2 kHz", "2 kHz", "20.8 kHz"'),
+        (lambda: Registers.preset(5), "preset is 5: must be a text"),
+        (lambda: Registers().commands_to(None), "target is None: must be a taxel.Registers"),
+        (lambda: Command(8, 0), "register is 8: must be a whole number from 0 to 7"),
+        (lambda: Command(0, -1), "value is -1"),
+        (lambda: Command(0, 2**32), "value is 4294967296"),
+        (lambda: Command.from_bytes(7), "data is 7: must be bytes"),
+    ],
+)
+def test_nonsense_is_refused_in_one_line(call, text):
+    with pytest.raises(taxel.ProblemError) as error:
+        call()
+    assert text in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_bytes_that_are_no_command_are_refused_by_place():
+    with pytest.raises(taxel.FormatError, match="command of 4 bytes: must be 5"):
+        Command.from_bytes(b"abcd")
+    with pytest.raises(taxel.FormatError, match="command, byte 0 is 61: must be 80 or above"):
+        Command.from_bytes(b"abcde")
+
+
+def test_boards_with_other_channels_are_not_led_to():
+    with pytest.raises(taxel.DeviceError, match="the board has 16 channels, the registers are for 64"):
+        Registers().commands_to(Registers.preset("20.8 kHz"))
