@@ -9,6 +9,8 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use serde::Deserialize;
 use serde_json::{Value, json};
+use taxel_core::detect::Readout;
+use taxel_core::encode::Tare;
 use taxel_core::problem;
 use taxel_core::wire::Registers;
 use taxel_live::capture::{self, SendCounts, Sender};
@@ -80,7 +82,10 @@ impl Live {
 
 #[pymethods]
 impl Live {
-    /// Opens the socket, and the file where one is named (path, compression, overwrite); `options` is JSON.
+    /// Opens the socket, and the file where one is named (path, compression, overwrite).
+    ///
+    /// `options`, `readout` and `tare` are JSON; `tare_us` takes a fresh tare. `say` is called with each detection in the
+    /// thread that made it, `lines` writes it to the standard output as JSON.
     #[new]
     #[allow(clippy::too_many_arguments)]
     fn start(
@@ -90,6 +95,9 @@ impl Live {
         parts: ArrayParts,
         options: &str,
         record: Option<(PathBuf, String, bool)>,
+        readout: Option<&str>,
+        tare: Option<&str>,
+        tare_us: Option<i64>,
         say: Option<Py<PyAny>>,
         lines: bool,
     ) -> PyResult<Self> {
@@ -124,8 +132,18 @@ impl Live {
                 Python::attach(|py| say.call1(py, said_parts(said.clone())).map(drop)).map_err(std::io::Error::other)
             }));
         }
+        let readout = readout.map(Readout::from_json).transpose().map_err(core)?;
+        let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
+        let ear = match (readout, tare_us) {
+            (None, _) => Ear::Deaf,
+            (Some(readout), Some(us)) => Ear::Taring(us, Box::new(readout)),
+            (Some(readout), None) => {
+                let frame_us = options.registers.frame_us();
+                Ear::Reading(Box::new(readout.stream(&options.array, frame_us, tare.as_ref()).map_err(core)?))
+            }
+        };
         let address = address(host, port)?;
-        let pipeline = enter(py, |_| Pipeline::start(address, options, Ear::Deaf, sinks))?;
+        let pipeline = enter(py, |_| Pipeline::start(address, options, ear, sinks))?;
         Ok(Self { pipeline: RwLock::new(Some(pipeline)) })
     }
 
@@ -164,6 +182,11 @@ impl Live {
     /// The values that the taxels hold, ticks, by taxel index.
     fn picture<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u16>>> {
         Ok(array(py, self.with(py, |pipeline| Ok(pipeline.picture()))?))
+    }
+
+    /// The tare that was taken, as JSON, once it is complete.
+    fn tare(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        self.with(py, |pipeline| Ok(pipeline.tare().map(|tare| tare.to_json())))
     }
 
     /// Starts and stops that came since this was asked last: (t us, start).

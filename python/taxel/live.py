@@ -1,0 +1,368 @@
+"""From a board's datagrams to detections, while they come."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._arguments import flag, instance, number, parameters, shown, text, whole
+from taxel._arguments import path as checked_path
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.detect import Readout
+from taxel.detections import Detections
+from taxel.tare import Tare
+
+__all__ = ["PORT", "Live", "Said", "Summary", "heard", "send"]
+
+#: Where the board's datagrams go (reading: the thesis names no port).
+PORT = 5208
+
+#: How long an iteration waits at a time.
+_WAIT_S = 0.5
+
+
+class Said(NamedTuple):
+    """Say what was detected, and when: all times but the last in us of the board's clock.
+
+    Attributes
+    ----------
+    label : str
+    t : int, us
+        When the event was: the crossing less the encoder's latency and the trained delay.
+    known : int, us
+        When it could first be said: the end of the board's frame in which the potential crosses.
+    slope : float, mV/ms
+        How steeply the potential crossed its threshold, as a measure of how sure.
+    said : int, us
+        When it was said, by the host's clock less the estimated offset between the clocks.
+    said_ns : int, ns since 1970
+        The same by the host's clock.
+    """
+
+    label: str
+    t: int
+    known: int
+    slope: float
+    said: int
+    said_ns: int
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Say how a `Live` ended.
+
+    Attributes
+    ----------
+    counters : dict
+        As `Live.counters`; its sums are closed.
+    verdict : str
+        One line: nothing lost after arrival, or what was lost where.
+    path : Path or None
+        The recording.
+    """
+
+    counters: dict[str, Any]
+    verdict: str
+    path: Path | None
+
+    @property
+    def lost(self) -> int:
+        """How many datagrams were lost after they had arrived."""
+        capture = self.counters["capture"]
+        return int(capture["dropped_by_kernel"] + capture["dropped_by_queue"])
+
+
+class Live:
+    """Receive a board's datagrams, record them, read them out, while they come.
+
+    A context manager, and an iterator of detections that ends when `stop` was called. The work is done in threads of
+    its own: receive; decode and record; encode and read out. What is too slow loses data where it is counted.
+
+    Parameters
+    ----------
+    port : int
+        UDP; 0 finds a free one, see `address`.
+    host : str
+        The address of this machine on which to listen: every one of its addresses by default.
+    array : Array
+        The sensor; the thesis' 64 x 64 by default.
+    registers : str
+        What the board's registers hold: a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz".
+    differences : bool
+        Whether the board sends differences for intensities (the panel's "delta intensity").
+    readout : Readout, optional
+        What listens. Left out, nothing is detected.
+    tare : Tare or float (s), optional
+        For a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event on, which
+        ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
+    record : path, optional
+        A new file: `.mcap` keeps all that is known, `.lsa` the manual's raw bytes.
+    compression : {"none", "lz4", "zstd"}
+        Of `.mcap`.
+    overwrite : bool
+        Whether an existing file may be replaced.
+    guard_frames : float, 0 or more
+        In silence the readout's time moves on by the host's clock, so many frames behind it.
+    say : callable, optional
+        Called with each `Said` in the thread that made it; what it raises ends the way and is raised by `next`.
+    lines : bool
+        Write each detection to the standard output as one line of JSON, from the thread that made it.
+    kernel_buffer_bytes, queue_bytes, readout_events : int, optional
+        How much may wait in the kernel, before the decoder and before the readout.
+    gro : bool, optional
+        Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`). It then counts its drops in trains.
+
+    Raises
+    ------
+    OSError : the port is taken, the file cannot be created
+    FileExistsError : the file is there already and `overwrite` is false
+    ProblemError : arguments that make no sense; a readout that needs a tare and has none
+    DeviceError : registers that break a rule
+
+    Notes
+    -----
+    `t` and `known` of a detection are the same here and from the recording; `said` is when it was said in fact. The
+    clocks' offset and drift are estimated from arrivals: nothing comes early, so the lower envelope of arrival less
+    board time is the offset.
+
+    Examples
+    --------
+    >>> with Live(0, host="127.0.0.1") as live:
+    ...     sent = send([bytes.fromhex("c000050304")], *live.address, seconds=0.01)
+    >>> live.stop().counters["wire"]["changes"] == sent["datagrams"]
+    True
+    >>> live
+    Live(ended; nothing lost after arrival (version 1 of the wire cannot show what was lost before it))
+    """
+
+    def __init__(
+        self,
+        port: int = PORT,
+        *,
+        host: str = "0.0.0.0",
+        array: Array | None = None,
+        registers: str = "5.2 kHz",
+        differences: bool = False,
+        readout: Readout | None = None,
+        tare: Tare | float | None = None,
+        record: str | os.PathLike[str] | None = None,
+        compression: str = "none",
+        overwrite: bool = False,
+        guard_frames: float = 5.0,
+        say: Callable[[Said], object] | None = None,
+        lines: bool = False,
+        kernel_buffer_bytes: int | None = None,
+        queue_bytes: int | None = None,
+        readout_events: int | None = None,
+        gro: bool | None = None,
+    ) -> None:
+        self.array = Array.thesis() if array is None else instance("array", array, Array)
+        sizes = {
+            "kernel_buffer_bytes": kernel_buffer_bytes,
+            "queue_bytes": queue_bytes,
+            "readout_events": readout_events,
+        }
+        options = {
+            "registers": text("registers", registers),
+            "differences": flag("differences", differences),
+            "guard_frames": number("guard_frames", guard_frames),
+            "gro": None if gro is None else flag("gro", gro),
+            **{name: None if size is None else whole(name, size, 0, 2**31 - 1) for name, size in sizes.items()},
+        }
+        if say is not None and not callable(say):
+            raise ProblemError(f"say is {shown(say)}: must be a function of a Said")
+        if readout is None and tare is not None:
+            raise ProblemError("tare without a readout: nothing would use it")
+        recording = None
+        if record is not None:
+            recording = (checked_path("record", record), text("compression", compression), flag("overwrite", overwrite))
+        self._summary: Summary | None = None
+        self._core = _core.Live(
+            text("host", host),
+            whole("port", port, 0, 65_535),
+            self.array._parts(),
+            parameters(options),
+            recording,
+            None if readout is None else instance("readout", readout, Readout).to_json(),
+            tare.to_json() if isinstance(tare, Tare) else None,
+            None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
+            None if say is None else lambda *said: say(Said(*said)),
+            flag("lines", lines),
+        )
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Host and port that it listens on."""
+        return self._core.address()
+
+    def next(self, timeout: float = 1.0) -> Said | None:
+        """Return the next detection, or None after `timeout` s without one, or at once after the end.
+
+        Raises
+        ------
+        OSError : the disk is full, the socket failed
+        ProblemError : the encoder cannot use what comes
+        """
+        said = self._core.next(number("timeout", timeout))
+        return None if said is None else Said(*said)
+
+    def __iter__(self) -> Iterator[Said]:
+        """Yield detections as they come, until `stop` is called."""
+        while not self._core.is_over():
+            said = self.next(_WAIT_S)
+            if said is not None:
+                yield said
+
+    @property
+    def counters(self) -> dict[str, Any]:
+        """What came, what became of it and what was lost where, up to now.
+
+        Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
+        (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `events`, `read_out`, `events_dropped`,
+        `late`, `detections`, `detections_dropped`, `decode_latency` and `said_latency` (count, p50_us, p99_us, max_us),
+        `offset` (board_us, host_ns, drift_ppm, or None), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
+
+        Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
+        `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +
+        events_dropped.
+        """
+        if self._summary is not None:
+            return self._summary.counters
+        counters: dict[str, Any] = json.loads(self._core.counters())
+        return counters
+
+    @property
+    def picture(self) -> NDArray[np.uint16]:
+        """What the taxels hold, ticks, shape (rows, columns), ten times a second; 0 until a taxel was heard of."""
+        return self._core.picture().reshape(self.array.shape)
+
+    @property
+    def tare(self) -> Tare | None:
+        """The fresh tare, once it is complete."""
+        taken = self._core.tare()
+        return None if taken is None else Tare.from_json(taken)
+
+    def take_markers(self) -> list[tuple[int, bool]]:
+        """Return the markers that came since this was asked last: (t us, start)."""
+        return self._core.take_markers()
+
+    def note(self, said: str) -> None:
+        """Write something down in the recording, with the time of now.
+
+        Raises
+        ------
+        ProblemError : nothing is recorded, or to a `.lsa`, which holds bytes only
+        """
+        self._core.note(text("note", said))
+
+    def stop(self) -> Summary:
+        """Work through what came, close the file, and say what was lost; once ended, say it again.
+
+        Raises
+        ------
+        OSError : the disk is full; what was written before stays readable
+        """
+        said = self._core.stop()
+        if said is not None:
+            values = json.loads(said)
+            path = None if values["path"] is None else Path(values["path"])
+            self._summary = Summary(values["counters"], values["verdict"], path)
+        if self._summary is None:
+            raise ProblemError("live: ended by an error, which was raised then")
+        return self._summary
+
+    def __enter__(self) -> Live:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.stop()
+        elif self._summary is None:
+            # The first error is the one to hear of.
+            try:
+                self.stop()
+            except (OSError, _core.Error):
+                pass
+
+    def __repr__(self) -> str:
+        if self._summary is not None:
+            return f"Live(ended; {self._summary.verdict})"
+        host, port = self.address
+        return f"Live({host}:{port}, {self.array.rows} x {self.array.columns} taxels)"
+
+
+def _stretch_us(seconds: float) -> int:
+    stretch = number("tare", seconds)
+    if not 1e-6 <= stretch <= 3600:
+        raise ProblemError(f"tare is {stretch} s: must lie between 1 us and an hour, or be a taxel.Tare")
+    return round(stretch * 1e6)
+
+
+def heard(said: Sequence[Said]) -> Detections:
+    """Return what was said live as `Detections`."""
+    return Detections(
+        [s.label for s in said],
+        [s.t for s in said],
+        [s.known for s in said],
+        [s.slope for s in said],
+        [s.said for s in said],
+    )
+
+
+def send(
+    datagrams: Sequence[bytes],
+    host: str = "127.0.0.1",
+    port: int = PORT,
+    *,
+    each: int = 1,
+    period_us: float = 192.0,
+    seconds: float = 1.0,
+    segment: bool = True,
+) -> dict[str, Any]:
+    """Send datagrams over and over, `each` of them every `period_us`, for `seconds`; return what was sent.
+
+    What a board does, without one: to try a receiver, or to measure it.
+
+    Parameters
+    ----------
+    datagrams : sequence of bytes, one or more
+    each : int, 1 or more
+        How many at a time.
+    period_us : float, us
+        From one time to the next; 0 for as fast as it goes.
+    seconds : float, s
+    segment : bool
+        Hand trains of datagrams to the kernel in one call where it can cut them (`UDP_SEGMENT`).
+
+    Returns
+    -------
+    dict : messages (send calls), datagrams, bytes, segmenting
+
+    Raises
+    ------
+    OSError : the system refuses to send
+    """
+    counts: dict[str, Any] = json.loads(
+        _core.send(
+            text("host", host),
+            whole("port", port, 1, 65_535),
+            [bytes(d) for d in datagrams],
+            whole("each", each, 1, 2**31 - 1),
+            number("period_us", period_us),
+            number("seconds", seconds),
+            flag("segment", segment),
+        )
+    )
+    return counts
