@@ -169,6 +169,7 @@ def emulate(
     begun: Callable[[str | None], object],
     watch: Callable[[str], object],
 ) -> str: ...
+
 # wire and board: columns as (t, x, y, ticks, p, present), registers as JSON, counts in the order of `wire.Counts`
 
 WIRE_STAMP_US: int
@@ -208,6 +209,7 @@ def registers_commands(source: str, target: str, array: tuple[Any, ...]) -> list
 
 # live: options, readout, tare, counters and summary as JSON; said as label, t, known, slope, said us, said ns
 
+@final
 class Live:
     def __new__(
         cls,

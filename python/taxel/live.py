@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -21,11 +22,15 @@ from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.tare import Tare
+from taxel.wire import Registers
 
 __all__ = ["PORT", "Live", "Said", "Summary", "heard", "send"]
 
 #: Where the board's datagrams go (reading: the thesis names no port).
 PORT = 5208
+
+#: The thesis' array (chapter 4).
+_THESIS = Array(64, 64, pitch_mm=2.67, name="thesis 64x64")
 
 #: How long an iteration waits at a time.
 _WAIT_S = 0.5
@@ -95,9 +100,9 @@ class Live:
     host : str
         The address of this machine on which to listen: every one of its addresses by default.
     array : Array
-        The sensor; the thesis' 64 x 64 by default.
-    registers : str
-        What the board's registers hold: a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz".
+        The sensor; by default the readout's own, or the thesis' 64 x 64.
+    registers : str or taxel.wire.Registers
+        What the board's registers hold: themselves, or a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz".
     differences : bool
         Whether the board sends differences for intensities (the panel's "delta intensity").
     readout : Readout, optional
@@ -151,7 +156,7 @@ class Live:
         *,
         host: str = "0.0.0.0",
         array: Array | None = None,
-        registers: str = "5.2 kHz",
+        registers: str | Registers = "5.2 kHz",
         differences: bool = False,
         readout: Readout | None = None,
         tare: Tare | float | None = None,
@@ -166,14 +171,18 @@ class Live:
         readout_events: int | None = None,
         gro: bool | None = None,
     ) -> None:
-        self.array = Array.thesis() if array is None else instance("array", array, Array)
+        if readout is not None:
+            instance("readout", readout, Readout)
+        if array is None:
+            array = readout.array if readout is not None and readout.array is not None else _THESIS
+        self.array = instance("array", array, Array)
         sizes = {
             "kernel_buffer_bytes": kernel_buffer_bytes,
             "queue_bytes": queue_bytes,
             "readout_events": readout_events,
         }
         options = {
-            "registers": text("registers", registers),
+            "registers": _held(registers),
             "differences": flag("differences", differences),
             "guard_frames": number("guard_frames", guard_frames),
             "gro": None if gro is None else flag("gro", gro),
@@ -193,7 +202,7 @@ class Live:
             self.array._parts(),
             parameters(options),
             recording,
-            None if readout is None else instance("readout", readout, Readout).to_json(),
+            None if readout is None else readout.to_json(),
             tare.to_json() if isinstance(tare, Tare) else None,
             None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
             None if say is None else lambda *said: say(Said(*said)),
@@ -291,16 +300,18 @@ class Live:
             self.stop()
         elif self._summary is None:
             # The first error is the one to hear of.
-            try:
+            with contextlib.suppress(OSError, _core.Error):
                 self.stop()
-            except (OSError, _core.Error):
-                pass
 
     def __repr__(self) -> str:
         if self._summary is not None:
             return f"Live(ended; {self._summary.verdict})"
         host, port = self.address
         return f"Live({host}:{port}, {self.array.rows} x {self.array.columns} taxels)"
+
+
+def _held(registers: str | Registers) -> object:
+    return json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
 
 
 def _stretch_us(seconds: float) -> int:
