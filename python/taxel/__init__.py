@@ -2,6 +2,7 @@
 
 from taxel import detect, device, encode, metrics, wire
 from taxel._convert import convert
+from taxel import detect, device, encode, live, metrics, wire
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel._health import Health, health
 from taxel.array import Array
@@ -41,6 +42,7 @@ __all__ = [
     "device",
     "encode",
     "health",
+    "live",
     "metrics",
     "open",
     "wire",
