@@ -1,0 +1,53 @@
+"""What the commands that listen to a board have in common."""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from taxel._core import ProblemError
+from taxel.array import Array
+
+__all__ = ["ArrayOption", "HostOption", "PortOption", "PresetOption", "counters_table", "geometry"]
+
+PortOption = Annotated[int, typer.Option(help="The UDP port that the board sends to.")]
+HostOption = Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: every one.")]
+ArrayOption = Annotated[str, typer.Option(help="Rows x columns of the sensor, as 64x64.")]
+PresetOption = Annotated[str, typer.Option(help='The board\'s registers: "5.2 kHz", "2 kHz", "20.8 kHz".')]
+
+
+def geometry(said: str) -> Array:
+    """Return the array of `said` rows x columns, at the thesis' pitch."""
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", said)
+    if match is None:
+        raise ProblemError(f"array is {said!r}: must be rows x columns, as 64x64")
+    return Array(int(match[1]), int(match[2]), pitch_mm=2.67, name=f"thesis {said}" if said == "64x64" else said)
+
+
+def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
+    """Return rates since `before`, totals and losses, as rows that do not move about."""
+    passed = max(now["seconds"] - before["seconds"], 1e-9)
+
+    def rate(total: float, earlier: float) -> str:
+        return f"{(total - earlier) / passed:,.0f}/s"
+
+    capture, wire, earlier = now["capture"], now["wire"], before["capture"]
+    damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
+    board = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
+    drift = "" if now["offset"] is None else f", drift {now['offset']['drift_ppm']:+.1f} ppm"
+    delay = now["decode_latency"]
+    table = Table.grid(padding=(0, 2))
+    for name, total, per_second in (
+        ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),
+        ("bytes", f"{capture['bytes']:,}", rate(capture["bytes"], earlier["bytes"])),
+        ("events", f"{now['events']:,}", rate(now["events"], before["events"])),
+        ("lost", f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue", ""),
+        ("damaged", f"{damaged:,} bytes and words, {wire['back']:,} steps back in time", ""),
+        ("arrival to decoded", f"p50 {delay['p50_us']:,.0f} us, p99 {delay['p99_us']:,.0f} us", ""),
+        ("board's clock", f"{board}{drift}", ""),
+    ):
+        table.add_row(name, total, per_second)
+    return table

@@ -1,0 +1,129 @@
+"""``taxel live``: detections while they come."""
+
+from __future__ import annotations
+
+from collections import deque
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console, Group
+from rich.live import Live as Display
+from rich.text import Text
+
+from taxel._core import ProblemError
+from taxel.cli import app
+from taxel.cli.board import HostOption, PortOption, PresetOption, counters_table, geometry
+from taxel.detect import Readout
+from taxel.live import Live, Said
+from taxel.tare import Tare
+
+__all__ = ["live"]
+
+#: How often the display is drawn anew, and the end looked for, s.
+_REDRAW = 0.1
+
+#: How many detections the display keeps.
+_SHOWN = 12
+
+
+@app.command()
+def live(
+    readout: Annotated[Path, typer.Option(help="A trained readout (JSON), as taxel train writes it.")],
+    port: PortOption = 5208,
+    host: HostOption = "0.0.0.0",
+    array: Annotated[str | None, typer.Option(help="Rows x columns; the readout's own where left out.")] = None,
+    preset: PresetOption = "5.2 kHz",
+    tare: Annotated[
+        str | None, typer.Option(help="Seconds at rest for a fresh one, or the file of an earlier one (JSON).")
+    ] = None,
+    save_tare: Annotated[Path | None, typer.Option(help="Keep the fresh tare in a new file (JSON).")] = None,
+    record: Annotated[Path | None, typer.Option(help="Keep everything in a new file (.mcap or .lsa).")] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
+    guard_frames: Annotated[float, typer.Option(min=0.0, help="In silence, frames behind the host's clock.")] = 5.0,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a line of JSON a detection, and nothing else.")
+    ] = False,
+) -> None:
+    """Listen to a board and say what a readout detects, while it happens.
+
+    Shows rates, losses and latency. With --json each detection is one line, written by the thread that made it: label;
+    t, known and said in us of the board's clock; slope in mV/ms; said_ns by the host's. Exit code 3 where something was
+    lost after it had arrived.
+
+    Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
+    """
+    heard = Readout.load(readout)
+    rest = _tare(tare)
+    if save_tare is not None and not isinstance(rest, float):
+        raise ProblemError("save_tare without a fresh tare: give --tare SECONDS")
+    if save_tare is not None and save_tare.exists():
+        raise FileExistsError(17, "File exists", str(save_tare))
+    console = Console(stderr=True, quiet=as_json)
+    shown: deque[Said] = deque(maxlen=_SHOWN)
+    with Live(
+        port,
+        host=host,
+        array=None if array is None else geometry(array),
+        registers=preset,
+        readout=heard,
+        tare=rest,
+        record=record,
+        guard_frames=guard_frames,
+        lines=as_json,
+    ) as pipeline:
+        console.print(f"listening on UDP {pipeline.address[0]}:{pipeline.address[1]}; Ctrl-C ends")
+        with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
+            before = pipeline.counters
+            try:
+                while seconds is None or before["seconds"] < seconds:
+                    said = pipeline.next(_REDRAW)
+                    while said is not None:
+                        shown.append(said)
+                        said = pipeline.next(0.0)
+                    now = pipeline.counters
+                    if now["seconds"] - before["seconds"] >= _REDRAW:
+                        display.update(Group(counters_table(before, now), _state(now, shown)))
+                        before = now
+            except (KeyboardInterrupt, BrokenPipeError):
+                # Whoever reads our lines has enough: as good an end as Ctrl-C.
+                pass
+        taken = pipeline.tare
+        summary = pipeline.stop()
+    if save_tare is not None and taken is not None:
+        taken.save(save_tare)
+        console.print(f"tare written to {save_tare}")
+    if not as_json:
+        counters = summary.counters
+        delay = counters["said_latency"]
+        typer.echo(f"{counters['detections']} detections, {counters['events']} events in {counters['seconds']:.1f} s")
+        typer.echo(f"from known to said: p50 {delay['p50_us']:.0f} us, p99 {delay['p99_us']:.0f} us")
+        if counters["late"]:
+            typer.echo(f"{counters['late']} events came later than {guard_frames:g} frames after silence was believed")
+        if summary.path is not None:
+            typer.echo(f"recorded to {summary.path}")
+        typer.echo(summary.verdict)
+    if save_tare is not None and taken is None:
+        raise ProblemError(f"tare: not complete after {summary.counters['seconds']:.1f} s; {save_tare} was not written")
+    if summary.lost or summary.counters["events_dropped"]:
+        raise typer.Exit(3)
+
+
+def _tare(said: str | None) -> Tare | float | None:
+    if said is None:
+        return None
+    try:
+        return float(said)
+    except ValueError:
+        return Tare.load(said)
+
+
+def _state(now: dict[str, object], shown: deque[Said]) -> Text:
+    """Return the last detections, the newest last, each with how long after `known` it was said."""
+    if now["taring"]:
+        return Text("taking a tare: leave the sensor at rest")
+    lines = [
+        f"{s.t / 1e6:10.4f} s  {s.label:<16} said {(s.said - s.known) / 1e3:.2f} ms after it was known" for s in shown
+    ]
+    dropped = f"\n{now['events_dropped']} events dropped before the readout" if now["events_dropped"] else ""
+    return Text("\n".join(lines) + dropped)

@@ -1,0 +1,155 @@
+"""``taxel record``: a board's datagrams into a file."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.live import Live as Display
+
+from taxel import _core
+from taxel._core import ProblemError
+from taxel.cli import app
+from taxel.cli.board import ArrayOption, HostOption, PortOption, PresetOption, counters_table, geometry
+from taxel.live import Live, Summary
+
+__all__ = ["record"]
+
+#: How often the display is drawn anew, and the end looked for, s.
+_REDRAW = 0.1
+
+
+@app.command()
+def record(
+    file: Annotated[Path, typer.Argument(help="A new file: .mcap keeps all that is known, .lsa raw bytes.")],
+    port: PortOption = 5208,
+    host: HostOption = "0.0.0.0",
+    array: ArrayOption = "64x64",
+    preset: PresetOption = "5.2 kHz",
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
+    markers: Annotated[bool, typer.Option("--markers", help="End where the board marks a stop.")] = False,
+    compression: Annotated[str, typer.Option(help="Of .mcap: none, lz4 or zstd.")] = "none",
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
+    differences: Annotated[bool, typer.Option("--differences", help="The board sends intensity differences.")] = False,
+    length: Annotated[
+        float | None, typer.Option(min=0.0, help="Automatic mode: record again and again, so long each, s.")
+    ] = None,
+    countdown: Annotated[int, typer.Option(min=0, help="Automatic mode: time before each recording, s.")] = 3,
+    start_index: Annotated[int, typer.Option(min=0, help="Automatic mode: appended to the first name.")] = 1,
+    trials: Annotated[int | None, typer.Option(min=1, help="Automatic mode: how many; else until Ctrl-C.")] = None,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a line of JSON a recording, and nothing else.")
+    ] = False,
+) -> None:
+    """Record what a board sends by UDP, and say what was lost.
+
+    Ends with Ctrl-C, after --seconds, or with the board's stop marker (--markers). With --length it records one trial
+    after the other, the index appended to the name, a countdown with beeps before each. Exit code 3 where something was
+    lost after it had arrived.
+
+    Example: taxel record --port 5208 walk.mcap
+    """
+    if length is None and trials is not None:
+        raise ProblemError("trials without a length: automatic mode needs --length, how long each trial is")
+    if length is not None and seconds is not None:
+        raise ProblemError("seconds and length: give --length for automatic mode, --seconds for one recording")
+    live: dict[str, Any] = {
+        "port": port,
+        "host": host,
+        "array": geometry(array),
+        "registers": preset,
+        "compression": compression,
+        "overwrite": overwrite,
+        "differences": differences,
+    }
+    console = Console(stderr=True, quiet=as_json)
+    if length is None:
+        summary, _ = _one(file, live, seconds, markers, console)
+        _say(summary, as_json)
+        lost = summary.lost
+    else:
+        lost = _automatic(file, live, length, countdown, start_index, trials, markers, console, as_json)
+    if lost:
+        raise typer.Exit(3)
+
+
+def _automatic(
+    file: Path,
+    live: dict[str, Any],
+    length: float,
+    countdown: int,
+    index: int,
+    trials: int | None,
+    markers: bool,
+    console: Console,
+    as_json: bool,
+) -> int:
+    """Record trial after trial until Ctrl-C, which ends the one that runs well; return what was lost in all."""
+    lost = done = 0
+    while trials is None or done < trials:
+        name = Path(_core.numbered_path(file, index + done))
+        if name.exists() and not live["overwrite"]:
+            raise FileExistsError(17, "File exists", str(name))
+        try:
+            _count_down(name, countdown, console)
+        except KeyboardInterrupt:
+            break
+        summary, stopped = _one(name, live, length, markers, console)
+        _say(summary, as_json)
+        lost, done = lost + summary.lost, done + 1
+        if stopped:
+            break
+    return lost
+
+
+def _count_down(name: Path, seconds: int, console: Console) -> None:
+    for left in range(seconds, 0, -1):
+        console.bell()
+        console.print(f"{name}: in {left} s")
+        time.sleep(1.0)
+    # The manual's last beep is a higher one; a terminal has one bell, so it rings twice.
+    console.bell()
+    console.bell()
+
+
+def _one(
+    file: Path, options: dict[str, Any], seconds: float | None, markers: bool, console: Console
+) -> tuple[Summary, bool]:
+    """Record one file until its time is over, the board marks a stop, or Ctrl-C; return whether it was that."""
+    stopped = False
+    with Live(record=file, **options) as live:
+        console.print(f"listening on UDP {live.address[0]}:{live.address[1]}, recording to {file}; Ctrl-C ends")
+        begun = time.monotonic()
+        with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
+            before, over = live.counters, False
+            try:
+                while not over:
+                    live.next(_REDRAW)
+                    now = live.counters
+                    for t, start in live.take_markers():
+                        console.print(f"{t / 1e6:.4f} s: {'start' if start else 'stop'} marked")
+                        over |= markers and not start
+                    display.update(counters_table(before, now))
+                    before = now
+                    over |= seconds is not None and time.monotonic() - begun >= seconds
+            except KeyboardInterrupt:
+                stopped = True
+        return live.stop(), stopped
+
+
+def _say(summary: Summary, as_json: bool) -> None:
+    if as_json:
+        typer.echo(json.dumps(asdict(summary) | {"path": str(summary.path)}))
+        return
+    counters = summary.counters
+    wire = counters["wire"]
+    typer.echo(
+        f"{summary.path}: {counters['seconds']:.1f} s, {counters['decoded']} datagrams, {wire['bytes']} bytes, "
+        f"{counters['events']} events, {wire['markers']} markers"
+    )
+    typer.echo(summary.verdict)
