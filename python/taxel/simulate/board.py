@@ -49,6 +49,34 @@ class EmulatorReport:
     late_us: Mapping[str, float]
     """How long after its end a frame was sent: p50, p99, max."""
 
+    @property
+    def wanted_hz(self) -> float:
+        """Frames a second by the board's clock."""
+        return self.frames / self.board_seconds if self.board_seconds else 0.0
+
+    @property
+    def reached_hz(self) -> float:
+        """Frames a second by the host's clock."""
+        return self.frames / self.seconds if self.seconds else 0.0
+
+    @property
+    def held(self) -> bool:
+        """Whether the machine held the board's rate, to within half a per cent of the time."""
+        return self.seconds <= 1.005 * self.board_seconds + 0.02
+
+    @property
+    def verdict(self) -> str:
+        """One line: whether the rate was held, or by how much not, and how late frames were."""
+        late = f"late by {self.late_us['p50']:.0f} us (median), {self.late_us['p99']:.0f} us (99 %), "
+        late += f"{self.late_us['max'] / 1000.0:.1f} ms at most; {self.late_frames} of {self.frames} by a frame or more"
+        if self.held:
+            return f"{self.wanted_hz:.0f} frames/s held; frames were {late}"
+        short = 100.0 * (1.0 - self.reached_hz / self.wanted_hz)
+        return (
+            f"this machine cannot hold {self.wanted_hz:.0f} frames/s: it reached {self.reached_hz:.0f}, "
+            f"{short:.1f} % less; frames were {late}"
+        )
+
     @classmethod
     def _from_json(cls, said: str) -> EmulatorReport:
         report = json.loads(said)

@@ -1,0 +1,1 @@
+"""``taxel demo``: the main job, shown."""

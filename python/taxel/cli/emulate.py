@@ -1,0 +1,80 @@
+"""``taxel emulate``: the demo's board alone."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+from taxel._core import ProblemError
+from taxel.cli import app
+from taxel.demo.script import TRAINING_SEED, script
+from taxel.simulate import EmulatorReport, truth
+from taxel.simulate import emulate as run
+
+__all__ = ["emulate"]
+
+
+@app.command()
+def emulate(
+    port: Annotated[int, typer.Option(help="Where the datagrams go.")] = 5208,
+    host: Annotated[str, typer.Option(help="To which machine, as an IP address.")] = "127.0.0.1",
+    scenes: Annotated[int, typer.Option(min=0, help="How many scenes.")] = 10,
+    seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Draws scenes, taxels, noise.")] = None,
+    tare: Annotated[float, typer.Option(help="How long the noise floor is 0 before the start marker, ms.")] = 50.0,
+    preset: Annotated[str, typer.Option(help='The registers: "5.2 kHz", "2 kHz", "20.8 kHz".')] = "5.2 kHz",
+    control: Annotated[int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")] = None,
+    rest: Annotated[bool, typer.Option("--rest", help="Nobody catches the ball.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False,
+) -> None:
+    """Play scenes on an emulated board of 64 x 64 taxels that sends its events by UDP, in real time.
+
+    A ball is dropped on foam, caught in flight, pressed by hand and lifted. The board arms after its first frame, is
+    tared with a noise floor of 0, then takes the preset's floor and marks the start.
+
+    Example: taxel emulate --port 5208 --scenes 5 --seed 1
+    """
+    if not 1 <= port <= 65_535:
+        raise ProblemError(f"port is {port}: must be 1 to 65535")
+    seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
+    acts = script(seed, scenes, tare_ms=tare, left_to_rest=rest)
+    # Drawn anew from the seed: what is played can be told before it is.
+    contacts, force = truth(acts, preset=preset)
+    console = Console(stderr=True, quiet=as_json)
+    console.print(f"seed {seed}: {scenes} scenes, {len(contacts)} touches, to {host}:{port} at {preset}")
+    bar = Progress(
+        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}"), TimeRemainingColumn(),
+        console=console, transient=True, disable=as_json,
+    )  # fmt: skip
+    with bar:
+        task = bar.add_task("playing", total=len(force), said="")
+
+        def begun(address: str | None) -> None:
+            if address is not None:
+                console.print(f"commands are taken at {address}")
+
+        def watch(report: EmulatorReport) -> None:
+            late = report.late_us["p99"]
+            bar.update(task, completed=report.frames, said=f"{report.changes} events, frames late p99 {late:.0f} us")
+
+        listens = None if control is None else f"127.0.0.1:{control}"
+        report = run(
+            f"[{host}]:{port}" if ":" in host else f"{host}:{port}",
+            acts,
+            seed=seed,
+            preset=preset,
+            tare_ms=tare,
+            control=listens,
+            begun=begun,
+            watch=watch,
+        )
+    if as_json:
+        typer.echo(json.dumps({"seed": seed, "scenes": scenes, "preset": preset, "held": report.held, **asdict(report)}))
+    else:
+        typer.echo(f"{report.changes} events in {report.datagrams} datagrams, {report.bytes} bytes")
+        typer.echo(report.verdict)

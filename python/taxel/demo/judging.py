@@ -1,0 +1,152 @@
+"""What was said against what really happened, by class of touch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.detect import Spread, score
+from taxel.detections import Detections
+from taxel.simulate import Contact
+from taxel.spikes import SpikeTrains
+
+__all__ = ["CLASSES", "GOALS", "LABELS", "Judged", "Row", "judge", "plain_rule"]
+
+LABELS = ("contact", "lift")
+
+#: Impacts come 30 ms apart: a wider window would pair a miss with its neighbour.
+_IMPACT_MS, _PRESS_MS = 10.0, 50.0
+
+#: Classes of touch, in the order of the report's rows; impacts by speed, presses by peak force.
+CLASSES: tuple[tuple[str, Callable[[Contact], bool]], ...] = (
+    ("first impact", lambda c: c.kind == "first"),
+    ("bounce, 0.4 m/s and more", lambda c: c.kind == "bounce" and c.speed_m_s >= 0.4),
+    ("bounce, 0.15 to 0.4 m/s", lambda c: c.kind == "bounce" and 0.15 <= c.speed_m_s < 0.4),
+    ("bounce below 0.15 m/s", lambda c: c.kind == "bounce" and c.speed_m_s < 0.15),
+    ("pressed by hand, 1 N and more", lambda c: c.kind == "hand" and c.peak_n >= 1.0),
+    ("pressed by hand, 0.4 to 1 N", lambda c: c.kind == "hand" and 0.4 <= c.peak_n < 1.0),
+    ("pressed by hand, below 0.4 N", lambda c: c.kind == "hand" and c.peak_n < 0.4),
+    ("come to rest, then lifted", lambda c: c.kind == "rest"),
+    ("footfall", lambda c: c.kind == "pictures"),
+)
+
+#: Within how many ms of a first impact and of its lift-off `known` should lie, in 95 of 100.
+GOALS = {"contact": 1.0, "lift": 1.5}
+
+
+class Row(NamedTuple):
+    """How the touches of one class were found, by one label."""
+
+    name: str
+    label: str
+    touches: int
+    errors_ms: NDArray[np.float64]
+    """Said minus true, of those that were found."""
+    delays_ms: NDArray[np.float64]
+    """`known` minus true, likewise."""
+    places: NDArray[np.int64]
+    """Which touches were found, and by which detections: shape (found, 2)."""
+
+    @property
+    def found(self) -> int:
+        """How many were found."""
+        return len(self.errors_ms)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return counts and spreads as plain values; what is not known is None."""
+        known = self.delays_ms
+        return {
+            "touches": self.touches,
+            "found": self.found,
+            "error_ms": _plain(Spread.of(self.errors_ms)._asdict()),
+            "known_ms": _plain(
+                {f"p{q}": float(np.percentile(known, q)) if len(known) else float("nan") for q in (5, 50, 95)}
+            ),
+        }
+
+
+class Judged(NamedTuple):
+    """What was said, by class of touch and label; and what was said of nothing."""
+
+    rows: list[Row]
+    false: dict[str, NDArray[np.int64]]
+    """By label: when something was said that belongs to no touch, us."""
+
+    def row(self, name: str, label: str) -> Row:
+        """Return one row; its name may be cut short."""
+        return next(row for row in self.rows if row.label == label and row.name.startswith(name))
+
+    def within_goal(self, label: str) -> float:
+        """Return the share of all first impacts of which `known` lay within the goal."""
+        row = self.row("first", label)
+        return float((np.abs(row.delays_ms) <= GOALS[label]).sum() / row.touches) if row.touches else float("nan")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain values."""
+        table: dict[str, Any] = {}
+        for row in self.rows:
+            if row.touches:
+                table.setdefault(row.name, {})[row.label] = row.to_dict()
+        goals = _plain({label: self.within_goal(label) for label in LABELS})
+        return {
+            "classes": table,
+            "first_within_goal": {label: {"goal_ms": GOALS[label], "share": goals[label]} for label in LABELS},
+            "false": {label: len(times) for label, times in self.false.items()},
+        }
+
+
+def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
+    """Match detections with touches in order: impacts within 10 ms, presses and all others within 50.
+
+    Parameters
+    ----------
+    found : Detections
+        With the labels "contact" (force leaves zero) and "lift" (returns there).
+    contacts : sequence of Contact
+
+    Returns
+    -------
+    Judged
+    """
+    windows = [_IMPACT_MS if c.kind in ("first", "bounce") else _PRESS_MS for c in contacts]
+    rows, false = [], {}
+    for label, begin in (("contact", True), ("lift", False)):
+        true = np.array([c.start_us if begin else c.stop_us for c in contacts], np.float64)
+        mine = found[label]
+        # Scored on whole us; errors are taken from the truth itself.
+        result = score(mine, {label: np.rint(true).astype(np.int64)}, {label: windows})
+        said, touch = result.pairs[:, 0], result.pairs[:, 1]
+        errors, delays = (mine.t[said] - true[touch]) / 1000.0, (mine.known[said] - true[touch]) / 1000.0
+        for name, belongs in CLASSES:
+            of_class = np.array([belongs(c) for c in contacts], bool)
+            chosen = of_class[touch] if len(touch) else np.zeros(0, bool)
+            places = np.column_stack([touch[chosen], said[chosen]])
+            rows.append(Row(name, label, int(of_class.sum()), errors[chosen], delays[chosen], places))
+        false[label] = mine.t[result.false_detections]
+    return Judged(rows, false)
+
+
+def plain_rule(area: SpikeTrains, frame_us: float) -> Detections:
+    """Say contact when two taxels are loaded, lift when fewer are: no neuron.
+
+    Parameters
+    ----------
+    area : SpikeTrains
+        Of `ContactArea` with its usual levels: train 0 rises to 2, train 5 falls below.
+    frame_us : float
+        The board's frame, at whose end it is known.
+    """
+    times = np.concatenate([area[0], area[5]])
+    label = np.repeat(LABELS, [len(area[0]), len(area[5])])
+    order = np.argsort(times, kind="stable")
+    t = np.rint(times[order] * 1000.0).astype(np.int64)
+    # A stamp is its frame's start, cut down to whole 100 us.
+    frame = np.ceil(t / frame_us)
+    return Detections(label[order], t, np.ceil((frame + 1) * frame_us).astype(np.int64))
+
+
+def _plain(values: dict[str, float]) -> dict[str, float | None]:
+    return {name: None if np.isnan(value) else float(value) for name, value in values.items()}

@@ -1,0 +1,106 @@
+"""The demo's readout, trained on seeds and places that the demo never plays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib.resources import files
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.demo.script import TRAINING_SEED, script
+from taxel.detect import Readout
+from taxel.encode import ContactArea
+from taxel.learn import ConeR
+from taxel.simulate import Contact, play, truth
+from taxel.spikes import SpikeTrains
+from taxel.tare import Tare
+
+__all__ = ["shipped", "train"]
+
+#: One frame of the 5.2 kHz preset, ms: the step of silent rows and of the neuron's grid.
+_FRAME_MS = 0.192
+
+#: How much later than the event each neuron is trained to fire, ms.
+_DELAY_MS = {"contact": 0.2, "lift": 0.5}
+
+_REFRACTORY_MS = 15.0
+
+
+class _Example(NamedTuple):
+    area: SpikeTrains
+    contacts: list[Contact]
+
+
+def shipped() -> Readout:
+    """Return the readout that `taxel demo` plays with, as ``taxel demo --train`` wrote it."""
+    return Readout.from_json(files("taxel.demo").joinpath("readout.json").read_text(encoding="utf-8"))
+
+
+def train(
+    *, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Callable[[str], object] = lambda _: None
+) -> Readout:
+    """Train contact and lift on scenes like the demo's and as many with the ball left to rest.
+
+    Parameters
+    ----------
+    boards : int
+        How many sensors are drawn for each of the two kinds.
+    scenes : int
+        On each of them; by default 16 scenes of each kind.
+    draw : int
+        Another draw of all of them.
+    progress : function of str, optional
+        Told what is being done.
+
+    Notes
+    -----
+    The encoder is the contact area, without place, so that weights hold at other places. Contact: tau 0.5 ms, target =
+    first input + 0.2 ms, weights 0 to 3 mV; lift: tau 3 ms, target = truth + 0.5 ms, weights 0 to 1 mV. Both run at 0.9
+    of their thresholds, since the trained weights only just touch them (one input ends at 0.815 of the threshold).
+    """
+    examples = []
+    for n in range(2 * boards):
+        progress(f"playing training scenes, board {n + 1} of {2 * boards}")
+        examples.append(_example(TRAINING_SEED + 1000 * draw + n, scenes, left_to_rest=n >= boards))
+    areas = [example.area for example in examples]
+    cones = {}
+    for label, tau, bound in (("contact", 0.5, 3.0), ("lift", 3.0, 1.0)):
+        progress(f"learning {label}")
+        cone = ConeR(tau=tau, refractory=_REFRACTORY_MS, step_ms=_FRAME_MS, lb=0.0, ub=bound)
+        cones[label] = cone.fit(areas, [_targets(example, label) for example in examples])
+    return Readout(ContactArea(), cones, delay_ms=_DELAY_MS, run_threshold=0.9)
+
+
+def _example(seed: int, scenes: int, *, left_to_rest: bool) -> _Example:
+    acts = script(seed, scenes, left_to_rest=left_to_rest)
+    events = play(acts, seed=seed).events
+    start = events.markers[0][0]
+    area = ContactArea(tare=Tare.take(events, stop_us=start)).encode(events)
+    # What comes before the start marker is the tare's.
+    return _Example(area.between(start / 1000.0, area.stop), truth(acts)[0])
+
+
+def _targets(example: _Example, label: str) -> NDArray[np.float64]:
+    """Return when the neuron shall fire: for touches that the taxels told of, apart by the refractory time."""
+    rises = example.area[0]
+    targets: list[float] = []
+    for contact in example.contacts:
+        start, stop = contact.start_us / 1000.0, contact.stop_us / 1000.0
+        inputs = rises[(rises >= start - _FRAME_MS) & (rises < stop)]
+        if not len(inputs):
+            continue
+        target = (float(inputs[0]) if label == "contact" else stop) + _DELAY_MS[label]
+        if not targets or target > targets[-1] + _REFRACTORY_MS:
+            targets.append(target)
+    return np.array(targets)
+
+
+def describe(readout: Readout, levels: Sequence[int] = (2, 4, 8, 16, 32)) -> str:
+    """Return the weights as a table, one line a neuron."""
+    names = [f"rise {n}" for n in levels] + [f"fall {n}" for n in levels]
+    return "\n".join(
+        f"{label}: " + ", ".join(f"{name} {weight:.3f}" for name, weight in zip(names, one.weights, strict=True) if weight)
+        for label, one in readout.neurons.items()
+    )
