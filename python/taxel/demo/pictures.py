@@ -1,0 +1,218 @@
+"""The report's pictures."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from taxel.demo.hearing import FRAME_US, Hearing
+from taxel.demo.judging import LABELS, Judged
+from taxel.events import Events
+from taxel.simulate import Contact
+
+__all__ = ["close_up", "delay_split", "delays_by_class", "maps", "noise", "rates", "scene_picture", "svg"]
+
+#: Truth, contact, lift, quiet.
+_TRUE, _SAID, _QUIET = "#e8b04b", {"contact": "#b5423c", "lift": "#2f6690"}, "#8a8a8a"
+
+_STYLE = {
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#555555",
+    "axes.labelcolor": "#333333",
+    "axes.titlesize": 10,
+    "axes.titlelocation": "left",
+    "font.size": 9,
+    "svg.fonttype": "none",
+    "svg.hashsalt": "taxel",
+}
+
+
+def svg(figure: Figure) -> str:
+    """Return a figure as SVG that stands inside a page, and close it."""
+    text = io.StringIO()
+    with mpl.rc_context(_STYLE):
+        figure.savefig(text, format="svg", metadata={"Date": None})
+    plt.close(figure)
+    said = text.getvalue()
+    return said[said.index("<svg") :]
+
+
+def _figure(rows: int, columns: int, size: tuple[float, float], **kwargs: object) -> tuple[Figure, NDArray[np.object_]]:
+    with mpl.rc_context(_STYLE):
+        figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **kwargs)  # type: ignore[arg-type]
+    return figure, axes
+
+
+def scene_picture(hearing: Hearing, start_us: float, stop_us: float) -> Figure:
+    """Draw force with truth, both potentials and what was said, from one time to another."""
+    figure, axes = _figure(3, 1, (9.5, 5.4), sharex=True, height_ratios=[2, 1, 1])
+    first, last = int(start_us / FRAME_US), int(stop_us / FRAME_US)
+    t = np.arange(first, last) * FRAME_US * 1e-6
+    top = axes[0, 0]
+    # Presses of half a newton and impacts of twenty in one picture.
+    top.set_yscale("function", functions=(lambda v: np.sqrt(np.maximum(v, 0.0)), np.square))
+    top.plot(t, hearing.force_n[first:last], color="#333333", linewidth=1.2)
+    top.set(ylabel="force (N, root scale)", title="Force on the foam; shaded where it really touches")
+    for contact in hearing.contacts:
+        if contact.start_us < stop_us and contact.stop_us > start_us:
+            for axis in axes[:, 0]:
+                axis.axvspan(contact.start_us * 1e-6, contact.stop_us * 1e-6, color=_TRUE, alpha=0.3, linewidth=0)
+    times = np.arange(start_us, stop_us, FRAME_US) / 1000.0
+    for axis, label in zip(axes[1:, 0], LABELS, strict=True):
+        colour = _SAID[label]
+        threshold = hearing.readout.neurons[label].neuron.theta_0 * hearing.readout.run_threshold
+        axis.plot(times * 1e-3, hearing.potential(label, times), color=colour, linewidth=0.9)
+        axis.axhline(threshold, color=_QUIET, linewidth=0.8, linestyle="--")
+        said = hearing.found[label].between(start_us, stop_us)
+        for place in (axis, top):
+            for at in said.known:
+                place.axvline(at * 1e-6, color=colour, linewidth=0.9, alpha=0.9)
+        axis.set(ylabel="mV", title=f"Potential of the neuron for {label}; line where it was said, dashed its threshold")
+    axes[2, 0].set(xlabel="board time (s)", xlim=(start_us * 1e-6, stop_us * 1e-6))
+    return figure
+
+
+def close_up(hearing: Hearing, contact: Contact, reach_us: float = 5_000.0) -> Figure:
+    """Draw force, every event and the contact area's spikes around a touch and around its end."""
+    figure, axes = _figure(3, 2, (9.5, 6.2), sharex="col", height_ratios=[1, 2.2, 1.4])
+    for column, (label, at) in enumerate((("contact", contact.start_us), ("lift", contact.stop_us))):
+        begin, end = at - reach_us, at + reach_us
+        frames = np.arange(max(0, int(begin / FRAME_US)), min(len(hearing.force_n), int(end / FRAME_US) + 1))
+        force, raster, area = axes[:, column]
+        force.plot((frames * FRAME_US - at) / 1000.0, hearing.force_n[frames], color="#333333", linewidth=1.2)
+        force.set(ylabel="force (N)", title=f"{label}, {contact.kind}, {contact.speed_m_s:.2f} m/s")
+        near = hearing.events.between(begin, end)
+        index = near.y.astype(int) * near.array.columns + near.x
+        for on, colour in ((True, "#c44e52"), (False, "#4c72b0")):
+            mine = near.p == on
+            name = f"{'more' if on else 'less'} pressure ({int(mine.sum())})"
+            raster.plot((near.t[mine] - at) / 1000.0, index[mine], ",", color=colour, marker=".", markersize=2.5, label=name)
+        raster.legend(loc="upper left", fontsize=7, frameon=False)
+        raster.set(ylabel="taxel (row by row)")
+        spikes = hearing.area.between(begin / 1000.0, end / 1000.0)
+        for train in range(len(spikes)):
+            colour = _SAID["contact"] if train < 5 else _SAID["lift"]
+            area.plot(spikes[train] - at / 1000.0, np.full(len(spikes[train]), train), "|", color=colour, markersize=9)
+        names = [f"{sign} {n}" for sign in ("≥", "<") for n in (2, 4, 8, 16, 32)]
+        area.set(yticks=range(10), yticklabels=names, ylim=(-0.7, 9.7), xlabel="from the true moment (ms)")
+        area.set_ylabel("taxels loaded")
+        for axis in (force, raster, area):
+            axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0)
+            for known in hearing.found[label].between(begin, end).known:
+                axis.axvline((known - at) / 1000.0, color=_SAID[label], linewidth=1.0)
+    figure.suptitle("yellow: the true moment; red and blue lines: when it was known", x=0.01, ha="left", fontsize=9)
+    return figure
+
+
+def maps(hearing: Hearing, contact: Contact) -> Figure:
+    """Draw what the host holds of every taxel, above its rest, around a touch."""
+    moments = (-0.4, 0.4, 1.0, 3.0, 8.0, 1e-3 * (contact.stop_us - contact.start_us) + 1.0)
+    figure, axes = _figure(1, len(moments), (9.5, 2.1))
+    rest = np.nan_to_num(hearing.tare.rest)
+    image = None
+    for axis, after in zip(axes[0], moments, strict=True):
+        held = _held(hearing.events, contact.start_us + 1000.0 * after, rest)
+        image = axis.imshow(held, cmap="magma", vmin=0.0, vmax=90.0, interpolation="nearest")
+        axis.set(xticks=[], yticks=[], title=f"{after:+.1f} ms")
+    if image is not None:
+        figure.colorbar(image, ax=list(axes[0]), label="ticks above rest", shrink=0.9)
+    return figure
+
+
+def _held(events: Events, until_us: float, rest: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return ticks above rest as the host holds them; a taxel that said nothing since the start is at rest."""
+    held = rest.copy()
+    before = events.t <= until_us
+    if events.intensity is not None:
+        # The last of equal places stays.
+        held[events.y[before], events.x[before]] = events.intensity[before]
+    return held - rest
+
+
+def rates(hearing: Hearing, bits: int = 9) -> Figure:
+    """Draw the data rate of impacts as events beside that of frames, as figure 5.14."""
+    impacts = [c for c in hearing.contacts if c.kind == "first"]
+    spans = [hearing.events.between(c.start_us - 500.0, c.stop_us + 1_000.0) for c in impacts]
+    each = np.array([len(s) / max(1, int(s.t[-1] - s.t[0])) * 1e6 for s in spans if len(s) > 1])
+    figure, axes = _figure(1, 1, (9.5, 2.6))
+    axis = axes[0, 0]
+    bins = np.geomspace(1e3, 1e9, 121)
+    if len(each):
+        axis.hist(each * bits, bins, color=_SAID["contact"], label=f"events in a first impact, {bits} bits each (as 5.14)")
+        axis.hist(each * 80, bins, color=_SAID["lift"], label="the same on the wire, 80 bits with intensity")
+    whole = len(hearing.events) / max(1.0, hearing.stop_us - hearing.start_us) * 1e6
+    taxels, hz = hearing.events.array.rows * hearing.events.array.columns, 1e6 / FRAME_US
+    for value, colour, name in (
+        (whole * 80, "#4b8f4b", "the whole play on the wire"),
+        (taxels * hz * 2, _QUIET, "frames, 2 bits a taxel"),
+        (taxels * hz * 10, "#333333", "frames, 10 bits a taxel"),
+    ):
+        axis.axvline(value, color=colour, linewidth=2.0, label=f"{name}: {_bits(value)}")
+    axis.set(xscale="log", xlabel="bits a second (log scale)", ylabel="impacts", xlim=(1e4, 1e9))
+    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
+    return figure
+
+
+def _bits(value: float) -> str:
+    return f"{value / 1e6:.3g} Mbit/s" if value >= 1e6 else f"{value / 1e3:.3g} kbit/s"
+
+
+def delays_by_class(judged: Judged, plain: Judged) -> Figure:
+    """Draw when it was known, touch by touch, by class; neuron above, plain rule below."""
+    figure, axes = _figure(1, 2, (9.5, 3.6), sharey=True)
+    names = [row.name for row in judged.rows if row.label == "contact" and row.touches]
+    jitter = np.random.default_rng(1)
+    for axis, label in zip(axes[0], LABELS, strict=True):
+        for place, name in enumerate(names):
+            for who, shift, colour in ((judged, 0.17, _SAID[label]), (plain, -0.17, _QUIET)):
+                delays = who.row(name, label).delays_ms
+                height = place + shift + jitter.uniform(-0.08, 0.08, len(delays))
+                axis.plot(delays, height, ".", color=colour, markersize=3.5)
+        axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0)
+        axis.set(xscale="symlog", xlabel="known minus true (ms)", title=f"{label}: neuron in colour, plain rule in grey")
+        axis.set_xticks([-30, -10, -3, -1, 0, 1, 3, 10, 30], ["-30", "-10", "-3", "-1", "0", "1", "3", "10", "30"])
+        axis.minorticks_off()
+        axis.grid(axis="x", color="#eeeeee")
+    axes[0, 0].set_yticks(range(len(names)), names)
+    axes[0, 0].invert_yaxis()
+    return figure
+
+
+def delay_split(parts: Mapping[str, Mapping[str, float]]) -> Figure:
+    """Draw the medians of what a delay is made of, one bar a class and label."""
+    figure, axes = _figure(1, 1, (9.5, 0.9 + 0.34 * max(1, len(parts))))
+    axis = axes[0, 0]
+    colours = {"physics": _TRUE, "kernel": "#b5423c", "frame": "#2f6690", "host": "#4b8f4b"}
+    for place, split in enumerate(parts.values()):
+        left = 0.0
+        for name, value in split.items():
+            axis.barh(place, value, left=left, color=colours[name], height=0.7, label=name if place == 0 else None)
+            left += value
+    axis.set_yticks(range(len(parts)), list(parts))
+    axis.invert_yaxis()
+    axis.set(xlabel="ms (medians)")
+    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
+    return figure
+
+
+def noise(hearing: Hearing) -> Figure:
+    """Draw a stretch in which nothing touches: events a second, and what was said."""
+    figure, axes = _figure(1, 1, (9.5, 1.8))
+    axis: Axes = axes[0, 0]
+    seconds = np.arange(0.0, (hearing.stop_us - hearing.start_us) * 1e-6, 1.0)
+    each = np.histogram((hearing.events.t - hearing.start_us) * 1e-6, np.append(seconds, seconds[-1] + 1.0))[0]
+    axis.bar(seconds + 0.5, each, width=0.9, color=_QUIET)
+    for label in LABELS:
+        for at in hearing.found[label].t:
+            axis.axvline((at - hearing.start_us) * 1e-6, color=_SAID[label])
+    said: Sequence[str] = [f"{len(hearing.found[label])} times {label}" for label in LABELS]
+    axis.set(xlabel="board time (s)", ylabel="events/s", title=f"Noise alone: said {' and '.join(said)}")
+    return figure

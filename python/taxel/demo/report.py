@@ -1,0 +1,253 @@
+"""The demo's report: a page with pictures, and the same figures as JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from taxel.demo import pictures
+from taxel.demo.hearing import FRAME_US, Hearing
+from taxel.demo.judging import GOALS, LABELS, Judged, Row
+
+__all__ = ["GUESSES", "Material", "figures", "write"]
+
+#: What nobody measured, and how much hangs on it.
+GUESSES = (
+    ("The foam's dashpot, 1 ms", "carries the delays: the rows at 0.3 ms and without it say how far"),
+    ("The foam's modulus, 50 to 75 kPa, and its collapse", "carry depth, length of contact and number of taxels"),
+    ("The ramp: an RC curve that ends at 3 V", "makes 0.02 N 4.5 ticks; one that reached 95 % of 5 V would hide it"),
+    ("Noise of half a tick, floor of 3", "carry idle events and the weakest touch that is heard"),
+    ("Taxels that differ: gain by a fifth, offset by 20 mV", "a sensor that drifts or sticks would do worse"),
+    ("Force on a taxel to the power 0.7", "no maker's curve was found"),
+    ("A rigid ball on independent columns of foam", "good where the foam does not widen (Poisson ratio 0)"),
+)
+
+
+@dataclass
+class Material:
+    """Everything that a report shows."""
+
+    seed: int
+    scenes: int
+    live: bool
+    hearing: Hearing
+    noise: Hearing
+    dashpots: dict[float, Hearing]
+    """By the dashpot's time, ms: the same scenes with another foam."""
+    footfalls: Hearing | None = None
+    footfall_note: str = ""
+    counters: dict[str, Any] | None = None
+    """What the host counted while it ran."""
+    emulator: dict[str, Any] | None = None
+    """What the board counted."""
+    verdicts: list[str] = field(default_factory=list)
+    """One line each: losses, frames."""
+    recording: str | None = None
+    agrees: bool | None = None
+    """Whether the recording, read again, says what was said live."""
+    extra: dict[str, Any] = field(default_factory=dict)
+
+
+def figures(material: Material) -> dict[str, Any]:
+    """Return all figures of a report as plain values."""
+    hearing = material.hearing
+    noise_s = (material.noise.stop_us - material.noise.start_us) * 1e-6
+    every = hearing.events
+    seconds = (hearing.stop_us - hearing.start_us) * 1e-6
+    impacts = [
+        len(hearing.events.between(c.start_us - 500.0, c.stop_us + 1_000.0)) / (c.stop_us - c.start_us + 1_500.0) * 1e6
+        for c in hearing.contacts
+        if c.kind == "first"
+    ]
+    return {
+        "what": "taxel demo",
+        "seed": material.seed,
+        "scenes": material.scenes,
+        "clock": "real time, over UDP" if material.live else "none: board time as fast as it goes, no socket",
+        "board_seconds": seconds,
+        "machine": _machine(),
+        "neuron": hearing.judged.to_dict(),
+        "plain_rule": hearing.judged_plain.to_dict(),
+        "delay_split_ms": _split(hearing),
+        "events": len(every),
+        "events_per_s": len(every) / seconds,
+        "events_per_s_in_first_impacts": _quantiles(impacts),
+        "wire_bits_per_s": 80 * len(every) / seconds,
+        "frames_bits_per_s": {
+            "2 bits a taxel": 2 * 4096 * 1e6 / FRAME_US,
+            "10 bits a taxel": 10 * 4096 * 1e6 / FRAME_US,
+        },
+        "noise": {
+            "clock": "none",
+            "seconds": noise_s,
+            "events_per_s": len(material.noise.events) / noise_s,
+            "said": {label: len(material.noise.found[label]) for label in LABELS},
+            "plain_rule_said": {label: len(material.noise.plain[label]) for label in LABELS},
+        },
+        "dashpot_ms": {f"{ms:g}": other.judged.to_dict() for ms, other in material.dashpots.items()},
+        "footfalls": None
+        if material.footfalls is None
+        else {"note": material.footfall_note, **material.footfalls.judged.to_dict()},
+        "host": material.counters,
+        "board": material.emulator,
+        "verdicts": material.verdicts,
+        "recording": material.recording,
+        "recording_agrees": material.agrees,
+        "guesses": dict(GUESSES),
+        **material.extra,
+    }
+
+
+def write(folder: Path, material: Material) -> Path:
+    """Write report.json and report.html into a folder that is there; return the page's path."""
+    values = figures(material)
+    _new(folder / "report.json", json.dumps(values, indent=1) + "\n")
+    page = folder / "report.html"
+    _new(page, _page(material, values))
+    return page
+
+
+def _new(path: Path, text: str) -> None:
+    with path.open("x", encoding="utf-8") as file:
+        file.write(text)
+
+
+def _page(material: Material, values: Mapping[str, Any]) -> str:
+    hearing = material.hearing
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+    template = environment.from_string(files("taxel.demo").joinpath("report.html.j2").read_text(encoding="utf-8"))
+    drawn = {name: pictures.svg(figure) for name, figure in _figures(material, values).items()}
+    return template.render(
+        values=values,
+        pictures={name: jinja2.utils.markupsafe.Markup(text) for name, text in drawn.items()},
+        tables={
+            "neuron": _table(hearing.judged),
+            "plain": _table(hearing.judged_plain),
+            "footfalls": None if material.footfalls is None else _table(material.footfalls.judged),
+        },
+        dashpots=_dashpots({1.0: hearing, **material.dashpots}),
+        goals=GOALS,
+        within={label: _share(hearing.judged.within_goal(label)) for label in LABELS},
+        guesses=GUESSES,
+        live=material.live,
+        footfall_note=material.footfall_note,
+        written=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
+    )
+
+
+def _figures(material: Material, values: Mapping[str, Any]) -> dict[str, Any]:
+    hearing = material.hearing
+    drawn: dict[str, Any] = {"rates": pictures.rates(hearing), "noise": pictures.noise(material.noise)}
+    first = next((c for c in hearing.contacts if c.kind == "first"), None)
+    if first is not None:
+        later = [c for c in hearing.contacts if c.kind == "first" and c is not first]
+        end = later[0].start_us if later else hearing.stop_us
+        hand = [c.stop_us for c in hearing.contacts if c.start_us < end]
+        drawn["scene"] = pictures.scene_picture(hearing, first.start_us - 60_000.0, max(hand) + 60_000.0)
+        drawn["close_up"] = pictures.close_up(hearing, first)
+        drawn["maps"] = pictures.maps(hearing, first)
+        drawn["delays"] = pictures.delays_by_class(hearing.judged, hearing.judged_plain)
+    if values["delay_split_ms"]:
+        drawn["split"] = pictures.delay_split(values["delay_split_ms"])
+    return drawn
+
+
+def _split(hearing: Hearing) -> dict[str, dict[str, float]]:
+    """Return the medians of what a delay is made of, ms, for impacts: physics, kernel, frame, host.
+
+    Physics: from the true moment to the start of the frame in which two neighbouring taxels first told of it (or fewer
+    than two were left). Kernel: from there to the crossing. Frame: on to the end of the crossing's frame. Host: until
+    it was said.
+    """
+    split = {}
+    for row in hearing.judged.rows:
+        if row.name not in ("first impact", "bounce, 0.4 m/s and more") or not row.found:
+            continue
+        said = hearing.found[row.label]
+        delay = hearing.readout.neurons[row.label].delay_ms
+        parts = []
+        for touch, place in row.places:
+            contact = hearing.contacts[touch]
+            stamp = hearing.first_input(contact, row.label)
+            if stamp is None:
+                continue
+            true = contact.start_us if row.label == "contact" else contact.stop_us
+            begin = np.ceil(stamp / FRAME_US) * FRAME_US
+            crossing = said.t[place] + 1000.0 * delay
+            known = float(said.known[place])
+            host = float(said.said[place]) - known if said.said is not None else 0.0
+            parts.append([begin - true, crossing - begin, known - crossing, host])
+        if parts:
+            medians = np.median(np.array(parts), axis=0) / 1000.0
+            split[f"{row.label}, {row.name}"] = dict(zip(("physics", "kernel", "frame", "host"), medians.tolist(), strict=True))
+    return split
+
+
+def _table(judged: Judged) -> list[dict[str, str]]:
+    return [_line(row) for row in judged.rows if row.touches]
+
+
+def _line(row: Row) -> dict[str, str]:
+    known = [f"{np.percentile(row.delays_ms, q):.2f}" if row.found else "–" for q in (50, 95)]
+    errors = row.errors_ms
+    error = f"{errors.mean():+.2f} ± {errors.std(ddof=1):.2f}" if len(errors) > 1 else "".join(f"{e:+.2f}" for e in errors)
+    return {
+        "name": row.name,
+        "label": row.label,
+        "found": f"{row.found} of {row.touches}",
+        "error": error or "–",
+        "p50": known[0],
+        "p95": known[1],
+        "missed": "missed" if row.found < row.touches else "",
+    }
+
+
+def _dashpots(heard: Mapping[float, Hearing]) -> list[dict[str, str]]:
+    lines = []
+    for ms, hearing in heard.items():
+        line = {"dashpot": f"{ms:g} ms" if ms else "none"}
+        for label in LABELS:
+            row = hearing.judged.row("first", label)
+            line[label] = _line(row)["p50"] + " / " + _line(row)["p95"]
+            line[f"{label}_within"] = _share(hearing.judged.within_goal(label))
+        line["found"] = ", ".join(
+            f"{sum(r.found for r in hearing.judged.rows if r.label == label and _fast(r))} of "
+            f"{sum(r.touches for r in hearing.judged.rows if r.label == label and _fast(r))}"
+            for label in LABELS
+        )
+        lines.append(line)
+    return lines
+
+
+def _fast(row: Row) -> bool:
+    return row.name in ("first impact", "bounce, 0.4 m/s and more")
+
+
+def _share(value: float) -> str:
+    return "–" if np.isnan(value) else f"{100 * value:.1f} %"
+
+
+def _quantiles(values: list[float]) -> dict[str, float] | None:
+    if not values:
+        return None
+    return {"least": min(values), "median": float(np.median(values)), "most": max(values)}
+
+
+def _machine() -> dict[str, Any]:
+    """Return what a figure of time hangs on."""
+    name = platform.processor() or platform.machine()
+    info = Path("/proc/cpuinfo")
+    if info.exists():
+        names = [line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")]
+        name = names[0] if names else name
+    return {"cpu": name, "cores": os.cpu_count(), "load": os.getloadavg()[0], "python": platform.python_version()}
