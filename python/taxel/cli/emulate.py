@@ -74,7 +74,9 @@ def emulate(
             watch=watch,
         )
     if as_json:
-        typer.echo(json.dumps({"seed": seed, "scenes": scenes, "preset": preset, "held": report.held, **asdict(report)}))
+        said = {"seed": seed, "scenes": scenes, "preset": preset, "held": report.held, "verdict": report.verdict}
+        said |= {"wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
+        typer.echo(json.dumps({**said, **asdict(report)}))
     else:
         typer.echo(f"{report.changes} events in {report.datagrams} datagrams, {report.bytes} bytes")
         typer.echo(report.verdict)

@@ -1,0 +1,117 @@
+"""The demo while it runs: the board in a process of its own, the host here."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import taxel
+from taxel._core import DeviceError
+from taxel.demo.hearing import FRAME_US, Hearing, listen
+from taxel.demo.script import script
+from taxel.detect import Readout, run
+from taxel.live import Live, Said, heard
+from taxel.simulate import Contact, truth
+
+__all__ = ["Playing", "Screen", "play_live"]
+
+#: How often the screen is drawn anew, s.
+_DRAW_EVERY_S = 0.1
+
+#: How long the host listens on after the board's process has ended, s.
+_LISTEN_ON_S = 0.3
+
+
+class Screen(Protocol):
+    """What is drawn while it runs."""
+
+    def draw(self, counters: dict[str, Any], picture: Any, said: list[Said]) -> None:
+        """Draw what came up to now."""
+
+
+@dataclass(frozen=True)
+class Playing:
+    """A play in real time, and what was counted."""
+
+    hearing: Hearing
+    counters: dict[str, Any]
+    emulator: dict[str, Any]
+    verdicts: list[str]
+    recording: Path
+    agrees: bool
+    """Whether the recording, read again, says what was said live."""
+
+
+def play_live(
+    readout: Readout,
+    folder: Path,
+    *,
+    seed: int,
+    scenes: int,
+    screen: Callable[[list[Contact], float], Screen],
+) -> Playing:
+    """Start the board, capture, record, encode, detect, until it stops.
+
+    Parameters
+    ----------
+    readout : Readout
+    folder : Path
+        Where the recording goes.
+    seed, scenes : int
+    screen : function of the touches to come and the play's length in s
+        Makes what is drawn while it runs.
+
+    Raises
+    ------
+    DeviceError : the board's process ended with an error
+    """
+    acts = script(seed, scenes)
+    contacts, force = truth(acts)
+    shown = screen(contacts, len(force) * FRAME_US * 1e-6)
+    recording = folder / "recording.mcap"
+    said: list[Said] = []
+    # The tare ends where the board marks its start, well before a second is over.
+    with Live(0, host="127.0.0.1", readout=readout, tare=1.0, record=recording) as live:
+        command = [sys.executable, "-m", "taxel", "emulate", "--json", "--port", str(live.address[1])]
+        command += ["--scenes", str(scenes), "--seed", str(seed)]
+        board = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        try:
+            ended = None
+            drawn = 0.0
+            while ended is None or time.monotonic() < ended + _LISTEN_ON_S:
+                one = live.next(0.05)
+                if one is not None:
+                    said.append(one)
+                if ended is None and board.poll() is not None:
+                    ended = time.monotonic()
+                if time.monotonic() > drawn + _DRAW_EVERY_S:
+                    drawn = time.monotonic()
+                    shown.draw(live.counters, live.picture, said)
+            told, complaint = board.communicate()
+        finally:
+            if board.poll() is None:
+                board.terminate()
+                board.wait()
+        if board.returncode != 0:
+            raise DeviceError(f"the board's process ended with code {board.returncode}: {complaint.strip()[-300:]}")
+        summary = live.stop()
+        tare = live.tare
+        while (one := live.next(0.0)) is not None:
+            said.append(one)
+    emulator = json.loads(told)
+    found = heard(said)
+    events = taxel.open(recording).events
+    again = run(readout, events, frame_us=FRAME_US, tare=tare)
+    hearing = listen(events, acts, readout, found)
+    again = again[again.t >= hearing.start_us]
+    mine = hearing.found
+    agrees = len(again) == len(mine) and bool(
+        (again.t == mine.t).all() and (again.known == mine.known).all() and (again.label == mine.label).all()
+    )
+    return Playing(hearing, summary.counters, emulator, [emulator["verdict"], summary.verdict], recording, agrees)
