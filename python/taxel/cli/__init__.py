@@ -66,3 +66,4 @@ def _said(error: OSError) -> str:
 from taxel.cli import bench, convert, info, live, record  # noqa: E402, F401
 from taxel.cli import bench, convert, info  # noqa: E402, F401
 from taxel.cli import bench, demo, emulate  # noqa: E402, F401
+from taxel.cli import bench, convert, demo, emulate, info  # noqa: E402, F401

@@ -28,7 +28,9 @@ def emulate(
     seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Draws scenes, taxels, noise.")] = None,
     tare: Annotated[float, typer.Option(help="How long the noise floor is 0 before the start marker, ms.")] = 50.0,
     preset: Annotated[str, typer.Option(help='The registers: "5.2 kHz", "2 kHz", "20.8 kHz".')] = "5.2 kHz",
-    control: Annotated[int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")] = None,
+    control: Annotated[
+        int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")
+    ] = None,
     rest: Annotated[bool, typer.Option("--rest", help="Nobody catches the ball.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False,
 ) -> None:

@@ -19,14 +19,14 @@ __all__ = ["NOTE", "footfalls"]
 #: Of each person, how many footfalls are played.
 _EACH = 2
 
-#: The array, and the part of it that a footprint may fill, mm; the peak as a share of the way from rest to the ramp's end.
+#: The array; how much of it a footprint may fill; the peak as a share of the way from rest to the ramp's end.
 _ROWS, _PITCH_MM, _FILL_MM, _PEAK = 64, 2.67, 150.0, 0.8
 
 NOTE = (
     f"Footfalls of a pressure plate, laid over the array and heard by the same readout, which never heard one in "
-    f"training; no goal. Guesses: the footprint is shrunk to {_FILL_MM:.0f} mm, the plate's pictures (500 a second) are "
-    f"joined by straight lines, and the largest value of a footfall is {_PEAK:.0%} of the way from rest to the ramp's "
-    f"end. Truth is the plate's own: its last empty picture before and the first after, so contact can be 2 ms early."
+    f"training; no goal. Guesses: the footprint is shrunk to {_FILL_MM:.0f} mm, the plate's pictures (500 a second) "
+    f"are joined by straight lines, and a footfall's largest value is {_PEAK:.0%} of the way from rest to the "
+    f"ramp's end. Truth is the plate's own: its last empty picture before and the first after, so it can be 2 ms early."
 )
 
 

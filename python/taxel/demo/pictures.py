@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
@@ -22,7 +23,7 @@ __all__ = ["close_up", "delay_split", "delays_by_class", "maps", "noise", "rates
 #: Truth, contact, lift, quiet.
 _TRUE, _SAID, _QUIET = "#e8b04b", {"contact": "#b5423c", "lift": "#2f6690"}, "#8a8a8a"
 
-_STYLE = {
+_STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.edgecolor": "#555555",
@@ -45,9 +46,9 @@ def svg(figure: Figure) -> str:
     return said[said.index("<svg") :]
 
 
-def _figure(rows: int, columns: int, size: tuple[float, float], **kwargs: object) -> tuple[Figure, NDArray[np.object_]]:
+def _figure(rows: int, columns: int, size: tuple[float, float], **kwargs: Any) -> tuple[Figure, Any]:
     with mpl.rc_context(_STYLE):
-        figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **kwargs)  # type: ignore[arg-type]
+        figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **kwargs)
     return figure, axes
 
 
@@ -75,7 +76,9 @@ def scene_picture(hearing: Hearing, start_us: float, stop_us: float) -> Figure:
         for place in (axis, top):
             for at in said.known:
                 place.axvline(at * 1e-6, color=colour, linewidth=0.9, alpha=0.9)
-        axis.set(ylabel="mV", title=f"Potential of the neuron for {label}; line where it was said, dashed its threshold")
+        axis.set(
+            ylabel="mV", title=f"Potential of the neuron for {label}; line where it was said, dashed its threshold"
+        )
     axes[2, 0].set(xlabel="board time (s)", xlim=(start_us * 1e-6, stop_us * 1e-6))
     return figure
 
@@ -94,7 +97,7 @@ def close_up(hearing: Hearing, contact: Contact, reach_us: float = 5_000.0) -> F
         for on, colour in ((True, "#c44e52"), (False, "#4c72b0")):
             mine = near.p == on
             name = f"{'more' if on else 'less'} pressure ({int(mine.sum())})"
-            raster.plot((near.t[mine] - at) / 1000.0, index[mine], ",", color=colour, marker=".", markersize=2.5, label=name)
+            raster.plot((near.t[mine] - at) / 1000.0, index[mine], ".", color=colour, markersize=2.5, label=name)
         raster.legend(loc="upper left", fontsize=7, frameon=False)
         raster.set(ylabel="taxel (row by row)")
         spikes = hearing.area.between(begin / 1000.0, end / 1000.0)
@@ -146,7 +149,9 @@ def rates(hearing: Hearing, bits: int = 9) -> Figure:
     axis = axes[0, 0]
     bins = np.geomspace(1e3, 1e9, 121)
     if len(each):
-        axis.hist(each * bits, bins, color=_SAID["contact"], label=f"events in a first impact, {bits} bits each (as 5.14)")
+        axis.hist(
+            each * bits, bins, color=_SAID["contact"], label=f"events in a first impact, {bits} bits each (as 5.14)"
+        )
         axis.hist(each * 80, bins, color=_SAID["lift"], label="the same on the wire, 80 bits with intensity")
     whole = len(hearing.events) / max(1.0, hearing.stop_us - hearing.start_us) * 1e6
     taxels, hz = hearing.events.array.rows * hearing.events.array.columns, 1e6 / FRAME_US
@@ -177,7 +182,9 @@ def delays_by_class(judged: Judged, plain: Judged) -> Figure:
                 height = place + shift + jitter.uniform(-0.08, 0.08, len(delays))
                 axis.plot(delays, height, ".", color=colour, markersize=3.5)
         axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0)
-        axis.set(xscale="symlog", xlabel="known minus true (ms)", title=f"{label}: neuron in colour, plain rule in grey")
+        axis.set(
+            xscale="symlog", xlabel="known minus true (ms)", title=f"{label}: neuron in colour, plain rule in grey"
+        )
         axis.set_xticks([-30, -10, -3, -1, 0, 1, 3, 10, 30], ["-30", "-10", "-3", "-1", "0", "1", "3", "10", "30"])
         axis.minorticks_off()
         axis.grid(axis="x", color="#eeeeee")

@@ -14,6 +14,7 @@ from typing import Any
 
 import jinja2
 import numpy as np
+from markupsafe import Markup
 
 from taxel.demo import pictures
 from taxel.demo.hearing import FRAME_US, Hearing
@@ -124,12 +125,14 @@ def _new(path: Path, text: str) -> None:
 
 def _page(material: Material, values: Mapping[str, Any]) -> str:
     hearing = material.hearing
-    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined)
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
     template = environment.from_string(files("taxel.demo").joinpath("report.html.j2").read_text(encoding="utf-8"))
     drawn = {name: pictures.svg(figure) for name, figure in _figures(material, values).items()}
     return template.render(
         values=values,
-        pictures={name: jinja2.utils.markupsafe.Markup(text) for name, text in drawn.items()},
+        pictures={name: Markup(text) for name, text in drawn.items()},
         tables={
             "neuron": _table(hearing.judged),
             "plain": _table(hearing.judged_plain),
@@ -189,7 +192,9 @@ def _split(hearing: Hearing) -> dict[str, dict[str, float]]:
             parts.append([begin - true, crossing - begin, known - crossing, host])
         if parts:
             medians = np.median(np.array(parts), axis=0) / 1000.0
-            split[f"{row.label}, {row.name}"] = dict(zip(("physics", "kernel", "frame", "host"), medians.tolist(), strict=True))
+            split[f"{row.label}, {row.name}"] = dict(
+                zip(("physics", "kernel", "frame", "host"), medians.tolist(), strict=True)
+            )
     return split
 
 
@@ -200,7 +205,9 @@ def _table(judged: Judged) -> list[dict[str, str]]:
 def _line(row: Row) -> dict[str, str]:
     known = [f"{np.percentile(row.delays_ms, q):.2f}" if row.found else "–" for q in (50, 95)]
     errors = row.errors_ms
-    error = f"{errors.mean():+.2f} ± {errors.std(ddof=1):.2f}" if len(errors) > 1 else "".join(f"{e:+.2f}" for e in errors)
+    error = (
+        f"{errors.mean():+.2f} ± {errors.std(ddof=1):.2f}" if len(errors) > 1 else "".join(f"{e:+.2f}" for e in errors)
+    )
     return {
         "name": row.name,
         "label": row.label,
@@ -248,6 +255,8 @@ def _machine() -> dict[str, Any]:
     name = platform.processor() or platform.machine()
     info = Path("/proc/cpuinfo")
     if info.exists():
-        names = [line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")]
+        names = [
+            line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")
+        ]
         name = names[0] if names else name
     return {"cpu": name, "cores": os.cpu_count(), "load": os.getloadavg()[0], "python": platform.python_version()}

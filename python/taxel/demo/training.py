@@ -101,6 +101,7 @@ def describe(readout: Readout, levels: Sequence[int] = (2, 4, 8, 16, 32)) -> str
     """Return the weights as a table, one line a neuron."""
     names = [f"rise {n}" for n in levels] + [f"fall {n}" for n in levels]
     return "\n".join(
-        f"{label}: " + ", ".join(f"{name} {weight:.3f}" for name, weight in zip(names, one.weights, strict=True) if weight)
+        f"{label}: "
+        + ", ".join(f"{name} {weight:.3f}" for name, weight in zip(names, one.weights, strict=True) if weight)
         for label, one in readout.neurons.items()
     )

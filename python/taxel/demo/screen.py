@@ -1,0 +1,98 @@
+"""What is drawn while the demo runs: the picture, the counters, what was said."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.columns import Columns
+from rich.console import Group
+from rich.live import Live as Drawing
+from rich.panel import Panel
+from rich.progress_bar import ProgressBar
+from rich.style import Style
+from rich.table import Table
+from rich.text import Text
+
+from taxel.demo.judging import LABELS
+from taxel.live import Said
+from taxel.simulate import Contact
+
+__all__ = ["Screen"]
+
+
+class Screen:
+    """What is drawn while it runs: the picture, the counters, what was said."""
+
+    _LINES = 9
+
+    def __init__(self, drawing: Drawing, contacts: list[Contact], seconds: float) -> None:
+        self._drawing = drawing
+        self._seconds = seconds
+        self._true = {
+            "contact": np.array([c.start_us for c in contacts]),
+            "lift": np.array([c.stop_us for c in contacts]),
+        }
+        self._kinds = [c.kind for c in contacts]
+        self._before: tuple[float, int] = (0.0, 0)
+        self._rate = 0.0
+
+    def draw(self, counters: dict[str, Any], picture: NDArray[np.uint16], said: list[Said]) -> None:
+        """Draw what came up to now."""
+        now = (counters["board_us"] or 0) * 1e-6
+        then, events = self._before
+        if now > then:
+            self._rate = (counters["events"] - events) / (now - then)
+            self._before = (now, counters["events"])
+        capture = counters["capture"]
+        lost = capture["dropped_by_kernel"] + capture["dropped_by_queue"] + counters["events_dropped"]
+        rows = Table.grid(padding=(0, 2))
+        decoded, told = counters["decode_latency"], counters["said_latency"]
+        for name, value in (
+            ("events/s", f"{self._rate:,.0f}"),
+            ("on the wire", f"{self._rate * 80 / 1e3:,.0f} kbit/s (frames: 213,000)"),
+            ("events", f"{counters['events']:,}"),
+            ("datagrams", f"{capture['datagrams']:,}, lost {lost}"),
+            ("arrived to decoded", f"{decoded['p50_us']:.0f} us, 99 %: {decoded['p99_us']:.0f}"),
+            ("known to said", f"{told['p50_us'] / 1e3:.2f} ms, 99 %: {told['p99_us'] / 1e3:.2f}"),
+            *((label, str(sum(one.label == label for one in said))) for label in LABELS),
+        ):
+            rows.add_row(Text(name, style="dim"), value)
+        state = "taring" if counters["taring"] else f"{min(now, self._seconds):5.1f} of {self._seconds:.1f} s"
+        self._drawing.update(
+            Group(
+                Columns([Panel(_blocks(picture), title="pressure", width=68), Panel(rows, title=state, width=56)]),
+                ProgressBar(total=self._seconds, completed=min(now, self._seconds), width=120),
+                *[self._line(one) for one in said[-self._LINES :]],
+            )
+        )
+
+    def _line(self, said: Said) -> Text:
+        true = self._true[said.label]
+        colour = "red" if said.label == "contact" else "blue"
+        line = Text(f"{said.t * 1e-6:8.3f} s  ").append(f"{said.label:<8}", style=f"bold {colour}")
+        if len(true):
+            nearest = int(np.abs(true - said.t).argmin())
+            line.append(f"{self._kinds[nearest]:<7} known {(said.known - true[nearest]) / 1e3:+6.2f} ms, ")
+            line.append(f"said {(said.said - true[nearest]) / 1e3:+6.2f} ms after the true moment", style="dim")
+        return line
+
+
+def _blocks(picture: NDArray[np.uint16]) -> Text:
+    """Return a picture of ticks as half blocks: two rows a line, each cell the larger of two columns."""
+    rest = np.median(picture)
+    above = np.clip(picture.astype(float) - rest - 6.0, 0.0, 80.0) / 80.0
+    small = above.reshape(32, 2, 64).max(axis=1)
+    text = Text()
+    for upper, lower in zip(small[::2], small[1::2], strict=True):
+        for a, b in zip(upper, lower, strict=True):
+            text.append("▀", Style(color=_colour(a), bgcolor=_colour(b)))
+        text.append("\n")
+    return text
+
+
+def _colour(share: float) -> str:
+    """Return black to red to yellow to white."""
+    red, green, blue = (int(255 * min(1.0, max(0.0, 3.0 * share - k))) for k in range(3))
+    return f"#{max(red, 18):02x}{max(green, 16):02x}{max(blue, 24):02x}"

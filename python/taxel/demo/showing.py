@@ -1,0 +1,174 @@
+"""The demo from beginning to end."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import time
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.live import Live as Drawing
+from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from taxel._core import ProblemError
+from taxel._files import write_whole
+from taxel.demo.footfalls import NOTE, footfalls
+from taxel.demo.hearing import Hearing, hear
+from taxel.demo.playing import play_live
+from taxel.demo.report import Material, figures, write
+from taxel.demo.screen import Screen
+from taxel.demo.script import TRAINING_SEED, script
+from taxel.demo.training import describe, shipped, train
+from taxel.detect import Readout
+from taxel.simulate import Act, Silence
+
+__all__ = ["show", "train_readout"]
+
+#: Of the dashpot, whose 1 ms is a guess: what the delays are shown with as well, ms.
+_DASHPOTS = (0.3, 0.0)
+
+
+def show(
+    console: Console,
+    *,
+    scenes: int,
+    seed: int | None = None,
+    live: bool = True,
+    noise_s: float | None = None,
+    data: Path | None = None,
+    readout: Path | None = None,
+    folder: Path | None = None,
+    result: Path | None = None,
+) -> tuple[dict[str, Any], Path]:
+    """Play, hear, judge, write the report; return its figures and its page.
+
+    Parameters
+    ----------
+    console : Console
+        Where it says what it does.
+    scenes : int, 1 or more
+    seed : int, optional
+        Drawn where it is left out.
+    live : bool
+        In real time over UDP; else board time goes as fast as it can.
+    noise_s : float, optional
+        60, or 120 where it is not live.
+    data : Path, optional
+        Recordings, whose ``plate/`` gives footfalls.
+    readout : Path, optional
+        Another readout than the shipped one.
+    folder : Path, optional
+        A new folder for the report; named by time and seed where it is left out.
+    result : Path, optional
+        Where the figures go as well; replaced if it is there.
+
+    Raises
+    ------
+    FileExistsError : the folder is there already
+    DeviceError : the board's process failed
+    """
+    if noise_s is not None and not 0.5 <= noise_s <= 86_400:
+        raise ProblemError(f"noise is {noise_s} s: must be 0.5 to 86400")
+    if result is not None and not result.parent.is_dir():
+        raise ProblemError(f"{result}: there is no folder {result.parent}")
+    heard_by = shipped() if readout is None else Readout.load(readout)
+    laid = None if data is None else footfalls(data)
+    seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
+    if folder is None:
+        folder = Path(f"taxel-demo-{datetime.now().astimezone():%Y%m%d-%H%M%S}-{seed}")
+    folder.mkdir(parents=True)
+    began = time.monotonic()
+    console.print(f"[bold]taxel demo[/bold]: {scenes} scenes of seed [bold]{seed}[/bold]")
+    counters: dict[str, Any] = {}
+    if not live:
+        hearing = _hear(console, f"playing {scenes} scenes without the clock", script(seed, scenes), heard_by, seed)
+    else:
+        with Drawing(console=console, refresh_per_second=10, transient=True) as drawing:
+            playing = play_live(heard_by, folder, seed=seed, scenes=scenes, screen=lambda *told: Screen(drawing, *told))
+        hearing = playing.hearing
+        counters = {
+            "counters": playing.counters,
+            "emulator": playing.emulator,
+            "verdicts": playing.verdicts,
+            "recording": playing.recording.name,
+            "agrees": playing.agrees,
+        }
+        for verdict in playing.verdicts:
+            console.print(f"[dim]{verdict}[/dim]")
+    seconds = (60.0 if live else 120.0) if noise_s is None else noise_s
+    quiet = _hear(console, f"hearing {seconds:g} s of noise without the clock", _noise(seconds), heard_by, seed)
+    # In real time there is a minute for all of it: a few scenes show what the dashpot does.
+    few = min(scenes, 4) if live else scenes
+    dashpots = {
+        ms: _hear(console, f"hearing a dashpot of {ms:g} ms", script(seed, few, dashpot_ms=ms), heard_by, seed)
+        for ms in _DASHPOTS
+    }
+    stepped = None if laid is None else _hear(console, "laying footfalls over the array", laid, heard_by, seed)
+    with _busy(console, "writing the report"):
+        material = Material(
+            seed=seed,
+            scenes=scenes,
+            live=live,
+            hearing=hearing,
+            noise=quiet,
+            dashpots=dashpots,
+            footfalls=stepped,
+            footfall_note=NOTE if stepped is not None else "",
+            **counters,
+        )
+        page = write(folder, material)
+    values = figures(material)
+    if result is not None:
+        write_whole(result, lambda file: file.write(json.dumps(values, indent=1).encode() + b"\n"), overwrite=True)
+    _say(console, hearing, quiet)
+    console.print(f"[dim]{time.monotonic() - began:.0f} s in all[/dim]")
+    if result is not None:
+        console.print(f"figures: {result}")
+    return values, page
+
+
+def train_readout(console: Console, place: Path) -> None:
+    """Train the demo's readout and write it to a new file."""
+    with _busy(console, "training") as bar:
+        readout = train(progress=lambda said: bar.update(bar.task_ids[0], description=said))
+    readout.save(place)
+    console.print(describe(readout))
+
+
+def _noise(seconds: float) -> list[Act]:
+    return [Silence(50.3 + 1000.0 * seconds)]
+
+
+def _busy(console: Console, said: str) -> Progress:
+    bar = Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console, transient=True
+    )
+    bar.add_task(said, total=None)
+    return bar
+
+
+def _hear(console: Console, said: str, acts: Sequence[Act], readout: Readout, seed: int) -> Hearing:
+    with _busy(console, said):
+        return hear(acts, readout, seed=seed)
+
+
+def _say(console: Console, hearing: Hearing, quiet: Hearing) -> None:
+    table = Table(box=None, pad_edge=False)
+    for name in ("touch", "said", "found", "said - true (ms)", "known, median / 95 % (ms)"):
+        table.add_column(name, justify="left" if name in ("touch", "said") else "right")
+    for row in hearing.judged.rows:
+        if not row.touches:
+            continue
+        error = f"{row.errors_ms.mean():+.2f}" if row.found else "-"
+        known = "{:.2f} / {:.2f}".format(*np.percentile(row.delays_ms, [50, 95])) if row.found else "-"
+        table.add_row(row.name, row.label, f"{row.found} of {row.touches}", error, known)
+    console.print(table)
+    false = sum(len(times) for times in hearing.judged.false.values())
+    noise_s = (quiet.stop_us - quiet.start_us) * 1e-6
+    console.print(f"said of nothing: {false} in the scenes, {len(quiet.found)} in {noise_s:.0f} s of noise")
