@@ -38,14 +38,13 @@ def demo(
 
     Examples: taxel demo --seed 1; taxel demo --scenes 100 --no-clock -o benchmarks/results/demo.json
     """
-    from taxel.demo.showing import show, train_readout  # noqa: PLC0415  pictures load slowly
-
     console = Console(quiet=as_json)
     if train_to is not None:
-        train_readout(console, train_to)
-        place = train_to
-        typer.echo(json.dumps({"readout": str(place)}) if as_json else f"readout: {place.resolve()}")
+        _train(console, train_to)
+        typer.echo(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")
         return
+    from taxel.demo.showing import show  # noqa: PLC0415  pictures load slowly
+
     values, page = show(
         console,
         scenes=scenes,
@@ -59,3 +58,13 @@ def demo(
     )
     # Not wrapped: a path is to be copied.
     typer.echo(json.dumps(values | {"report": str(page)}) if as_json else f"report: {page.resolve()}")
+
+
+def _train(console: Console, place: Path) -> None:
+    from taxel.demo.shipped import described  # noqa: PLC0415
+    from taxel.demo.training import train  # noqa: PLC0415
+
+    with console.status("training") as status:
+        readout = train(progress=status.update)
+    readout.save(place)
+    console.print(described(readout))

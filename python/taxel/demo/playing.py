@@ -100,10 +100,10 @@ def play_live(
                 board.wait()
         if board.returncode != 0:
             raise DeviceError(f"the board's process ended with code {board.returncode}: {complaint.strip()[-300:]}")
-        summary = live.stop()
-        tare = live.tare
         while (one := live.next(0.0)) is not None:
             said.append(one)
+        tare = live.tare
+        summary = live.stop()
     emulator = json.loads(told)
     found = heard(said)
     events = taxel.open(recording).events

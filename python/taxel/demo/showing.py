@@ -24,11 +24,11 @@ from taxel.demo.playing import play_live
 from taxel.demo.report import Material, figures, write
 from taxel.demo.screen import Screen
 from taxel.demo.script import TRAINING_SEED, script
-from taxel.demo.training import describe, shipped, train
+from taxel.demo.shipped import shipped
 from taxel.detect import Readout
 from taxel.simulate import Act, Silence
 
-__all__ = ["show", "train_readout"]
+__all__ = ["show"]
 
 #: Of the dashpot, whose 1 ms is a guess: what the delays are shown with as well, ms.
 _DASHPOTS = (0.3, 0.0)
@@ -100,7 +100,7 @@ def show(
             "agrees": playing.agrees,
         }
         for verdict in playing.verdicts:
-            console.print(f"[dim]{verdict}[/dim]")
+            console.print(f"[dim]{verdict}[/dim]", soft_wrap=True)
     seconds = (60.0 if live else 120.0) if noise_s is None else noise_s
     quiet = _hear(console, f"hearing {seconds:g} s of noise without the clock", _noise(seconds), heard_by, seed)
     # In real time there is a minute for all of it: a few scenes show what the dashpot does.
@@ -133,22 +133,13 @@ def show(
     return values, page
 
 
-def train_readout(console: Console, place: Path) -> None:
-    """Train the demo's readout and write it to a new file."""
-    with _busy(console, "training") as bar:
-        readout = train(progress=lambda said: bar.update(bar.task_ids[0], description=said))
-    readout.save(place)
-    console.print(describe(readout))
-
-
 def _noise(seconds: float) -> list[Act]:
     return [Silence(50.3 + 1000.0 * seconds)]
 
 
 def _busy(console: Console, said: str) -> Progress:
-    bar = Progress(
-        SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn(), console=console, transient=True
-    )
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
     bar.add_task(said, total=None)
     return bar
 
@@ -160,8 +151,8 @@ def _hear(console: Console, said: str, acts: Sequence[Act], readout: Readout, se
 
 def _say(console: Console, hearing: Hearing, quiet: Hearing) -> None:
     table = Table(box=None, pad_edge=False)
-    for name in ("touch", "said", "found", "said - true (ms)", "known, median / 95 % (ms)"):
-        table.add_column(name, justify="left" if name in ("touch", "said") else "right")
+    for name in ("touch", "said", "found", "error, ms", "known, ms"):
+        table.add_column(name, justify="left" if name in ("touch", "said") else "right", no_wrap=True)
     for row in hearing.judged.rows:
         if not row.touches:
             continue
@@ -169,6 +160,7 @@ def _say(console: Console, hearing: Hearing, quiet: Hearing) -> None:
         known = "{:.2f} / {:.2f}".format(*np.percentile(row.delays_ms, [50, 95])) if row.found else "-"
         table.add_row(row.name, row.label, f"{row.found} of {row.touches}", error, known)
     console.print(table)
+    console.print("[dim]error: said minus true, mean; known: minus true, median / 95 %[/dim]")
     false = sum(len(times) for times in hearing.judged.false.values())
     noise_s = (quiet.stop_us - quiet.start_us) * 1e-6
     console.print(f"said of nothing: {false} in the scenes, {len(quiet.found)} in {noise_s:.0f} s of noise")

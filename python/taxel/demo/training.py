@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from importlib.resources import files
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from taxel.simulate import Contact, play, truth
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
-__all__ = ["shipped", "train"]
+__all__ = ["train"]
 
 #: One frame of the 5.2 kHz preset, ms: the step of silent rows and of the neuron's grid.
 _FRAME_MS = 0.192
@@ -31,11 +30,6 @@ _REFRACTORY_MS = 15.0
 class _Example(NamedTuple):
     area: SpikeTrains
     contacts: list[Contact]
-
-
-def shipped() -> Readout:
-    """Return the readout that `taxel demo` plays with, as ``taxel demo --train`` wrote it."""
-    return Readout.from_json(files("taxel.demo").joinpath("readout.json").read_text(encoding="utf-8"))
 
 
 def train(
@@ -95,13 +89,3 @@ def _targets(example: _Example, label: str) -> NDArray[np.float64]:
         if not targets or target > targets[-1] + _REFRACTORY_MS:
             targets.append(target)
     return np.array(targets)
-
-
-def describe(readout: Readout, levels: Sequence[int] = (2, 4, 8, 16, 32)) -> str:
-    """Return the weights as a table, one line a neuron."""
-    names = [f"rise {n}" for n in levels] + [f"fall {n}" for n in levels]
-    return "\n".join(
-        f"{label}: "
-        + ", ".join(f"{name} {weight:.3f}" for name, weight in zip(names, one.weights, strict=True) if weight)
-        for label, one in readout.neurons.items()
-    )
