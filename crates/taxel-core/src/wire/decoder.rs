@@ -829,7 +829,7 @@ mod tests {
             for k in 0..run {
                 stamp = match style {
                     5 => stamp.wrapping_add(random.random()),
-                    6 if random.random_bool(0.1) => stamp.wrapping_sub(random.random_range(0..1010)),
+                    6 if random.random_bool(0.02) => stamp.wrapping_sub(*[1, 999, 1000, 1001].choose(random).unwrap()),
                     _ if quiet => stamp,
                     _ => stamp.wrapping_add(random.random_range(0..3)),
                 };
@@ -885,7 +885,7 @@ mod tests {
     fn every_set_of_instructions_decodes_alike() {
         let mut random = StdRng::seed_from_u64(11);
         let mut seen = (0, 0);
-        for round in 0..400 {
+        for round in 0..250 {
             let side = *[8, 40, 63, 64, 200].choose(&mut random).unwrap();
             let decoder = Decoder::new(Array::new(side, 64, 1.0, "array").unwrap());
             let bytes = stream(&mut random, 3000);
@@ -900,7 +900,7 @@ mod tests {
                 assert_eq!(others, counts, "{set:?}, round {round}");
             }
         }
-        assert!(seen.0 > 400_000 && seen.1 > 100_000, "streams that say little: {seen:?}");
+        assert!(seen.0 > 300_000 && seen.1 > 60_000, "streams that say little: {seen:?}");
     }
 
     #[test]
