@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import sys
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,13 +27,15 @@ def bench(
 
     Example: taxel bench wire_decode
     """
-    files = {path.stem: path for path in sorted(folder.glob("*.py"))}
+    files = {path.stem: path for path in sorted(folder.glob("[!_]*.py"))}
     if not files:
         raise ProblemError(
             f"{folder}: holds no benchmark; run this in a checkout of taxel, or name its folder by --folder"
         )
     if name != "all" and name not in files:
         raise ProblemError(f"no benchmark {name!r}: there are {', '.join(files)} and all")
+    # What benchmarks share lies beside them, in files that begin with an underscore.
+    sys.path.insert(0, str(folder))
     for stem in files if name == "all" else [name]:
         result = _load(files[stem]).run(quick=quick)
         if not quick:

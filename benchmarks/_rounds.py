@@ -1,0 +1,96 @@
+"""How every benchmark measures: peers in one run, rounds interleaved, CPU time of the thread that works."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+import time
+from collections.abc import Callable, Mapping
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+#: Middle half of the rounds wider than this share of the median: not stable enough to claim a ratio by.
+WIDEST = 0.15
+
+
+def measure(
+    runs: Mapping[str, Callable[[], Any]],
+    *,
+    rounds: int,
+    work: float = 1.0,
+    clock: int = time.CLOCK_THREAD_CPUTIME_ID,
+) -> dict[str, dict[str, Any]]:
+    """Run each once to warm up, then all of them `rounds` times in turn; return seconds and `work` per second.
+
+    Parameters
+    ----------
+    runs : by name, called without arguments
+    rounds : int
+    work : float
+        What one call does, in the unit of the rate: events, spikes ...
+    clock : int
+        CPU time of this thread; of the process (``CLOCK_PROCESS_CPUTIME_ID``) where peers have threads of their own.
+    """
+    seconds: dict[str, list[float]] = {name: [] for name in runs}
+    walls: dict[str, list[float]] = {name: [] for name in runs}
+    for done in range(rounds + 1):
+        for name, run in runs.items():
+            wall, cpu = time.perf_counter(), time.clock_gettime(clock)
+            run()
+            cpu, wall = time.clock_gettime(clock) - cpu, time.perf_counter() - wall
+            if done:
+                seconds[name].append(cpu)
+                walls[name].append(wall)
+    return {name: _summary(seconds[name], walls[name], work) for name in runs}
+
+
+def _summary(seconds: list[float], walls: list[float], work: float) -> dict[str, Any]:
+    low, middle, high = np.percentile(seconds, [25, 50, 75])
+    return {
+        "cpu_s": {"median": middle, "quartiles": [low, high], "rounds": len(seconds)},
+        "wall_s": {"median": float(np.median(walls))},
+        "rate": work / middle,
+        "stable": bool(high - low <= WIDEST * middle),
+    }
+
+
+def ratio(results: Mapping[str, Mapping[str, Any]], ours: str, peer: str) -> float:
+    """Return how many times faster ours is than the peer, by medians."""
+    return float(results[ours]["rate"] / results[peer]["rate"])
+
+
+def stamp(*packages: str) -> dict[str, Any]:
+    """Return machine, versions and commit."""
+    cpu = next(
+        (line.split(":", 1)[1].strip() for line in _read("/proc/cpuinfo") if line.startswith("model name")),
+        platform.processor(),
+    )
+    versions = {"python": platform.python_version()}
+    for package in ("taxel", "numpy", *packages):
+        try:
+            versions[package] = metadata.version(package)
+        except metadata.PackageNotFoundError:
+            versions[package] = "in the checkout" if package == "taxel" else "absent"
+    said = subprocess.run(
+        ["git", "describe", "--always", "--dirty"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=Path(__file__).parent,
+    )
+    return {
+        "machine": {"cpu": cpu, "cores": os.cpu_count(), "load": os.getloadavg()[0], "system": platform.platform()},
+        "versions": versions,
+        "commit": said.stdout.strip() or "unknown",
+    }
+
+
+def _read(path: str) -> list[str]:
+    try:
+        return Path(path).read_text().splitlines()
+    except OSError:
+        return []

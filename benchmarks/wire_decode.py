@@ -1,0 +1,226 @@
+"""How fast bytes become events, beside a plain C loop, blocked NumPy, expelliarmus and faery (both EVT2).
+
+One core, 20 million words in the page cache. "Warm" columns have been written before, "fresh" ones come from NumPy in
+the call. Ours are the nouns' own columns (t int64, x and y uint16, p bool: 13 bytes an event, and 3 more for pairs); so
+are the C loop's; NumPy writes 11 bytes (x and y uint8), which is its best.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from _rounds import measure, ratio, stamp
+from numpy.typing import NDArray
+
+import taxel
+from taxel import wire
+
+WORDS, BLOCK = 20_000_000, 65_536
+
+C_LOOP = r"""
+#include <stdint.h>
+#include <stddef.h>
+/* Word by word, with a look at every byte's place; an intensity belongs to the change directly before it. */
+size_t decode(const uint8_t *b, size_t n, int64_t *t, uint16_t *x, uint16_t *y, uint8_t *p, uint16_t *ticks,
+              uint8_t *present) {
+  size_t rows = 0, i = 0;
+  int64_t latest = -1;
+  int open = 0;
+  while (i + 5 <= n) {
+    if (!(b[i] & 0x80) || ((b[i + 1] | b[i + 2] | b[i + 3] | b[i + 4]) & 0x80)) { i++; continue; }
+    uint16_t value = (uint16_t)(b[i] << 14 | b[i + 1] << 7 | b[i + 2]), cx = b[i + 3] & 63, cy = b[i + 4] & 63;
+    if (!(b[i] & 0x28)) {
+      uint16_t ahead = (uint16_t)(value - latest);
+      int64_t now = latest < 0 ? value : ahead >= 64536 ? latest + ahead - 65536 : latest + ahead;
+      if (now > latest) latest = now;
+      t[rows] = now * 100; x[rows] = cx; y[rows] = cy; p[rows] = b[i] >> 6 & 1;
+      ticks[rows] = 0; present[rows] = 0;
+      rows++; open = 1;
+    } else {
+      if ((b[i] & 0x28) == 0x20 && open && x[rows - 1] == cx && y[rows - 1] == cy) {
+        ticks[rows - 1] = value; present[rows - 1] = 1;
+      }
+      open = 0;
+    }
+    i += 5;
+  }
+  return rows;
+}
+"""
+
+
+def streams(words: int) -> dict[str, bytes]:
+    """Return clean changes, changes that alternate with their intensities, and a random mix of kinds."""
+    rng = np.random.default_rng(1)
+    stamps = np.cumsum(rng.random(words) < 1 / 4096) + 60_000
+    x, y, p = rng.integers(0, 64, words), rng.integers(0, 64, words), rng.integers(0, 2, words)
+    ticks, alternate, random = rng.integers(0, 150, words), np.arange(words) % 2, rng.integers(0, 2, words)
+    twice = [np.repeat(column[::2], 2)[:words] for column in (x, y, p)]
+
+    def pack(intensity: Any, x: Any, y: Any, p: Any) -> bytes:
+        value = np.where(intensity, ticks, stamps % 65_536)
+        out = np.empty((words, 5), np.uint8)
+        out[:, 0] = 0x80 | p << 6 | intensity << 5 | value >> 14
+        out[:, 1], out[:, 2], out[:, 3], out[:, 4] = value >> 7 & 127, value & 127, x, y
+        return out.tobytes()
+
+    return {"clean": pack(0 * x, x, y, p), "pairs": pack(alternate, *twice), "mix": pack(random, x, y, p)}
+
+
+def numpy_blocked(data: bytes, columns: tuple[NDArray[Any], ...]) -> None:
+    """Decode clean changes as NumPy does it best: byte columns of a block, then a pass for each field."""
+    raw = np.frombuffer(data, np.uint8).reshape(-1, 5)
+    t, x, y, p = columns
+    planes, stamp16, high = np.empty((5, BLOCK), np.uint8), np.empty(BLOCK, np.uint16), np.empty(BLOCK, np.uint16)
+    latest = None
+    for at in range(0, len(raw), BLOCK):
+        n = min(BLOCK, len(raw) - at)
+        block, s, h, to = planes[:, :n], stamp16[:n], high[:n], slice(at, at + n)
+        np.copyto(block, raw[to].T)
+        if block[0].min() < 0x80 or (block[0] & 0x28).any() or block[1:].max() > 0x7F:
+            raise ValueError("this decoder takes clean changes only")
+        np.left_shift(block[0], 14, out=s, dtype=np.uint16)
+        np.left_shift(block[1], 7, out=h, dtype=np.uint16)
+        s |= h
+        s |= block[2]
+        latest = int(s[0]) if latest is None else latest
+        s -= np.uint16(latest % 65_536)
+        np.multiply(s, 100, out=t[to], dtype=np.int64)
+        t[to] += 100 * latest
+        latest += int(s[-1])
+        x[to], y[to] = block[3], block[4]
+        np.right_shift(block[0], 6, out=p[to])
+        p[to] &= 1
+
+
+def compiled(folder: Path) -> Callable[..., int] | None:
+    """Return the C loop, compiled here and now; None where there is no compiler."""
+    if shutil.which("cc") is None:
+        return None
+    (folder / "loop.c").write_text(C_LOOP)
+    library = folder / "loop.so"
+    subprocess.run(["cc", "-O3", "-shared", "-fPIC", "-o", library, folder / "loop.c"], check=True)
+    function = ctypes.CDLL(str(library)).decode
+    function.restype = ctypes.c_size_t
+    return function
+
+
+def evt2(folder: Path, words: int) -> dict[str, Callable[[], Any]]:
+    """Return the peers that read as many events from an EVT2 file; those that are not installed are left out."""
+    runs: dict[str, Callable[[], Any]] = {}
+    try:
+        import faery  # noqa: PLC0415  an extra
+    except ImportError:
+        return runs
+    rng, path = np.random.default_rng(2), folder / "events.raw"
+    events = np.zeros(words, faery.EVENTS_DTYPE)
+    events["t"] = np.sort(rng.integers(0, words // 20, words))
+    events["x"], events["y"] = rng.integers(0, 64, words), rng.integers(0, 64, words)
+    events["on"] = rng.integers(0, 2, words).astype(bool)
+    faery.events_stream_from_array(events, dimensions=(64, 64)).to_file(path, version="evt2")
+
+    def by_faery() -> None:
+        for packet in faery.events_stream_from_file(path):
+            len(packet)
+
+    runs["faery, EVT2"] = by_faery
+    try:
+        from expelliarmus import Wizard  # noqa: PLC0415  an extra
+    except ImportError:
+        return runs
+
+    def by_expelliarmus() -> None:
+        wizard = Wizard(encoding="evt2", chunk_size=BLOCK)
+        wizard.set_file(path)
+        for chunk in wizard.read_chunk():
+            len(chunk)
+
+    return runs | {"expelliarmus, EVT2": by_expelliarmus}
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    words, rounds = (WORDS // 20, 3) if quick else (WORDS, 11)
+    data = streams(words)
+    columns = wire.Columns(words + 2)
+    blocked = (np.ones(words, np.int64), *(np.ones(words, np.uint8) for _ in range(3)))
+
+    def warm(name: str) -> Callable[[], Any]:
+        return lambda: wire.Decoder().push_into(columns, data[name])
+
+    def fresh(name: str) -> Callable[[], Any]:
+        return lambda: wire.Decoder().push(data[name])
+
+    def in_chunks() -> None:
+        decoder, view = wire.Decoder(), memoryview(data["clean"])
+        for at in range(0, len(view), 5 * BLOCK):
+            decoder.push_into(columns, view[at : at + 5 * BLOCK])
+
+    runs: dict[str, Callable[[], Any]] = {
+        "taxel, clean, warm": warm("clean"),
+        "numpy, clean, warm": lambda: numpy_blocked(data["clean"], blocked),
+        "taxel, clean, fresh": fresh("clean"),
+        "taxel, clean, chunks of 65536 in turn": in_chunks,
+        "taxel, pairs, warm": warm("pairs"),
+        "taxel, pairs, fresh": fresh("pairs"),
+        "taxel, mix, warm": warm("mix"),
+    }
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        loop = compiled(folder)
+        if loop is not None:
+            places = [ctypes.c_void_p(c.ctypes.data) for c in _c_order(columns)]
+            for name in data:
+                runs[f"C loop, {name}, warm"] = lambda name=name: loop(data[name], ctypes.c_size_t(5 * words), *places)
+        runs |= evt2(folder, words)
+        _agree(data, columns, blocked, loop)
+        results = measure(runs, rounds=rounds, work=words)
+    ours = "taxel, clean, warm"
+    ratios = {f"{ours} / {peer}": ratio(results, ours, peer) for peer in results if not peer.startswith("taxel")}
+    ratios = {key: value for key, value in ratios.items() if "pairs" not in key and "mix" not in key}
+    ratios["taxel, clean, fresh / numpy, clean, warm"] = ratio(results, "taxel, clean, fresh", "numpy, clean, warm")
+    for name in ("pairs", "mix"):
+        if loop is not None:
+            ratios[f"taxel, {name}, warm / C loop, {name}, warm"] = ratio(
+                results, f"taxel, {name}, warm", f"C loop, {name}, warm"
+            )
+        ratios[f"taxel, {name}, warm, million words/s"] = results[f"taxel, {name}, warm"]["rate"] / 1e6
+    ratios["taxel, clean, warm, million events/s"] = results[ours]["rate"] / 1e6
+    return {
+        "question": __doc__.splitlines()[0],
+        **stamp("expelliarmus", "faery"),
+        "words": words,
+        "left_out": [] if loop is not None else ["C loop: no cc"],
+        "results": results,
+        "ratios": ratios,
+        "stable": all(result["stable"] for result in results.values()),
+    }
+
+
+def _c_order(columns: wire.Columns) -> tuple[NDArray[Any], ...]:
+    return columns.t, columns.x, columns.y, columns.p, columns.intensity, columns.present
+
+
+def _agree(
+    data: dict[str, bytes], columns: wire.Columns, blocked: tuple[NDArray[Any], ...], loop: Callable[..., int] | None
+) -> None:
+    """See that all decode the same before anything is measured."""
+    expected = wire.decode(data["clean"])
+    numpy_blocked(data["clean"], blocked)
+    for ours, theirs in zip((expected.t, expected.x, expected.y, expected.p), blocked, strict=True):
+        if not np.array_equal(ours, theirs):
+            raise taxel.Error("the NumPy decoder disagrees with ours")
+    for stream in data.values() if loop is not None else ():
+        places = [ctypes.c_void_p(c.ctypes.data) for c in _c_order(columns)]
+        rows = loop(stream, ctypes.c_size_t(len(stream)), *places)  # type: ignore[misc]
+        ours = wire.decode(stream)
+        pairs = () if ours.intensity is None else (ours.intensity, ours.present)
+        for mine, theirs in zip((ours.t, ours.x, ours.y, ours.p, *pairs), _c_order(columns), strict=False):
+            if not np.array_equal(mine, theirs[:rows]):
+                raise taxel.Error("the C loop disagrees with ours")
