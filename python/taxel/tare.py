@@ -51,6 +51,7 @@ class Tare:
     start_us: int
     stop_us: int
     note: str
+    _text: str
 
     def __init__(self) -> None:
         raise ProblemError("a tare is taken (Tare.take) or loaded (Tare.load), not built")
@@ -99,8 +100,9 @@ class Tare:
         """
         if not isinstance(text, str):
             raise ProblemError(f"tare is {text!r}: must be JSON text")
-        values: dict[str, Any] = json.loads(_core.check_tare(text))
         tare = cls.__new__(cls)
+        tare._text = _core.check_tare(text)
+        values: dict[str, Any] = json.loads(tare._text)
         tare.array = Array._from_geometry(values["array"])
         tare.rest = np.array([np.nan if r is None else r for r in values["rest"]]).reshape(tare.array.shape)
         tare.rest.setflags(write=False)
@@ -109,11 +111,7 @@ class Tare:
 
     def to_json(self) -> str:
         """Return the tare as JSON."""
-        rest = [None if np.isnan(r) else float(r) for r in self.rest.ravel()]
-        window = {"start_us": self.start_us, "stop_us": self.stop_us}
-        return _core.check_tare(
-            json.dumps({"array": self.array._geometry(), "rest": rest, **window, "note": self.note})
-        )
+        return self._text
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the tare to a JSON file, whole or not at all.

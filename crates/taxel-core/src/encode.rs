@@ -1,5 +1,6 @@
 //! Events or frames to spikes, live or whole: the same spikes either way.
 
+mod bracket;
 mod change_events;
 mod contact_area;
 mod fa1;
@@ -9,6 +10,7 @@ mod running_range;
 mod sampled;
 mod tare;
 mod threshold_izhikevich;
+mod wide;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -83,8 +85,7 @@ impl Encoder {
     ///
     /// `Problem`, naming the parameter.
     pub fn from_json(json: &str) -> Result<Self> {
-        let value: Value = serde_json::from_str(json).map_err(|e| problem!("encoder: not JSON: {e}"))?;
-        let encoder: Self = serde_json::from_value(value.clone()).map_err(|e| said(&value, &e))?;
+        let encoder: Self = serde_json::from_str(json).map_err(|e| said(json, &e))?;
         encoder.check()?;
         Ok(encoder)
     }
@@ -229,7 +230,11 @@ fn collect(mut stream: Box<dyn Stream>, mut out: Vec<Spike>, first: Option<i64>)
 }
 
 /// Names the parameter that serde could not read: it says only what is wrong with it.
-fn said(value: &Value, error: &serde_json::Error) -> Error {
+fn said(json: &str, error: &serde_json::Error) -> Error {
+    let value: Value = match serde_json::from_str(json) {
+        Ok(value) => value,
+        Err(error) => return problem!("encoder: not JSON: {error}"),
+    };
     let Some(object) = value.as_object() else {
         return problem!("encoder is {value}: must be an object with a name and parameters");
     };

@@ -16,7 +16,6 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
-from taxel.tare import Tare
 
 __all__ = ["Encoder", "EncoderStream"]
 
@@ -188,8 +187,6 @@ class EncoderStream:
 
 
 def _plain(value: object) -> object:
-    if isinstance(value, Tare):
-        return json.loads(value.to_json())
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         return dataclasses.asdict(value)
     return value

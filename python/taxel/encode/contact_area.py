@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from typing import Any, Self
 
+from taxel._arguments import parameters
 from taxel.encode._encoder import Encoder
 from taxel.tare import Tare
 
@@ -58,6 +59,13 @@ class ContactArea(Encoder):
         self.levels = levels
         self.tare = tare
         self._check()
+
+    def _json(self) -> str:
+        if not isinstance(self.tare, Tare):
+            return super()._json()
+        # As it stands: a tare of thousands of taxels need not be read to be handed over.
+        others = parameters({"name": self.name, "noise_floor": self.noise_floor, "levels": self.levels})
+        return f'{others[:-1]}, "tare": {self.tare.to_json()}}}'
 
     @classmethod
     def _from_parameters(cls, values: dict[str, Any]) -> Self:

@@ -116,6 +116,7 @@ impl Rule for Changes {
         self.last = held.to_vec();
     }
 
+    #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
         let floor = self.floor;
         for (block, (new, last)) in held.iter().zip(&mut self.last).enumerate().filter(|(b, _)| changed[*b]) {

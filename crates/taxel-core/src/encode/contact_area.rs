@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::sampled::{BLOCK, Block, Channels, Source, blocks};
+use super::wide::wide;
 use super::{Stream, Tare, ms};
 use crate::{Array, Events, Result, Spike, problem};
 
@@ -104,6 +105,17 @@ fn round_up(x: f64) -> f32 {
     if f64::from(near) < x { near.next_up() } else { near }
 }
 
+wide! {
+    /// Whether the same places are loaded as before.
+    fn as_loaded(held: &Block, from: &Block, loaded: &[u32; BLOCK]) -> bool {
+        let mut other = 0;
+        for lane in 0..BLOCK {
+            other |= u32::from(held[lane] >= from[lane]) ^ loaded[lane];
+        }
+        other == 0
+    }
+}
+
 struct Area {
     levels: Vec<u32>,
     rows: usize,
@@ -111,7 +123,7 @@ struct Area {
     /// From which value on each place is loaded; infinite where it has no rest.
     loaded_from: Vec<Block>,
     /// 1 where a place is loaded.
-    loaded: Vec<[u8; BLOCK]>,
+    loaded: Vec<[u32; BLOCK]>,
     /// How many neighbours of each place are loaded.
     neighbours: Vec<u8>,
     /// How many loaded places have a loaded neighbour.
@@ -132,7 +144,7 @@ impl Area {
     /// Loads or unloads a place, and keeps the counts of its neighbours and the area in step.
     fn toggle(&mut self, place: usize) {
         let loaded = !self.is_loaded(place);
-        self.loaded[place / BLOCK][place % BLOCK] = u8::from(loaded);
+        self.loaded[place / BLOCK][place % BLOCK] = u32::from(loaded);
         let (row, column) = (place / self.columns, place % self.columns);
         for y in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
             for x in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
@@ -224,11 +236,12 @@ impl Stream for Area {
             if !std::mem::take(&mut self.changed[block]) {
                 continue;
             }
-            let (held, from, loaded) = (&self.held[block], &self.loaded_from[block], self.loaded[block]);
-            let now: [u8; BLOCK] = std::array::from_fn(|lane| u8::from(held[lane] >= from[lane]));
-            if now != loaded {
-                for lane in (0..BLOCK).filter(|&lane| now[lane] != loaded[lane]) {
-                    self.toggle(block * BLOCK + lane);
+            if !as_loaded(&self.held[block], &self.loaded_from[block], &self.loaded[block]) {
+                for lane in 0..BLOCK {
+                    let loaded = self.held[block][lane] >= self.loaded_from[block][lane];
+                    if loaded != (self.loaded[block][lane] != 0) {
+                        self.toggle(block * BLOCK + lane);
+                    }
                 }
             }
         }

@@ -147,16 +147,16 @@ struct Afferents {
     blocks: Vec<Afferent>,
     channels: usize,
     /// 5.1 of every tick.
-    table: Box<[f64]>,
+    table: Box<[f64; TICKS]>,
 }
 
-/// How many ticks a word of the wire can hold.
-const TICKS: u16 = u16::MAX;
+/// How many different ticks a word of the wire can hold.
+const TICKS: usize = 65_536;
 
 impl Afferents {
     fn new(parameters: &Fa1, channels: usize) -> Self {
         let (theta_0, t) = (parameters.baseline(), parameters.period_ms);
-        let mut table = vec![0.0; usize::from(TICKS) + 1];
+        let mut table = Box::new([0.0; TICKS]);
         for (k, rho) in table.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {
             let ticks = std::array::from_fn(|lane| (k * BLOCK + lane) as f32);
             power(&ticks, parameters.alpha, rho);
@@ -171,19 +171,23 @@ impl Afferents {
             theta_0,
             blocks: vec![],
             channels,
-            table: table.into_boxed_slice(),
+            table,
         }
     }
 
     /// 5.1, from the table where all values are ticks.
     #[inline(always)]
-    fn compress(alpha: f64, table: &[f64], values: &Block, rho: &mut [f64; BLOCK]) {
-        /// Added to a whole number below 2^22, it shows that number in the lowest bits.
+    fn compress(alpha: f64, table: &[f64; TICKS], values: &Block, rho: &mut [f64; BLOCK]) {
+        /// Added to a whole number below 2^23, it shows that number in the lowest bits.
         const SHIFT: f32 = 8_388_608.0; // 2^23
-        let whole = |v: f32| (v + SHIFT) - SHIFT == v && v >= 0.0 && v <= f32::from(TICKS);
-        if values.iter().fold(true, |all, &v| all & whole(v)) {
+        let mut odd = 0;
+        for &v in values {
+            odd |= ((v + SHIFT) - SHIFT).to_bits() ^ v.to_bits();
+            odd |= (v + SHIFT).to_bits() & !(SHIFT.to_bits() | (TICKS as u32 - 1));
+        }
+        if odd == 0 {
             for (rho, &v) in rho.iter_mut().zip(values) {
-                *rho = table[((v + SHIFT).to_bits() & u32::from(TICKS)) as usize];
+                *rho = table[(v + SHIFT).to_bits() as usize % TICKS];
             }
         } else {
             power(values, alpha, rho);
@@ -195,22 +199,23 @@ impl Afferent {
     /// One sample; says whether any afferent fired.
     #[inline(always)]
     fn sample(&mut self, rho: &[f64; BLOCK], jump: f64, decay: f64, theta_0: f64) -> bool {
-        let (mut fired, mut moved) = (false, false);
+        let (mut fired, mut moved) = (0, 0);
         for (lane, &rho) in rho.iter().enumerate() {
-            let theta = self.theta[lane];
+            let (theta, s) = (self.theta[lane], self.s[lane]);
             let quiet = if theta > theta_0 { theta - decay } else { theta_0 };
-            let theta = if self.s[lane] != 0.0 { theta + jump } else { quiet };
+            let theta = if s == 0.0 { quiet } else { theta + jump };
             let u = self.u[lane] + (rho - self.rho[lane]);
-            let s = f64::from(u8::from(u > theta)) - f64::from(u8::from(u < -theta));
+            let (rise, fall) = (if u > theta { 1.0 } else { 0.0 }, if u < -theta { -1.0 } else { 0.0 });
+            let s: f64 = rise + fall;
             self.rho[lane] = rho;
             self.theta[lane] = theta;
             self.s[lane] = s;
-            self.u[lane] = if s != 0.0 { 0.0 } else { u };
-            fired |= s != 0.0;
-            moved |= theta != theta_0;
+            self.u[lane] = if s == 0.0 { u } else { 0.0 };
+            fired |= s.to_bits();
+            moved |= theta.to_bits() ^ theta_0.to_bits();
         }
-        self.still = !fired && !moved;
-        fired
+        self.still = fired | moved == 0;
+        fired != 0
     }
 }
 
@@ -228,6 +233,7 @@ impl Rule for Afferents {
         }
     }
 
+    #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
         let (jump, decay, theta_0) = (self.jump, self.decay, self.theta_0);
         let mut rho = [0.0; BLOCK];

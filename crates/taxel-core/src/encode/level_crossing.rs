@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
+use super::bracket::Bracket;
 use super::running_range::{RunningRange, Window};
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
 use super::{Stream, check_levels, micros, ms, sort_from};
@@ -122,6 +123,7 @@ struct Crossings {
     hold: i64,
     /// `channel * levels + level`.
     states: Vec<State>,
+    bracket: Bracket,
     /// Crossings on trial: when they will have held, and which; all hold equally long, so this is in order.
     trials: VecDeque<(i64, usize)>,
     tonic: Option<Tonic>,
@@ -163,6 +165,7 @@ impl Crossings {
             channels,
             hold: if parameters.hold_ms == 0.0 { 0 } else { micros("hold_ms", parameters.hold_ms)? },
             states,
+            bracket: Bracket::new(blocks(channels)),
             trials: VecDeque::new(),
             tonic,
             window: parameters.running_range.as_ref().map(|r| Window::new(r, blocks(channels))).transpose()?,
@@ -182,6 +185,20 @@ impl Crossings {
                 };
             }
         }
+        (0..self.channels).for_each(|channel| self.set_bracket(channel));
+    }
+
+    fn set_bracket(&mut self, channel: usize) {
+        let levels = self.levels.len();
+        let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
+        for state in &self.states[channel * levels..(channel + 1) * levels] {
+            if state.above {
+                low = low.max(state.off_at);
+            } else {
+                high = high.min(state.on_at);
+            }
+        }
+        self.bracket.set(channel, low, high);
     }
 
     /// The first sample that counts: no crossing, but tonic spikes where it is above.
@@ -197,33 +214,44 @@ impl Crossings {
                     self.speak_tonic(t, channel, level, true, out);
                 }
             }
+            self.set_bracket(channel);
         }
     }
 
+    #[inline(always)]
     fn cross(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
         let from = out.len();
         self.say_trials(t, true, out);
-        let levels = self.levels.len();
-        for (block, _) in changed.iter().enumerate().filter(|&(_, &c)| c) {
-            for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
-                let value = held[block][channel % BLOCK];
-                for train in channel * levels..(channel + 1) * levels {
-                    let state = &mut self.states[train];
-                    let above = value >= if state.above { state.off_at } else { state.on_at };
-                    if above != state.above {
-                        state.above = above;
-                        state.since = t;
-                        if self.hold == 0 {
-                            self.say(t, train, out);
-                        } else if above != state.said {
-                            self.trials.push_back((t + self.hold, train));
-                        }
+        for (block, values) in held.iter().enumerate() {
+            if changed[block] && self.bracket.left(block, values) {
+                for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
+                    let value = values[channel % BLOCK];
+                    if !self.bracket.holds(channel, value) {
+                        self.cross_channel(t, channel, value, out);
                     }
                 }
             }
         }
         self.say_tonic(t, true, out);
         sort_from(out, from);
+    }
+
+    fn cross_channel(&mut self, t: i64, channel: usize, value: f32, out: &mut Vec<Spike>) {
+        let levels = self.levels.len();
+        for train in channel * levels..(channel + 1) * levels {
+            let state = &mut self.states[train];
+            let above = value >= if state.above { state.off_at } else { state.on_at };
+            if above != state.above {
+                state.above = above;
+                state.since = t;
+                if self.hold == 0 {
+                    self.say(t, train, out);
+                } else if above != state.said {
+                    self.trials.push_back((t + self.hold, train));
+                }
+            }
+        }
+        self.set_bracket(channel);
     }
 
     fn say(&mut self, t: i64, train: usize, out: &mut Vec<Spike>) {
@@ -287,6 +315,7 @@ impl Rule for Crossings {
         }
     }
 
+    #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
         let Some(mut window) = self.window.take() else { return self.cross(t, held, changed, out) };
         let everything = vec![true; held.len()];

@@ -11,41 +11,44 @@ use super::sampled::{BLOCK, Block};
 /// Added and taken away again, it rounds to a whole number.
 const ROUND: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
 
-/// x^alpha for alpha > 0 and 0 <= x; values below 0 count as 0.
+/// Its lowest bits show a whole number from 0 that is added to it.
+const WHOLE: f64 = 4_503_599_627_370_496.0; // 2^52
+
+/// x^alpha for alpha > 0; values below 0 count as 0.
 #[inline(always)]
 pub(super) fn power(values: &Block, alpha: f64, out: &mut [f64; BLOCK]) {
     for (out, &value) in out.iter_mut().zip(values) {
-        *out = power_of(f64::from(value.max(0.0)), alpha);
+        *out = power_of(f64::from(value), alpha);
     }
 }
 
 #[inline(always)]
 fn power_of(x: f64, alpha: f64) -> f64 {
-    // x = 2^exponent * m with m between sqrt(1/2) and sqrt(2); f32 values are never subnormal in f64.
+    let one = 1.0_f64.to_bits();
+    // x = 2^(biased - 1023) * m with m between sqrt(1/2) and sqrt(2); f32 values are never subnormal in f64.
     let bits = x.to_bits();
-    let shifted = bits.wrapping_sub((SQRT_2 / 2.0).to_bits());
-    let exponent = (shifted as i64) >> 52;
-    let m = f64::from_bits(bits.wrapping_sub((exponent << 52) as u64));
+    let biased = bits.wrapping_add(one - (SQRT_2 / 2.0).to_bits()) >> 52;
+    let m = f64::from_bits(bits.wrapping_sub(biased << 52).wrapping_add(one));
     // ln m = 2 (s + s^3/3 + s^5/5 + ...) with s = (m - 1) / (m + 1), |s| < 0.172.
     let s = (m - 1.0) / (m + 1.0);
     let q = s * s;
-    let mut series = 1.0 / 23.0;
-    for k in [21.0, 19.0, 17.0, 15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
+    let mut series = 1.0 / 19.0;
+    for k in [17.0, 15.0, 13.0, 11.0, 9.0, 7.0, 5.0, 3.0, 1.0] {
         series = series * q + 1.0 / k;
     }
     let small = alpha * (2.0 / LN_2) * s * series;
-    // The exponent as f64, by way of its bits: there is no vector instruction for i64 to f64.
-    let whole = f64::from_bits(ROUND.to_bits().wrapping_add(exponent as u64)) - ROUND;
+    // The exponent as f64, by way of its bits: few machines have a vector instruction for i64 to f64.
+    let whole = f64::from_bits(WHOLE.to_bits() | biased) - (WHOLE + 1023.0);
     // 2^y = 2^n * e^(f ln 2) with |f| <= 1/2.
-    let y = alpha * whole + small;
-    let shifted = y + ROUND;
+    let large = alpha * whole;
+    let shifted = (large + small) + ROUND;
     let n = shifted - ROUND;
-    let f = ((alpha * whole - n) + small) * LN_2;
+    let f = ((large - n) + small) * LN_2;
     let mut exponential = 1.0;
-    for k in [13.0, 12.0, 11.0, 10.0, 9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0] {
-        exponential = exponential * f * (1.0 / k) + 1.0;
+    for k in [12.0, 11.0, 10.0, 9.0, 8.0, 7.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0] {
+        exponential = exponential * (f * (1.0 / k)) + 1.0;
     }
-    let scale = f64::from_bits((shifted.to_bits().wrapping_sub(ROUND.to_bits()) << 52).wrapping_add(1.0_f64.to_bits()));
+    let scale = f64::from_bits((shifted.to_bits() << 52).wrapping_add(one));
     if x > 0.0 { exponential * scale } else { 0.0 }
 }
 

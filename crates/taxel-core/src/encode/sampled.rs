@@ -3,6 +3,7 @@
 //! A [`Rule`] knows one encoder's law and nothing of events, pieces or order; [`Sampled`] brings it the samples. What
 //! did not change since the last sample is known by block, so a rule need not look at it.
 
+use super::wide::wide;
 use super::{Stream, micros, ms};
 use crate::{Array, Events, Result, Spike, problem};
 
@@ -12,9 +13,9 @@ pub(super) const BLOCK: usize = 64;
 /// One value a channel, for [`BLOCK`] channels.
 pub(super) type Block = [f32; BLOCK];
 
-/// What an encoder does with samples; channels are the existing taxels in the order of their index.
+/// What an encoder does with samples; `sample` and `pass` are `#[inline(always)]`, to be compiled for wider vectors.
 ///
-/// The last block is filled up with channels that always read 0 and must never spike.
+/// Channels are the existing taxels in the order of their index. The last block is filled up with channels that always read 0 and must never spike.
 pub(super) trait Rule: Send {
     fn trains(&self) -> usize;
 
@@ -29,6 +30,19 @@ pub(super) trait Rule: Send {
 
     /// Whether nothing would ever come while the last sample holds, so that samples without change may be left out.
     fn idle(&self) -> bool;
+}
+
+wide! {
+    fn take_sample<R: Rule>(rule: &mut R, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+        rule.pass(t, out);
+        rule.sample(t, held, changed, out);
+    }
+}
+
+wide! {
+    fn pass<R: Rule>(rule: &mut R, t: i64, out: &mut Vec<Spike>) {
+        rule.pass(t, out);
+    }
 }
 
 /// Which taxels are channels.
@@ -222,8 +236,7 @@ impl<R: Rule> Sampled<R> {
 
     fn sample(&mut self, t: i64, out: &mut Vec<Spike>) {
         if self.begun {
-            self.rule.pass(t, out);
-            self.rule.sample(t, &self.held, &self.changed, out);
+            take_sample(&mut self.rule, t, &self.held, &self.changed, out);
         } else {
             self.rule.begin(t, &self.held, out);
             self.begun = true;
@@ -291,7 +304,7 @@ impl<R: Rule> Stream for Sampled<R> {
         }
         self.source = Source::Events { present };
         if self.begun {
-            self.rule.pass(present, out);
+            pass(&mut self.rule, present, out);
         }
         Ok(())
     }
@@ -318,7 +331,7 @@ impl<R: Rule> Stream for Sampled<R> {
             Source::Frames { open } => *open = t.max(*open),
         }
         if self.begun {
-            self.rule.pass(t, out);
+            pass(&mut self.rule, t, out);
         }
     }
 

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
+use super::bracket::Bracket;
+use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
 use super::{Stream, check_levels, micros, ms, sort_from};
 use crate::{Array, Result, Spike};
 
@@ -150,6 +151,7 @@ struct Neurons {
 
 impl Neurons {
     /// Takes `steps` steps; tells `fired` each spike's step and lane.
+    #[inline(always)]
     fn run(&mut self, model: Model, steps: i64, mut fired: impl FnMut(i64, usize)) {
         if self.still || steps <= 0 {
             return;
@@ -189,6 +191,7 @@ struct Pairs {
     begin: Begin,
     channels: usize,
     levels: Vec<f32>,
+    bracket: Bracket,
     /// Whether each train's taxel is at its level; the last eight are filled up.
     on: Vec<[bool; LANES]>,
     rises: Vec<Neurons>,
@@ -209,6 +212,7 @@ impl Pairs {
             begin: parameters.begin,
             channels,
             levels: parameters.levels.iter().map(|&l| l as f32).collect(),
+            bracket: Bracket::new(blocks(channels)),
             on: vec![[false; LANES]; groups],
             rises: vec![neurons.clone(); groups],
             falls: vec![neurons; groups],
@@ -217,26 +221,29 @@ impl Pairs {
         }
     }
 
-    fn hear(&mut self, held: &[Block], changed: impl Fn(usize) -> bool) {
+    fn hear(&mut self, channel: usize, value: f32) {
         let (levels, gain) = (self.levels.len(), self.model.gain);
-        for block in (0..held.len()).filter(|&b| changed(b)) {
-            for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
-                let value = held[block][channel % BLOCK];
-                for (level, &at) in self.levels.iter().enumerate() {
-                    let train = channel * levels + level;
-                    let (group, lane) = (train / LANES, train % LANES);
-                    let on = value >= at;
-                    if self.on[group][lane] != on {
-                        self.on[group][lane] = on;
-                        self.rises[group].set(lane, if on { gain } else { 0.0 });
-                        self.falls[group].set(lane, if on { 0.0 } else { gain });
-                    }
-                }
+        let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
+        for (level, &at) in self.levels.iter().enumerate() {
+            let train = channel * levels + level;
+            let (group, lane) = (train / LANES, train % LANES);
+            let on = value >= at;
+            if on {
+                low = at;
+            } else {
+                high = high.min(at);
+            }
+            if self.on[group][lane] != on {
+                self.on[group][lane] = on;
+                self.rises[group].set(lane, if on { gain } else { 0.0 });
+                self.falls[group].set(lane, if on { 0.0 } else { gain });
             }
         }
+        self.bracket.set(channel, low, high);
     }
 
     /// Takes all steps that begin before `t`.
+    #[inline(always)]
     fn step_until(&mut self, t: i64) {
         let steps = (t - self.next + STEP - 1).div_euclid(STEP);
         if steps <= 0 {
@@ -279,7 +286,9 @@ impl Rule for Pairs {
         for falls in &mut self.falls {
             falls.input = [self.model.gain; LANES];
         }
-        self.hear(held, |_| true);
+        for channel in 0..self.channels {
+            self.hear(channel, held[channel / BLOCK][channel % BLOCK]);
+        }
         // Lanes beyond the last train hear nothing and stay at rest.
         let used = self.trains() % LANES;
         if used > 0
@@ -297,11 +306,22 @@ impl Rule for Pairs {
         }
     }
 
+    #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
-        self.hear(held, |block| changed[block]);
+        for (block, values) in held.iter().enumerate() {
+            if changed[block] && self.bracket.left(block, values) {
+                for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
+                    let value = values[channel % BLOCK];
+                    if !self.bracket.holds(channel, value) {
+                        self.hear(channel, value);
+                    }
+                }
+            }
+        }
         self.hand_on(t, true, out);
     }
 
+    #[inline(always)]
     fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
         self.step_until(t);
         self.hand_on(t, false, out);

@@ -1,0 +1,37 @@
+//! Between which values a channel crosses nothing, so that most channels need no closer look.
+
+use super::sampled::{BLOCK, Block};
+
+/// For each channel the values `low <= value < high` that change nothing.
+pub(super) struct Bracket {
+    low: Vec<Block>,
+    high: Vec<Block>,
+}
+
+impl Bracket {
+    /// Brackets around everything.
+    pub(super) fn new(blocks: usize) -> Self {
+        Self { low: vec![[f32::NEG_INFINITY; BLOCK]; blocks], high: vec![[f32::INFINITY; BLOCK]; blocks] }
+    }
+
+    pub(super) fn set(&mut self, channel: usize, low: f32, high: f32) {
+        self.low[channel / BLOCK][channel % BLOCK] = low;
+        self.high[channel / BLOCK][channel % BLOCK] = high;
+    }
+
+    /// Whether a channel of this block left its bracket.
+    #[inline(always)]
+    pub(super) fn left(&self, block: usize, values: &Block) -> bool {
+        let (low, high) = (&self.low[block], &self.high[block]);
+        let mut left = 0_u32;
+        for lane in 0..BLOCK {
+            left |= u32::from((values[lane] < low[lane]) | (values[lane] >= high[lane]));
+        }
+        left != 0
+    }
+
+    pub(super) fn holds(&self, channel: usize, value: f32) -> bool {
+        let (block, lane) = (channel / BLOCK, channel % BLOCK);
+        self.low[block][lane] <= value && value < self.high[block][lane]
+    }
+}
