@@ -2,7 +2,8 @@
 //!
 //! Each taxel integrates the change of its compressed pressure and fires where that passes a threshold, which a spike
 //! raises by `T A theta_0` and a quiet sample lowers by `B theta_0`. Order within a sample: the threshold moves by the
-//! last sample's spike, the change is added, both are compared, a spike resets the integral.
+//! last sample's spike, the change is added, both are compared, a spike resets the integral. (The threshold's move is
+//! reckoned at the end of a sample instead of at the start of the next: the same numbers, one array less.)
 //!
 //! Reading: as printed, equation 5.5 lets the threshold sink below `theta_0` for one sample, by less than `B theta_0`,
 //! before its third case restores it. Kept, so that spikes equal the thesis'.
@@ -127,14 +128,10 @@ impl Fa1 {
 /// The state of the afferents of one block.
 #[derive(Clone)]
 struct Afferent {
-    /// rho of the last sample (5.1).
-    rho: [f64; BLOCK],
-    /// U (5.3).
-    u: [f64; BLOCK],
-    /// theta (5.5).
+    /// rho (5.1) where U was last reset: U, the sum of changes since then (5.3), is rho less this.
+    base: [f64; BLOCK],
+    /// theta (5.5) of the next sample.
     theta: [f64; BLOCK],
-    /// s of the last sample (5.4).
-    s: [f64; BLOCK],
     /// Whether a sample without change would leave all this as it is.
     still: bool,
 }
@@ -196,23 +193,23 @@ impl Afferents {
 }
 
 impl Afferent {
-    /// One sample; says whether any afferent fired.
+    /// One sample; fills `s` (5.4) and says whether any afferent fired.
     #[inline(always)]
-    fn sample(&mut self, rho: &[f64; BLOCK], jump: f64, decay: f64, theta_0: f64) -> bool {
+    fn sample(&mut self, rho: &[f64; BLOCK], s: &mut [f64; BLOCK], jump: f64, decay: f64, theta_0: f64) -> bool {
         let (mut fired, mut moved) = (0, 0);
         for (lane, &rho) in rho.iter().enumerate() {
-            let (theta, s) = (self.theta[lane], self.s[lane]);
+            let (base, theta) = (self.base[lane], self.theta[lane]);
+            let u = rho - base;
+            let rise = if u > theta { 1.0 } else { 0.0 };
+            let fall = if u < -theta { -1.0 } else { 0.0 };
+            let said: f64 = rise + fall;
             let quiet = if theta > theta_0 { theta - decay } else { theta_0 };
-            let theta = if s == 0.0 { quiet } else { theta + jump };
-            let u = self.u[lane] + (rho - self.rho[lane]);
-            let (rise, fall) = (if u > theta { 1.0 } else { 0.0 }, if u < -theta { -1.0 } else { 0.0 });
-            let s: f64 = rise + fall;
-            self.rho[lane] = rho;
-            self.theta[lane] = theta;
-            self.s[lane] = s;
-            self.u[lane] = if s == 0.0 { u } else { 0.0 };
-            fired |= s.to_bits();
-            moved |= theta.to_bits() ^ theta_0.to_bits();
+            let next = if said == 0.0 { quiet } else { theta + jump };
+            s[lane] = said;
+            self.base[lane] = if said == 0.0 { base } else { rho };
+            self.theta[lane] = next;
+            fired |= said.to_bits();
+            moved |= (next.to_bits() ^ theta_0.to_bits()) | (theta.to_bits() ^ theta_0.to_bits());
         }
         self.still = fired | moved == 0;
         fired != 0
@@ -225,29 +222,30 @@ impl Rule for Afferents {
     }
 
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
-        let blank =
-            Afferent { rho: [0.0; BLOCK], u: [0.0; BLOCK], theta: [self.theta_0; BLOCK], s: [0.0; BLOCK], still: true };
+        let blank = Afferent { base: [0.0; BLOCK], theta: [self.theta_0; BLOCK], still: true };
         self.blocks = vec![blank; held.len()];
         for (afferent, values) in self.blocks.iter_mut().zip(held) {
-            Self::compress(self.alpha, &self.table, values, &mut afferent.rho);
+            Self::compress(self.alpha, &self.table, values, &mut afferent.base);
         }
     }
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
         let (jump, decay, theta_0) = (self.jump, self.decay, self.theta_0);
-        let mut rho = [0.0; BLOCK];
+        let (mut rho, mut s) = ([0.0; BLOCK], [0.0; BLOCK]);
         for (block, afferent) in self.blocks.iter_mut().enumerate() {
-            if changed[block] {
-                Self::compress(self.alpha, &self.table, &held[block], &mut rho);
-            } else if afferent.still {
+            if afferent.still && !changed[block] {
                 continue;
-            } else {
-                rho = afferent.rho;
             }
-            if afferent.sample(&rho, jump, decay, theta_0) {
-                for (lane, &s) in afferent.s.iter().enumerate().filter(|&(_, &s)| s != 0.0) {
-                    out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value: s as f32 });
+            Self::compress(self.alpha, &self.table, &held[block], &mut rho);
+            if afferent.sample(&rho, &mut s, jump, decay, theta_0) {
+                for (part, eight) in s.as_chunks::<8>().0.iter().enumerate() {
+                    if eight.iter().fold(0, |any, s| any | s.to_bits()) != 0 {
+                        for (lane, &s) in eight.iter().enumerate().filter(|&(_, &s)| s != 0.0) {
+                            let train = (block * BLOCK + part * 8 + lane) as u32;
+                            out.push(Spike { t: ms(t), train, value: s as f32 });
+                        }
+                    }
                 }
             }
         }
