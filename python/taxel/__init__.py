@@ -3,6 +3,7 @@
 from taxel import detect, device, encode, metrics, wire
 from taxel._convert import convert
 from taxel import detect, device, encode, live, metrics, wire
+from taxel import learn, metrics
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel._health import Health, health
 from taxel.array import Array
@@ -43,6 +44,7 @@ __all__ = [
     "encode",
     "health",
     "live",
+    "learn",
     "metrics",
     "open",
     "wire",

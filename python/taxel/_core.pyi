@@ -243,3 +243,26 @@ def send(
     seconds: float,
     segment: bool,
 ) -> str: ...
+# learn: parameters as JSON; a fit as (weights, objective, parts, gap, rounds, rows, solved, unreachable, refires)
+
+_Fit = tuple[
+    NDArray[np.float64],
+    float,
+    list[float],
+    float,
+    int,
+    int,
+    bool,
+    list[tuple[int, int]],
+    int,
+]
+
+def check_cone_r(parameters: str) -> str: ...
+
+class ConeRProblem:
+    def __new__(
+        cls, parameters: str, patterns: list[tuple[Any, ...]], targets: list[NDArray[np.float64]]
+    ) -> ConeRProblem: ...
+    @property
+    def silent_rows(self) -> int: ...
+    def fit(self, parameters: str, start: NDArray[np.float64] | None, progress: Any) -> _Fit: ...

@@ -164,7 +164,7 @@ class Neuron:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        default = Neuron.__init__.__kwdefaults__
+        default = Neuron.__init__.__kwdefaults__ or {}
         changed = [f"{name}={value!r}" for name, value in vars(self).items() if value != default[name]]
         return f"Neuron({', '.join(changed)})"
 

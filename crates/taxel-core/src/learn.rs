@@ -1,1 +1,77 @@
-//! Weights from examples.
+//! Weights from examples: patterns of input spikes, and the times at which the neuron shall fire.
+
+mod cone_program;
+mod cone_r;
+mod rounds;
+mod rows;
+
+pub use cone_r::{ConeR, Divisor, Fit, Norm, Parts, Problem, Round, Status};
+
+use crate::neuron::Neuron;
+use crate::{Result, SpikeTrains, problem};
+
+/// Checks what every learner is given: one list of targets (ms, ascending) a pattern, the same trains in each pattern.
+///
+/// # Errors
+///
+/// `Problem`, naming pattern and target.
+fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>]) -> Result<()> {
+    if patterns.is_empty() {
+        return Err(problem!("patterns: there is none, at least one is needed"));
+    }
+    if patterns.len() != targets.len() {
+        return Err(problem!(
+            "targets: {} lists for {} patterns, must be one a pattern (an empty one teaches silence)",
+            targets.len(),
+            patterns.len()
+        ));
+    }
+    for (p, (pattern, targets)) in patterns.iter().zip(targets).enumerate() {
+        pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
+        if pattern.is_empty() {
+            return Err(problem!("pattern {p}: has no train"));
+        }
+        if pattern.len() != patterns[0].len() {
+            return Err(problem!("pattern {p}: {} trains, pattern 0 has {}", pattern.len(), patterns[0].len()));
+        }
+        if pattern.times.is_empty() {
+            return Err(problem!("pattern {p}: has no spike, so no weight can matter in it"));
+        }
+        if pattern.values.is_some() {
+            return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
+        }
+        for (k, &t) in targets.iter().enumerate() {
+            if !t.is_finite() {
+                return Err(problem!("pattern {p}, target {k}: time is {t}, must be finite"));
+            }
+            if t < pattern.start || t > pattern.stop {
+                return Err(problem!(
+                    "pattern {p}, target {k}: {t} ms lies outside the pattern's window {} to {} ms",
+                    pattern.start,
+                    pattern.stop
+                ));
+            }
+            if k == 0 {
+                continue;
+            }
+            let since = t - targets[k - 1];
+            if since <= 0.0 {
+                return Err(problem!(
+                    "pattern {p}, target {k}: {t} ms comes after {} ms, targets must ascend",
+                    targets[k - 1]
+                ));
+            }
+            if since <= neuron.refractory {
+                return Err(problem!(
+                    "pattern {p}, target {k} ({t} ms): {since} ms after target {}, inside the refractory {} ms",
+                    k - 1,
+                    neuron.refractory
+                ));
+            }
+        }
+    }
+    if targets.iter().all(Vec::is_empty) {
+        return Err(problem!("targets: no pattern has one, so nothing is to be learnt"));
+    }
+    Ok(())
+}

@@ -7,6 +7,7 @@ mod knock;
 
 mod detect;
 mod encode;
+mod learn;
 mod live;
 mod neuron;
 mod nouns;
@@ -25,6 +26,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     detect::register(module)?;
     encode::register(module)?;
     live::register(module)?;
+    learn::register(module)?;
     neuron::register(module)?;
     recording::register(module)?;
     simulate::register(module)?;

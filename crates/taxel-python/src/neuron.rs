@@ -22,6 +22,9 @@ fn check_neuron(parameters: &str) -> PyResult<String> {
     serde_json::to_string(&neuron).map_err(|e| core(problem!("neuron: {e}")))
 }
 
+/// Times (ms) and slopes (mV/ms) of output spikes.
+type OutputSpikes<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
 /// Times and slopes of the output spikes.
 #[pyfunction]
 fn neuron_run<'py>(
@@ -30,7 +33,7 @@ fn neuron_run<'py>(
     weights: PyReadonlyArray1<'py, f64>,
     trains: SpikesIn<'py>,
     threshold: f64,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+) -> PyResult<OutputSpikes<'py>> {
     let (neuron, trains) = (to_neuron(parameters)?, to_spikes(trains)?);
     let weights = slice("weights", &weights)?;
     let spikes = enter(py, |stop| neuron.run(weights, &trains, threshold, stop))?;

@@ -13,7 +13,7 @@ __all__ = ["victor_purpura"]
 def victor_purpura(a: ArrayLike, b: ArrayLike, *, q: float) -> float:
     """Return the cheapest way to turn spike train `a` into spike train `b`.
 
-    Removing or adding a spike costs 1, moving it by dt costs ``q * |dt|``: spikes more than ``2 / q`` apart never match.
+    Removing or adding a spike costs 1, moving it by dt costs ``q * |dt|``: spikes over ``2 / q`` apart never match.
 
     Parameters
     ----------

@@ -1,0 +1,258 @@
+//! The convex program over a few rows, as a cone program for Clarabel.
+//!
+//! Minimise `linear.w + l1 |w|_1 + l2 |w|_2 (or |w|_2^2) + quadratic |B w|^2 + sum_i weight_i max(r_i.w - limit_i, 0)` over
+//! `lower <= w <= upper`. Each hinge gets one slack variable, so a dense row stands in the matrix once.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::{
+    DefaultInfo, DefaultSettings, DefaultSolver, IPSolver, NonnegativeConeT, SecondOrderConeT, SupportedConeT,
+    ZeroConeT,
+};
+
+use super::cone_r::Norm;
+use crate::{Error, Result, Stop};
+
+/// A sum of hinges, `weight_i max(r_i.w - limit_i, 0)`, with rows one after the other.
+#[derive(Debug, Default)]
+pub(super) struct Hinges {
+    pub(super) rows: Vec<f64>,
+    pub(super) limit: Vec<f64>,
+    pub(super) weight: Vec<f64>,
+}
+
+/// The whole program.
+#[derive(Debug)]
+pub(super) struct ConeProgram<'a> {
+    pub(super) linear: &'a [f64],
+    pub(super) l1: f64,
+    pub(super) l2: f64,
+    pub(super) norm: Norm,
+    /// Half the curvature of `B`, and its rows, one after the other.
+    pub(super) quadratic: f64,
+    pub(super) behind: &'a [f64],
+    /// `B'B`, column by column.
+    pub(super) gram: &'a [f64],
+    pub(super) lower: f64,
+    pub(super) upper: f64,
+    pub(super) hinges: &'a Hinges,
+}
+
+/// What the solver found; whether it is the optimum, the caller finds out.
+#[derive(Debug)]
+pub(super) struct Answer {
+    pub(super) weights: Vec<f64>,
+    /// One multiplier a hinge, between 0 and its weight.
+    pub(super) multipliers: Vec<f64>,
+}
+
+/// Coefficients below this do not move a potential by more than its rounding.
+const NOTHING: f64 = 1e-14;
+
+/// Columns of a sparse matrix, filled one after the other.
+struct Columns {
+    pointers: Vec<usize>,
+    rows: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Columns {
+    fn new() -> Self {
+        Self { pointers: vec![0], rows: vec![], values: vec![] }
+    }
+
+    fn put(&mut self, row: usize, value: f64) {
+        if value.abs() > NOTHING {
+            self.rows.push(row);
+            self.values.push(value);
+        }
+    }
+
+    fn end(&mut self) {
+        self.pointers.push(self.rows.len());
+    }
+
+    fn matrix(self, rows: usize) -> CscMatrix<f64> {
+        CscMatrix::new(rows, self.pointers.len() - 1, self.pointers, self.rows, self.values)
+    }
+}
+
+impl ConeProgram<'_> {
+    /// Solves the program to a relative gap of about `tolerance`, all costs times `scale` (so that they are about 1).
+    pub(super) fn solve(&self, scale: f64, tolerance: f64, stop: Stop<'_>) -> Result<Answer> {
+        let n = self.linear.len();
+        let (m, k) = (self.hinges.limit.len(), self.behind.len() / n.max(1));
+        let quadratic = self.quadratic * scale;
+        // B as a dense n x n block costs nothing where the hinges fill that block anyway; else its few rows are cheaper.
+        let factored = quadratic > 0.0 && m + k < n;
+        let dense = quadratic > 0.0 && !factored;
+        let of_one_sign = self.lower >= 0.0 || self.upper <= 0.0;
+        let absolute = self.l1 > 0.0 && !of_one_sign;
+        let sign = if self.lower >= 0.0 { 1.0 } else { -1.0 };
+        let normed = self.l2 > 0.0 && self.norm == Norm::Norm;
+
+        // Variables: w, the hinges' slacks, |w| by synapse, |w|_2, B w.
+        let (slack, size, length, image) = (n, n + m, n + m + if absolute { n } else { 0 }, 0);
+        let image = image + length + usize::from(normed);
+        let variables = image + if factored { k } else { 0 };
+        // Rows: B w - y = 0; r w - slack <= limit; slack >= 0; bounds; -|w| <= w <= |w|; the cone of |w|_2.
+        let hinge = if factored { k } else { 0 };
+        let positive = hinge + m;
+        let (above, below) = (positive + m, positive + m + n);
+        let (plus, minus) = (below + n, below + 2 * n);
+        let cone = if absolute { minus + n } else { plus };
+        let rows = cone + if normed { n + 1 } else { 0 };
+
+        let mut q = vec![0.0; variables];
+        for (q, &c) in q.iter_mut().zip(self.linear) {
+            *q = scale * (c + if self.l1 > 0.0 && of_one_sign { sign * self.l1 } else { 0.0 });
+        }
+        for (q, &c) in q[slack..size].iter_mut().zip(&self.hinges.weight) {
+            *q = scale * c;
+        }
+        if absolute {
+            q[size..length].fill(scale * self.l1);
+        }
+        if normed {
+            q[length] = scale * self.l2;
+        }
+
+        let ridge = if self.norm == Norm::Square { 2.0 * scale * self.l2 } else { 0.0 };
+        let mut p = Columns::new();
+        for j in 0..n {
+            if dense {
+                for i in 0..=j {
+                    p.put(i, 2.0 * quadratic * self.gram[j * n + i] + if i == j { ridge } else { 0.0 });
+                }
+            } else {
+                p.put(j, ridge);
+            }
+            p.end();
+        }
+        for _ in n..image {
+            p.end();
+        }
+        for j in image..variables {
+            p.put(j, 2.0 * quadratic);
+            p.end();
+        }
+
+        let mut a = Columns::new();
+        for j in 0..n {
+            if factored {
+                for i in 0..k {
+                    a.put(i, self.behind[i * n + j]);
+                }
+            }
+            for i in 0..m {
+                a.put(hinge + i, self.hinges.rows[i * n + j]);
+            }
+            a.put(above + j, 1.0);
+            a.put(below + j, -1.0);
+            if absolute {
+                a.put(plus + j, 1.0);
+                a.put(minus + j, -1.0);
+            }
+            if normed {
+                a.put(cone + 1 + j, -1.0);
+            }
+            a.end();
+        }
+        for i in 0..m {
+            a.put(hinge + i, -1.0);
+            a.put(positive + i, -1.0);
+            a.end();
+        }
+        if absolute {
+            for j in 0..n {
+                a.put(plus + j, -1.0);
+                a.put(minus + j, -1.0);
+                a.end();
+            }
+        }
+        if normed {
+            a.put(cone, -1.0);
+            a.end();
+        }
+        if factored {
+            for i in 0..k {
+                a.put(i, -1.0);
+                a.end();
+            }
+        }
+
+        let mut b = vec![0.0; rows];
+        b[hinge..positive].copy_from_slice(&self.hinges.limit);
+        b[above..below].fill(self.upper);
+        b[below..plus].fill(-self.lower);
+
+        let mut cones: Vec<SupportedConeT<f64>> = Vec::new();
+        if factored {
+            cones.push(ZeroConeT(k));
+        }
+        cones.push(NonnegativeConeT(cone - hinge));
+        if normed {
+            cones.push(SecondOrderConeT(n + 1));
+        }
+
+        let settings = DefaultSettings {
+            verbose: false,
+            // The tolerance counts relative to the objective; the absolute one is for an optimum of 0.
+            tol_gap_abs: 1e-13,
+            tol_gap_rel: tolerance,
+            tol_feas: tolerance,
+            // Rows are few and all matter; one thread, so that a fit gives the same bits again.
+            presolve_enable: false,
+            max_threads: 1,
+            ..DefaultSettings::default()
+        };
+        let (p, a) = (p.matrix(variables), a.matrix(rows));
+        let (x, z) = solve_stoppable(&p, &q, &a, &b, &cones, settings, stop)?;
+        let weights = x[..n].iter().map(|w| w.clamp(self.lower, self.upper)).collect();
+        let multipliers =
+            z[hinge..positive].iter().zip(&self.hinges.weight).map(|(z, &most)| (z / scale).clamp(0.0, most)).collect();
+        Ok(Answer { weights, multipliers })
+    }
+}
+
+/// Runs Clarabel beside this thread, which looks out for a request to stop.
+fn solve_stoppable(
+    p: &CscMatrix<f64>,
+    q: &[f64],
+    a: &CscMatrix<f64>,
+    b: &[f64],
+    cones: &[SupportedConeT<f64>],
+    settings: DefaultSettings<f64>,
+    stop: Stop<'_>,
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    let stopped = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stopped);
+    let (done, wait) = std::sync::mpsc::channel::<()>();
+    let solved = std::thread::scope(|scope| {
+        let solving = scope.spawn(move || {
+            let _done = done; // hung up when this thread ends, however it ends
+            let mut solver = DefaultSolver::new(p, q, a, b, cones, settings).map_err(|e| e.to_string())?;
+            solver.set_termination_callback(move |_: &DefaultInfo<f64>| asked.load(Ordering::Relaxed));
+            solver.solve();
+            Ok::<_, String>((solver.solution.x, solver.solution.z))
+        });
+        while let Err(std::sync::mpsc::RecvTimeoutError::Timeout) = wait.recv_timeout(Duration::from_millis(10)) {
+            if stop.asked() {
+                stopped.store(true, Ordering::Relaxed);
+            }
+        }
+        solving.join()
+    });
+    stop.check()?;
+    match solved {
+        Ok(Ok((x, z))) if x.iter().chain(&z).all(|v| v.is_finite()) => Ok((x, z)),
+        Ok(Ok(_)) => {
+            Err(Error::Problem("the cone solver gave no finite answer: are the parameters of a sane size?".into()))
+        }
+        Ok(Err(text)) => Err(Error::Problem(format!("the cone solver refuses the problem: {text}"))),
+        Err(panic) => std::panic::resume_unwind(panic),
+    }
+}

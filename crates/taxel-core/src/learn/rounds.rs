@@ -1,0 +1,319 @@
+//! The minimum of 6.14 by rounds of row generation, with a proven gap.
+//!
+//! Nearly all of the million silent rows of a long recording do not matter. A round puts each hinge into one of three
+//! states, by where it stands at the best weights so far: *off* (counted as 0), *on* (counted as its straight part), or, near
+//! its kink, *kept* (its whole hinge goes to the cone program). Off and on lie below the hinge, so what the cone program
+//! minimises lies below 6.14 and touches it at those weights: its minimum is a lower bound, and the way there goes down. An
+//! exact line search on 6.14 keeps the next round from overshooting where hinges change state on the way.
+
+use super::cone_program::{ConeProgram, Hinges};
+use super::cone_r::{Norm, Objective, Parts, Problem, Round};
+use crate::{Result, Stop};
+
+/// Rows of the first program: every 4th ms of the 60 ms before a target ...
+pub(super) const START_NEAR_MS: f64 = 60.0;
+const START_STRIDE_MS: f64 = 4.0;
+/// ... and no more than this, there and in any round.
+const MOST_ROWS: usize = 5000;
+/// A hinge is kept within this share of `theta_0` from its kink.
+const NEAR: f64 = 0.02;
+/// Rounds end without a proof where the objective falls by less than this, relatively, and nothing else helps.
+const STALLED: f64 = 1e-10;
+
+/// What the rounds came to.
+pub(super) struct Found {
+    pub(super) weights: Vec<f64>,
+    pub(super) parts: Parts,
+    pub(super) gap: f64,
+    pub(super) rounds: usize,
+    pub(super) rows: usize,
+}
+
+/// The state of a hinge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    Off,
+    On,
+    Kept,
+}
+
+/// Weights, and where they bring the potential.
+#[derive(Debug, Clone)]
+struct Point {
+    weights: Vec<f64>,
+    /// Potential less limit on the silent rows, then potential less threshold at the targets, mV.
+    excess: Vec<f64>,
+    /// Potential less `kappa` thresholds behind the targets, mV.
+    behind: Vec<f64>,
+    parts: Parts,
+}
+
+/// The hinges that go to the cone program.
+struct Kept {
+    /// Their numbers: silent rows, then targets.
+    rows: Vec<usize>,
+    hinges: Hinges,
+    /// The slope of everything linear: hinges that are on, 6.12's `-x`, B's mixed term.
+    linear: Vec<f64>,
+}
+
+impl Problem {
+    /// Finds the least objective, from `start` or from a small program of its own.
+    pub(super) fn minimise(
+        &self,
+        objective: &Objective,
+        tolerance: f64,
+        start: Option<Vec<f64>>,
+        progress: &mut dyn FnMut(Round),
+        stop: Stop<'_>,
+    ) -> Result<Found> {
+        let zero = self.point(objective, vec![0.0_f64.clamp(objective.lower, objective.upper); self.trains]);
+        let scale = if zero.parts.sum() > 0.0 { 1.0 / zero.parts.sum() } else { 1.0 };
+        let mut accuracy = (0.01 * tolerance).min(1e-8);
+        let mut best = match start {
+            Some(weights) => self.point(objective, weights),
+            None => {
+                let answer = self.program(objective, &self.start(objective)).solve(scale, 1e-6, stop)?;
+                self.better(objective, zero, answer.weights)
+            }
+        };
+        let (mut bound, mut rounds, mut near) = (f64::NEG_INFINITY, 0, NEAR * self.base.neuron.theta_0);
+        loop {
+            rounds += 1;
+            let states = self.states(&best, near);
+            let kept = self.kept(objective, &states);
+            let answer = self.program(objective, &kept).solve(scale, accuracy, stop)?;
+            let trial = self.point(objective, answer.weights.clone());
+            let mut factors = self.slopes(objective, &states);
+            for (&row, multiplier) in kept.rows.iter().zip(answer.multipliers) {
+                factors[row] = multiplier;
+            }
+            bound = bound.max(trial.parts.sum() - self.gap(objective, &trial, &factors));
+            let before = best.parts.sum();
+            best = self.better(objective, best, answer.weights);
+            let least = best.parts.sum();
+            let gap = (least - bound).max(0.0) / least.max(1e-12 / scale);
+            progress(Round { round: rounds, rows: kept.rows.len(), objective: least, gap });
+            let stalled = before - least <= STALLED * least;
+            if gap <= tolerance || (stalled && accuracy < 1e-12) {
+                let Point { weights, parts, .. } = best;
+                return Ok(Found { weights, parts, gap, rounds, rows: kept.rows.len() });
+            }
+            if stalled {
+                accuracy *= 0.1;
+                near *= 2.0;
+            }
+        }
+    }
+
+    /// 6.14 at these weights.
+    fn point(&self, objective: &Objective, weights: Vec<f64>) -> Point {
+        let mut excess = Vec::with_capacity(self.silent.len() + self.targets.len());
+        self.silent.potential(&weights, &mut excess);
+        excess.iter_mut().zip(&self.silent.limit).for_each(|(u, limit)| *u -= limit);
+        excess.extend(self.targets.iter().map(|row| dot(&row.at, &weights) - row.threshold));
+        let behind: Vec<f64> =
+            self.targets.iter().map(|r| dot(&r.behind, &weights) - objective.kappa * r.threshold).collect();
+        let (silent, targets) = excess.split_at(self.silent.len());
+        let square: f64 = weights.iter().map(|w| w * w).sum();
+        let parts = Parts {
+            l1: objective.l1 * weights.iter().map(|w| w.abs()).sum::<f64>(),
+            l2: objective.l2 * if objective.norm == Norm::Norm { square.sqrt() } else { square },
+            B: objective.b * behind.iter().map(|x| x * x).sum::<f64>(),
+            C: objective.c * targets.iter().map(|x| x.abs()).sum::<f64>(),
+            D: objective.d * silent.iter().map(|x| x.max(0.0)).sum::<f64>(),
+        };
+        Point { weights, excess, behind, parts }
+    }
+
+    /// The best point on the way from `from` to `to`.
+    fn better(&self, objective: &Objective, from: Point, to: Vec<f64>) -> Point {
+        let end = self.point(objective, to);
+        let silent = self.silent.len();
+        // How steeply 6.14 falls or rises at the share `s` of the way.
+        let slope = |s: f64| {
+            let mut sum = 0.0;
+            let (mut along, mut square) = (0.0, 0.0);
+            for (&a, &b) in from.weights.iter().zip(&end.weights) {
+                let (w, d) = (a + s * (b - a), b - a);
+                sum += objective.l1
+                    * if w > 0.0 {
+                        d
+                    } else if w < 0.0 {
+                        -d
+                    } else {
+                        d.abs()
+                    };
+                along += w * d;
+                square += w * w;
+            }
+            sum += objective.l2
+                * match objective.norm {
+                    Norm::Square => 2.0 * along,
+                    Norm::Norm if square > 0.0 => along / square.sqrt(),
+                    Norm::Norm => 0.0,
+                };
+            for (&a, &b) in from.behind.iter().zip(&end.behind) {
+                sum += 2.0 * objective.b * (a + s * (b - a)) * (b - a);
+            }
+            let pairs = || from.excess.iter().zip(&end.excess);
+            for (&a, &b) in pairs().skip(silent) {
+                let x = a + s * (b - a);
+                sum += objective.c * if x > 0.0 { b - a } else { a - b };
+            }
+            let rise = |(&a, &b): (&f64, &f64)| if a + s * (b - a) > 0.0 { b - a } else { 0.0 };
+            sum + objective.d * pairs().take(silent).filter(|p| p.0.is_finite()).map(rise).sum::<f64>()
+        };
+        if slope(1.0) <= 0.0 {
+            return if end.parts.sum() < from.parts.sum() { end } else { from };
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..40 {
+            let middle = f64::midpoint(low, high);
+            if slope(middle) > 0.0 {
+                high = middle;
+            } else {
+                low = middle;
+            }
+        }
+        let at = |s: f64| from.weights.iter().zip(&end.weights).map(|(a, b)| a + s * (b - a)).collect();
+        let middle = self.point(objective, at(low));
+        [middle, end].into_iter().fold(from, |best, p| if p.parts.sum() < best.parts.sum() { p } else { best })
+    }
+
+    /// The state of each hinge at these weights.
+    fn states(&self, point: &Point, near: f64) -> Vec<State> {
+        let mut distances: Vec<f64> = point.excess.iter().map(|x| x.abs()).filter(|&x| x <= near).collect();
+        let near = if distances.len() > MOST_ROWS {
+            *distances.select_nth_unstable_by(MOST_ROWS, f64::total_cmp).1
+        } else {
+            near
+        };
+        let state = |&x: &f64| match x {
+            x if x > near => State::On,
+            x if x >= -near => State::Kept,
+            _ => State::Off,
+        };
+        point.excess.iter().map(state).collect()
+    }
+
+    /// The slope of each hinge that is not kept.
+    fn slopes(&self, objective: &Objective, states: &[State]) -> Vec<f64> {
+        let slope = |(row, &state)| if state == State::On { self.hinge_weight(objective, row) } else { 0.0 };
+        states.iter().enumerate().map(slope).collect()
+    }
+
+    /// The weight of a hinge: |x| of 6.12 is `2 max(x, 0) - x`.
+    fn hinge_weight(&self, objective: &Objective, row: usize) -> f64 {
+        if row < self.silent.len() { objective.d } else { 2.0 * objective.c }
+    }
+
+    fn kept(&self, objective: &Objective, states: &[State]) -> Kept {
+        let rows: Vec<usize> = (0..states.len()).filter(|&row| states[row] == State::Kept).collect();
+        let slopes = self.slopes(objective, states);
+        let mut linear = vec![0.0; self.trains];
+        self.silent.add_sum(&slopes[..self.silent.len()], &mut linear);
+        for (target, slope) in self.targets.iter().zip(&slopes[self.silent.len()..]) {
+            add(&mut linear, slope - objective.c, &target.at);
+            add(&mut linear, -2.0 * objective.b * objective.kappa * target.threshold, &target.behind);
+        }
+        let weight = rows.iter().map(|&row| self.hinge_weight(objective, row)).collect();
+        Kept { hinges: self.hinges(&rows, weight), rows, linear }
+    }
+
+    fn hinges(&self, rows: &[usize], weight: Vec<f64>) -> Hinges {
+        let (silent, targets) = rows.split_at(rows.partition_point(|&row| row < self.silent.len()));
+        let targets = || targets.iter().map(|row| &self.targets[row - self.silent.len()]);
+        let mut coefficients = self.silent.coefficients(silent);
+        targets().for_each(|target| coefficients.extend_from_slice(&target.at));
+        let limit = silent.iter().map(|&row| self.silent.limit[row]).chain(targets().map(|t| t.threshold)).collect();
+        Hinges { rows: coefficients, limit, weight }
+    }
+
+    /// The first program: some targets, evenly chosen, and every 4th ms before them, each standing for those left out.
+    fn start(&self, objective: &Objective) -> Kept {
+        let stride = (START_STRIDE_MS / self.base.neuron.step_ms).round().max(1.0) as usize;
+        let of_a_target = self.silent.before_targets.iter().map(|r| r.len().div_ceil(stride)).max().unwrap_or(0) + 1;
+        let every = (self.targets.len() * of_a_target).div_ceil(MOST_ROWS).max(1);
+        let mut rows = Vec::new();
+        for before in self.silent.before_targets.iter().step_by(every) {
+            rows.extend(before.clone().rev().step_by(stride).filter(|&row| self.silent.limit[row].is_finite()));
+        }
+        rows.sort_unstable();
+        rows.dedup();
+        let mut weight = vec![objective.d * (stride * every) as f64; rows.len()];
+        let mut linear = vec![0.0; self.trains];
+        for (k, target) in self.targets.iter().enumerate() {
+            if k % every == 0 {
+                rows.push(self.silent.len() + k);
+                weight.push(2.0 * objective.c * every as f64);
+                add(&mut linear, -objective.c * every as f64, &target.at);
+            }
+            add(&mut linear, -2.0 * objective.b * objective.kappa * target.threshold, &target.behind);
+        }
+        Kept { hinges: self.hinges(&rows, weight), rows, linear }
+    }
+
+    fn program<'a>(&'a self, objective: &Objective, kept: &'a Kept) -> ConeProgram<'a> {
+        ConeProgram {
+            linear: &kept.linear,
+            l1: objective.l1,
+            l2: objective.l2,
+            norm: objective.norm,
+            quadratic: objective.b,
+            behind: &self.behind,
+            gram: &self.gram,
+            lower: objective.lower,
+            upper: objective.upper,
+            hinges: &kept.hinges,
+        }
+    }
+
+    /// A bound on how far 6.14 at this point lies above its least value, whatever the solver did.
+    ///
+    /// Every term is replaced by a tangent below it: hinges by multipliers between 0 and their weight, l2 and B by their
+    /// slopes. What is left is linear and l1 over the box, and has its least value synapse by synapse.
+    fn gap(&self, objective: &Objective, point: &Point, factors: &[f64]) -> f64 {
+        let silent = self.silent.len();
+        let mut gradient = vec![0.0; self.trains];
+        self.silent.add_sum(&factors[..silent], &mut gradient);
+        for ((target, factor), behind) in self.targets.iter().zip(&factors[silent..]).zip(&point.behind) {
+            add(&mut gradient, factor - objective.c, &target.at);
+            add(&mut gradient, 2.0 * objective.b * behind, &target.behind);
+        }
+        let length = point.weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+        match objective.norm {
+            Norm::Square => add(&mut gradient, 2.0 * objective.l2, &point.weights),
+            Norm::Norm if length > 0.0 => add(&mut gradient, objective.l2 / length, &point.weights),
+            // At w = 0 any slope up to l2 long will do: the one that takes most of the gradient away.
+            Norm::Norm => {
+                let steep = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
+                let left = if steep > objective.l2 { 1.0 - objective.l2 / steep } else { 0.0 };
+                gradient.iter_mut().for_each(|g| *g *= left);
+            }
+        }
+        let mut gap = 0.0;
+        for (row, (&x, &factor)) in point.excess.iter().zip(factors).enumerate() {
+            if x.is_finite() {
+                gap += self.hinge_weight(objective, row) * x.max(0.0) - factor * x;
+            }
+        }
+        for (&g, &w) in gradient.iter().zip(&point.weights) {
+            let cost = |v: f64| g * v + objective.l1 * v.abs();
+            let ends = cost(objective.lower).min(cost(objective.upper));
+            let inside = objective.lower < 0.0 && objective.upper > 0.0;
+            gap += cost(w) - if inside { ends.min(0.0) } else { ends };
+        }
+        gap
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn add(sum: &mut [f64], factor: f64, row: &[f64]) {
+    if factor != 0.0 {
+        sum.iter_mut().zip(row).for_each(|(s, r)| *s += factor * r);
+    }
+}
