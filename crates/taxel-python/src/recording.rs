@@ -186,6 +186,12 @@ impl RecordingWriter {
         self.with(py, |writer| writer.registers(at_ns, &registers))
     }
 
+    /// Keeps what was received and lost so far, given as JSON.
+    fn counts(&self, py: Python<'_>, at_ns: i64, counts: &str) -> PyResult<()> {
+        let counts: Counts = from_json("counts", counts)?;
+        self.with(py, |writer| writer.counts(at_ns, &counts))
+    }
+
     /// Keeps a picture of held ticks, row by row.
     fn picture(
         &self,

@@ -1,0 +1,59 @@
+"""Small recordings for tests, made here."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+import taxel
+from taxel import _core
+
+HEADER = {
+    "array": {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"},
+    "source": "udp 127.0.0.1:5208",
+    "started_ns": 1_700_000_000_000_000_000,
+}
+
+
+def some_events(n: int = 400, *, seed: int = 1, start: int = 0, intensity: bool = True) -> taxel.Events:
+    """Return events as the board would send them: stamps in units of 100 us, mostly ascending."""
+    rng = np.random.default_rng(seed)
+    t = start + np.cumsum(rng.integers(0, 4, n)) * 100
+    x, y, p = rng.integers(0, 64, n), rng.integers(0, 64, n), rng.random(n) < 0.5
+    ticks = {"intensity": rng.integers(0, 150, n), "present": rng.random(n) < 0.9} if intensity else {}
+    markers = [(int(t[0]), True), (int(t[-1]) + 100, False)]
+    return taxel.Events(t, x, y, p, array=taxel.Array.thesis(), markers=markers, **ticks)
+
+
+def record(
+    path: Path,
+    events: taxel.Events,
+    *,
+    compression: str = "none",
+    each: int = 10,
+    finish: bool = True,
+    header: dict[str, object] | None = None,
+) -> None:
+    """Write events as the live format, `each` a datagram, 1 ms on the way, with one remark of every kind."""
+    writer = _core.RecordingWriter(path, json.dumps({**HEADER, **(header or {})}), compression, False)
+    at = HEADER["started_ns"]
+    assert isinstance(at, int)
+    number = 0
+    for k in range(0, len(events), each):
+        part = events[k : k + each]
+        # The first datagram carries the start, the last the stop.
+        part.markers = events.markers[:1] * (k == 0) + events.markers[1:] * (k + each >= len(events))
+        writer.datagram(at + int(part.t[-1]) * 1000 + 1_000_000, number, taxel.wire.encode(part))
+        number += 1
+    for t, start in events.markers:
+        writer.marker(at + t * 1000, t, start)
+    writer.note(at + 5_000_000, 5000, "left heel")
+    writer.note(at + 6_000_000, None, "somebody coughed")
+    writer.detection(at + 7_000_000, "contact", 6000, 6192, 1.5)
+    writer.registers(at, json.dumps(json.loads(_core.registers_preset("5.2 kHz"))))
+    writer.picture(at, 0, 64, np.full(4096, 75, np.uint16), 150)
+    writer.counts(at, json.dumps({"received": number, "recorded": number}))
+    if finish:
+        writer.finish(json.dumps({"received": number}))

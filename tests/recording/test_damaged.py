@@ -1,0 +1,97 @@
+"""A file that is cut or damaged anywhere gives what is left, and says what is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel._core import FormatError
+
+from .making import record, some_events
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("small") / "small.mcap"
+    record(path, some_events(200), compression="lz4")
+    return path
+
+
+def test_a_small_file_cut_at_every_byte_gives_what_is_left(small: Path, tmp_path: Path) -> None:
+    whole, all_of_it = small.read_bytes(), taxel.open(small).datagrams()
+    path = tmp_path / "cut.mcap"
+    before, refused = 0, 0
+    for cut in range(len(whole)):
+        path.write_bytes(whole[:cut])
+        try:
+            rec = taxel.open(path)
+        except FormatError as error:
+            assert "cut.mcap" in str(error)
+            refused = cut
+            continue
+        left = rec.datagrams()
+        assert len(left) >= before, f"fewer datagrams from {cut} bytes"
+        assert np.array_equal(left.number, all_of_it.number[: len(left)])
+        assert np.array_equal(left.payload, all_of_it.payload[: left.payload.size])
+        assert rec.rebuilt["bad_chunks"] == 0
+        before = len(left)
+    assert before == len(all_of_it)
+    assert refused < 1000, "only a file without its header is refused"
+
+
+def test_a_file_cut_before_its_end_says_that_it_is_truncated(small: Path, tmp_path: Path) -> None:
+    whole = small.read_bytes()
+    assert not taxel.open(small).truncated
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(whole[: len(whole) // 2])
+    rec = taxel.open(path)
+    assert rec.truncated
+    assert rec.verdict.startswith("not finished")
+    assert rec.rebuilt["torn_bytes"] > 0
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
+def test_damage_anywhere_loses_chunks_but_never_invents_datagrams(tmp_path: Path, compression: str) -> None:
+    path = tmp_path / "whole.mcap"
+    record(path, some_events(3000), compression=compression)
+    whole = path.read_bytes()
+    sound = taxel.open(path).datagrams()
+    known = {int(n): sound[k] for k, n in enumerate(sound.number)}
+    rng = np.random.default_rng(5)
+    for place in rng.integers(8, len(whole), 150):
+        damaged = bytearray(whole)
+        damaged[place] ^= int(rng.integers(1, 256))
+        path.write_bytes(damaged)
+        rec = taxel.open(path)
+        left = rec.datagrams()
+        assert all(known[int(n)] == left[k] for k, n in enumerate(left.number))
+        if len(left) < len(sound):
+            assert rec.rebuilt["bad_chunks"] + rec.rebuilt["gaps"] + rec.rebuilt["torn_bytes"] > 0, f"byte {place}"
+            assert "LOST in the file" in rec.verdict or "not finished" in rec.verdict
+
+
+def test_a_bad_chunk_is_skipped_counted_and_said(tmp_path: Path) -> None:
+    path = tmp_path / "long.mcap"
+    writer_events = some_events(1000)
+    record(path, writer_events, finish=True)
+    damaged = bytearray(path.read_bytes())
+    place = damaged.index(taxel.open(path).datagrams()[50])
+    damaged[place + 2] ^= 1
+    path.write_bytes(damaged)
+    rec = taxel.open(path)
+    assert rec.rebuilt["bad_chunks"] == 1
+    assert rec.verdict.startswith("LOST in the file: 1 bad chunks skipped")
+    assert not rec.truncated
+    assert len(rec.events) < 1000
+
+
+def test_random_bytes_behind_the_magic_are_refused_or_empty(tmp_path: Path) -> None:
+    rng = np.random.default_rng(6)
+    path = tmp_path / "noise.mcap"
+    for size in (0, 1, 9, 100, 10_000, 200_000):
+        path.write_bytes(b"\x89MCAP0\r\n" + rng.integers(0, 256, size, dtype=np.uint8).tobytes())
+        with pytest.raises(FormatError, match="without the header of a taxel recording"):
+            taxel.open(path)

@@ -1,0 +1,130 @@
+"""A full disk, a forbidden folder, a missing one: one clear error, and what was written can be read."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import _core
+
+from .making import HEADER, some_events
+
+#: Writes datagrams into a file that may not grow beyond a limit, and prints the error.
+LIMITED = """
+import json, resource, signal, sys, time
+import numpy as np
+from taxel import _core
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
+writer = _core.RecordingWriter(sys.argv[1], sys.argv[3], sys.argv[4], False)
+sent = 0
+try:
+    for k in range(5000):
+        writer.datagram(1000 + k, k, bytes([k % 128]) * 1400)
+        sent += 1
+        if k % 50 == 0:
+            time.sleep(0.01)
+    writer.finish("{}")
+except OSError as error:
+    print(json.dumps([type(error).__name__, error.errno, error.filename, str(error), sent]))
+"""
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4"])
+@pytest.mark.parametrize("limit", [60_000, 1_000_000, 2_345_678])
+def test_a_disk_that_fills_up_is_one_error_and_leaves_a_readable_file(
+    tmp_path: Path, compression: str, limit: int
+) -> None:
+    path = tmp_path / "full.mcap"
+    arguments = [str(path), str(limit), json.dumps(HEADER), compression]
+    said = subprocess.run([sys.executable, "-c", LIMITED, *arguments], capture_output=True, text=True, check=True)
+    if compression == "lz4" and not said.stdout:
+        assert taxel.open(path).verdict, "lz4 packs this into less than the limit"
+        return
+    name, code, filename, text, sent = json.loads(said.stdout)
+    assert (name, code, filename) == ("OSError", errno.EFBIG, str(path))
+    assert "\n" not in text
+    rec = taxel.open(path)
+    kept = rec.datagrams()
+    assert 0 <= len(kept) <= sent
+    assert np.array_equal(kept.number, np.arange(len(kept)))
+    assert rec.truncated
+    assert rec.rebuilt["torn_bytes"] == 0, "what was torn is cut off"
+    # What a reader loses is what waited in memory, not what the disk had taken.
+    assert path.stat().st_size <= limit
+
+
+def test_a_full_device_is_an_oserror_that_names_it() -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("there is no /dev/full here")
+    with pytest.raises(OSError, match="No space left on device") as caught:
+        _core.RecordingWriter("/dev/full", json.dumps(HEADER), "none", True)
+    assert caught.value.errno == errno.ENOSPC
+    assert caught.value.filename == "/dev/full"
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+def test_an_existing_file_is_never_overwritten_unless_asked(tmp_path: Path, ending: str) -> None:
+    path, events = tmp_path / f"a{ending}", some_events(50)
+    path.write_bytes(b"precious")
+    with pytest.raises(FileExistsError, match=f"a{ending}"):
+        taxel.convert(events, path)
+    assert path.read_bytes() == b"precious"
+    taxel.convert(events, path, overwrite=True)
+    assert len(taxel.open(path).events) == 50
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted([path.name] + ["a.lss"] * (ending == ".lsa"))
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+def test_a_missing_folder_is_a_file_not_found(tmp_path: Path, ending: str) -> None:
+    with pytest.raises(FileNotFoundError, match="nowhere"):
+        taxel.convert(some_events(5), tmp_path / "nowhere" / f"a{ending}")
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+def test_a_forbidden_folder_is_a_permission_error(tmp_path: Path, ending: str) -> None:
+    if os.geteuid() == 0:
+        pytest.skip("root may write anywhere")
+    tmp_path.chmod(0o500)
+    try:
+        with pytest.raises(PermissionError):
+            taxel.convert(some_events(5), tmp_path / f"a{ending}")
+    finally:
+        tmp_path.chmod(0o700)
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+def test_a_conversion_that_fails_leaves_no_file(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"a{ending}"
+    code = (
+        "import resource, signal, sys, taxel, numpy as np\n"
+        "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "n = 100_000\n"
+        "rng = np.random.default_rng(1)\n"
+        "x, y = rng.integers(0, 64, n), rng.integers(0, 64, n)\n"
+        "events = taxel.Events(np.arange(n) * 100, x, y, rng.random(n) < 0.5, array=taxel.Array.thesis())\n"
+        "resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))\n"
+        "try:\n"
+        "    taxel.convert(events, sys.argv[1])\n"
+        "except OSError as error:\n"
+        "    print(error.errno, error.filename)\n"
+    )
+    said = subprocess.run([sys.executable, "-c", code, str(path)], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == [str(errno.EFBIG), str(path)]
+    # A .lsa is written in place, as while recording; that it is not complete shows in the missing .lss.
+    assert [p.name for p in tmp_path.iterdir()] == ([path.name] if ending == ".lsa" else [])
+
+
+def test_the_limit_used_here_is_the_kernels(tmp_path: Path) -> None:
+    assert resource.getrlimit(resource.RLIMIT_FSIZE)[1] == resource.RLIM_INFINITY, (
+        "a limit outside would blur these tests"
+    )

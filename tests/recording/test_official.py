@@ -1,0 +1,67 @@
+"""The official MCAP reader takes a finished file as it is, and finds the picture in its standard schema."""
+
+from __future__ import annotations
+
+import base64
+import json
+from pathlib import Path
+
+import pytest
+from mcap.reader import make_reader
+
+import taxel
+
+from .making import HEADER, record, some_events
+
+#: The fields that the standard schemas name (https://docs.foxglove.dev, RawImage and Log).
+RAW_IMAGE = {"timestamp", "frame_id", "width", "height", "encoding", "step", "data"}
+LOG = {"timestamp", "level", "message", "name", "file", "line"}
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
+def test_the_official_reader_gives_every_message_of_a_finished_file(tmp_path: Path, compression: str) -> None:
+    path = tmp_path / "a.mcap"
+    record(path, some_events(), compression=compression)
+    ours = taxel.open(path).datagrams()
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        messages = list(reader.iter_messages())
+        assert summary.statistics.message_count == len(messages)
+        theirs = [m for _, channel, m in messages if channel.topic == "/datagrams"]
+        assert [m.data for m in theirs] == [ours[k] for k in range(len(ours))]
+        assert [m.log_time for m in theirs] == ours.arrived_ns.tolist()
+        assert [m.sequence for m in theirs] == ours.number.tolist()
+        metadata = {m.name: m.metadata for m in reader.iter_metadata()}
+    assert json.loads(metadata["taxel"]["header"])["source"] == HEADER["source"]
+    assert metadata["taxel.end"]["verdict"].startswith("nothing lost after arrival")
+
+
+def test_the_picture_is_a_standard_raw_image_and_a_note_a_standard_log(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    record(path, some_events())
+    with path.open("rb") as file:
+        messages = {channel.topic: (schema, m) for schema, channel, m in make_reader(file).iter_messages()}
+    schema, message = messages["/pressure"]
+    assert (schema.name, schema.encoding) == ("foxglove.RawImage", "jsonschema")
+    assert set(json.loads(schema.data)["properties"]) >= RAW_IMAGE
+    picture = json.loads(message.data)
+    assert set(picture) >= RAW_IMAGE
+    assert (picture["width"], picture["height"], picture["encoding"], picture["step"]) == (64, 64, "mono8", 64)
+    assert base64.b64decode(picture["data"]) == bytes([75 * 255 // 150]) * 4096
+    schema, message = messages["/notes"]
+    assert schema.name == "foxglove.Log"
+    assert set(json.loads(message.data)) >= LOG
+
+
+def test_every_schema_is_json_and_names_what_its_messages_hold(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    record(path, some_events())
+    with path.open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            if schema is None:
+                assert channel.topic == "/datagrams"
+                continue
+            assert set(json.loads(message.data)) <= set(json.loads(schema.data)["properties"]), channel.topic
