@@ -188,13 +188,15 @@ def _numbers(path: Path, names: list[str], body: bytes, dtype: type[Any]) -> NDA
         table = np.loadtxt(io.BytesIO(body), dtype=dtype, delimiter=",", comments=None, ndmin=2)
     except (ValueError, OverflowError) as error:
         place = re.search(r"at row (\d+)(?:, column (\d+))?", str(error))
-        where = "" if place is None else f", line {_line_number(body, int(place[1]))}"
+        # Rows are counted from 0 in one of its messages, from 1 in the other.
+        row = 0 if place is None else int(place[1]) - ("changed" in str(error))
+        where = "" if place is None else f", line {_line_number(body, row)}"
         if place is not None and place[2] is not None and int(place[2]) <= len(names):
             where += f", column {names[int(place[2]) - 1]}"
         said = re.sub(r" at row .*|; use `usecols`.*", "", str(error).split("\n", maxsplit=1)[0])
         raise FormatError(f"{path}{where}: {said}; must be {len(names)} numbers a line") from None
     if table.shape[1] != len(names):
-        raise FormatError(f"{path}, line 2: {table.shape[1]} numbers below {len(names)} names")
+        raise FormatError(f"{path}, line 2: {table.shape[1]} numbers; must be {len(names)} numbers a line")
     return table
 
 

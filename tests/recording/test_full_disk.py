@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -122,9 +121,3 @@ def test_a_conversion_that_fails_leaves_no_file(tmp_path: Path, ending: str) -> 
     assert said.stdout.split() == [str(errno.EFBIG), str(path)]
     # A .lsa is written in place, as while recording; that it is not complete shows in the missing .lss.
     assert [p.name for p in tmp_path.iterdir()] == ([path.name] if ending == ".lsa" else [])
-
-
-def test_the_limit_used_here_is_the_kernels(tmp_path: Path) -> None:
-    assert resource.getrlimit(resource.RLIMIT_FSIZE)[1] == resource.RLIM_INFINITY, (
-        "a limit outside would blur these tests"
-    )

@@ -1,7 +1,7 @@
 //! Writes the live format without ever making the way wait for the disk.
 //!
-//! Callers append to a queue in memory; a thread of its own takes the queue every [`FLUSH_EVERY`](super::FLUSH_EVERY),
-//! packs it into chunks and hands each to the operating system in whole records. Chunks are built in memory (the crate's
+//! Callers append to a queue in memory; a thread of its own takes the queue when it fills a chunk, at the latest every
+//! [`FLUSH_EVERY`](super::FLUSH_EVERY), and hands chunks to the operating system in whole records. Chunks are built in memory (the crate's
 //! buffered mode) because its direct mode goes back to fill in lengths: a kill in between would leave a length of 2e16.
 
 use std::collections::BTreeMap;
@@ -48,7 +48,7 @@ pub struct Writer {
 
 struct Shared {
     state: Mutex<State>,
-    /// Wakes the thread: the end has come, or the queue is full.
+    /// Wakes the thread: the end has come, or the queue fills a chunk.
     work: Condvar,
     /// Wakes callers: there is room in the queue again, or no hope.
     room: Condvar,
@@ -235,7 +235,11 @@ impl Writer {
         if let Some(broken) = &state.broken {
             return Err(broken.clone().named(&self.path));
         }
+        let before = state.queue.bytes.len();
         state.queue.bytes.extend_from_slice(bytes);
+        if before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
+            self.shared.work.notify_all();
+        }
         // The format's number has 32 bits; the reader unwraps it.
         #[allow(clippy::cast_possible_truncation)]
         let number = number as u32;
@@ -297,7 +301,7 @@ impl Shared {
             }
             queue.clear();
             let state = self.lock();
-            if state.end.is_none() && state.queue.bytes.len() < QUEUE_BYTES {
+            if state.end.is_none() && state.queue.bytes.len() < CHUNK_BYTES {
                 let rest = FLUSH_EVERY.saturating_sub(began.elapsed());
                 drop(self.work.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner));
             }

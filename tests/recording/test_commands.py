@@ -1,0 +1,120 @@
+"""`taxel info` and `taxel convert` as a shell sees them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+
+from .making import record, some_events
+
+
+def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "taxel", *map(str, arguments)], check=False, capture_output=True, text=True
+    )
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("walk") / "walk.mcap"
+    record(path, some_events())
+    return path
+
+
+def test_info_says_what_is_in_a_recording(walk: Path) -> None:
+    said = run("info", walk)
+    assert said.returncode == 0
+    for words in (
+        "walk.mcap: .mcap, from udp 127.0.0.1:5208",
+        "64 x 64 taxels",
+        "400, ",
+        "2 markers",
+        "rate, board",
+        "rate, host",
+        "dead taxels",
+        "verdict             nothing lost after arrival",
+    ):
+        assert words in said.stdout
+
+
+def test_info_as_json_holds_rates_by_both_clocks_losses_and_taxels(walk: Path) -> None:
+    said = json.loads(run("info", walk, "--json").stdout)
+    seconds = said["seconds"]
+    assert said["events"] == 400
+    assert said["events_per_s_board"] == pytest.approx(400 / seconds)
+    assert said["events_per_s_host"] == pytest.approx(400 / said["seconds_host"])
+    assert said["peak_events_per_s_board"] >= said["events_per_s_board"]
+    assert set(said["taxels"]) == {"dead", "stuck", "noisy"}
+    assert said["counts"]["decoder"]["skipped"] == 0
+    assert said["registers"]["ramp"] == 150
+    assert said["notes"][0] == {"t_us": 5000, "text": "left heel"}
+    assert said["detections"] == {"contact": 1}
+    assert not said["truncated"]
+
+
+def test_info_writes_its_picture_once(walk: Path, tmp_path: Path) -> None:
+    picture = tmp_path / "walk.png"
+    said = run("info", walk, "--picture", picture)
+    assert said.returncode == 0
+    assert f"picture written to {picture}" in said.stdout
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    again = run("info", walk, "--picture", picture)
+    assert (again.returncode, again.stderr.count("\n")) == (2, 1)
+    assert "exists already" in again.stderr
+    assert run("info", walk, "--picture", picture, "--overwrite").returncode == 0
+    assert "a picture ends in" in run("info", walk, "--picture", tmp_path / "a.txt").stderr
+
+
+def test_info_of_an_unfinished_file_says_so(walk: Path, tmp_path: Path) -> None:
+    path = tmp_path / "cut.mcap"
+    path.write_bytes(walk.read_bytes()[:-20_000])
+    said = run("info", path)
+    assert said.returncode == 0
+    assert "verdict             not finished" in said.stdout
+
+
+def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_path: Path) -> None:
+    said = run("convert", walk, tmp_path / "walk.csv")
+    assert said.returncode == 0
+    assert said.stdout.startswith(f"written to {tmp_path / 'walk.csv'}\n  a .csv cannot hold: ")
+    said = run("convert", walk, tmp_path / "walk.npz", "--json")
+    assert json.loads(said.stdout)["lost"] == ["raw datagrams with their arrival times"]
+    assert run("convert", walk, tmp_path / "p.npz", "--frames", "500").returncode == 0
+    frames = taxel.open(tmp_path / "p.npz").frames()
+    assert np.array_equal(np.unique(np.diff(frames.t)), [2000])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("info",), "Missing argument"),
+        (("info", "nothing.mcap"), "nothing.mcap: no such file or directory"),
+        (("info", "."), "is a directory"),
+        (("convert", "WALK", "walk.xyz"), "must be .mcap, .lsa, .npz, .csv"),
+        (("convert", "WALK", "WALK"), "exists already"),
+        (("convert", "WALK", "nowhere/a.csv"), "nowhere: no such folder"),
+        (("convert", "WALK", "a.mcap", "--compression", "gzip"), "compression is 'gzip'"),
+        (("convert", "WALK", "a.csv", "--frames", "-3"), "rate_hz is -3.0"),
+    ],
+)
+def test_wrong_input_ends_in_one_line_and_exit_code_2(
+    walk: Path, tmp_path: Path, arguments: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = run(*(str(walk) if a == "WALK" else a for a in arguments))
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("command", ["info", "convert"])
+def test_help_shows_an_example(command: str) -> None:
+    assert "Example: taxel" in run(command, "--help").stdout

@@ -1,0 +1,225 @@
+"""Every conversion gives back what the target can hold, and says what it cannot."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel._core import FormatError, ProblemError
+
+from .making import record, some_events
+
+KINDS = (".mcap", ".lsa", ".npz", ".csv")
+THESIS = taxel.Array.thesis()
+
+
+def same_but_markers(a: taxel.Events, b: taxel.Events) -> bool:
+    """Whether two Events differ at most in their markers, which a .csv cannot hold."""
+    a, b = a[:], b[:]
+    a.markers = b.markers = ()
+    return a == b
+
+
+@pytest.mark.parametrize(("first", "second"), list(itertools.product(KINDS, KINDS)))
+def test_events_survive_any_two_conversions(tmp_path: Path, first: str, second: str) -> None:
+    events = some_events()
+    one, two = tmp_path / f"one{first}", tmp_path / f"two{second}"
+    taxel.convert(events, one)
+    taxel.convert(one, two)
+    assert same_but_markers(taxel.open(two).events, events)
+    if ".csv" not in (first, second):
+        assert taxel.open(two).events == events
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
+def test_a_recording_copied_to_mcap_keeps_every_message(tmp_path: Path, compression: str) -> None:
+    one, two = tmp_path / "one.mcap", tmp_path / "two.mcap"
+    record(one, some_events())
+    assert taxel.convert(one, two, compression=compression) == []
+    a, b = taxel.open(one), taxel.open(two)
+    for name in ("arrived_ns", "number", "offsets", "payload"):
+        assert np.array_equal(getattr(a.datagrams(), name), getattr(b.datagrams(), name))
+    assert (a.events, a.notes, a.detections, a.registers) == (b.events, b.notes, b.detections, b.registers)
+    assert a.register_changes == b.register_changes
+    assert b.verdict == f"converted from a recording that says: {a.verdict}"
+
+
+def test_raw_bytes_come_back_exactly_through_mcap(tmp_path: Path) -> None:
+    rng = np.random.default_rng(8)
+    for k, size in enumerate((0, 1, 7, 1400, 5000, 40_000)):
+        raw = taxel.wire.encode(some_events(3000))[:size] if k % 2 else rng.integers(0, 256, size, np.uint8).tobytes()
+        lsa, mcap, back = (tmp_path / f"{k}{name}" for name in ("a.lsa", "b.mcap", "c.lsa"))
+        lsa.write_bytes(raw)
+        taxel.convert(lsa, mcap)
+        taxel.convert(mcap, back)
+        assert back.read_bytes() == raw
+        if k % 2:
+            assert taxel.open(mcap).events == taxel.open(lsa).events
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    gaps=st.lists(st.integers(0, 40_000_000), max_size=60),
+    start=st.integers(-(10**10), 10**10),
+    seed=st.integers(0, 99),
+    intensity=st.booleans(),
+)
+def test_any_silence_and_any_start_survive_mcap(
+    tmp_path: Path, gaps: list[int], start: int, seed: int, intensity: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    t = (start + np.cumsum(np.array([0, *gaps]))) // 100 * 100
+    n = len(t)
+    ticks = {"intensity": rng.integers(0, 65_536, n), "present": rng.random(n) < 0.5} if intensity else {}
+    if intensity and not ticks["present"].any():
+        ticks = {}
+    markers = [(int(t[0]), True)] * (seed % 2) + [(int(t[-1]), False)] * (seed % 3 == 0)
+    events = taxel.Events(
+        t, rng.integers(0, 64, n), rng.integers(0, 64, n), rng.random(n) < 0.5, array=THESIS, markers=markers, **ticks
+    )
+    path = tmp_path / "a.mcap"
+    assert taxel.convert(events, path, overwrite=True) == []
+    assert taxel.open(path).events == events
+
+
+def test_what_a_target_cannot_hold_is_said(tmp_path: Path) -> None:
+    one = tmp_path / "one.mcap"
+    record(one, some_events())
+    lost = {kind: " | ".join(taxel.convert(one, tmp_path / f"x{kind}")) for kind in (".lsa", ".npz", ".csv")}
+    assert lost[".npz"] == "raw datagrams with their arrival times"
+    for word in ("arrival times", "2 notes", "1 detections", "registers"):
+        assert word in lost[".lsa"]
+    for word in ("raw datagrams", "sensor", "2 markers", "2 notes", "1 detections", "registers"):
+        assert word in lost[".csv"]
+    fine = taxel.Events([0, 192], [1, 2], [3, 4], [True, False], array=THESIS)
+    assert taxel.convert(fine, tmp_path / "fine.mcap") == ["times finer than 100 us"]
+    assert taxel.open(tmp_path / "fine.mcap").events.t.tolist() == [0, 100]
+    back = taxel.Events([500_000, 0], [1, 2], [3, 4], [True, False], array=THESIS)
+    assert taxel.convert(back, tmp_path / "back.mcap") == ["the order of times that step back by more than 0.1 s"]
+
+
+def test_a_npz_keeps_notes_detections_registers_and_the_sensor(tmp_path: Path) -> None:
+    exists = np.ones((64, 64), bool)
+    exists[3, 4] = False
+    array = taxel.Array(64, 64, 2.0, exists, "mat")
+    one, two = tmp_path / "one.mcap", tmp_path / "two.npz"
+    record(one, some_events(), header={"array": {"rows": 64, "columns": 64, "pitch_mm": 2.0, "name": "mat"}})
+    taxel.convert(one, two)
+    a, b = taxel.open(one), taxel.open(two)
+    assert (a.events, a.notes, a.detections, a.registers) == (b.events, b.notes, b.detections, b.registers)
+    assert b.verdict == a.verdict
+    events = taxel.Events([0], [1], [2], [True], array=array)
+    taxel.convert(events, tmp_path / "mat.npz")
+    assert taxel.open(tmp_path / "mat.npz").array == array
+
+
+def some_frames(n: int = 7, shape: tuple[int, int] = (5, 6)) -> taxel.Frames:
+    rng = np.random.default_rng(4)
+    return taxel.Frames(rng.normal(size=(n, *shape)).astype(np.float32), np.arange(n) * 1000 - 2000)
+
+
+@pytest.mark.parametrize(("first", "second"), list(itertools.product((".npz", ".csv"), repeat=2)))
+def test_pictures_survive_to_the_last_bit(tmp_path: Path, first: str, second: str) -> None:
+    frames = some_frames()
+    one, two = tmp_path / f"one{first}", tmp_path / f"two{second}"
+    taxel.convert(frames, one)
+    taxel.convert(one, two)
+    back = taxel.open(two).frames()
+    assert np.array_equal(back.values, frames.values)
+    assert np.array_equal(back.t, frames.t)
+    assert not taxel.open(two).has_events
+
+
+def test_a_csv_of_pictures_has_a_column_a_taxel_that_exists(tmp_path: Path) -> None:
+    exists = np.array([[True, False], [True, True]])
+    frames = taxel.Frames(np.array([[[1, 0], [2.5, 3]]]), [100], array=taxel.Array(2, 2, exists=exists))
+    path = tmp_path / "a.csv"
+    taxel.convert(frames, path)
+    assert path.read_text() == "t_us,x0y0,x0y1,x1y1\n100,1,2.5,3\n"
+    back = taxel.open(path).frames()
+    assert np.array_equal(back.values, frames.values)
+    assert np.array_equal(back.array.exists, exists)
+
+
+def test_a_csv_of_events_has_the_columns_that_the_field_knows(tmp_path: Path) -> None:
+    events = taxel.Events(
+        [0, 100], [1, 2], [3, 4], [True, False], array=THESIS, intensity=[7, 0], present=[True, False]
+    )
+    path = tmp_path / "a.csv"
+    taxel.convert(events, path)
+    assert path.read_text() == "t_us,x,y,p,intensity\n0,1,3,1,7\n100,2,4,0,\n"
+    assert taxel.open(path).events == events
+
+
+def test_pictures_of_events_are_written_where_a_rate_is_asked_for(tmp_path: Path) -> None:
+    events = some_events()
+    taxel.convert(events, tmp_path / "a.csv", frames_hz=1000)
+    back = taxel.open(tmp_path / "a.csv").frames()
+    assert np.array_equal(back.values, events.held(1000).values)
+
+
+@pytest.mark.parametrize("kind", [".mcap", ".lsa"])
+def test_pictures_do_not_go_into_files_of_events(tmp_path: Path, kind: str) -> None:
+    with pytest.raises(ProblemError, match="holds events and no pictures"):
+        taxel.convert(some_frames(), tmp_path / f"a{kind}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_taxel_beyond_six_bits_is_refused_by_the_wire(tmp_path: Path) -> None:
+    wide = taxel.Events([0], [64], [0], [True], array=taxel.Array(8, 100))
+    for kind in (".mcap", ".lsa"):
+        with pytest.raises(ProblemError, match="63"):
+            taxel.convert(wide, tmp_path / f"a{kind}")
+    assert taxel.convert(wide, tmp_path / "a.npz") == []
+    assert taxel.open(tmp_path / "a.npz").events == wide
+
+
+def test_a_slice_of_a_recording_is_converted_as_a_slice(tmp_path: Path) -> None:
+    one = tmp_path / "one.mcap"
+    record(one, some_events())
+    part = taxel.open(one).between(10_000, 30_000)
+    for kind in KINDS:
+        taxel.convert(part, tmp_path / f"part{kind}")
+        assert len(taxel.open(tmp_path / f"part{kind}").events) == len(part.events) > 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((3, "a.npz"), "source is 3"),
+        ((None, "a.npz"), "source is None"),
+        (("E", 7), "target is 7"),
+        (("E", b"a.npz"), "target is b'a.npz'"),
+        (("E", "a.xyz"), "ends in '.xyz'; must be .mcap, .lsa, .npz, .csv"),
+        (("E", "a"), "ends in 'nothing'"),
+        (("E", "a.mcap", {"compression": "gzip"}), "compression is 'gzip'"),
+        (("E", "a.mcap", {"compression": None}), "compression is None"),
+        (("E", "a.npz", {"frames_hz": 0}), "frames_hz is 0"),
+        (("E", "a.npz", {"frames_hz": "fast"}), "frames_hz is 'fast'"),
+        (("E", "a.npz", {"frames_hz": float("nan")}), "frames_hz is nan"),
+        (("F", "a.npz", {"frames_hz": 10}), "pictures keep their own times"),
+        (("E", "a.npz", {"overwrite": "yes"}), "overwrite is 'yes'"),
+    ],
+)
+def test_nonsense_is_one_clear_error(tmp_path: Path, arguments: tuple, said: str) -> None:
+    source, target, *more = arguments
+    source = {"E": some_events(5), "F": some_frames()}.get(source, source) if isinstance(source, str) else source
+    target = tmp_path / target if isinstance(target, str) else target
+    with pytest.raises(ProblemError) as caught:
+        taxel.convert(source, target, **(more[0] if more else {}))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_source_that_is_no_recording_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"\x1f\x8b\x08\x00")
+    with pytest.raises(FormatError, match="gzip"):
+        taxel.convert(path, tmp_path / "b.npz")

@@ -1,0 +1,293 @@
+"""taxel.open knows its kinds by their bytes, and says of others what they are and what would be right."""
+
+from __future__ import annotations
+
+import gzip
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel._core import FormatError, ProblemError
+
+from .making import HEADER, record, some_events
+
+THESIS = taxel.Array.thesis()
+
+
+def npz(**columns: object) -> bytes:
+    file = io.BytesIO()
+    np.savez(file, **columns)
+    return file.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        (
+            "a.mcap",
+            gzip.compress(b"x"),
+            "byte 0: starts with 1F 8B 08 00 (gzip), not with the MCAP magic; unpack it first",
+        ),
+        ("a.mcap", b"", "byte 0: the file ends inside the MCAP magic"),
+        ("a.mcap", b"\x89MCA", "byte 4: the file ends inside the MCAP magic"),
+        ("a.mcap", b"hello, world", "byte 0: starts with 68 65 6C 6C, not with the MCAP magic"),
+        ("a.mcap", npz(t=[1]), "starts with 50 4B 03 04 (a .npz file), not with the MCAP magic; rename it"),
+        ("a.npz", b"\x89MCAP0\r\n", "(a .mcap file), not with the magic of a .npz; rename it"),
+        ("a.npz", b"t_us,x,y,p\n", "not with the magic of a .npz"),
+        ("a.npz", npz(t=[1])[:40], "cannot be unpacked"),
+        ("a.npz", npz(t=[1], x=[2]), "holds t, x: y is missing"),
+        ("a.npz", npz(t=[1], x=[2], y=[3], p=[True, False]), "p"),
+        ("a.npz", npz(t=[1], x=[2], y=[3], p=[True], about="{"), "array about"),
+        ("a.npz", npz(t=[1], values=np.zeros((2, 3, 3))), "t has shape"),
+        ("a.csv", b"\x89PNG\r\n", "a PNG picture, no recording"),
+        ("a.csv", b"time,x,y\n1,2,3\n", "line 1: 'time,x,y': must be t_us,x,y,p[,intensity]"),
+        ("a.csv", b"", "line 1: '': must be"),
+        ("a.csv", b"\xff\xfe\x00", "line 1"),
+        ("a.csv", b"t_us,x,y,p,colour\n", "line 1: 'colour' after p"),
+        ("a.csv", b"t_us,x,y,p\n1,2,3\n", "must be 4 numbers a line"),
+        ("a.csv", b"t_us,x,y,p\n1,2,3,1\n5,6,abc,1\n", "line 3, column y"),
+        ("a.csv", b"t_us,x,y,p\n\n1,2,3,1\n\n5,6,,1\n", "line 5, column y"),
+        ("a.csv", b"t_us,x,y,p\n1,2,3,2\n", "line 2, column p: is 2; must be 0 to 1"),
+        ("a.csv", b"t_us,x,y,p\n1,-2,3,0\n", "line 2, column x: is -2"),
+        ("a.csv", b"t_us,x,y,p\n1.5,2,3,0\n", "line 2, column t_us"),
+        ("a.csv", b"t_us,x,y,p,intensity\n1,2,3,0,70000\n", "column intensity: is 70000; must be 0 to 65535"),
+        ("a.csv", b"t_us,x0y0,x0y0\n0,1,2\n", "column 'x0y0' stands there twice"),
+        ("a.csv", b"t_us,x0y0,heel\n0,1,2\n", "column 'heel' among taxels"),
+        ("a.csv", b"t_us,x0y0\n0,1\n0,2\n", "t[1] is 0 us, not after"),
+        ("a.csv", b"t_us,x0y0\n0.5,1\n", "t[0] is 0.5"),
+        ("a.csv", b"t_us,x0y0\n0,1\n1,2,3\n", "line 3"),
+        ("a.csv", b"t_us,x9999y9999\n0,1\n", "most are missing"),
+        ("a.txt", b"hello", "no recording; there are .mcap, .lsa, .npz and .csv"),
+        ("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5"),
+        ("a.bag", b"#ROSBAG V2.0", "ROS 1 bag"),
+    ],
+)
+def test_a_wrong_file_is_one_line_with_place_and_remedy(tmp_path: Path, name: str, content: bytes, said: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(FormatError) as caught:
+        taxel.open(path)
+    text = str(caught.value)
+    assert said in text
+    assert name in text
+    assert "\n" not in text
+
+
+def test_a_pickle_in_a_npz_is_never_loaded(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    path.write_bytes(npz(t=np.array([object()])))
+    with pytest.raises(FormatError):
+        taxel.open(path)
+
+
+def test_missing_files_and_folders_are_oserrors(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError):
+        taxel.open(tmp_path / "nothing.mcap")
+    with pytest.raises(IsADirectoryError):
+        taxel.open(tmp_path)
+
+
+@pytest.mark.parametrize("path", [3, None, b"a.mcap", 1.5, ["a.mcap"], "", "a\0b"])
+def test_a_path_that_is_none_is_refused(path: object) -> None:
+    with pytest.raises(ProblemError, match="path is"):
+        taxel.open(path)
+
+
+@pytest.mark.parametrize("arguments", [{"array": 3}, {"pairing": "best"}, {"pairing": None}, {"differences": 1}])
+def test_nonsense_in_options_is_refused_by_name(tmp_path: Path, arguments: dict) -> None:
+    path = tmp_path / "a.lsa"
+    path.write_bytes(b"")
+    with pytest.raises(ProblemError, match=f"{next(iter(arguments))} is"):
+        taxel.open(path, **arguments)
+
+
+def test_kinds_are_known_by_their_bytes_where_the_name_says_nothing(tmp_path: Path) -> None:
+    record(tmp_path / "a.mcap", some_events(20))
+    (tmp_path / "a.mcap").rename(tmp_path / "recording")
+    assert taxel.open(tmp_path / "recording").kind == "mcap"
+
+
+def test_raw_bytes_need_no_magic_and_say_whether_they_are_complete(tmp_path: Path) -> None:
+    events = some_events(100)
+    path = tmp_path / "a.lsa"
+    taxel.convert(events, path)
+    assert (tmp_path / "a.lss").read_bytes() == b""
+    rec = taxel.open(path)
+    assert not rec.truncated
+    assert rec.events == events
+    assert rec.verdict.startswith("raw bytes do not say what was lost")
+    (tmp_path / "a.lss").unlink()
+    assert taxel.open(path).truncated
+    assert "a.lss is not there" in taxel.open(path).verdict
+    path.write_bytes(b"\x89MCAP0\r\n")
+    assert len(taxel.open(path).events) == 0
+    assert "bytes skipped" in taxel.open(path).verdict
+
+
+def test_a_plain_npz_or_csv_gets_the_thesis_array_or_one_that_fits(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    path.write_bytes(npz(t=[0, 5], x=[1, 2], y=[3, 4], p=[True, False]))
+    assert taxel.open(path).array == THESIS
+    assert taxel.open(path, array=taxel.Array(8, 8)).array == taxel.Array(8, 8)
+    (tmp_path / "b.csv").write_text("t_us,x,y,p\n0,99,3,1\n")
+    assert taxel.open(tmp_path / "b.csv").array.shape == (64, 100)
+    with pytest.raises(FormatError, match="outside"):
+        taxel.open(tmp_path / "b.csv", array=THESIS)
+
+
+def test_a_csv_from_other_programs_is_read_as_it_comes(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(b"\xef\xbb\xbft_us, x, y, p\r\n0, 1, 2, 1\r\n100, 3, 4, 0\r\n\r\n")
+    assert taxel.open(path).events.t.tolist() == [0, 100]
+    path.write_bytes(b"t_us,left,right\n0,1,2\n10,3,4\n")
+    assert taxel.open(path).frames().values.tolist() == [[[1, 2]], [[3, 4]]]
+    assert taxel.open(path, array=taxel.Array(2, 1)).frames().values.tolist() == [[[1], [2]], [[3], [4]]]
+    path.write_bytes(b"t_us,x,y,p\n")
+    assert len(taxel.open(path).events) == 0
+
+
+@pytest.fixture
+def rec(tmp_path: Path) -> taxel.Recording:
+    record(tmp_path / "walk.mcap", some_events(), header={"registers": None})
+    return taxel.open(tmp_path / "walk.mcap")
+
+
+def test_a_recording_gives_all_that_was_recorded(rec: taxel.Recording) -> None:
+    assert rec.events == some_events()
+    assert rec.array == THESIS
+    assert rec.source == HEADER["source"]
+    assert rec.kind == "mcap"
+    at = HEADER["started_ns"]
+    assert rec.notes == (
+        taxel.Note("left heel", 5000, at + 5_000_000),
+        taxel.Note("somebody coughed", None, at + 6_000_000),
+    )
+    assert rec.detections == taxel.Detections(["contact"], [6000], [6192], [1.5])
+    assert rec.registers == taxel.wire.Registers.preset("5.2 kHz")
+    assert [registers for _, registers in rec.register_changes] == [rec.registers]
+    assert not rec.truncated
+    assert rec.verdict == "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)"
+    assert rec.counts["datagrams"] == rec.counts["received"] == 40
+    assert rec.counts["missing_numbers"] == 0
+    assert rec.counts["decoder"]["changes"] == 400
+    assert repr(rec).startswith("Recording(walk.mcap: 400 events, ")
+    assert "2 notes, 1 detections" in repr(rec)
+
+
+def test_the_clock_finds_offset_and_delay(rec: taxel.Recording) -> None:
+    clock = rec.clock
+    assert clock is not None
+    assert clock.offset_ns == HEADER["started_ns"] + 1_000_000
+    assert clock.drift_ppm == 0.0
+    assert np.abs(clock.delay_us).max() < 1.0
+    assert clock.host_ns(1000) == clock.offset_ns + 1_000_000
+
+
+def test_slicing_by_time_cuts_events_notes_and_detections(rec: taxel.Recording) -> None:
+    part = rec.between(5000, 6000)
+    assert part.events == rec.events.between(5000, 6000)
+    assert [note.text for note in part.notes] == ["left heel"]
+    assert len(part.detections) == 0
+    assert len(rec.between(6000, 6001).detections) == 1
+    twice = rec.between(0, 20_000).between(10_000, 90_000)
+    assert twice.events == rec.events.between(10_000, 20_000)
+    assert len(rec.between(3, 3).events) == 0
+    assert rec.between(float("-inf"), float("inf")).events == rec.events
+    for start, stop in ((2, 1), ("a", 3), (float("nan"), 3), (None, 3)):
+        with pytest.raises(ProblemError):
+            rec.between(start, stop)
+
+
+def test_frames_hold_what_came_and_a_slice_knows_what_came_before_it(rec: taxel.Recording) -> None:
+    frames = rec.frames(1000)
+    assert np.array_equal(np.diff(frames.t), np.full(len(frames) - 1, 1000))
+    assert frames == rec.events.held(1000)
+    start = int(frames.t[10])
+    part = rec.between(start, start + 5000).frames(1000)
+    assert np.array_equal(part.values, frames.values[10:15])
+    assert len(rec.frames()) == len(rec.events.held(10_000))
+    for rate in (0, -1, "fast", float("nan"), True, 2e6):
+        with pytest.raises(ProblemError, match="rate_hz is"):
+            rec.frames(rate)
+
+
+def test_frames_of_a_file_of_pictures_are_its_own_or_the_last_at_each_time(tmp_path: Path) -> None:
+    own = taxel.Frames(np.arange(12, dtype=np.float32).reshape(3, 2, 2), [0, 1000, 2500])
+    taxel.convert(own, tmp_path / "a.npz")
+    rec = taxel.open(tmp_path / "a.npz")
+    assert rec.frames() == own
+    held = rec.frames(1000)
+    assert held.t.tolist() == [0, 1000, 2000]
+    assert held.values[:, 0, 0].tolist() == [0, 4, 4]
+    assert rec.between(500, 3000).frames().t.tolist() == [1000, 2500]
+    with pytest.raises(ProblemError, match="holds pictures and no events"):
+        _ = rec.events
+    with pytest.raises(ProblemError, match=r"only \.mcap does"):
+        rec.datagrams()
+    assert rec.clock is None
+    assert "3 pictures" in repr(rec)
+
+
+def test_a_recording_draws_itself(rec: taxel.Recording, tmp_path: Path) -> None:
+    figure = rec.plot()
+    assert len(figure.axes) >= 2
+    frames = taxel.Frames(np.ones((3, 2, 2)), [0, 1, 2])
+    taxel.convert(frames, tmp_path / "f.npz")
+    taxel.open(tmp_path / "f.npz").plot()
+    taxel.convert(taxel.Events([], [], [], [], array=THESIS), tmp_path / "empty.mcap")
+    taxel.open(tmp_path / "empty.mcap").plot()
+
+
+def test_intensities_may_be_paired_by_taxel_on_request(tmp_path: Path) -> None:
+    words = taxel.wire.encode(taxel.Events([0, 0], [1, 2], [3, 4], [1, 1], array=THESIS, intensity=[7, 8]))
+    (tmp_path / "a.lsa").write_bytes(words[:5] + words[10:15] + words[5:10] + words[15:])
+    assert taxel.open(tmp_path / "a.lsa").events.intensity is None
+    assert taxel.open(tmp_path / "a.lsa").counts["decoder"]["unpaired"] == 2
+    by_taxel = taxel.open(tmp_path / "a.lsa", pairing="taxel").events
+    assert by_taxel.intensity.tolist() == [7, 8]
+
+
+def test_losses_while_recording_are_in_the_verdict(tmp_path: Path) -> None:
+    import json
+
+    from taxel import _core
+
+    path = tmp_path / "a.mcap"
+    writer = _core.RecordingWriter(path, json.dumps(HEADER), "none", False)
+    for number in (0, 1, 4):
+        writer.datagram(number, number, b"\xc0\x00\x00\x03\x04")
+    said = {"received": 5, "dropped_by_kernel": 2, "dropped_by_queue": 2, "decoder": {"bytes_skipped": 3}}
+    writer.finish(json.dumps(said))
+    rec = taxel.open(path)
+    assert rec.counts["missing_numbers"] == 2
+    assert rec.verdict == (
+        "LOST: 2 messages dropped by the kernel, 2 datagrams dropped by taxel's queue; "
+        "in the bytes that came: 3 bytes skipped"
+    )
+
+
+def test_a_finished_writer_takes_no_more_and_nonsense_is_refused(tmp_path: Path) -> None:
+    import json
+
+    from taxel import _core
+
+    for header in ("{", "{}", '{"array": 3}'):
+        with pytest.raises(ProblemError, match="header"):
+            _core.RecordingWriter(tmp_path / "b.mcap", header, "none", False)
+    with pytest.raises(ProblemError, match="compression"):
+        _core.RecordingWriter(tmp_path / "b.mcap", json.dumps(HEADER), "gzip", False)
+    assert not list(tmp_path.iterdir())
+    writer = _core.RecordingWriter(tmp_path / "a.mcap", json.dumps(HEADER), "none", False)
+    with pytest.raises(ProblemError, match="65507"):
+        writer.datagram(0, 0, bytes(70_000))
+    with pytest.raises(ProblemError, match="whole rows"):
+        writer.picture(0, 0, 64, np.zeros(63, np.uint16), 150)
+    with pytest.raises(ProblemError, match="registers"):
+        writer.registers(0, "[]")
+    writer.finish("{}")
+    for call in (lambda: writer.datagram(0, 0, b""), lambda: writer.finish("{}")):
+        with pytest.raises(ProblemError, match="the recording is finished"):
+            call()
