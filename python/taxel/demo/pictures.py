@@ -6,7 +6,6 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,12 +17,16 @@ from taxel.demo.judging import LABELS, Judged
 from taxel.events import Events
 from taxel.simulate import Contact
 
-__all__ = ["close_up", "delay_split", "delays_by_class", "maps", "noise", "rates", "scene_picture", "svg"]
+__all__ = ["STYLE", "close_up", "delay_split", "delays_by_class", "maps", "noise", "rates", "scene_picture", "svg"]
+
+#: How many taxels of a side a map shows.
+_CROP = 28
 
 #: Truth, contact, lift, quiet.
 _TRUE, _SAID, _QUIET = "#e8b04b", {"contact": "#b5423c", "lift": "#2f6690"}, "#8a8a8a"
 
-_STYLE: Any = {
+#: The look of all pictures: draw inside ``matplotlib.rc_context(STYLE)``.
+STYLE: Any = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.edgecolor": "#555555",
@@ -39,17 +42,14 @@ _STYLE: Any = {
 def svg(figure: Figure) -> str:
     """Return a figure as SVG that stands inside a page, and close it."""
     text = io.StringIO()
-    with mpl.rc_context(_STYLE):
-        figure.savefig(text, format="svg", metadata={"Date": None})
+    figure.savefig(text, format="svg", metadata={"Date": None})
     plt.close(figure)
     said = text.getvalue()
     return said[said.index("<svg") :]
 
 
 def _figure(rows: int, columns: int, size: tuple[float, float], **kwargs: Any) -> tuple[Figure, Any]:
-    with mpl.rc_context(_STYLE):
-        figure, axes = plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **kwargs)
-    return figure, axes
+    return plt.subplots(rows, columns, figsize=size, layout="constrained", squeeze=False, **kwargs)
 
 
 def scene_picture(hearing: Hearing, start_us: float, stop_us: float) -> Figure:
@@ -116,15 +116,22 @@ def close_up(hearing: Hearing, contact: Contact, reach_us: float = 5_000.0) -> F
 
 
 def maps(hearing: Hearing, contact: Contact) -> Figure:
-    """Draw what the host holds of every taxel, above its rest, around a touch."""
+    """Draw what the host holds of the taxels, above their rest, around a touch and where it is."""
     moments = (-0.4, 0.4, 1.0, 3.0, 8.0, 1e-3 * (contact.stop_us - contact.start_us) + 1.0)
-    figure, axes = _figure(1, len(moments), (9.5, 2.1))
+    figure, axes = _figure(1, len(moments), (9.5, 1.9))
     rest = np.nan_to_num(hearing.tare.rest)
+    held = [_held(hearing.events, contact.start_us + 1000.0 * after, rest) for after in moments]
+    touched = hearing.events.between(contact.start_us, contact.start_us + 3_000.0)
+    middle = [float(np.median(v)) if len(v) else 31.5 for v in (touched.y, touched.x)]
+    top, left = (int(np.clip(m - _CROP / 2, 0, n - _CROP)) for m, n in zip(middle, rest.shape, strict=True))
+    seen = [h[top : top + _CROP, left : left + _CROP] for h in held]
+    most = max(1.0, *(float(s.max()) for s in seen))
     image = None
-    for axis, after in zip(axes[0], moments, strict=True):
-        held = _held(hearing.events, contact.start_us + 1000.0 * after, rest)
-        image = axis.imshow(held, cmap="magma", vmin=0.0, vmax=90.0, interpolation="nearest")
-        axis.set(xticks=[], yticks=[], title=f"{after:+.1f} ms")
+    for axis, picture, after in zip(axes[0], seen, moments, strict=True):
+        edges = (left - 0.5, left + _CROP - 0.5, top + _CROP - 0.5, top - 0.5)
+        image = axis.imshow(picture, cmap="magma", vmin=0.0, vmax=most, interpolation="nearest", extent=edges)
+        axis.set_title(f"{after:+.1f} ms")
+        axis.tick_params(labelsize=6)
     if image is not None:
         figure.colorbar(image, ax=list(axes[0]), label="ticks above rest", shrink=0.9)
     return figure

@@ -114,4 +114,10 @@ def play_live(
     agrees = len(again) == len(mine) and bool(
         (again.t == mine.t).all() and (again.known == mine.known).all() and (again.label == mine.label).all()
     )
-    return Playing(hearing, summary.counters, emulator, [emulator["verdict"], summary.verdict], recording, agrees)
+    verdicts = [emulator["verdict"], summary.verdict]
+    if summary.counters["late"]:
+        verdicts.append(
+            f"{summary.counters['late']} events came after the readout's time had moved on, 5 frames behind the host's "
+            f"clock: this machine was too busy, and what they told was known later than it could have been"
+        )
+    return Playing(hearing, summary.counters, emulator, verdicts, recording, agrees)

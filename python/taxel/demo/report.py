@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import jinja2
+import matplotlib as mpl
 import numpy as np
 from markupsafe import Markup
 
@@ -129,7 +130,8 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     template = environment.from_string(files("taxel.demo").joinpath("report.html.j2").read_text(encoding="utf-8"))
-    drawn = {name: pictures.svg(figure) for name, figure in _figures(material, values).items()}
+    with mpl.rc_context(pictures.STYLE):
+        drawn = {name: pictures.svg(figure) for name, figure in _figures(material, values).items()}
     return template.render(
         values=values,
         pictures={name: Markup(text) for name, text in drawn.items()},

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from rich.columns import Columns
 from rich.console import Group
 from rich.live import Live as Drawing
+from rich.padding import Padding
 from rich.panel import Panel
 from rich.progress_bar import ProgressBar
 from rich.style import Style
@@ -51,7 +52,8 @@ class Screen:
         decoded, told = counters["decode_latency"], counters["said_latency"]
         for name, value in (
             ("events/s", f"{self._rate:,.0f}"),
-            ("on the wire", f"{self._rate * 80 / 1e3:,.0f} kbit/s (frames: 213,000)"),
+            ("on the wire", f"{self._rate * 80 / 1e3:,.0f} kbit/s"),
+            ("as frames", "213,333 kbit/s"),
             ("events", f"{counters['events']:,}"),
             ("datagrams", f"{capture['datagrams']:,}, lost {lost}"),
             ("arrived to decoded", f"{decoded['p50_us']:.0f} us, 99 %: {decoded['p99_us']:.0f}"),
@@ -62,8 +64,8 @@ class Screen:
         state = "taring" if counters["taring"] else f"{min(now, self._seconds):5.1f} of {self._seconds:.1f} s"
         self._drawing.update(
             Group(
-                Columns([Panel(_blocks(picture), title="pressure", width=68), Panel(rows, title=state, width=56)]),
-                ProgressBar(total=self._seconds, completed=min(now, self._seconds), width=120),
+                Columns([Panel(_blocks(picture), title="pressure", width=36), Panel(rows, title=state, height=18)]),
+                Padding(ProgressBar(total=self._seconds, completed=min(now, self._seconds), width=80), (0, 0)),
                 *[self._line(one) for one in said[-self._LINES :]],
             )
         )
@@ -80,19 +82,18 @@ class Screen:
 
 
 def _blocks(picture: NDArray[np.uint16]) -> Text:
-    """Return a picture of ticks as half blocks: two rows a line, each cell the larger of two columns."""
-    rest = np.median(picture)
-    above = np.clip(picture.astype(float) - rest - 6.0, 0.0, 80.0) / 80.0
-    small = above.reshape(32, 2, 64).max(axis=1)
-    text = Text()
-    for upper, lower in zip(small[::2], small[1::2], strict=True):
-        for a, b in zip(upper, lower, strict=True):
-            text.append("▀", Style(color=_colour(a), bgcolor=_colour(b)))
-        text.append("\n")
-    return text
+    """Return a picture of ticks as half blocks: two rows a line; each cell is the largest of 2 x 2 taxels."""
+    above = np.clip((picture.astype(float) - np.median(picture) - 6.0) / 80.0, 0.0, 1.0)
+    rows, columns = (n // 2 for n in picture.shape)
+    cells = np.sqrt(above[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2).max(axis=(1, 3)))
+    lines = []
+    for upper, lower in zip(cells[::2], cells[1::2], strict=True):
+        pairs = zip(upper, lower, strict=True)
+        lines.append(Text.assemble(*(("▀", Style(color=_colour(a), bgcolor=_colour(b))) for a, b in pairs)))
+    return Text("\n").join(lines)
 
 
 def _colour(share: float) -> str:
-    """Return black to red to yellow to white."""
-    red, green, blue = (int(255 * min(1.0, max(0.0, 3.0 * share - k))) for k in range(3))
-    return f"#{max(red, 18):02x}{max(green, 16):02x}{max(blue, 24):02x}"
+    """Return night over red and yellow to white."""
+    red, green, blue = (int(255 * min(1.0, max(0.0, 2.6 * share - k))) for k in (0.0, 0.8, 1.6))
+    return f"#{max(red, 18):02x}{max(green, 16):02x}{max(blue, 26):02x}"

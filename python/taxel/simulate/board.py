@@ -70,7 +70,8 @@ class EmulatorReport:
         late = f"late by {self.late_us['p50']:.0f} us (median), {self.late_us['p99']:.0f} us (99 %), "
         late += f"{self.late_us['max'] / 1000.0:.1f} ms at most; {self.late_frames} of {self.frames} by a frame or more"
         if self.held:
-            return f"{self.wanted_hz:.0f} frames/s held; frames were {late}"
+            whole = "held" if self.late_frames <= 0.01 * self.frames else "held on the whole, but not frame by frame"
+            return f"{self.wanted_hz:.0f} frames/s {whole}; frames were {late}"
         short = 100.0 * (1.0 - self.reached_hz / self.wanted_hz)
         return (
             f"this machine cannot hold {self.wanted_hz:.0f} frames/s: it reached {self.reached_hz:.0f}, "
