@@ -1,0 +1,153 @@
+"""The demo: without the clock at toy size, and (slowly) in real time."""
+
+import json
+import math
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from taxel.cli import app
+from taxel.demo.hearing import FRAME_US, hear
+from taxel.demo.judging import GOALS, LABELS
+from taxel.demo.script import TRAINING_SEED, script
+from taxel.demo.shipped import shipped
+from taxel.simulate import Scene, Silence
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["demo", *map(str, arguments)], catch_exceptions=False)
+
+
+@pytest.fixture(scope="module")
+def toy(tmp_path_factory):
+    """A report of two scenes without the clock, and its figures."""
+    folder = tmp_path_factory.mktemp("demo") / "report"
+    result = folder.with_name("figures.json")
+    ended = run("--no-clock", "--scenes", 2, "--seed", 5, "--noise", 2, "--folder", folder, "-o", result)
+    assert ended.exit_code == 0
+    assert f"report: {folder / 'report.html'}" in ended.output
+    return folder, result
+
+
+def test_the_demo_finds_the_impacts_of_scenes_that_it_was_not_trained_on(toy):
+    values = json.loads((toy[0] / "report.json").read_text())
+    for label in LABELS:
+        first = values["neuron"]["classes"]["first impact"][label]
+        assert (first["found"], first["touches"]) == (2, 2)
+        assert values["neuron"]["first_within_goal"][label]["share"] == 1.0
+        assert -GOALS[label] <= first["known_ms"]["p95"] <= GOALS[label]
+    assert values["noise"]["said"] == {"contact": 0, "lift": 0}
+    assert set(values["dashpot_ms"]) == {"0.3", "0"}
+
+
+def test_the_report_shows_what_it_should(toy):
+    page = (toy[0] / "report.html").read_text()
+    assert page.count("<svg") == 7
+    for said in ("without the clock", "does as well", "dashpot", "0.02 N", "seed 5", "figure 5.14", "5208 frames"):
+        assert said in page, said
+    assert "nan" not in page.replace("finance", "")
+
+
+def test_the_figures_stand_in_both_places(toy):
+    folder, result = toy
+    mine, other = (json.loads(path.read_text()) for path in (folder / "report.json", result))
+    mine.pop("machine"), other.pop("machine")
+    assert mine == other
+
+
+def test_an_existing_folder_is_not_touched(toy):
+    before = (toy[0] / "report.json").read_bytes()
+    with pytest.raises(FileExistsError):
+        run("--no-clock", "--scenes", 1, "--folder", toy[0])
+    assert (toy[0] / "report.json").read_bytes() == before
+
+
+def test_the_demo_never_plays_what_the_readout_was_trained_on():
+    ended = CliRunner().invoke(app, ["demo", "--seed", str(TRAINING_SEED)])
+    assert ended.exit_code == 2
+    drawn = {Scene.draw(TRAINING_SEED + n).parameters["x_mm"] for n in range(8)}
+    assert len(drawn) == 8
+
+
+def test_the_parts_of_a_delay_sum_to_it():
+    hearing = hear(script(3, 2), shipped(), seed=3)
+    row = hearing.judged.row("first", "contact")
+    for (place, said), delay in zip(row.places, row.delays_ms, strict=True):
+        contact = hearing.contacts[place]
+        stamp = hearing.first_input(contact, "contact")
+        assert stamp is not None
+        begin = math.ceil(stamp / FRAME_US) * FRAME_US
+        physics = (begin - contact.start_us) / 1000
+        assert -0.2 < physics < delay
+        assert hearing.found.known[hearing.found.label == "contact"][said] >= begin + FRAME_US - 1
+
+
+def test_noise_alone_says_nothing():
+    quiet = hear([Silence(5_050.3)], shipped(), seed=8)
+    assert len(quiet.found) == 0
+    assert len(quiet.plain) == 0
+    assert 20 < len(quiet.events) / 5 < 400
+
+
+def test_footfalls_of_a_plate_are_laid_over_the_array(tmp_path):
+    """A small made-up plate: a heel that rolls to toes, its rows interpolated as the real files' are."""
+    (tmp_path / "plate").mkdir()
+    sensors = np.zeros((42, 33, 400))
+    rows, columns, frames = np.ogrid[:42, :33, :400]
+    middle = 4 + 28 * frames / 300
+    sensors = 200.0 * np.exp(-(((rows - middle) / 5) ** 2) - ((columns - 16) / 3) ** 2) * (frames < 300)
+    sensors = np.where(sensors < 20, 0, np.round(sensors)).astype(int)
+    image = np.zeros((63, 33, 400), np.uint16)
+    for k in range(21):
+        a, b, c = (sensors[min(2 * k + n, 41)] for n in range(3))
+        image[3 * k], image[3 * k + 1], image[3 * k + 2] = a, (a + 2 * b) // 3, (2 * b + c) // 3
+    with h5py.File(tmp_path / "plate" / "subj000.h5", "w") as file:
+        file["img000"] = image
+    ended = run(
+        "--no-clock", "--scenes", 1, "--seed", 5, "--noise", 1, "--data", tmp_path, "--folder", tmp_path / "r", "--json"
+    )
+    assert ended.exit_code == 0
+    steps = json.loads(ended.stdout)["footfalls"]["classes"]["footfall"]
+    assert {label: (steps[label]["found"], steps[label]["touches"]) for label in LABELS} == {
+        "contact": (1, 1),
+        "lift": (1, 1),
+    }
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--noise", "0"], "noise"),
+        (["--data", "nowhere"], "plate"),
+        (["-o", "nowhere/x.json"], "no folder"),
+    ],
+)
+def test_what_the_user_got_wrong_is_one_line(arguments, said, tmp_path):
+    command = [sys.executable, "-m", "taxel", "demo", "--no-clock", "--scenes", "1", *arguments]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
+    assert ended.returncode == 2
+    assert ended.stderr.count("\n") == 1
+    assert said in ended.stderr
+    assert not list(Path(tmp_path).iterdir())
+
+
+@pytest.mark.slow
+def test_in_real_time_the_board_is_a_process_of_its_own_and_its_recording_says_the_same(tmp_path):
+    command = [sys.executable, "-m", "taxel", "demo", "--scenes", "2", "--seed", "5", "--noise", "1", "--json"]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True, cwd=tmp_path)
+    values = json.loads(ended.stdout)
+    folder = Path(values["report"]).parent
+    assert {path.name for path in (tmp_path / folder).iterdir()} == {"recording.mcap", "report.html", "report.json"}
+    host, board = values["host"], values["board"]
+    assert board["bytes"] == host["wire"]["bytes"]
+    assert host["events"] == host["read_out"] + host["events_dropped"]
+    # On a machine that is busy, events come after the readout's time has moved on: then they are counted.
+    assert values["recording_agrees"] or host["late"] > 0
+    assert values["neuron"]["classes"]["first impact"]["contact"]["found"] == 2
+    shutil.rmtree(tmp_path / folder)

@@ -1,0 +1,66 @@
+"""Detections against touches, by class."""
+
+import numpy as np
+import pytest
+
+from taxel import Detections, SpikeTrains
+from taxel.demo.judging import CLASSES, LABELS, judge, plain_rule
+from taxel.simulate import Contact
+
+
+def touch(kind="first", start=100_000.0, stop=115_000.0, speed=1.6, peak=20.0):
+    return Contact(kind, start, stop, speed, peak)
+
+
+def said(*times, label="contact"):
+    return Detections([label] * len(times), list(times), [t + 200 for t in times])
+
+
+def test_each_touch_belongs_to_one_class():
+    for kind in ("first", "bounce", "hand", "rest", "pictures"):
+        for speed in (0.05, 0.15, 0.3, 0.4, 1.0):
+            for peak in (0.1, 0.4, 0.7, 1.0, 4.0):
+                one = touch(kind, speed=speed, peak=peak)
+                assert sum(belongs(one) for _, belongs in CLASSES) == 1, one
+
+
+def test_errors_are_taken_from_the_truth_itself():
+    judged = judge(said(100_300), [touch(start=100_000.4)])
+    row = judged.row("first", "contact")
+    assert (row.found, row.touches) == (1, 1)
+    assert row.errors_ms == pytest.approx([0.2996])
+    assert row.delays_ms == pytest.approx([0.4996])
+
+
+def test_impacts_have_a_narrow_window_and_presses_a_wide_one():
+    late = 30_000
+    assert judge(said(100_000 + late), [touch("bounce")]).row("bounce, 0.4", "contact").found == 0
+    assert judge(said(100_000 + late), [touch("hand", peak=2.0)]).row("pressed by hand, 1 N", "contact").found == 1
+
+
+def test_what_belongs_to_no_touch_is_false():
+    judged = judge(said(100_300, 400_000), [touch()])
+    assert judged.false["contact"].tolist() == [400_000]
+    assert judged.false["lift"].tolist() == []
+
+
+def test_a_goal_counts_the_missed_as_well():
+    contacts = [touch(start=1e6 * k, stop=1e6 * k + 15_000) for k in range(1, 5)]
+    found = said(1_000_300, 2_000_300, 3_001_500)
+    assert judge(found, contacts).within_goal("contact") == 0.5  # one is 1.7 ms late, one is missed
+
+
+def test_a_judgement_without_touches_is_plain_values():
+    values = judge(Detections([], [], []), []).to_dict()
+    assert values["classes"] == {}
+    assert values["false"] == dict.fromkeys(LABELS, 0)
+
+
+def test_the_plain_rule_knows_at_the_end_of_the_frame():
+    """A stamp is floor(1.92 k) units of 100 us: its frame k ends at 192 (k + 1) us."""
+    frames = np.array([3, 260, 1_000, 5_207])
+    stamps = np.floor(1.92 * frames) * 0.1
+    lists = [stamps.tolist()] + [[]] * 4 + [(stamps + 50).round(1).tolist()] + [[]] * 4
+    found = plain_rule(SpikeTrains.from_lists(lists, stop=5_000.0), 192.0)
+    assert found["contact"].known.tolist() == (192 * (frames + 1)).tolist()
+    assert len(found["lift"]) == 4

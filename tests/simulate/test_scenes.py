@@ -1,0 +1,142 @@
+"""Scenes and what they do: mechanics, truth, and nonsense in every argument."""
+
+import math
+
+import numpy as np
+import pytest
+
+from taxel import Array, ProblemError, SceneError
+from taxel.simulate import Pictures, Scene, Silence, play, truth
+
+FRAME_US = 192.0
+
+
+def test_a_ball_falls_as_galilei_says():
+    """The first contact comes sqrt(2 h / g) after the ball is let go, at sqrt(2 g h)."""
+    for index in range(5):
+        scene = Scene.draw(3, index)
+        first = scene.motion().contacts[0]
+        height = scene.parameters["drop_mm"] * 1e-3
+        assert first.speed_m_s == pytest.approx(math.sqrt(2 * 9.81 * height), rel=2e-3)
+        fallen_us = 1e6 * math.sqrt(2 * height / 9.81)
+        assert first.start_us == pytest.approx(1e3 * scene.parameters["lead_ms"] + fallen_us, abs=60)
+
+
+def test_force_leaves_and_returns_to_zero_where_truth_says():
+    motion = Scene.draw(4).motion()
+    times = np.arange(len(motion.force_n)) * motion.step_us
+    inside = np.zeros(len(times), bool)
+    for contact in motion.contacts:
+        inside |= (times > contact.start_us) & (times < contact.stop_us)
+    assert np.array_equal(motion.force_n > 0, inside)
+
+
+def test_momentum_of_an_impact_is_what_the_ball_brought_and_took():
+    """The integral of force less weight over a contact is mass times the change of speed."""
+    scene = Scene.draw(5)
+    motion = scene.motion(6.0)
+    first, second = motion.contacts[:2]
+    inside = slice(round(first.start_us / 6.0), round(first.stop_us / 6.0) + 1)
+    mass = scene.parameters["ball"]["mass_g"] * 1e-3
+    pushed = float(motion.force_n[inside].sum()) * 6e-6 - mass * 9.81 * 1e-6 * (first.stop_us - first.start_us)
+    # The ball leaves a little below the foam's face, where the dashpot frees it, and rises against gravity to it.
+    assert pushed == pytest.approx(mass * (first.speed_m_s + second.speed_m_s), rel=0.02)
+
+
+def test_a_stronger_dashpot_takes_more_speed():
+    speeds = [Scene.draw(6).replace(foam={"dashpot_ms": ms}).motion().contacts[1].speed_m_s for ms in (0.0, 0.3, 1.0)]
+    assert speeds[0] > speeds[1] > speeds[2] > 0.3
+
+
+def test_a_press_reaches_the_force_that_was_drawn():
+    scene = Scene.draw(7)
+    press = scene.parameters["ending"]["caught"]["press"]
+    hand = scene.motion().contacts[-1]
+    assert hand.kind == "hand"
+    assert press["peak_n"] <= hand.peak_n < 1.3 * press["peak_n"]
+
+
+def test_acts_follow_one_another_in_board_time():
+    """Truth of a play is each scene's own, moved to where its first frame begins."""
+    scenes = [Scene.draw(8, index) for index in range(2)]
+    contacts, force = truth([Silence(100.0), *scenes])
+    begin = round(100_000 / FRAME_US)
+    for scene in scenes:
+        motion = scene.motion(FRAME_US / 4)
+        for mine, whole in zip(motion.contacts, contacts, strict=False):
+            assert whole.start_us == pytest.approx(mine.start_us + begin * FRAME_US, abs=1e-6)
+        contacts = contacts[len(motion.contacts) :]
+        begin += -(-len(motion.force_n) // 4)
+    assert not contacts
+    assert len(force) == begin
+
+
+def test_events_come_with_a_touch_and_lie_where_it_is():
+    scene = Scene.draw(9)
+    played = play([Silence(300.0), scene], seed=9)
+    first = truth([Silence(300.0), scene])[0][0]
+    start = played.events.markers[0][0]
+    idle = played.events.between(start, first.start_us - FRAME_US)
+    assert len(idle) / (first.start_us - start) * 1e6 < 400  # events/s: noise of half a tick against a floor of 3
+    touched = played.events.between(first.start_us, first.start_us + 5_000)
+    assert len(touched) > 100
+    assert np.mean(touched.p) > 0.95
+    assert np.median(touched.x) * 2.67 == pytest.approx(scene.parameters["x_mm"], abs=6)
+    assert np.median(touched.y) * 2.67 == pytest.approx(scene.parameters["y_mm"], abs=6)
+
+
+def test_the_same_seed_plays_the_same_bytes_and_another_does_not():
+    acts = [Silence(100.0)]
+    assert play(acts, seed=1).events == play(acts, seed=1).events
+    assert play(acts, seed=1).events != play(acts, seed=2).events
+
+
+def test_without_noise_an_untouched_board_is_silent_after_the_tare():
+    played = play([Silence(100.0)], seed=1, sensor={"noise_ticks": 0.0})
+    assert len(played.events) == 0
+    assert [start for _, start in played.events.markers] == [True, False]
+    assert (played.datagrams, played.words) == (2, 2)
+
+
+def test_pictures_touch_from_the_empty_one_before_to_the_empty_one_after():
+    values = np.zeros((5, 64, 64))
+    values[2:4, 20:30, 20:30] = 0.5
+    contacts, _ = truth([Pictures(values, 2000.0)])
+    assert [(c.kind, c.start_us, c.stop_us) for c in contacts] == [("pictures", 2000.0, 8000.0)]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "error", "said"),
+    [
+        (lambda: Scene.draw(-1), ProblemError, "seed"),
+        (lambda: Scene.draw(1, 0.5), ProblemError, "index"),
+        (lambda: Scene.draw(1, left_to_rest="yes"), ProblemError, "left_to_rest"),
+        (lambda: Scene.draw(1, array=64), ProblemError, "array"),
+        (lambda: Scene.draw(1, array=Array(8, 8)), SceneError, "too small"),
+        (lambda: Scene("ball"), ProblemError, "parameters"),
+        (lambda: Scene({}).motion(), SceneError, "missing field"),
+        (lambda: Scene.draw(1).replace(colour="red"), ProblemError, "colour"),
+        (lambda: Scene.draw(1).replace(drop_mm=-5).motion(), SceneError, "drop_mm"),
+        (lambda: Scene.draw(1).replace(foam={"poisson": 0.5}).motion(), SceneError, "poisson"),
+        (lambda: Scene.draw(1).replace(drop_mm=800, foam={"modulus_kpa": 5}).motion(), SceneError, "bottoms out"),
+        (lambda: Scene.draw(1).motion(0), SceneError, "step"),
+        (lambda: Scene.draw(1).motion("fast"), ProblemError, "step_us"),
+        (lambda: Pictures(np.zeros((2, 3)), 2000), ProblemError, "shape"),
+        (lambda: Pictures(np.full((1, 2, 2), 1.5), 2000), ProblemError, "0 to 1"),
+        (lambda: Pictures(np.full((1, 2, 2), np.nan), 2000), ProblemError, "0 to 1"),
+        (lambda: truth([Pictures(np.zeros((1, 64, 64)), 10.0)]), SceneError, "act 0"),
+        (lambda: truth([Pictures(np.zeros((1, 8, 8)), 2000)]), ProblemError, "act 0"),
+        (lambda: truth([Silence(1.0), Silence(-1.0)]), SceneError, "act 1"),
+        (lambda: truth(["silence"]), ProblemError, "act 0"),
+        (lambda: truth([], preset="9 kHz"), ProblemError, "preset"),
+        (lambda: play([Silence(10.0)], seed=1), ProblemError, "need"),
+        (lambda: play([Silence(100.0)], seed=1, tare_ms=-1), ProblemError, "tare"),
+        (lambda: play([Silence(100.0)], seed="x"), ProblemError, "seed"),
+        (lambda: play([Silence(100.0)], seed=1, sensor={"exponent": 2.0}), SceneError, "exponent"),
+        (lambda: play([Silence(100.0)], seed=1, sensor={"colour": 2.0}), SceneError, "colour"),
+    ],
+)
+def test_nonsense_gets_one_clear_line(wrong, error, said):
+    with pytest.raises(error, match=said) as caught:
+        wrong()
+    assert "\n" not in str(caught.value)
