@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._arguments import column, floats, number, shown, window
-from taxel._core import ProblemError
+from taxel._arguments import path as checked_path
+from taxel._core import FormatError, ProblemError
+from taxel._files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -209,6 +214,35 @@ class SpikeTrains:
         if all("value" in t.array_annotations for t in trains):
             values = [np.asarray(t.array_annotations["value"], np.float32) for t in trains]
         return cls.from_lists(times, start, stop, values)
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write the trains to a .npz (``times offsets start stop``, and ``values`` of signed ones); return its path.
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        """
+        columns = {"times": self.times, "offsets": self.offsets, "start": self.start, "stop": self.stop}
+        if self.values is not None:
+            columns["values"] = self.values
+        return write_whole(path, lambda file: np.savez_compressed(file, **columns), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> SpikeTrains:
+        """Read the trains from the file that `save` wrote.
+
+        Raises
+        ------
+        FormatError : another file (names it)
+        FileNotFoundError : no such file
+        """
+        place = checked_path("path", path)
+        try:
+            with open(place, "rb") as file, np.load(file) as columns:
+                held = {name: columns[name] for name in columns.files}
+            return cls(held["times"], held["offsets"], held["start"].item(), held["stop"].item(), held.get("values"))
+        except (ValueError, KeyError, AttributeError, EOFError, BadZipFile, ProblemError) as error:
+            raise FormatError(f"{place}: holds no spike trains: {shown(str(error))}") from None
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes in another colour."""

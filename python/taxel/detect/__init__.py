@@ -2,5 +2,19 @@
 
 from taxel.detect.readout import Learner, Readout, ReadoutStream, TrainedNeuron, run
 from taxel.detect.scoring import Score, Spread, score
+from taxel.detect.training import Example, Recipe, read_labels, train
 
-__all__ = ["Learner", "Readout", "ReadoutStream", "Score", "Spread", "TrainedNeuron", "run", "score"]
+__all__ = [
+    "Example",
+    "Learner",
+    "Readout",
+    "ReadoutStream",
+    "Recipe",
+    "Score",
+    "Spread",
+    "TrainedNeuron",
+    "read_labels",
+    "run",
+    "score",
+    "train",
+]

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from taxel import _core
-from taxel._arguments import parameters
+from taxel._arguments import parameters, shown
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -82,6 +82,12 @@ class Encoder:
     def latency_ms(self) -> float:
         """How much later than the touch itself a spike comes, ms: what the encoder's own rule costs."""
         return _core.encoder_about(self._json(), Array(1, 1)._parts())[2]
+
+    def with_tare(self, tare: Tare) -> Encoder:
+        """Return the same encoder with this tare; one that reads none stays as it is."""
+        if not isinstance(tare, Tare):
+            raise ProblemError(f"tare is {shown(tare)}: must be a taxel.Tare")
+        return self
 
     def encode(self, x: Events | Frames) -> SpikeTrains:
         """Return the spikes of a whole recording.

@@ -67,6 +67,11 @@ class ContactArea(Encoder):
         others = parameters({"name": self.name, "noise_floor": self.noise_floor, "levels": self.levels})
         return f'{others[:-1]}, "tare": {self.tare.to_json()}}}'
 
+    def with_tare(self, tare: Tare) -> ContactArea:
+        """Return the same encoder with this tare."""
+        super().with_tare(tare)
+        return ContactArea(noise_floor=self.noise_floor, levels=self.levels, tare=tare)
+
     @classmethod
     def _from_parameters(cls, values: dict[str, Any]) -> Self:
         if values.get("tare") is not None:

@@ -1,0 +1,61 @@
+"""``taxel encode``: a recording to spikes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from taxel._core import ProblemError
+from taxel.cli import app
+from taxel.cli._listening import SET_HELP, TARE_HELP, encoder_of, open_recording, tare_of, told
+
+__all__ = ["encode"]
+
+
+@app.command()
+def encode(
+    recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
+    out: Annotated[Path, typer.Argument(help="Where the spikes go: a .npz that SpikeTrains.load reads.")],
+    encoder: Annotated[
+        str, typer.Option(help="change_events, level_crossing, threshold_izhikevich, fa1 or contact_area.")
+    ],
+    values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Turn a recording into spike trains.
+
+    Example: taxel encode walk.mcap walk.npz --encoder level_crossing --set "levels=[40, 80]" --set hold_ms=2
+    """
+    if out.suffix != ".npz":
+        raise ProblemError(f"{out}: spikes are written to a .npz")
+    chosen = encoder_of(encoder, values or [])
+    opened = open_recording(recording)
+    with told(as_json) as tell:
+        tell(f"reading {recording}")
+        source = opened.events if opened.has_events else opened.frames()
+        rest = tare_of(tare, opened)
+        if rest is not None:
+            chosen = chosen.with_tare(rest)
+        tell(f"encoding {len(source)} {'events' if opened.has_events else 'pictures'}")
+        trains = chosen.encode(source)
+    trains.save(out, overwrite=overwrite)
+    counts = trains.counts
+    result = {
+        "recording": str(recording),
+        "encoder": {key: value for key, value in json.loads(chosen.to_json()).items() if key != "tare"},
+        "latency_ms": chosen.latency_ms,
+        "trains": len(trains),
+        "signed": trains.signed,
+        "spikes": int(counts.sum()),
+        "silent_trains": int(np.count_nonzero(counts == 0)),
+        "start_ms": trains.start,
+        "stop_ms": trains.stop,
+        "written": str(out),
+    }
+    typer.echo(json.dumps(result) if as_json else f"{trains!r}, {result['silent_trains']} silent\nwritten to {out}")

@@ -1,0 +1,79 @@
+"""``taxel train``: labelled recordings to a readout."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from taxel._core import ProblemError
+from taxel.cli import app
+from taxel.cli._listening import SET_HELP, TARE_HELP, assignments, open_recording, reference, tare_of, told
+
+__all__ = ["train"]
+
+
+@app.command()
+def train(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz or .csv.")],
+    labels: Annotated[
+        str, typer.Option(help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own.")
+    ] = "notes",
+    recipe: Annotated[
+        Path | None, typer.Option(help="A TOML or JSON file: [encoder], [learner], [neurons.LABEL], run_threshold.")
+    ] = None,
+    encoder: Annotated[str | None, typer.Option(help="The encoder's name, short for --set encoder.name=NAME.")] = None,
+    values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Where the readout goes.")] = Path("readout.json"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the readout where it exists.")] = False,
+    window_ms: Annotated[float, typer.Option(help="Of the score on the training recordings themselves.")] = 50.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Train neurons to say when labelled events happen, and save them as a readout.
+
+    Example: taxel train a.mcap b.mcap --labels events.csv --encoder contact_area --tare 0.05
+    --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
+    """
+    from taxel.detect import Example, Recipe, run, score  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect import train as train_readout  # noqa: PLC0415
+    from taxel.detect.training import changed  # noqa: PLC0415
+
+    if out.exists() and not overwrite:
+        raise FileExistsError(17, "exists already; say --overwrite or another --out", str(out))
+    changes = assignments(values or [])
+    if encoder is not None:
+        changes["encoder.name"] = encoder
+    plan = Recipe.from_dict(changed({}, changes)) if recipe is None else Recipe.load(recipe, changes)
+    opened = [open_recording(path) for path in recordings]
+    with told(as_json) as tell:
+        examples = []
+        for one in opened:
+            tell(f"reading {one.path}")
+            source = one.events if one.has_events else one.frames()
+            examples.append(Example(source, reference(labels, one, len(opened)), tare_of(tare, one)))
+        if not any(example.labels for example in examples):
+            raise ProblemError(f"--labels {labels}: names no event in {', '.join(str(one.path) for one in opened)}")
+        readout = train_readout(examples, plan, progress=tell)
+        scores = []
+        for one, example in zip(opened, examples, strict=True):
+            tell(f"hearing {one.path} again")
+            truth = {label: example.labels.get(label, []) for label in readout.labels}
+            scores.append(score(run(readout, one, tare=example.tare), truth, window_ms))
+    readout.save(out, overwrite=overwrite)
+    result: dict[str, Any] = {
+        "readout": str(out),
+        "labels": list(readout.labels),
+        "recordings": [
+            {"recording": str(one.path), "score_on_itself": each.to_dict()} for one, each in zip(opened, scores, strict=True)
+        ],
+    }
+    if as_json:
+        typer.echo(json.dumps(result))
+        return
+    typer.echo(repr(readout))
+    for one, each in zip(opened, scores, strict=True):
+        typer.echo(f"\n{one.path}, on which it was trained (window {window_ms:g} ms):\n{each!r}")
+    typer.echo(f"\nwritten to {out}")

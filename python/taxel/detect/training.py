@@ -1,0 +1,298 @@
+"""From labelled recordings to a readout: what `taxel train` does."""
+
+from __future__ import annotations
+
+import csv
+import inspect
+import json
+import os
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._arguments import column, instance, number, parameters, shown, text
+from taxel._arguments import path as checked_path
+from taxel._core import FormatError, ProblemError
+from taxel.detect.readout import Readout
+from taxel.encode import Encoder
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.learn import ConeR
+from taxel.tare import Tare
+
+__all__ = ["Example", "Recipe", "read_labels", "train"]
+
+
+class Example(NamedTuple):
+    """Something to learn from: events or frames, when what happened in them (us, by label), the taxels' rest."""
+
+    source: Events | Frames
+    labels: Mapping[str, Any]
+    tare: Tare | None = None
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Say how to train a readout.
+
+    Parameters
+    ----------
+    encoder : Encoder
+    learner : mapping
+        Parameters of `taxel.learn.ConeR` for all neurons, and `delay_ms`: how much later than the event a neuron is
+        trained to fire, the encoder's latency apart.
+    neurons : mapping of str to mapping
+        The same by label, before those for all. Where there are any, only these labels are learnt.
+    run_threshold : float, above 0
+        See `taxel.Readout`.
+
+    Raises
+    ------
+    ProblemError : a parameter that is not known (names it) or makes no sense
+
+    Examples
+    --------
+    >>> from taxel.encode import ContactArea
+    >>> recipe = Recipe(ContactArea(), {"refractory": 15.0}, {"contact": {"tau": 0.5, "delay_ms": 0.2}})
+    >>> recipe.learner_of("contact")
+    (ConeR(tau=0.5, refractory=15.0), 0.2)
+    """
+
+    encoder: Encoder
+    learner: Mapping[str, Any] = field(default_factory=dict)
+    neurons: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    run_threshold: float = 1.0
+
+    def __post_init__(self) -> None:
+        instance("encoder", self.encoder, Encoder)
+        number("run_threshold", self.run_threshold)
+        if not isinstance(self.neurons, Mapping):
+            raise ProblemError(f"neurons is {shown(self.neurons)}: must be parameters by label")
+        _learner("learner", self.learner)
+        for label in self.neurons:
+            self.learner_of(text("label", label))
+
+    def learner_of(self, label: str) -> tuple[ConeR, float]:
+        """Return the learner of a label, not yet fitted, and the delay it is trained with (ms)."""
+        own = self.neurons.get(label, {})
+        if not isinstance(own, Mapping):
+            raise ProblemError(f"neurons.{label} is {shown(own)}: must be parameters by name")
+        return _learner(f"neurons.{label}", {**self.learner, **own})
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Recipe:
+        """Build a recipe from plain values with the keys ``encoder learner neurons run_threshold``.
+
+        The encoder is a table with its `name` and parameters.
+
+        Raises
+        ------
+        ProblemError : a key that is not known (names it), or no encoder
+        """
+        if not isinstance(values, Mapping):
+            raise ProblemError(f"recipe is {shown(values)}: must be values by name")
+        known = tuple(inspect.signature(cls).parameters)
+        for key in values:
+            if key not in known:
+                raise ProblemError(f"recipe: no key {shown(key)}: there are {', '.join(known)}")
+        encoder = values.get("encoder")
+        if not isinstance(encoder, Mapping):
+            raise ProblemError("recipe: says no encoder: give one with its name and parameters")
+        return cls(**{**values, "encoder": Encoder.from_json(parameters(encoder))})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None) -> Recipe:
+        """Read a recipe from a TOML or JSON file; `changes` by dotted key, as ``learner.tau``, come on top.
+
+        Raises
+        ------
+        FormatError : neither TOML nor JSON
+        ProblemError : a key that is not known, or a value that makes no sense
+        FileNotFoundError : no such file
+        """
+        return cls.from_dict(changed(_read_tables(path), changes or {}))
+
+
+def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return values with others put in at dotted keys."""
+    if not isinstance(changes, Mapping):
+        raise ProblemError(f"changes is {shown(changes)}: must be values by dotted key")
+    values = json.loads(json.dumps(values))
+    for key, value in changes.items():
+        *tables, last = text("key", key).split(".")
+        place = values
+        for table in tables:
+            place = place.setdefault(table, {})
+            if not isinstance(place, dict):
+                raise ProblemError(f"{key}: {table} is a value and holds no other")
+        place[last] = value
+    return values
+
+
+def train(
+    examples: Sequence[Example],
+    recipe: Recipe,
+    *,
+    progress: Callable[[str], object] | None = None,
+) -> Readout:
+    """Train a readout on labelled recordings.
+
+    Parameters
+    ----------
+    examples : sequence of Example
+        All of the same array. A label that an example lacks is not in it: that teaches silence.
+    recipe : Recipe
+    progress : function of str, optional
+        Told what is done next.
+
+    Returns
+    -------
+    Readout
+
+    Raises
+    ------
+    ProblemError : no event at all of a label, an event outside its example, or examples that make no sense
+
+    Warns
+    -----
+    UserWarning : what `taxel.learn.ConeR` warns of, behind the label
+
+    Notes
+    -----
+    Target = event + the encoder's latency + the trained delay (thesis 6.5; the delay is ours).
+
+    Examples
+    --------
+    >>> from taxel.encode import LevelCrossing
+    >>> frames = Frames([[[v]] for v in (0.0, 0.0, 9.0, 9.0, 0.0, 0.0)], range(0, 60_000, 10_000), unit="N")
+    >>> recipe = Recipe(LevelCrossing([5.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
+    >>> train([Example(frames, {"contact": [20_000]})], recipe)
+    Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
+    """
+    instance("recipe", recipe, Recipe)
+    examples = _examples(examples)
+    told = progress or (lambda _: None)
+    wanted = tuple(recipe.neurons) or tuple(sorted({label for example in examples for label in example.labels}))
+    if not wanted:
+        raise ProblemError("no label in any example: there is nothing to learn")
+    arrays = [example.source.array for example in examples]
+    for k, array in enumerate(arrays):
+        if array != arrays[0]:
+            raise ProblemError(f"example {k} is of {array!r}, example 0 of {arrays[0]!r}: must be equal")
+    patterns = []
+    for k, example in enumerate(examples):
+        told(f"encoding {k + 1} of {len(examples)}")
+        encoder = recipe.encoder if example.tare is None else recipe.encoder.with_tare(example.tare)
+        trains = encoder.encode(example.source)
+        patterns.append(trains.split_by_sign() if trains.signed else trains)
+    learners, delays = {}, {}
+    for label in wanted:
+        learner, delay_ms = recipe.learner_of(label)
+        shift_ms = recipe.encoder.latency_ms + delay_ms
+        targets = []
+        for k, (example, trains) in enumerate(zip(examples, patterns, strict=True)):
+            times = np.sort(example.labels.get(label, np.empty(0, np.int64))) / 1000.0
+            outside = times[(times < trains.start) | (times > trains.stop)]
+            if len(outside):
+                raise ProblemError(
+                    f"example {k}: {label} at {outside[0]:g} ms lies outside it, {trains.start:g} to {trains.stop:g} ms"
+                )
+            targets.append(times + shift_ms)
+        if not any(len(times) for times in targets):
+            raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
+        told(f"learning {label} from {sum(map(len, targets))} events")
+        learners[label] = learner.fit(patterns, targets)
+        delays[label] = delay_ms
+    return Readout(
+        recipe.encoder, learners, array=arrays[0], delay_ms=delays, run_threshold=float(recipe.run_threshold)
+    )
+
+
+def read_labels(path: str | os.PathLike[str]) -> dict[str, dict[str, NDArray[np.int64]]]:
+    """Read reference events: a table ``recording,label,t_us``, or ``label,t_us`` where it is of one recording.
+
+    Returns
+    -------
+    dict of recording to dict of label to int64, us, ascending
+        The recording is "" where the table does not name it.
+
+    Raises
+    ------
+    FormatError : another header, or a value that makes no sense (names the line)
+    FileNotFoundError : no such file
+    """
+    place = checked_path("path", path)
+    found: dict[str, dict[str, list[int]]] = {}
+    try:
+        with open(place, newline="", encoding="utf-8-sig") as file:
+            table = csv.reader(file)
+            header = [name.strip() for name in next(table, [])]
+            if header not in (["recording", "label", "t_us"], ["label", "t_us"]):
+                said = ",".join(header) or "nothing"
+                raise FormatError(f"{place}, line 1: {said}; must be recording,label,t_us or label,t_us")
+            for row in table:
+                if not row:
+                    continue
+                if len(row) != len(header):
+                    raise FormatError(f"{place}, line {table.line_num}: {len(row)} values; must be {len(header)}")
+                *recording, label, t = (cell.strip() for cell in row)
+                try:
+                    time = int(t)
+                except ValueError:
+                    raise FormatError(f"{place}, line {table.line_num}: t_us is {shown(t)}; must be whole us") from None
+                if not label or not -(2**52) <= time <= 2**52:
+                    raise FormatError(f"{place}, line {table.line_num}: must name a label, and a time within 2^52 us")
+                found.setdefault("".join(recording), {}).setdefault(label, []).append(time)
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise FormatError(f"{place}: not a table of text: {error}") from None
+    return {
+        recording: {label: np.sort(np.array(times, np.int64)) for label, times in labels.items()}
+        for recording, labels in found.items()
+    }
+
+
+def _learner(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
+    if not isinstance(values, Mapping):
+        raise ProblemError(f"{name} is {shown(values)}: must be parameters by name")
+    values = dict(values)
+    delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0))
+    known = inspect.signature(ConeR).parameters
+    for key in values:
+        if key not in known:
+            raise ProblemError(f"{name}: no parameter {shown(key)}: there are {', '.join(known)} and delay_ms")
+    return ConeR(**values), delay_ms
+
+
+def _examples(examples: Sequence[Example]) -> list[Example]:
+    """Return examples whose labels are columns of whole us."""
+    if not isinstance(examples, Sequence) or not len(examples):
+        raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")
+    checked = []
+    for k, example in enumerate(examples):
+        if not isinstance(example, tuple) or len(example) not in (2, 3) or not isinstance(example[0], Events | Frames):
+            raise ProblemError(f"example {k} is {shown(example)}: must be an Example of Events or Frames, and labels")
+        source, labels, *rest = example
+        if not isinstance(labels, Mapping):
+            raise ProblemError(f"example {k}: labels is {shown(labels)}: must be times (us) by label")
+        times = {text("label", label): column(f"labels[{label!r}]", t, np.int64) for label, t in labels.items()}
+        tare = rest[0] if rest else None
+        checked.append(Example(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
+    return checked
+
+
+def _read_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
+    place = Path(checked_path("path", path))
+    try:
+        said = place.read_text(encoding="utf-8")
+        values = json.loads(said) if place.suffix.lower() == ".json" else tomllib.loads(said)
+    except (UnicodeDecodeError, json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
+        kind = "JSON" if place.suffix.lower() == ".json" else "TOML"
+        raise FormatError(f"{place}: not {kind}: {error}") from None
+    if not isinstance(values, dict):
+        raise FormatError(f"{place}: holds no recipe, which is values by name")
+    return values

@@ -1,0 +1,296 @@
+"""Readouts: what they hold, their files, and what they say, live and from recordings."""
+
+import itertools
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel.detect import Readout, TrainedNeuron, run, score
+from taxel.encode import ChangeEvents, ContactArea, LevelCrossing, ThresholdIzhikevich
+
+ARRAY = taxel.Array(8, 8, pitch_mm=2.67, name="small")
+FRAME_US = 192.0
+
+
+def touches(seed: int, count: int = 6, array: taxel.Array = ARRAY) -> tuple[taxel.Events, dict[str, list[int]]]:
+    """Play a disc that grows and shrinks on the array: the board's events with stamps of 100 us, and the truth."""
+    random = np.random.default_rng(seed)
+    y, x = np.mgrid[: array.rows, : array.columns]
+    sent = np.full(array.shape, 60, np.int64)
+    columns: list[tuple[int, int, int, bool, int]] = []
+    columns += [(0, int(c), int(r), True, 60) for r, c in zip(y.ravel(), x.ravel(), strict=True)]
+    truth: dict[str, list[int]] = {"contact": [], "lift": []}
+    start = 300
+    for _ in range(count):
+        start += int(random.integers(150, 400))
+        length = int(random.integers(150, 300))
+        centre = random.uniform(2.5, 4.5, 2)
+        truth["contact"].append(int(start * FRAME_US))
+        truth["lift"].append(int((start + length) * FRAME_US))
+        for k in range(start, start + length + 1):
+            near = min(k - start, start + length - k) / 6.0
+            radius = min(2.6, near)
+            ticks = np.where(np.hypot(y - centre[0], x - centre[1]) < radius, 90, 60) + random.integers(
+                -1, 2, array.shape
+            )
+            for r, c in np.argwhere(np.abs(ticks - sent) > 3):
+                new = int(ticks[r, c])
+                columns.append((int(k * FRAME_US) // 100 * 100, int(c), int(r), new >= sent[r, c], new))
+                sent[r, c] = new
+        start += length
+    t, cx, cy, p, ticks = map(list, zip(*columns, strict=True))
+    return taxel.Events(t, cx, cy, p, array=array, intensity=ticks), truth
+
+
+def tare() -> taxel.Tare:
+    return taxel.Tare.take(taxel.Frames(np.full((2, 8, 8), 60.0), [0, 1000], array=ARRAY))
+
+
+def trained() -> Readout:
+    """Fit contact and lift on other seeds than the tests play."""
+    encoder = ContactArea(levels=(2, 4, 8), tare=tare())
+    patterns, targets = [], {"contact": [], "lift": []}
+    for seed in (1, 2, 3):
+        events, truth = touches(seed)
+        patterns.append(encoder.encode(events))
+        # The area reaches 2 taxels some frames after the truth: that is the sensor's, so no latency of the encoder.
+        for label, delay_ms in (("contact", 2.0), ("lift", 1.0)):
+            targets[label].append([t / 1000.0 + delay_ms for t in truth[label]])
+    cones = {}
+    for label, tau in (("contact", 1.5), ("lift", 3.0)):
+        cones[label] = taxel.learn.ConeR(
+            tau=tau, step_ms=0.192, lb=-3.0, ub=3.0, refractory=15.0, divide_b_by="targets"
+        ).fit(patterns, targets[label])
+    return Readout(
+        ContactArea(levels=(2, 4, 8)), cones, array=ARRAY, delay_ms={"contact": 2.0, "lift": 1.0}, run_threshold=0.9
+    )
+
+
+@pytest.fixture(scope="module")
+def readout() -> Readout:
+    return trained()
+
+
+def plain(encoder: taxel.encode.Encoder, array: taxel.Array, seed: int = 0, **neuron: object) -> Readout:
+    """A readout of random weights, which says much and means nothing."""
+    inputs = encoder.trains(array) * (2 if encoder.signed else 1)
+    random = np.random.default_rng(seed)
+    neurons = {
+        label: (taxel.Neuron(tau=3.0, refractory=5.0, **neuron), random.normal(0.1, 0.5, inputs), 0.25 * k)
+        for k, label in enumerate(("a", "b", "c"))
+    }
+    return Readout(encoder, neurons, array=array)
+
+
+def test_events_that_were_never_seen_are_found_by_what_was_learnt(readout: Readout) -> None:
+    for seed in (11, 12):
+        events, truth = touches(seed)
+        result = score(run(readout, events, tare=tare()), truth, 10.0)
+        assert (result["contact"].found, result["contact"].false) == (6, 0)
+        assert (result["lift"].found, result["lift"].false) == (6, 0)
+        assert np.abs(result.errors_ms).max() < 2.0
+        # `known` takes nothing off: it is later than t by the delay and at most two frames.
+        lead = result["contact"].delays_ms - result["contact"].errors_ms
+        assert ((lead >= 2.0) & (lead <= 2.0 + 0.4)).all()
+
+
+def test_a_file_gives_the_same_readout_back(readout: Readout, tmp_path) -> None:
+    path = readout.save(tmp_path / "readout.json")
+    again = Readout.load(path)
+    assert again == readout
+    events, _ = touches(20, count=2)
+    assert run(again, events, tare=tare()) == run(readout, events, tare=tare())
+    for label, one in again.neurons.items():
+        assert one.weights.tobytes() == readout.neurons[label].weights.tobytes()
+        assert one.neuron == readout.neurons[label].neuron
+    with pytest.raises(FileExistsError):
+        readout.save(path)
+    readout.save(path, overwrite=True)
+    assert [p.name for p in tmp_path.iterdir()] == ["readout.json"]
+
+
+def test_a_readout_holds_what_it_was_given(readout: Readout) -> None:
+    assert readout.labels == ("contact", "lift")
+    assert (readout.time, readout.after_spike, readout.run_threshold) == ("grid", "keep", 0.9)
+    assert (readout.array, readout.encoder) == (ARRAY, ContactArea(levels=[2, 4, 8]))
+    assert {label: one.delay_ms for label, one in readout.neurons.items()} == {"contact": 2.0, "lift": 1.0}
+    assert repr(readout).startswith("Readout(contact, lift; ContactArea(")
+    assert repr(readout).endswith("on 8 x 8 taxels; grid, keep, threshold x 0.9)")
+    assert Readout(readout.encoder, readout.neurons, array=ARRAY, run_threshold=0.9) == readout
+    assert Readout.from_json(readout.to_json()) == readout
+    assert readout != 3
+
+
+def pieces_of(events: taxel.Events, cuts: list[int]) -> list[taxel.Events]:
+    bounds = [0, *sorted(c % (len(events) + 1) for c in cuts), len(events)]
+    return [events[a:b] for a, b in itertools.pairwise(bounds)]
+
+
+def together(parts: list[taxel.Detections]) -> taxel.Detections:
+    columns = [np.concatenate([getattr(p, name) for p in parts]) for name in ("label", "t", "known", "slope")]
+    return taxel.Detections(*columns)
+
+
+@settings(max_examples=30, deadline=None)
+@given(cuts=st.lists(st.integers(0, 10**6), max_size=12), which=st.integers(0, 3), data=st.data())
+def test_cuts_and_moves_of_time_change_nothing_whatever_the_encoder(cuts: list[int], which: int, data) -> None:
+    events, _ = touches(5, count=2)
+    encoder = [
+        ContactArea(levels=(2, 4), tare=tare()),
+        LevelCrossing([70.0, 80.0], hold_ms=1.0),
+        ThresholdIzhikevich([75.0]),
+        ChangeEvents(noise_floor=3.0),
+    ][which]
+    read = plain(encoder, ARRAY, time=data.draw(st.sampled_from(["grid", "continuous"])))
+    whole = run(read, events)
+    assert len(whole) > 3
+    stream = read.stream()
+    said = []
+    for piece in pieces_of(events, cuts):
+        said.append(stream.push(piece))
+        if len(piece) and stream.now_us is not None:
+            later = events.t[events.t > piece.t[-1]]
+            until = int(later[0]) if len(later) else int(events.t[-1]) + 500
+            said.append(stream.advance(data.draw(st.integers(stream.now_us, until))))
+    said.append(stream.advance(int(events.t[-1]) + 1_000_000))
+    assert together(said) == whole
+    assert stream.late == 0
+    assert set(stream.potentials) == {"a", "b", "c"}
+
+
+def test_known_is_never_before_the_crossing_and_ends_a_frame() -> None:
+    events, _ = touches(6, count=3)
+    encoder = LevelCrossing([70.0], hold_ms=1.5)
+    for frame_us in (192.0, 499.84, 48.0):
+        found = run(plain(encoder, ARRAY), events, frame_us=frame_us)
+        offset = 1500 + np.array([{"a": 0, "b": 250, "c": 500}[label] for label in found.label])
+        crossing = found.t + offset
+        assert (found.known >= crossing).all()
+        assert (found.known <= crossing + frame_us + 102).all()
+        frames = found.known / frame_us
+        assert (found.known - np.round(frames) * frame_us < 1.0).all()
+
+
+def test_pictures_are_known_when_their_frame_ends() -> None:
+    values = np.zeros((40, 8, 8))
+    values[10:, 3, 3] = 100.0
+    frames = taxel.Frames(values, np.arange(40) * 2000 + 13, array=ARRAY)
+    weights = np.zeros(128)
+    weights[27] = 2.0
+    read = Readout(LevelCrossing([50.0]), {"contact": TrainedNeuron(taxel.Neuron(tau=1.0), weights, 0.1)})
+    found = run(read, frames)
+    assert found.known.tolist() == [13 + 11 * 2000]
+    assert run(read, frames, frame_us=500).known.tolist() == [13 + 10 * 2000 + 500]
+    stream = read.stream(frame_us=2000)
+    parts = [stream.push(frames[k : k + 3]) for k in range(0, 40, 3)]
+    assert together([*parts, stream.advance(10**6)]) == found
+
+
+def test_a_late_event_is_counted_and_taken_as_coming_now(readout: Readout) -> None:
+    events, _ = touches(7, count=1)
+    stream = readout.stream(tare=tare())
+    stream.push(events[:200])
+    stream.advance(int(events.t[199]) + 5000)
+    stream.push(events[150:160])
+    assert stream.late == 10
+
+
+def test_a_missing_tare_is_said_and_taken_when_given(readout: Readout) -> None:
+    events, _ = touches(8, count=1)
+    with pytest.raises(taxel.ProblemError, match="tare"):
+        run(readout, events)
+    with pytest.raises(taxel.ProblemError, match="tare"):
+        readout.stream()
+    assert len(run(readout, events, tare=tare())) == 2
+
+
+def test_another_array_is_refused(readout: Readout) -> None:
+    other = taxel.Events([1], [1], [1], [True], array=taxel.Array(9, 8), intensity=[5])
+    with pytest.raises(taxel.ProblemError, match="9 x 8 taxels: the readout was trained on small, 8 x 8"):
+        run(readout, other, tare=tare())
+    stream = readout.stream(tare=tare())
+    with pytest.raises(taxel.ProblemError, match="input from 9 x 8 taxels"):
+        stream.push(other)
+
+
+def test_neurons_trained_otherwise_are_refused() -> None:
+    weights = np.ones(6)
+    area = ContactArea(levels=(2, 4, 8))
+    first = (taxel.Neuron(), weights)
+    with pytest.raises(taxel.ProblemError, match='b: trained for after_spike "reset", this readout is for'):
+        Readout(area, {"a": first, "b": (taxel.Neuron(after_spike="reset"), weights)})
+    with pytest.raises(taxel.ProblemError, match='b: trained for time "grid", this readout is for time "continuous"'):
+        Readout(area, {"a": first, "b": (taxel.Neuron(time="grid"), weights)})
+    with pytest.raises(taxel.ProblemError, match=r"c: ConeR.* is not fitted"):
+        Readout(area, {"c": taxel.learn.ConeR()})
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"encoder": None}, "encoder is None: must be a taxel.Encoder"),
+        ({"neurons": {}}, "must be trained neurons by label"),
+        ({"neurons": None}, "must be trained neurons by label"),
+        ({"neurons": {3: (taxel.Neuron(), [1.0] * 6)}}, "label is 3"),
+        ({"neurons": {" ": (taxel.Neuron(), [1.0] * 6)}}, "without a name"),
+        ({"neurons": {"a": (taxel.Neuron(), [1.0] * 5)}}, "a: 5 weights, the encoder speaks on 6 trains"),
+        ({"neurons": {"a": (taxel.Neuron(), [math.nan] * 6)}}, "weights"),
+        ({"neurons": {"a": (taxel.Neuron(), "heavy")}}, "a: weights"),
+        ({"neurons": {"a": (None, [1.0] * 6)}}, "a: neuron is None"),
+        ({"neurons": {"a": 5}}, "a: 5 must be a fitted learner"),
+        ({"array": (8, 8)}, "array is"),
+        ({"delay_ms": -1.0}, "a: delay_ms is -1"),
+        ({"delay_ms": math.nan}, "delay_ms is nan"),
+        ({"delay_ms": {"b": 1.0}}, "delay_ms: there is none for 'a'"),
+        ({"delay_ms": "soon"}, "a: delay_ms is 'soon'"),
+        ({"run_threshold": 0.0}, "run_threshold is 0"),
+        ({"run_threshold": math.inf}, "run_threshold is inf"),
+    ],
+)
+def test_nonsense_in_a_readout_is_one_clear_error(change: dict[str, object], said: str) -> None:
+    sound = {"encoder": ContactArea(levels=(2, 4, 8)), "neurons": {"a": (taxel.Neuron(), [1.0] * 6)}, "array": ARRAY}
+    with pytest.raises(taxel.ProblemError, match=said) as error:
+        Readout(**{**sound, **change})
+    assert "\n" not in str(error.value)
+
+
+def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_path) -> None:
+    path = tmp_path / "a.json"
+    good = json.loads(readout.to_json())
+    cases = [
+        (b"\x80\xff", "not text, so no readout"),
+        (b"", "not JSON"),
+        (b"{}", "does not say"),
+        (json.dumps({**good, "version": 2}).encode(), "version 2, this taxel reads version 1 only"),
+        (json.dumps({**good, "wings": 2}).encode(), "unknown field `wings`"),
+        (json.dumps({**good, "neurons": {}}).encode(), "without a neuron"),
+        (json.dumps({**good, "time": "always"}).encode(), "unknown variant `always`"),
+        (readout.to_json()[:500].encode(), "not JSON"),
+    ]
+    for content, said in cases:
+        path.write_bytes(content)
+        with pytest.raises(taxel.FormatError, match=said) as error:
+            Readout.load(path)
+        assert str(error.value).startswith(str(path))
+    with pytest.raises(FileNotFoundError):
+        Readout.load(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize("source", [None, 3, "a.mcap", [1, 2], ARRAY])
+def test_a_readout_listens_to_recordings_events_and_frames_only(readout: Readout, source: object) -> None:
+    with pytest.raises(taxel.ProblemError, match="source is"):
+        run(readout, source)
+    with pytest.raises(taxel.ProblemError, match="a readout listens to"):
+        readout.stream(tare=tare()).push(source)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("frame_us", [0.0, -192.0, math.nan, math.inf, 1e12, "long"])
+def test_a_frame_that_makes_no_sense_is_refused(readout: Readout, frame_us: object) -> None:
+    events, _ = touches(9, count=1)
+    with pytest.raises(taxel.ProblemError, match="frame_us is"):
+        run(readout, events, frame_us=frame_us, tare=tare())  # type: ignore[arg-type]
