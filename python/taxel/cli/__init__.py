@@ -64,3 +64,8 @@ def _said(error: OSError) -> str:
 
 # One line a command; they stand at the end because each registers itself with `app`.
 from taxel.cli import bench, convert, demo, emulate, info, live, record  # noqa: E402, F401
+from taxel.cli import bench, convert, info, live, record  # noqa: E402, F401
+from taxel.cli import bench, convert, info  # noqa: E402, F401
+from taxel.cli import bench, demo, emulate  # noqa: E402, F401
+from taxel.cli import bench, convert, demo, emulate, info  # noqa: E402, F401
+from taxel.cli import bench, convert, detect, encode, info, train  # noqa: E402, F401

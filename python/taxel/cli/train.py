@@ -67,7 +67,8 @@ def train(
         "readout": str(out),
         "labels": list(readout.labels),
         "recordings": [
-            {"recording": str(one.path), "score_on_itself": each.to_dict()} for one, each in zip(opened, scores, strict=True)
+            {"recording": str(one.path), "score_on_itself": each.to_dict()}
+            for one, each in zip(opened, scores, strict=True)
         ],
     }
     if as_json:

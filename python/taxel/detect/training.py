@@ -23,9 +23,14 @@ from taxel.encode import Encoder
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.learn import ConeR
+from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
 __all__ = ["Example", "Recipe", "read_labels", "train"]
+
+
+#: How long after its last event something may still happen in an example, ms: a readout listens as long.
+SILENCE_MS = 1000.0
 
 
 class Example(NamedTuple):
@@ -197,7 +202,7 @@ def train(
         targets = []
         for k, (example, trains) in enumerate(zip(examples, patterns, strict=True)):
             times = np.sort(example.labels.get(label, np.empty(0, np.int64))) / 1000.0
-            outside = times[(times < trains.start) | (times > trains.stop)]
+            outside = times[(times < trains.start) | (times > trains.stop + SILENCE_MS)]
             if len(outside):
                 raise ProblemError(
                     f"example {k}: {label} at {outside[0]:g} ms lies outside it, {trains.start:g} to {trains.stop:g} ms"
@@ -206,7 +211,7 @@ def train(
         if not any(len(times) for times in targets):
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         told(f"learning {label} from {sum(map(len, targets))} events")
-        learners[label] = learner.fit(patterns, targets)
+        learners[label] = learner.fit([_until(*both) for both in zip(patterns, targets, strict=True)], targets)
         delays[label] = delay_ms
     return Readout(
         recipe.encoder, learners, array=arrays[0], delay_ms=delays, run_threshold=float(recipe.run_threshold)
@@ -254,6 +259,12 @@ def read_labels(path: str | os.PathLike[str]) -> dict[str, dict[str, NDArray[np.
         recording: {label: np.sort(np.array(times, np.int64)) for label, times in labels.items()}
         for recording, labels in found.items()
     }
+
+
+def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:
+    """Return the same trains, listened to until the last target at least: it may come after the last spike."""
+    stop = max(trains.stop, *targets, trains.start)
+    return SpikeTrains(trains.times, trains.offsets, trains.start, stop, trains.values)
 
 
 def _learner(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:

@@ -1,0 +1,200 @@
+"""The commands encode, train and detect: from a recording to scored detections, and what they refuse."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_readout import recipe, tare, touches
+
+import taxel
+from taxel.cli import main
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    """Run the command line; give exit code, what it printed, what it complained of."""
+    with pytest.raises(SystemExit) as ended:
+        main([str(a) for a in arguments])
+    said = capsys.readouterr()
+    return int(ended.value.code or 0), said.out, said.err
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Three recordings with their labels, a tare, a recipe."""
+    folder = tmp_path_factory.mktemp("recordings")
+    rows, far = ["recording,label,t_us"], ["label,t_us"]
+    for seed in (1, 2, 9):
+        events, truth = touches(seed)
+        taxel.convert(events, folder / f"{seed}.npz")
+        rows += [f"{seed}.npz,{label},{t}" for label, times in truth.items() for t in times]
+        if seed == 9:
+            far += [f"{label},{t}" for label, times in truth.items() for t in times]
+    (folder / "labels.csv").write_text("\n".join(rows) + "\n")
+    (folder / "truth.csv").write_text("\n".join(far) + "\n")
+    tare().save(folder / "tare.json")
+    (folder / "recipe.toml").write_text(
+        """
+        run_threshold = 0.9
+        [encoder]
+        name = "contact_area"
+        levels = [2, 4, 8]
+        [learner]
+        step_ms = 0.192
+        lb = -3.0
+        ub = 3.0
+        refractory = 15.0
+        divide_b_by = "targets"
+        [neurons.contact]
+        tau = 1.5
+        delay_ms = 2.0
+        [neurons.lift]
+        tau = 99.0
+        delay_ms = 1.0
+        """
+    )
+    return folder
+
+
+@pytest.fixture(scope="module")
+def trained(folder: Path) -> Path:
+    """The readout that the command trains: a recipe's values, one of them changed on the command line."""
+    out = folder / "touch.json"
+    with pytest.raises(SystemExit) as ended:
+        main(
+            [
+                *("train", str(folder / "1.npz"), str(folder / "2.npz"), "--labels", str(folder / "labels.csv")),
+                *("--recipe", str(folder / "recipe.toml"), "--set", "neurons.lift.tau=3.0"),
+                *("--tare", str(folder / "tare.json"), "--out", str(out), "--json"),
+            ]
+        )
+    assert not ended.value.code
+    return out
+
+
+def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path, capsys) -> None:
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json")
+    code, out, _ = call(capsys, *arguments, "--truth", folder / "truth.csv", "--window-ms", 10, "--json")
+    assert code == 0
+    result = json.loads(out)
+    assert result["score"]["by_label"]["contact"]["found"] == 6
+    assert (result["score"]["missed"], result["score"]["false"]) == (0, 0)
+    assert len(result["detections"]) == 12
+    # The labels of all recordings do as well: this one is named in them.
+    code, out, _ = call(capsys, *arguments, "--truth", folder / "labels.csv", "--window-ms", 10)
+    assert (code, out.count("contact")) == (0, 6 + 2)
+    assert "known (ms)" in out
+
+
+def test_the_command_and_the_function_train_the_same(trained: Path) -> None:
+    examples = [taxel.detect.Example(*touches(seed), tare()) for seed in (1, 2)]
+    assert taxel.Readout.load(trained) == taxel.detect.train(examples, recipe())
+
+
+def test_detections_go_to_a_table(folder: Path, trained: Path, capsys) -> None:
+    table = folder / "found.csv"
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--csv", table)
+    assert call(capsys, *arguments)[0] == 0
+    found = taxel.Detections.from_csv(table)
+    assert found == taxel.detect.run(taxel.Readout.load(trained), taxel.open(folder / "9.npz"), tare=tare())
+    code, _, error = call(capsys, *arguments)
+    assert code == 2
+    assert "exists already" in error
+
+
+def test_a_tare_may_be_the_beginning_of_the_recording(folder: Path, trained: Path, capsys) -> None:
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--truth", folder / "truth.csv", "--json")
+    code, out, _ = call(capsys, *arguments, "--tare", 0.05)
+    assert (code, json.loads(out)["score"]["found"]) == (0, 12)
+
+
+def test_spikes_are_written_and_read_back(folder: Path, capsys) -> None:
+    out = folder / "spikes.npz"
+    arguments = ("encode", folder / "1.npz", out, "--encoder", "level_crossing", "--set", "levels=[70.0, 80]")
+    code, said, _ = call(capsys, *arguments, "--set", "hold_ms=1", "--json")
+    assert code == 0
+    encoder = taxel.encode.LevelCrossing([70.0, 80.0], hold_ms=1.0)
+    assert taxel.SpikeTrains.load(out) == encoder.encode(taxel.open(folder / "1.npz").events)
+    result = json.loads(said)
+    assert (result["trains"], result["signed"], result["latency_ms"]) == (128, True, 1.0)
+    assert call(capsys, *arguments)[0] == 2, "an existing file stays"
+    area = ("encode", folder / "1.npz", out, "--encoder", "contact_area", "--tare", 0.05, "--overwrite")
+    assert call(capsys, *area)[0] == 0
+    assert len(taxel.SpikeTrains.load(out)) == 10
+
+
+def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
+    values = np.zeros((400, 2, 2))
+    truth = [50, 130, 250, 330]
+    for k in truth:
+        values[k : k + 30, 0, 1] = 20.0
+    frames = taxel.Frames(values, np.arange(400) * 10_000, unit="N")
+    taxel.convert(frames, tmp_path / "steps.npz")
+    labels = tmp_path / "labels.csv"
+    labels.write_text("label,t_us\n" + "".join(f"step,{k * 10_000}\n" for k in truth))
+    learner = ("--set", "learner.ub=2.0", "--set", "learner.delay_ms=5", "--set", "encoder.levels=[10.0]")
+    arguments = ("train", tmp_path / "steps.npz", "--encoder", "level_crossing", *learner, "-o", tmp_path / "r.json")
+    code, _, error = call(capsys, *arguments)
+    assert (code, "names no event" in error) == (2, True), "a .npz has no notes"
+    code, out, _ = call(capsys, *arguments, "--labels", labels, "--json")
+    assert code == 0
+    assert json.loads(out)["recordings"][0]["score_on_itself"]["found"] == 4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("detect", "none.npz", "--readout", "touch.json"), "none.npz: no such file"),
+        (("detect", "9.npz", "--readout", "none.json"), "none.json: no such file"),
+        (("detect", "9.npz", "--readout", "labels.csv"), "labels.csv: readout: not JSON"),
+        (("detect", "9.npz", "--readout", "touch.json"), "tare"),
+        (("detect", "9.npz", "--readout", "touch.json", "--tare", "-1"), "--tare -1: must be seconds above 0"),
+        (("detect", "9.npz", "--readout", "touch.json", "--tare", "none.json"), "none.json: no such file"),
+        (("detect", "9.npz", "--readout", "touch.json", "--tare", "tare.json", "--frame-us", "0"), "frame_us is 0"),
+        (("detect", "9.npz", "--readout", "touch.json", "--truth", "recipe.toml"), "recipe.toml, line 1"),
+        (("encode", "1.npz", "out.txt", "--encoder", "fa1"), "out.txt: spikes are written to a .npz"),
+        (("encode", "1.npz", "out.npz", "--encoder", "fa2"), "encoder fa2: must be one of"),
+        (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings=2"), "wings"),
+        (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings"), "--set wings: must be KEY=VALUE"),
+        (("train", "1.npz", "--labels", "labels.csv", "-o", "new.json"), "recipe: says no encoder"),
+        (("train", "1.npz", "--labels", "none.csv", "--encoder", "fa1", "-o", "new.json"), "none.csv: no such file"),
+        (
+            ("train", "1.npz", "2.npz", "--labels", "truth.csv", "--encoder", "fa1", "-o", "new.json"),
+            "names no recording",
+        ),
+        (("train", "1.npz", "--recipe", "labels.csv", "-o", "new.json"), "labels.csv: not TOML"),
+        (
+            ("train", "1.npz", "--recipe", "recipe.toml", "--set", "learner.wings=2", "-o", "n.json"),
+            "no parameter 'wings'",
+        ),
+        (("train", "1.npz", "--recipe", "recipe.toml", "--set", "wings=2"), "recipe: no key 'wings'"),
+        (("train", "1.npz", "--recipe", "recipe.toml", "-o", "touch.json"), "touch.json: exists already"),
+    ],
+)
+def test_wrong_input_ends_in_one_line(
+    folder: Path, trained: Path, monkeypatch, capsys, arguments: tuple[str, ...], said: str
+) -> None:
+    monkeypatch.chdir(folder)
+    assert trained.exists()
+    code, _, error = call(capsys, *arguments)
+    assert code == 2
+    assert said in error
+    assert error.count("\n") == 1, error
+    assert not Path("new.json").exists()
+    assert not Path("readout.json").exists()
+
+
+def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:
+    table = tmp_path / "labels.csv"
+    for text, said in [
+        ("a,b\n", "line 1: a,b; must be recording,label,t_us or label,t_us"),
+        ("label,t_us\nstep,soon\n", "line 2: t_us is 'soon'; must be whole us"),
+        ("label,t_us\nstep\n", "line 2: 1 values; must be 2"),
+        ("label,t_us\n,5\n", "line 2: must name a label"),
+        ("label,t_us\nstep,99999999999999999999\n", "line 2: must name a label, and a time within 2"),
+    ]:
+        table.write_text(text)
+        with pytest.raises(taxel.FormatError, match=said.replace("^", r"\^")):
+            taxel.detect.read_labels(table)
+    table.write_text("label,t_us\nb,5\n\na,7\na,-3\n")
+    assert {k: v.tolist() for k, v in taxel.detect.read_labels(table)[""].items()} == {"a": [-3, 7], "b": [5]}
