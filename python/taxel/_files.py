@@ -10,6 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from taxel._arguments import flag
+from taxel._arguments import path as checked_path
+
 __all__ = ["whole_file", "write_whole"]
 
 
@@ -48,7 +51,8 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     FileExistsError : the file is there already and `overwrite` is false
     OSError : the folder is missing, the disk is full ...
     """
-    place = Path(path)
+    place = Path(checked_path("path", path))
+    overwrite = flag("overwrite", overwrite)
     if not overwrite and os.path.lexists(place):
         raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
     if not place.parent.is_dir():

@@ -23,6 +23,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.neuron import Neuron
 from taxel.tare import Tare
+from taxel.wire import Registers
 
 __all__ = ["Learner", "Readout", "ReadoutStream", "TrainedNeuron", "run"]
 
@@ -362,7 +363,7 @@ def run(
     if not isinstance(source, Events | Frames):
         source, registers = _opened(source)
         if period is None and registers:
-            period = registers["lines"] * registers["line_period"] / 100.0
+            period = registers.frame_us
     if isinstance(source, Events):
         period = FRAME_US if period is None else period
         return Detections._from_parts(_core.readout_run_events(text, source._parts(), period, rest))
@@ -370,7 +371,7 @@ def run(
     return Detections._from_parts(_core.readout_run_frames(text, *parts, period, rest))
 
 
-def _opened(source: Any) -> tuple[Events | Frames, dict[str, Any] | None]:
+def _opened(source: Any) -> tuple[Events | Frames, Registers | None]:
     """Return what a recording holds, and the board's registers."""
     if not hasattr(source, "has_events"):
         raise ProblemError(f"source is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
