@@ -1,9 +1,7 @@
 """Touch as events: from the bytes of a tactile array to decisions that say when."""
 
-from taxel import detect, device, encode, metrics, wire
+from taxel import detect, device, encode, formats, learn, live, metrics, simulate, wire
 from taxel._convert import convert
-from taxel import detect, device, encode, live, metrics, wire
-from taxel import learn, metrics
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel._health import Health, health
 from taxel.array import Array
@@ -42,10 +40,12 @@ __all__ = [
     "detect",
     "device",
     "encode",
+    "formats",
     "health",
-    "live",
     "learn",
+    "live",
     "metrics",
     "open",
+    "simulate",
     "wire",
 ]

@@ -69,3 +69,4 @@ from taxel.cli import bench, convert, info  # noqa: E402, F401
 from taxel.cli import bench, demo, emulate  # noqa: E402, F401
 from taxel.cli import bench, convert, demo, emulate, info  # noqa: E402, F401
 from taxel.cli import bench, convert, detect, encode, info, train  # noqa: E402, F401
+from taxel.cli import bench, convert, demo, detect, emulate, encode, info, live, record, train  # noqa: E402, F401

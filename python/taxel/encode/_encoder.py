@@ -16,6 +16,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.spikes import SpikeTrains
+from taxel.tare import Tare
 
 __all__ = ["Encoder", "EncoderStream"]
 
