@@ -45,6 +45,28 @@ wide! {
     }
 }
 
+wide! {
+    /// Takes a block of a picture where it differs from the one held.
+    fn take(t: i64, new: &Block, held: &mut Block, changed: &mut bool) -> Result<()> {
+        /// All exponent bits: infinite or not a number.
+        const NOT_FINITE: u32 = 0x7f80_0000;
+        let (mut other, mut bad) = (0, 0);
+        for (new, held) in new.iter().zip(held.iter()) {
+            other |= new.to_bits() ^ held.to_bits();
+            bad |= u32::from(new.to_bits() & NOT_FINITE == NOT_FINITE);
+        }
+        if bad != 0 {
+            let bad = new.iter().find(|v| !v.is_finite()).unwrap_or(&f32::NAN);
+            return Err(problem!("frame at {t} us holds {bad}: values must be finite"));
+        }
+        if other != 0 {
+            *held = *new;
+            *changed = true;
+        }
+        Ok(())
+    }
+}
+
 /// Which taxels are channels.
 pub(super) struct Channels {
     rows: u16,
@@ -98,14 +120,14 @@ impl Channels {
         let Some(places) = &self.places else {
             let (whole, rest) = values.as_chunks::<BLOCK>();
             for ((new, block), changed) in whole.iter().zip(held.iter_mut()).zip(changed.iter_mut()) {
-                self.take(t, new, block, changed)?;
+                take(t, new, block, changed)?;
             }
             if let Some((block, changed)) = held.last_mut().zip(changed.last_mut())
                 && !rest.is_empty()
             {
                 let mut new = [0.0; BLOCK];
                 new[..rest.len()].copy_from_slice(rest);
-                self.take(t, &new, block, changed)?;
+                take(t, &new, block, changed)?;
             }
             return Ok(());
         };
@@ -114,21 +136,8 @@ impl Channels {
             for (value, &place) in new.iter_mut().zip(places) {
                 *value = values[place as usize];
             }
-            self.take(t, &new, block, changed)?;
+            take(t, &new, block, changed)?;
         }
-        Ok(())
-    }
-
-    #[inline]
-    fn take(&self, t: i64, new: &Block, block: &mut Block, changed: &mut bool) -> Result<()> {
-        if new.iter().zip(block.iter()).fold(0, |any, (a, b)| any | (a.to_bits() ^ b.to_bits())) == 0 {
-            return Ok(());
-        }
-        if let Some(bad) = new.iter().find(|v| !v.is_finite()) {
-            return Err(problem!("frame at {t} us holds {bad}: values must be finite"));
-        }
-        *block = *new;
-        *changed = true;
         Ok(())
     }
 

@@ -156,26 +156,31 @@ impl Neurons {
         if self.still || steps <= 0 {
             return;
         }
-        let input = self.input;
-        let (mut v, mut u) = (self.v, self.u);
-        let mut before = (v, u);
-        for step in 0..steps {
-            before = (v, u);
+        for step in 0..steps - 1 {
+            self.step(model, step, &mut fired);
+        }
+        let before = (self.v, self.u);
+        self.step(model, steps - 1, &mut fired);
+        self.still = before == (self.v, self.u);
+    }
+
+    #[inline(always)]
+    fn step(&mut self, model: Model, step: i64, fired: &mut impl FnMut(i64, usize)) {
+        let mut any = 0_u64;
+        for lane in 0..LANES {
+            let (v, u) = model.step(self.v[lane], self.u[lane], self.input[lane]);
+            (self.v[lane], self.u[lane]) = (v, u);
+            any |= u64::from(v >= PEAK);
+        }
+        if any != 0 {
             for lane in 0..LANES {
-                (v[lane], u[lane]) = model.step(before.0[lane], before.1[lane], input[lane]);
-            }
-            if v.iter().fold(false, |any, &v| any | (v >= PEAK)) {
-                for lane in 0..LANES {
-                    if v[lane] >= PEAK {
-                        v[lane] = C;
-                        u[lane] += D;
-                        fired(step, lane);
-                    }
+                if self.v[lane] >= PEAK {
+                    self.v[lane] = C;
+                    self.u[lane] += D;
+                    fired(step, lane);
                 }
             }
         }
-        self.still = before == (v, u);
-        (self.v, self.u) = (v, u);
     }
 
     fn set(&mut self, lane: usize, input: f64) {
