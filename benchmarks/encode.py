@@ -178,7 +178,7 @@ def run(*, quick: bool) -> dict[str, Any]:
         "seconds": seconds,
         "events": len(events),
         "goals, times real time": GOALS,
-        "reached": {name: results[f"taxel, {name}"]["rate"] >= goal for name, goal in GOALS.items()},
+        "reached": {name: bool(results[f"taxel, {name}"]["rate"] >= goal) for name, goal in GOALS.items()},
         "results": results,
         "ratios": ratios,
         "stable": all(result["stable"] for result in results.values()),
