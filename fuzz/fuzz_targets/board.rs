@@ -1,0 +1,38 @@
+//! Any commands and trip times: no panic, datagrams of whole words within their length, and a decoder that reads them.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use taxel_core::board::{Board, DATAGRAM_WORDS};
+use taxel_core::wire::{Decoder, Registers, WORD_BYTES};
+use taxel_core::Array;
+
+fuzz_target!(|input: &[u8]| {
+    let Some((&[queue, commands, takes], rest)) = input.split_first_chunk::<3>() else { return };
+    let array = Array::new(8, 64, 1.0, "fuzz").unwrap();
+    let mut board = Board::new(Registers::default(), &array).unwrap().queue(8 * usize::from(queue));
+    let (serial, touch) = rest.split_at(rest.len().min(commands.into()));
+    assert!(board.command(serial).lines().all(|line| line.starts_with("ok REG") || line.starts_with("bad REG")));
+    let mut decoder = Decoder::new(array.clone());
+    let mut ticks = vec![0; array.len()];
+    for (frame, values) in touch.chunks(64).enumerate() {
+        for (k, &value) in values.iter().enumerate() {
+            ticks[(k * 7 + frame * 31) % array.len()] = u16::from(value) * 257;
+        }
+        let mut taken = 0;
+        board
+            .frame(&ticks, |datagram| {
+                assert!(datagram.len() <= DATAGRAM_WORDS * WORD_BYTES && datagram.len() % WORD_BYTES == 0);
+                taken += 1;
+                let takes = taken <= takes;
+                if takes {
+                    decoder.push(datagram, None);
+                    decoder.end_of_datagram();
+                }
+                takes
+            })
+            .unwrap();
+    }
+    assert_eq!((decoder.counts().skipped, decoder.counts().unpaired), (0, 0));
+    assert_eq!(decoder.counts().words, board.counts().sent);
+});
