@@ -14,15 +14,18 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._core import ProblemError
 
 __all__ = [
+    "callback",
     "column",
     "fields",
     "flag",
     "floats",
     "instance",
+    "mapping",
     "number",
     "numbers",
     "parameters",
     "path",
+    "several",
     "shown",
     "text",
     "whole",
@@ -43,6 +46,28 @@ def instance(name: str, value: object, kind: type[T]) -> T:
     if not isinstance(value, kind):
         raise ProblemError(f"{name} is {shown(value)}: must be a taxel.{kind.__name__}")
     return value
+
+
+def several(name: str, values: object) -> list[Any]:
+    """Return a list of what an iterable gives; refuse what is none, by name."""
+    try:
+        return list(values)  # type: ignore[call-overload, no-any-return]
+    except TypeError:
+        raise ProblemError(f"{name} is {shown(values)}: must be a sequence") from None
+
+
+def callback(name: str, value: T) -> T:
+    """Return a function to be called; refuse what is none, by name."""
+    if not callable(value):
+        raise ProblemError(f"{name} is {shown(value)}: must be a function")
+    return value
+
+
+def mapping(name: str, value: object) -> dict[str, Any]:
+    """Return values by name; refuse what is no mapping."""
+    if not isinstance(value, Mapping):
+        raise ProblemError(f"{name} is {shown(value)}: must be values by name")
+    return {text(f"a name in {name}", key): entry for key, entry in value.items()}
 
 
 def number(name: str, value: object) -> float:

@@ -244,6 +244,7 @@ def send(
     seconds: float,
     segment: bool,
 ) -> str: ...
+
 # learn: parameters as JSON; a fit as (weights, objective, parts, gap, rounds, rows, solved, unreachable, refires)
 
 _Fit = tuple[

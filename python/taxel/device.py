@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._arguments import column, flag, instance, text, whole
+from taxel._arguments import flag, instance, numbers, text, whole
 from taxel.array import Array
 from taxel.wire import _THESIS, Registers, _bytes
 
@@ -91,7 +91,7 @@ class Board:
         ProblemError : not one trip time a taxel
         """
         taken = 2**32 if most is None else whole("most", most, 0, 2**32)
-        return self._core.frame(column("ticks", np.ravel(ticks), np.uint16), taken)
+        return self._core.frame(numbers("ticks", ticks, np.uint16).reshape(-1), taken)
 
     def command(self, data: Any) -> str:
         """Take command bytes as they come; return the status lines that answer them."""

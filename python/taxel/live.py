@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import flag, instance, number, parameters, shown, text, whole
+from taxel._arguments import flag, instance, number, parameters, several, shown, text, whole
 from taxel._arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -369,7 +369,7 @@ def send(
         _core.send(
             text("host", host),
             whole("port", port, 1, 65_535),
-            [bytes(d) for d in datagrams],
+            [_datagram(n, d) for n, d in enumerate(several("datagrams", datagrams))],
             whole("each", each, 1, 2**31 - 1),
             number("period_us", period_us),
             number("seconds", seconds),
@@ -377,3 +377,9 @@ def send(
         )
     )
     return counts
+
+
+def _datagram(n: int, data: object) -> bytes:
+    if not isinstance(data, bytes | bytearray | memoryview):
+        raise ProblemError(f"datagram {n} is {shown(data)}: must be bytes")
+    return bytes(data)

@@ -222,7 +222,7 @@ class SpikeTrains:
         ------
         FileExistsError : the file is there already and `overwrite` is false
         """
-        columns = {"times": self.times, "offsets": self.offsets, "start": self.start, "stop": self.stop}
+        columns: dict[str, Any] = {"times": self.times, "offsets": self.offsets, "start": self.start, "stop": self.stop}
         if self.values is not None:
             columns["values"] = self.values
         return write_whole(path, lambda file: np.savez_compressed(file, **columns), overwrite=overwrite)

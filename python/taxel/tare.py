@@ -11,6 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._arguments import path as checked_path
+from taxel._arguments import shown, whole
+from taxel._arguments import text as checked_text
 from taxel._core import FormatError, ProblemError
 from taxel._files import write_whole
 from taxel.array import Array
@@ -76,12 +79,11 @@ class Tare:
         ------
         ProblemError : events without intensities, or a stretch in which nothing was heard
         """
-        for name, value in (("start_us", start_us), ("stop_us", stop_us)):
-            if value is not None and (isinstance(value, bool) or not isinstance(value, int | np.integer)):
-                raise ProblemError(f"{name} is {value!r}: must be a whole number of us")
-        if not isinstance(note, str):
-            raise ProblemError(f"note is {note!r}: must be a text")
-        window = None if start_us is None else int(start_us), None if stop_us is None else int(stop_us)
+        note = checked_text("note", note)
+        window = (
+            None if start_us is None else whole("start_us", start_us),
+            None if stop_us is None else whole("stop_us", stop_us),
+        )
         if isinstance(x, Events):
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
         if isinstance(x, Frames):
@@ -99,7 +101,7 @@ class Tare:
         ProblemError : a tare whose parts do not fit
         """
         if not isinstance(text, str):
-            raise ProblemError(f"tare is {text!r}: must be JSON text")
+            raise ProblemError(f"tare is {shown(text)}: must be JSON text")
         tare = cls.__new__(cls)
         tare._text = _core.check_tare(text)
         values: dict[str, Any] = json.loads(tare._text)
@@ -130,8 +132,9 @@ class Tare:
         ------
         FormatError : no tare (names the file)
         """
+        place = Path(checked_path("path", path))
         try:
-            return cls.from_json(Path(path).read_text(encoding="utf-8"))
+            return cls.from_json(place.read_text(encoding="utf-8"))
         except (_core.Error, UnicodeDecodeError) as error:
             raise FormatError(f"{path}: {error}") from None
 

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from taxel import FormatError, formats
+from taxel import FormatError, ProblemError, formats
 from taxel.formats import gaitndd, gaitpdb, moticon, pedar, plate
 
 SHARED = Path(os.environ.get("TAXEL_DATA", Path(__file__).parents[3] / "shared" / "data"))
@@ -366,7 +366,7 @@ def test_a_folder_of_no_or_of_several_formats_is_refused(tmp_path):
     with pytest.raises(FormatError, match=r"several formats \(gaitpdb, pedar\)"):
         list(formats.trials(tmp_path))
     assert len(list(formats.trials(tmp_path, "pedar"))) == 2
-    with pytest.raises(FormatError, match="format 'emed': must be one of"):
+    with pytest.raises(ProblemError, match="format is 'emed': must be one of"):
         list(formats.trials(tmp_path, "emed"))
     with pytest.raises(FileNotFoundError):
         list(formats.trials(tmp_path / "nothing"))

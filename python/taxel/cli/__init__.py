@@ -6,6 +6,7 @@ Exit codes, for scripts: 0 done, 2 the user's input is wrong, 3 board, socket or
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from typing import NoReturn
 
 import typer
@@ -63,10 +64,16 @@ def _said(error: OSError) -> str:
 
 
 # One line a command; they stand at the end because each registers itself with `app`.
-from taxel.cli import bench, convert, demo, emulate, info, live, record  # noqa: E402, F401
-from taxel.cli import bench, convert, info, live, record  # noqa: E402, F401
-from taxel.cli import bench, convert, info  # noqa: E402, F401
-from taxel.cli import bench, demo, emulate  # noqa: E402, F401
-from taxel.cli import bench, convert, demo, emulate, info  # noqa: E402, F401
-from taxel.cli import bench, convert, detect, encode, info, train  # noqa: E402, F401
-from taxel.cli import bench, convert, demo, detect, emulate, encode, info, live, record, train  # noqa: E402, F401
+for _command in (
+    "bench",
+    "convert",
+    "demo",
+    "detect",
+    "emulate",
+    "encode",
+    "info",
+    "live",
+    "record",
+    "train",
+):
+    import_module(f"taxel.cli.{_command}")

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import column, instance, number, parameters, shown, text
+from taxel._arguments import callback, column, instance, number, parameters, shown, text
 from taxel._arguments import path as checked_path
 from taxel._core import FormatError, ProblemError
 from taxel.detect.readout import Readout
@@ -84,7 +84,7 @@ class Recipe:
 
     def learner_of(self, label: str) -> tuple[ConeR, float]:
         """Return the learner of a label, not yet fitted, and the delay it is trained with (ms)."""
-        own = self.neurons.get(label, {})
+        own = self.neurons.get(text("label", label), {})
         if not isinstance(own, Mapping):
             raise ProblemError(f"neurons.{label} is {shown(own)}: must be parameters by name")
         return _learner(f"neurons.{label}", {**self.learner, **own})
@@ -120,7 +120,7 @@ class Recipe:
         ProblemError : a key that is not known, or a value that makes no sense
         FileNotFoundError : no such file
         """
-        return cls.from_dict(changed(_read_tables(path), changes or {}))
+        return cls.from_dict(changed(_read_tables(path), {} if changes is None else changes))
 
 
 def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -181,7 +181,7 @@ def train(
     """
     instance("recipe", recipe, Recipe)
     examples = _examples(examples)
-    told = progress or (lambda _: None)
+    told = (lambda _: None) if progress is None else callback("progress", progress)
     wanted = tuple(recipe.neurons) or tuple(sorted({label for example in examples for label in example.labels}))
     if not wanted:
         raise ProblemError("no label in any example: there is nothing to learn")

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from taxel import _core
-from taxel._arguments import parameters, shown
+from taxel._arguments import instance, parameters, shown
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -62,7 +62,7 @@ class Encoder:
         ProblemError : an unknown name or parameter, or a value that makes no sense
         """
         if not isinstance(text, str):
-            raise ProblemError(f"encoder is {text!r}: must be JSON text")
+            raise ProblemError(f"encoder is {shown(text)}: must be JSON text")
         values = json.loads(_core.check_encoder(text))
         return Encoder._by_name[values.pop("name")]._from_parameters(values)
 
@@ -156,7 +156,7 @@ class EncoderStream:
 
     def __init__(self, encoder: Encoder, array: Array | None = None) -> None:
         self.encoder = encoder
-        self._parameters = encoder._json()
+        self._parameters = instance("encoder", encoder, Encoder)._json()
         self._core: _core.EncoderStream | None = None
         if array is not None:
             self._begin(array)
@@ -182,7 +182,7 @@ class EncoderStream:
     def advance(self, t_us: int) -> SpikeTrains:
         """Say that nothing will come any more before `t_us` (exclusive); an earlier time changes nothing."""
         if isinstance(t_us, bool) or not isinstance(t_us, int | np.integer) or not -(2**60) <= t_us <= 2**60:
-            raise ProblemError(f"t_us is {t_us!r}: must be a whole number of us")
+            raise ProblemError(f"t_us is {shown(t_us)}: must be a whole number of us")
         return self._told(None if self._core is None else self._core.advance(int(t_us)))
 
     def finish(self) -> SpikeTrains:
@@ -201,7 +201,7 @@ def _plain(value: object) -> object:
 
 def _array(array: Array) -> Array:
     if not isinstance(array, Array):
-        raise ProblemError(f"array is {array!r}: must be a taxel.Array")
+        raise ProblemError(f"array is {shown(array)}: must be a taxel.Array")
     return array
 
 

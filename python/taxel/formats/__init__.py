@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from taxel._arguments import path as checked_path
+from taxel._arguments import text as checked_text
 from taxel._core import FormatError
 from taxel.formats import gaitndd, gaitpdb, moticon, pedar, plate
 from taxel.formats.trial import Trial
@@ -68,11 +70,11 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
     FormatError : no format, or several, or a file that does not hold what it should (names file and line)
     FileNotFoundError : nothing is there
     """
-    place = Path(path)
+    place = Path(checked_path("path", path))
     if not place.exists():
         raise FileNotFoundError(2, "No such file or directory", str(place))
-    if format is not None and format not in FORMATS:
-        raise FormatError(f"format {format!r}: must be one of {', '.join(FORMATS)}")
+    if format is not None:
+        checked_text("format", format, FORMATS)
     names = [format] if format else [name for name, kind in FORMATS.items() if kind.files(place)]
     if len(names) != 1:
         said = "no known format" if not names else "several formats (" + ", ".join(names) + ")"

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import floats, parameters
-from taxel._core import ProblemError
+from taxel._arguments import callback, floats, instance, parameters, several
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
@@ -221,11 +220,11 @@ class ConeRProblem:
     """
 
     def __init__(self, cone: ConeR, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
-        for p, pattern in enumerate(patterns):
-            if not isinstance(pattern, SpikeTrains):
-                raise ProblemError(f"pattern {p} is a {type(pattern).__name__}: must be SpikeTrains")
-        times = [floats(f"targets of pattern {p}", t) for p, t in enumerate(targets)]
-        self._problem = _core.ConeRProblem(cone._json(), [p._parts() for p in patterns], times)
+        trains = [
+            instance(f"pattern {p}", pattern, SpikeTrains) for p, pattern in enumerate(several("patterns", patterns))
+        ]
+        times = [floats(f"targets of pattern {p}", t) for p, t in enumerate(several("targets", targets))]
+        self._problem = _core.ConeRProblem(instance("cone", cone, ConeR)._json(), [p._parts() for p in trains], times)
         self.silent_rows: int = self._problem.silent_rows
 
     def fit(
@@ -255,6 +254,9 @@ class ConeRProblem:
         ProblemError : a learner that needs other rows
         """
         first = None if start is None else floats("start", start)
+        if progress is not None:
+            callback("progress", progress)
+        instance("cone", cone, ConeR)
         found = self._problem.fit(cone._json(), first, progress)
         weights, objective, parts, gap, rounds, rows, solved, unreachable, refires = found
         cone.weights_ = weights

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import flag, instance, number, numbers, parameters, whole
+from taxel._arguments import flag, instance, number, numbers, parameters, shown, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -82,7 +82,7 @@ class Scene:
 
     def __init__(self, parameters: Mapping[str, Any]) -> None:
         if not isinstance(parameters, Mapping):
-            raise ProblemError(f"parameters are {parameters!r}: must be a mapping, as Scene.draw(seed).parameters")
+            raise ProblemError(f"parameters are {shown(parameters)}: must be a mapping, as Scene.draw(seed).parameters")
         self.parameters = dict(parameters)
 
     @classmethod

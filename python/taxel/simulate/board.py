@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import number, parameters, text, whole
+from taxel._arguments import mapping, number, parameters, several, shown, text, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -164,7 +164,7 @@ def play(
     events, datagrams, words = _core.play(
         _thesis(array)._parts(),
         text("preset", preset),
-        parameters(dict(sensor or {})),
+        parameters({} if sensor is None else mapping("sensor", sensor)),
         whole("seed", seed, 0),
         parts,
         number("tare_ms", tare_ms),
@@ -212,7 +212,7 @@ def emulate(
         text("to", to),
         _thesis(array)._parts(),
         text("preset", preset),
-        parameters(dict(sensor or {})),
+        parameters({} if sensor is None else mapping("sensor", sensor)),
         whole("seed", seed, 0),
         _parts(acts, _thesis(array)),
         number("tare_ms", tare_ms),
@@ -224,9 +224,9 @@ def emulate(
 
 
 def _parts(acts: Sequence[Act], array: Array) -> list[Any]:
-    for n, act in enumerate(acts):
+    for n, act in enumerate(several("acts", acts)):
         if not isinstance(act, Silence | Scene | Pictures):
-            raise ProblemError(f"act {n} is {act!r}: must be a Scene, Silence or Pictures")
+            raise ProblemError(f"act {n} is {shown(act)}: must be a Scene, Silence or Pictures")
         if isinstance(act, Pictures) and act.values.shape[1:] != array.shape:
             raise ProblemError(f"act {n}: pictures of shape {act.values.shape[1:]}, the array has {array.shape}")
     return [act._part() for act in acts]

@@ -1,0 +1,451 @@
+"""Nonsense in every argument of every public function: one clear error of taxel's, or Python's own for files.
+
+Each public callable has a sound call below; each argument in turn is replaced by each piece of nonsense. A callable
+without a sound call fails the first test, so that nothing public stays untried.
+"""
+
+import inspect
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import taxel
+
+NONSENSE: dict[str, Any] = {
+    "None": None,
+    "NaN": math.nan,
+    "infinity": -math.inf,
+    "minus one": -1,
+    "zero": 0,
+    "a half": 0.5,
+    "huge": 10**30,
+    "a huge float": 1e308,
+    "beyond int64": 2**63,
+    "true": True,
+    "text": "nonsense",
+    "text with a zero": "\0",
+    "bytes": b"\x80\xff",
+    "an object": object(),
+    "a class": int,
+    "a function": len,
+    "nothing in a list": [],
+    "NaN in a list": [math.nan],
+    "None in a list": [None],
+    "a ragged list": [[1.0, 2.0], [3.0]],
+    "three dimensions": np.zeros((2, 3, 4)),
+    "falling numbers": np.array([3.0, 2.0, -1.0]),
+    "a wrong dtype": np.array(["a", "b"]),
+    "complex numbers": np.array([1j, 2j]),
+    "an empty dictionary": {},
+    "a strange dictionary": {"nonsense": None, 3: object()},
+    "a set": {1, 2},
+    "another array": taxel.Array(3, 5),
+    "other trains": taxel.SpikeTrains.from_lists([[1.0], [2.0]]),
+}
+
+ARRAY = taxel.Array(4, 4, pitch_mm=2.0, name="small")
+EVENTS = taxel.Events(
+    [0, 200, 400], [0, 1, 2], [0, 1, 2], [True, False, True], array=ARRAY, intensity=[9, 8, 7], markers=[(0, True)]
+)
+FRAMES = taxel.Frames(np.ones((3, 4, 4)), [0, 192, 384], array=ARRAY)
+TRAINS = taxel.SpikeTrains.from_lists([[1.0, 2.0], [3.0]], 0.0, 20.0, [[1.0, -1.0], [1.0]])
+FOUND = taxel.Detections(["a", "b"], [10, 20], [11, 22], [0.5, 0.5])
+TARE = taxel.Tare.take(FRAMES)
+LEVELS = taxel.encode.LevelCrossing([0.5])
+READOUT = taxel.Readout(LEVELS, {"a": (taxel.Neuron(tau=2.0), [0.5] * 32)}, array=ARRAY)
+RECIPE = taxel.detect.Recipe(LEVELS, {"tau": 5.0}, {"a": {"ub": 1.0}})
+EXAMPLE = taxel.detect.Example(taxel.Frames(np.eye(4)[:, :, None] * np.ones(4), [0, 9000, 18000, 27000]), {"a": [9000]})
+CONE = taxel.learn.ConeR(tau=5.0, ub=1.0)
+PLAIN = TRAINS.split_by_sign()
+SCENE = taxel.simulate.Scene.draw(1)
+REGISTERS = taxel.wire.Registers()
+BYTES = taxel.wire.encode(EVENTS)
+
+Sound = Callable[[], tuple[Callable[..., Any], dict[str, Any]]]
+
+
+def method(instance: Any, name: str, **arguments: Any) -> Sound:
+    """A call of a method of something that calls do not change."""
+    return lambda: (getattr(instance, name), arguments)
+
+
+def fresh(make: Callable[[], Any], name: str, **arguments: Any) -> Sound:
+    """A call of a method of something that each call gets anew."""
+    return lambda: (getattr(make(), name), arguments)
+
+
+def plain(function: Callable[..., Any], **arguments: Any) -> Sound:
+    return lambda: (function, arguments)
+
+
+def every(function: Callable[..., Iterator[Any]], **arguments: Any) -> Sound:
+    """A call of a function that gives one thing after the other."""
+    return lambda: (lambda **given: list(function(**given)), arguments)
+
+
+def listen(**arguments: Any) -> None:
+    """Begin to listen live, and stop."""
+    taxel.live.Live(**arguments).stop()
+
+
+def read_out() -> taxel.detect.ReadoutStream:
+    return READOUT.stream()
+
+
+#: A sound call of everything public that takes anything, by its full name.
+SOUND: dict[str, Sound] = {
+    "taxel.Array": plain(taxel.Array, rows=4, columns=4, pitch_mm=1.0, exists=np.ones((4, 4)), name="small"),
+    "taxel.Array.index": method(ARRAY, "index", x=1, y=2),
+    "taxel.Events": plain(
+        taxel.Events, t=[1], x=[1], y=[1], p=[True], array=ARRAY, intensity=[5], present=[True], markers=[(0, True)]
+    ),
+    "taxel.Events.between": method(EVENTS, "between", start=0, stop=300),
+    "taxel.Events.region": method(EVENTS, "region", x=slice(0, 2), y=slice(0, 2)),
+    "taxel.Events.from_numpy": plain(taxel.Events.from_numpy, records=EVENTS.to_numpy(), array=ARRAY),
+    "taxel.Events.from_tonic": plain(taxel.Events.from_tonic, records=EVENTS.to_tonic(), array=ARRAY),
+    "taxel.Events.from_faery": plain(taxel.Events.from_faery, records=EVENTS.to_faery(), array=ARRAY),
+    "taxel.Events.held": method(EVENTS, "held", period_us=100, start=0, stop=500),
+    "taxel.Frames": plain(taxel.Frames, values=np.ones((2, 4, 4)), t=[0, 5], unit="N", array=ARRAY),
+    "taxel.Frames.from_events": plain(taxel.Frames.from_events, events=EVENTS, period_us=100, start=0, stop=500),
+    "taxel.Frames.between": method(FRAMES, "between", start=0, stop=200),
+    "taxel.Frames.region": method(FRAMES, "region", x=slice(0, 2), y=slice(0, 2)),
+    "taxel.SpikeTrains": plain(
+        taxel.SpikeTrains, times=[1.0, 2.0], offsets=[0, 1, 2], start=0.0, stop=5.0, values=[1.0, -1.0]
+    ),
+    "taxel.SpikeTrains.from_lists": plain(
+        taxel.SpikeTrains.from_lists, times=[[1.0], []], start=0.0, stop=5.0, values=[[1.0], []]
+    ),
+    "taxel.SpikeTrains.between": method(TRAINS, "between", start=0.0, stop=2.0),
+    "taxel.SpikeTrains.select": method(TRAINS, "select", trains=[1]),
+    "taxel.SpikeTrains.from_neo": plain(taxel.SpikeTrains.from_neo, trains=TRAINS.to_neo()),
+    "taxel.SpikeTrains.save": method(TRAINS, "save", path="trains.npz", overwrite=True),
+    "taxel.SpikeTrains.load": plain(taxel.SpikeTrains.load, path="here.npz"),
+    "taxel.Detections": plain(taxel.Detections, label=["a"], t=[1], known=[2], slope=[0.5], said=[3]),
+    "taxel.Detections.between": method(FOUND, "between", start=0, stop=15),
+    "taxel.Detections.from_numpy": plain(taxel.Detections.from_numpy, records=FOUND.to_numpy()),
+    "taxel.Detections.to_csv": method(FOUND, "to_csv", path="found.csv", overwrite=True),
+    "taxel.Detections.from_csv": plain(taxel.Detections.from_csv, path="here.csv"),
+    "taxel.Tare.take": plain(taxel.Tare.take, x=FRAMES, start_us=0, stop_us=300, note="bench 2"),
+    "taxel.Tare.from_json": plain(taxel.Tare.from_json, text=TARE.to_json()),
+    "taxel.Tare.save": method(TARE, "save", path="tare.json", overwrite=True),
+    "taxel.Tare.load": plain(taxel.Tare.load, path="here_tare.json"),
+    "taxel.Neuron": plain(
+        taxel.Neuron,
+        tau=10.0,
+        theta_0=0.3,
+        theta_plus=0.2,
+        tau_rec=20.0,
+        refractory=3.0,
+        after_spike="keep",
+        first_threshold="theta_0",
+        time="grid",
+        step_ms=0.5,
+    ),
+    "taxel.Neuron.run": method(taxel.Neuron(), "run", weights=[1.0] * 2, trains=TRAINS, threshold=1.0),
+    "taxel.Neuron.potential": method(
+        taxel.Neuron(), "potential", weights=[1.0] * 2, trains=TRAINS, times=[1.0, 5.0], spikes=[2.0]
+    ),
+    "taxel.Readout": plain(
+        taxel.Readout, encoder=LEVELS, neurons=READOUT.neurons, array=ARRAY, delay_ms={"a": 1.0}, run_threshold=0.9
+    ),
+    "taxel.Readout.from_json": plain(taxel.Readout.from_json, text=READOUT.to_json()),
+    "taxel.Readout.save": method(READOUT, "save", path="readout.json", overwrite=True),
+    "taxel.Readout.load": plain(taxel.Readout.load, path="here_readout.json"),
+    "taxel.Readout.stream": method(READOUT, "stream", array=ARRAY, frame_us=192.0, tare=TARE),
+    "taxel.detect.ReadoutStream": plain(
+        taxel.detect.ReadoutStream, readout=READOUT, array=ARRAY, frame_us=192.0, tare=TARE
+    ),
+    "taxel.detect.ReadoutStream.push": fresh(read_out, "push", x=FRAMES),
+    "taxel.detect.ReadoutStream.advance": fresh(read_out, "advance", t_us=5),
+    "taxel.detect.run": plain(taxel.detect.run, readout=READOUT, source=FRAMES, frame_us=192.0, tare=TARE),
+    "taxel.detect.score": plain(taxel.detect.score, found=FOUND, truth={"a": [10], "b": [25]}, window_ms=50.0),
+    "taxel.detect.Spread.of": plain(taxel.detect.Spread.of, values=[1.0, 2.0]),
+    "taxel.detect.Recipe": plain(
+        taxel.detect.Recipe, encoder=LEVELS, learner={"tau": 5.0}, neurons={"a": {"ub": 1.0}}, run_threshold=1.0
+    ),
+    "taxel.detect.Recipe.learner_of": method(RECIPE, "learner_of", label="a"),
+    "taxel.detect.Recipe.from_dict": plain(taxel.detect.Recipe.from_dict, values={"encoder": {"name": "fa1"}}),
+    "taxel.detect.Recipe.load": plain(taxel.detect.Recipe.load, path="here.toml", changes={"learner.tau": 5.0}),
+    "taxel.detect.train": plain(taxel.detect.train, examples=[EXAMPLE], recipe=RECIPE, progress=lambda _: None),
+    "taxel.detect.read_labels": plain(taxel.detect.read_labels, path="here_labels.csv"),
+    "taxel.encode.ChangeEvents": plain(
+        taxel.encode.ChangeEvents, noise_floor=3.0, bits=2, previous="last_sent", rounding="floor", period_ms=0.1
+    ),
+    "taxel.encode.ContactArea": plain(taxel.encode.ContactArea, noise_floor=3.0, levels=[2, 4], tare=TARE),
+    "taxel.encode.ContactArea.with_tare": method(taxel.encode.ContactArea(), "with_tare", tare=TARE),
+    "taxel.encode.Encoder.encode": method(LEVELS, "encode", x=FRAMES),
+    "taxel.encode.Encoder.from_json": plain(taxel.encode.Encoder.from_json, text=LEVELS.to_json()),
+    "taxel.encode.Encoder.stream": method(LEVELS, "stream", array=ARRAY),
+    "taxel.encode.Encoder.trains": method(LEVELS, "trains", array=ARRAY),
+    "taxel.encode.Encoder.with_tare": method(LEVELS, "with_tare", tare=TARE),
+    "taxel.encode.EncoderStream": plain(taxel.encode.EncoderStream, encoder=LEVELS, array=ARRAY),
+    "taxel.encode.EncoderStream.push": fresh(lambda: LEVELS.stream(ARRAY), "push", x=FRAMES),
+    "taxel.encode.EncoderStream.advance": fresh(lambda: LEVELS.stream(ARRAY), "advance", t_us=5),
+    "taxel.encode.FA1": plain(
+        taxel.encode.FA1, alpha=0.7, a=20.0, b=0.05, decay="sample", theta_0=1.0, range=None, period_ms=1.0
+    ),
+    "taxel.encode.LevelCrossing": plain(
+        taxel.encode.LevelCrossing,
+        levels=[0.5],
+        release_share=0.5,
+        release_by=None,
+        hold_ms=1.0,
+        tonic_ms=5.0,
+        tonic_level=0.5,
+        running_range=taxel.encode.RunningRange(),
+        period_ms=0.1,
+    ),
+    "taxel.encode.RunningRange": plain(
+        lambda **given: taxel.encode.LevelCrossing([0.5], running_range=taxel.encode.RunningRange(**given)),
+        low=10.0,
+        high=95.0,
+        window_s=10.0,
+        renew_s=1.0,
+        first_window="silent",
+    ),
+    "taxel.encode.ThresholdIzhikevich": plain(
+        taxel.encode.ThresholdIzhikevich, levels=[1.0], published="6.5.1", begin="settled", period_ms=0.1
+    ),
+    "taxel.learn.ConeR": plain(
+        taxel.learn.ConeR,
+        tau=5.0,
+        theta_0=0.3,
+        theta_plus=0.2,
+        tau_rec=10.0,
+        refractory=3.0,
+        after_spike="reset",
+        first_threshold="theta_0",
+        step_ms=1.0,
+        kappa=1.2,
+        delta_t_ms=1.0,
+        lambdas=[1.0, 1.0, 1.0, 1.0, 1.0],
+        lb=-1.0,
+        ub=1.0,
+        divide_b_by="targets",
+        norm="square",
+        margin=0.01,
+        horizon=30.0,
+        tolerance=1e-6,
+    ),
+    "taxel.learn.ConeR.fit": method(
+        CONE, "fit", patterns=[PLAIN], targets=[[5.0]], start=[0.1] * 4, progress=lambda *_: None
+    ),
+    "taxel.learn.ConeR.prepare": method(CONE, "prepare", patterns=[PLAIN], targets=[[5.0]]),
+    "taxel.learn.ConeRProblem": plain(taxel.learn.ConeRProblem, cone=CONE, patterns=[PLAIN], targets=[[5.0]]),
+    "taxel.learn.ConeRProblem.fit": method(
+        CONE.prepare([PLAIN], [[5.0]]), "fit", cone=CONE, start=[0.1] * 4, progress=lambda *_: None
+    ),
+    "taxel.metrics.victor_purpura": plain(taxel.metrics.victor_purpura, a=[1.0, 2.0], b=[1.5], q=0.1),
+    "taxel.open": plain(taxel.open, path="here_events.npz", array=ARRAY, pairing="direct", differences=False),
+    "taxel.Recording.between": lambda: (taxel.open("here_events.npz").between, {"start": 0, "stop": 300}),
+    "taxel.Recording.frames": lambda: (taxel.open("here_events.npz").frames, {"rate_hz": 1000.0}),
+    "taxel.convert": plain(
+        taxel.convert, source=EVENTS, target="there.npz", frames_hz=1000.0, compression="none", overwrite=True
+    ),
+    "taxel.health": plain(taxel.health, recorded=EVENTS),
+    "taxel.device.Board": plain(
+        taxel.device.Board, registers=REGISTERS, array=None, previous="last_sent", intensity="value", queue=100
+    ),
+    "taxel.device.Board.command": fresh(taxel.device.Board, "command", data=bytes.fromhex("e000000000")),
+    "taxel.device.Board.frame": fresh(taxel.device.Board, "frame", ticks=np.zeros(4096, np.uint16), most=5),
+    "taxel.device.Board.record": fresh(taxel.device.Board, "record", start=True),
+    "taxel.wire.Columns": plain(taxel.wire.Columns, rows=100),
+    "taxel.wire.Command": plain(taxel.wire.Command, register=1, value=300),
+    "taxel.wire.Command.from_bytes": plain(taxel.wire.Command.from_bytes, data=taxel.wire.Command(1, 300).to_bytes()),
+    "taxel.wire.Decoder": plain(taxel.wire.Decoder, array=ARRAY, pairing="direct", differences=False),
+    "taxel.wire.Decoder.push": fresh(taxel.wire.Decoder, "push", data=BYTES, arrived=5),
+    "taxel.wire.Decoder.push_into": fresh(
+        taxel.wire.Decoder, "push_into", columns=taxel.wire.Columns(100), data=BYTES, arrived=5
+    ),
+    "taxel.wire.Registers": plain(taxel.wire.Registers, array=None, noise_floor=4, line_period=3.0),
+    "taxel.wire.Registers.commands_to": method(REGISTERS, "commands_to", target=REGISTERS),
+    "taxel.wire.Registers.preset": plain(taxel.wire.Registers.preset, name="2 kHz", array=None),
+    "taxel.wire.Registers.replace": method(REGISTERS, "replace", noise_floor=4, frame_sync=True, nrows=63),
+    "taxel.wire.decode": plain(taxel.wire.decode, data=BYTES, array=ARRAY, pairing="direct", differences=False),
+    "taxel.wire.encode": plain(taxel.wire.encode, events=EVENTS),
+    "taxel.live.Live": plain(
+        listen,
+        port=0,
+        host="127.0.0.1",
+        array=None,
+        registers="5.2 kHz",
+        differences=False,
+        readout=None,
+        tare=None,
+        record="live.mcap",
+        compression="none",
+        overwrite=True,
+        guard_frames=5.0,
+        say=lambda _: None,
+        lines=False,
+        kernel_buffer_bytes=100_000,
+        queue_bytes=100_000,
+        readout_events=1000,
+        gro=False,
+    ),
+    "taxel.live.send": plain(
+        taxel.live.send,
+        datagrams=[BYTES],
+        host="127.0.0.1",
+        port=9,
+        each=1,
+        period_us=192.0,
+        seconds=0.001,
+        segment=False,
+    ),
+    "taxel.simulate.Pictures": plain(taxel.simulate.Pictures, values=np.zeros((3, 64, 64)), period_us=192.0),
+    "taxel.simulate.Scene": plain(lambda **given: taxel.simulate.Scene(**given).motion(), parameters=SCENE.parameters),
+    "taxel.simulate.Scene.draw": plain(taxel.simulate.Scene.draw, seed=1, index=0, left_to_rest=False, array=None),
+    "taxel.simulate.Scene.motion": method(SCENE, "motion", step_us=100.0),
+    "taxel.simulate.Scene.replace": lambda: (
+        lambda **given: SCENE.replace(**given).motion(),
+        {"drop_mm": 100.0, "foam": {"dashpot_ms": 0.0}, "lead_ms": 5.0},
+    ),
+    "taxel.simulate.play": plain(
+        taxel.simulate.play,
+        acts=[taxel.simulate.Silence(10.0)],
+        seed=1,
+        preset="5.2 kHz",
+        tare_ms=3.0,
+        array=None,
+        sensor={},
+    ),
+    "taxel.simulate.truth": plain(
+        taxel.simulate.truth, acts=[taxel.simulate.Silence(10.0)], preset="5.2 kHz", array=None
+    ),
+    "taxel.simulate.Silence": plain(
+        lambda **given: taxel.simulate.play([taxel.simulate.Silence(**given)], seed=1, tare_ms=3.0), ms=10.0
+    ),
+    "taxel.formats.trials": every(taxel.formats.trials, path="pdb", format="gaitpdb"),
+}
+
+#: Functions to be called: a function of another kind is the caller's to blame, and its own error comes out.
+CALLED = {"progress", "say"}
+
+#: What is not tried, and why.
+LEFT_OUT = {
+    "taxel.Error": "raised, not called",
+    "taxel.FormatError": "raised, not called",
+    "taxel.ProblemError": "raised, not called",
+    "taxel.DeviceError": "raised, not called",
+    "taxel.SceneError": "raised, not called",
+    "taxel.Clock": "of a recording",
+    "taxel.Clock.host_ns": "of a recording",
+    "taxel.Datagrams": "of a recording",
+    "taxel.Health": "a result",
+    "taxel.Note": "of a recording",
+    "taxel.Recording": "made by taxel.open",
+    "taxel.detect.Score": "a result",
+    "taxel.detect.Spread": "a result",
+    "taxel.detect.Example": "checked by train",
+    "taxel.detect.TrainedNeuron": "checked by Readout",
+    "taxel.detect.Learner": "a protocol",
+    "taxel.formats.Format": "a result",
+    "taxel.formats.Trial": "a result",
+    "taxel.live.Said": "a result",
+    "taxel.live.Summary": "a result",
+    "taxel.live.heard": "takes what Live said",
+    "taxel.live.Live.next": "waits",
+    "taxel.live.Live.note": "tried with Live's own tests",
+    "taxel.simulate.Contact": "a result",
+    "taxel.simulate.Motion": "a result",
+    "taxel.simulate.Played": "a result",
+    "taxel.simulate.EmulatorReport": "a result",
+    "taxel.simulate.emulate": "plays in real time; its arguments are those of play, tried there",
+    "taxel.wire.Counts": "a result",
+}
+
+
+def modules() -> list[Any]:
+    """The package and the rooms that it offers; the command line has exit codes instead, and tests of its own."""
+    return [taxel, *(room for name in taxel.__all__ if inspect.ismodule(room := getattr(taxel, name)))]
+
+
+def public() -> dict[str, Any]:
+    """Every public callable once, by its shortest name: functions, classes, and what classes define themselves."""
+    names: dict[int, str] = {}
+    found: dict[str, Any] = {}
+    for module in modules():
+        for name in getattr(module, "__all__", ()):
+            value = getattr(module, name)
+            if not callable(value) or id(value) in names:
+                continue
+            full = f"{module.__name__}.{name}"
+            names[id(value)] = full
+            found[full] = value
+            if inspect.isclass(value) and not issubclass(value, BaseException):
+                for part, member in vars(value).items():
+                    held = member.__func__ if isinstance(member, classmethod | staticmethod) else member
+                    if not part.startswith("_") and part != "plot" and inspect.isfunction(held):
+                        found[f"{full}.{part}"] = held
+    return {name: value for name, value in found.items() if takes(value) or name in SOUND or name in LEFT_OUT}
+
+
+def takes(value: Any) -> set[str]:
+    """The names of what a callable takes; ``**`` takes names of its own."""
+    try:
+        parameters = inspect.signature(value).parameters.values()
+    except ValueError:  # exceptions that the compiled part makes
+        return set()
+    named = {p.name for p in parameters if p.kind not in (p.VAR_KEYWORD, p.VAR_POSITIONAL)}
+    return named - {"self", "cls"}
+
+
+def test_every_public_callable_has_a_sound_call() -> None:
+    there = public()
+    untried = sorted(set(there) - set(SOUND) - set(LEFT_OUT))
+    gone = sorted((set(SOUND) | set(LEFT_OUT)) - set(there))
+    assert (untried, gone) == ([], []), "add a sound call to SOUND, or a reason to LEFT_OUT; take out what is gone"
+
+
+@pytest.mark.usefixtures("somewhere")
+def test_every_argument_of_a_sound_call_is_there_to_be_tried() -> None:
+    there = public()
+    for name, sound in SOUND.items():
+        assert takes(there[name]) <= set(sound()[1]), name
+
+
+@pytest.fixture
+def somewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    FOUND.to_csv("here.csv")
+    TRAINS.save("here.npz")
+    TARE.save("here_tare.json")
+    READOUT.save("here_readout.json")
+    taxel.convert(EVENTS, "here_events.npz")
+    (tmp_path / "here.toml").write_text('[encoder]\nname = "fa1"\n')
+    (tmp_path / "here_labels.csv").write_text("label,t_us\na,5\n")
+    (tmp_path / "pdb").mkdir()
+    row = "\t".join(["0"] * 18)
+    (tmp_path / "pdb" / "GaCo01_01.txt").write_text("\n".join(f"{k / 100}\t{row}" for k in range(50)) + "\n")
+    return tmp_path
+
+
+@pytest.mark.usefixtures("somewhere")
+@pytest.mark.parametrize("name", SOUND)
+def test_a_sound_call_is_sound(name: str) -> None:
+    function, arguments = SOUND[name]()
+    function(**arguments)
+
+
+@pytest.mark.usefixtures("somewhere")
+@pytest.mark.parametrize("name", SOUND)
+def test_nonsense_in_each_argument_is_one_clear_error(name: str) -> None:
+    faults = []
+    for argument in SOUND[name]()[1]:
+        for kind, nonsense in NONSENSE.items():
+            if argument in CALLED and callable(nonsense):
+                continue
+            function, arguments = SOUND[name]()
+            try:
+                function(**{**arguments, argument: nonsense})
+            except (taxel.Error, OSError) as error:
+                said = str(error)
+                if not said or "\n" in said or "a bug in taxel" in said:
+                    faults.append(f"{argument} = {kind}: {type(error).__name__}: {said!r}")
+            except BaseException as error:  # what else comes out is a fault, a panic too
+                faults.append(f"{argument} = {kind}: {type(error).__name__}: {error}")
+    assert not faults, "\n".join(["", *faults])
