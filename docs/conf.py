@@ -23,3 +23,6 @@ napoleon_use_rtype = False
 napoleon_custom_sections = [("Raises", "params_style")]
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
+napoleon_use_ivar = True
+# `events` in a docstring is the argument, whichever class has an attribute of that name.
+suppress_warnings = ["ref.python"]

@@ -77,3 +77,13 @@ for _command in (
     "train",
 ):
     import_module(f"taxel.cli.{_command}")
+# Each registers itself with `app`, so they stand at the end.
+from taxel.cli import (  # noqa: E402
+    bench,  # noqa: F401
+    convert,  # noqa: F401
+    demo,  # noqa: F401
+    emulate,  # noqa: F401
+    info,  # noqa: F401
+    live,  # noqa: F401
+    record,  # noqa: F401
+)
