@@ -47,6 +47,8 @@ pub(super) struct Answer {
     pub(super) weights: Vec<f64>,
     /// One multiplier a hinge, between 0 and its weight.
     pub(super) multipliers: Vec<f64>,
+    /// The slope that stands for `l2 |w|_2` in the dual, no longer than `l2`; zeros without that term.
+    pub(super) pull: Vec<f64>,
 }
 
 /// Coefficients below this do not move a potential by more than its rounding.
@@ -212,9 +214,16 @@ impl ConeProgram<'_> {
         let (p, a) = (p.matrix(variables), a.matrix(rows));
         let (x, z) = solve_stoppable(&p, &q, &a, &b, &cones, settings, stop)?;
         let weights = x[..n].iter().map(|w| w.clamp(self.lower, self.upper)).collect();
-        let multipliers =
-            z[hinge..positive].iter().zip(&self.hinges.weight).map(|(z, &most)| (z / scale).clamp(0.0, most)).collect();
-        Ok(Answer { weights, multipliers })
+        let hinged = z[hinge..positive].iter().zip(&self.hinges.weight);
+        let multipliers = hinged.map(|(z, &most)| (z / scale).clamp(0.0, most)).collect();
+        let mut pull = vec![0.0; n];
+        if normed {
+            let dual = &z[cone + 1..];
+            let length = dual.iter().map(|z| z * z).sum::<f64>().sqrt();
+            let shrink = (self.l2 / length.max(f64::MIN_POSITIVE)).min(1.0 / scale);
+            pull.iter_mut().zip(dual).for_each(|(p, z)| *p = -z * shrink);
+        }
+        Ok(Answer { weights, multipliers, pull })
     }
 }
 

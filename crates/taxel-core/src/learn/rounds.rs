@@ -17,6 +17,8 @@ const START_STRIDE_MS: f64 = 4.0;
 const MOST_ROWS: usize = 5000;
 /// A hinge is kept within this share of `theta_0` from its kink.
 const NEAR: f64 = 0.02;
+/// What the cone solver can do at best.
+const FINEST: f64 = 1e-12;
 /// Rounds end without a proof where the objective falls by less than this, relatively, and nothing else helps.
 const STALLED: f64 = 1e-10;
 
@@ -77,7 +79,7 @@ impl Problem {
                 self.better(objective, zero, answer.weights)
             }
         };
-        let (mut bound, mut rounds, mut near) = (f64::NEG_INFINITY, 0, NEAR * self.base.neuron.theta_0);
+        let (mut bound, mut rounds, near) = (f64::NEG_INFINITY, 0, NEAR * self.base.neuron.theta_0);
         loop {
             rounds += 1;
             let states = self.states(&best, near);
@@ -88,20 +90,19 @@ impl Problem {
             for (&row, multiplier) in kept.rows.iter().zip(answer.multipliers) {
                 factors[row] = multiplier;
             }
-            bound = bound.max(trial.parts.sum() - self.gap(objective, &trial, &factors));
+            bound = bound.max(trial.parts.sum() - self.gap(objective, &trial, &factors, &answer.pull));
             let before = best.parts.sum();
             best = self.better(objective, best, answer.weights);
             let least = best.parts.sum();
             let gap = (least - bound).max(0.0) / least.max(1e-12 / scale);
             progress(Round { round: rounds, rows: kept.rows.len(), objective: least, gap });
             let stalled = before - least <= STALLED * least;
-            if gap <= tolerance || (stalled && accuracy < 1e-12) {
+            if gap <= tolerance || (stalled && accuracy < FINEST) {
                 let Point { weights, parts, .. } = best;
                 return Ok(Found { weights, parts, gap, rounds, rows: kept.rows.len() });
             }
             if stalled {
-                accuracy *= 0.1;
-                near *= 2.0;
+                accuracy *= 0.01;
             }
         }
     }
@@ -271,9 +272,9 @@ impl Problem {
 
     /// A bound on how far 6.14 at this point lies above its least value, whatever the solver did.
     ///
-    /// Every term is replaced by a tangent below it: hinges by multipliers between 0 and their weight, l2 and B by their
-    /// slopes. What is left is linear and l1 over the box, and has its least value synapse by synapse.
-    fn gap(&self, objective: &Objective, point: &Point, factors: &[f64]) -> f64 {
+    /// Every term is replaced by a tangent below it: hinges by multipliers between 0 and their weight, the norm by a
+    /// `pull` no longer than its factor, a square by its slope. What is left is linear and l1 over the box, and has its least value synapse by synapse.
+    fn gap(&self, objective: &Objective, point: &Point, factors: &[f64], pull: &[f64]) -> f64 {
         let silent = self.silent.len();
         let mut gradient = vec![0.0; self.trains];
         self.silent.add_sum(&factors[..silent], &mut gradient);
@@ -281,18 +282,16 @@ impl Problem {
             add(&mut gradient, factor - objective.c, &target.at);
             add(&mut gradient, 2.0 * objective.b * behind, &target.behind);
         }
-        let length = point.weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+        let mut gap = 0.0;
         match objective.norm {
             Norm::Square => add(&mut gradient, 2.0 * objective.l2, &point.weights),
-            Norm::Norm if length > 0.0 => add(&mut gradient, objective.l2 / length, &point.weights),
-            // At w = 0 any slope up to l2 long will do: the one that takes most of the gradient away.
+            // |w|_2 lies above u.w for every u no longer than 1. The solver's own u fits its multipliers, w/|w| would not:
+            // weights come out to the root of the gap only.
             Norm::Norm => {
-                let steep = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
-                let left = if steep > objective.l2 { 1.0 - objective.l2 / steep } else { 0.0 };
-                gradient.iter_mut().for_each(|g| *g *= left);
+                add(&mut gradient, 1.0, pull);
+                gap += point.parts.l2 - dot(pull, &point.weights);
             }
         }
-        let mut gap = 0.0;
         for (row, (&x, &factor)) in point.excess.iter().zip(factors).enumerate() {
             if x.is_finite() {
                 gap += self.hinge_weight(objective, row) * x.max(0.0) - factor * x;
