@@ -174,4 +174,232 @@ def test_the_objective_is_that_of_every_row_handed_whole_to_a_solver(options, se
     assert cone.objective_ == pytest.approx(value.sum(), rel=1e-12)
     assert cone.status_ == "solved"
     assert cone.objective_ == pytest.approx(least(cone, rows), rel=1e-6)
-    assert cone.weights_.min() >= cone.lb and cone.weights_.max() <= cone.ub
+    assert cone.weights_.min() >= cone.lb
+    assert cone.weights_.max() <= cone.ub
+
+
+def fitted(cone, *args, **kwargs):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return cone.fit(*args, **kwargs)
+
+
+@pytest.mark.parametrize(
+    "lambdas", [(1, 0, 0, 0, 0), (0, 0, 0, 1, 0), (0, 0, 0, 1, 1), (0, 0, 1, 0, 0), (0, 0, 0, 0, 1)]
+)
+def test_an_objective_that_can_be_met_whole_is_solved_at_0(lambdas):
+    patterns, targets = examples(5, trains=30, targets=1)
+    cone = fitted(ConeR(lambdas=lambdas, lb=-3.0, ub=3.0), patterns, targets)
+    assert cone.status_ == "solved"
+    assert cone.objective_ < 1e-12
+
+
+def test_a_start_changes_the_way_but_not_the_result():
+    patterns, targets = examples(6, trains=40, patterns=4, targets=3, duration=300.0)
+    cold = fitted(ConeR(tau=12.0, after_spike="reset"), patterns, targets)
+    other = np.random.default_rng(0).uniform(-1, 1, 40)
+    for start in (cold.weights_, other, np.zeros(40)):
+        warm = fitted(ConeR(tau=12.0, after_spike="reset"), patterns, targets, start=start)
+        assert warm.status_ == "solved"
+        assert warm.objective_ == pytest.approx(cold.objective_, rel=1e-6)
+
+
+def test_one_layout_serves_many_parameters_and_refuses_those_that_need_other_rows():
+    patterns, targets = examples(7)
+    rows = ConeR(tau=12.0).prepare(patterns, targets)
+    for options in ({"kappa": 1.4}, {"lambdas": (0, 4, 100, 100, 80)}, {"lb": -1.0, "ub": 2.0}, {"norm": "square"}):
+        here = rows.fit(ConeR(tau=12.0, **options))
+        assert here.objective_ == fitted(ConeR(tau=12.0, **options), patterns, targets).objective_
+    for options in ({"tau": 13.0}, {"margin": 0.1}, {"delta_t_ms": 3.0}, {"after_spike": "reset"}, {"horizon": 400.0}):
+        with pytest.raises(ProblemError, match="lay them out anew"):
+            rows.fit(ConeR(**{"tau": 12.0, **options}))
+
+
+def test_the_same_fit_again_gives_the_same_bits():
+    patterns, targets = examples(8)
+    first, again = (fitted(ConeR(tau=12.0), patterns, targets).weights_ for _ in range(2))
+    assert first.tobytes() == again.tobytes()
+
+
+def test_a_shift_in_time_and_another_order_of_trains_change_nothing():
+    patterns, targets = examples(9, whole_ms=True)
+    here = fitted(ConeR(tau=12.0), patterns, targets)
+    order = np.random.default_rng(1).permutation(len(patterns[0]))
+    there = [
+        SpikeTrains.from_lists([p[n] + 1000.0 for n in order], start=p.start + 1000.0, stop=p.stop + 1000.0)
+        for p in patterns
+    ]
+    moved = fitted(ConeR(tau=12.0), there, [t + 1000.0 for t in targets])
+    assert moved.objective_ == pytest.approx(here.objective_, rel=1e-6)
+    assert moved.weights_ == pytest.approx(here.weights_[order], abs=1e-3)
+
+
+@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
+def test_with_a_margin_the_trained_neuron_fires_at_its_targets_and_nowhere_else(after_spike):
+    """Learner and neuron mean the same by after_spike, refractory time and thresholds."""
+    patterns, targets = examples(10, trains=150, patterns=3, targets=3, duration=200.0, whole_ms=True)
+    # A target is met to rounding, from below as well: so the neuron is run a hair below its threshold.
+    cone = fitted(
+        ConeR(after_spike=after_spike, lambdas=(0, 1e-4, 0, 100, 1e4), lb=-2.0, ub=2.0, margin=0.02), patterns, targets
+    )
+    assert cone.parts_["C"] + cone.parts_["D"] < 1e-8
+    assert cone.refires_ == 0
+    for pattern, wanted in zip(patterns, targets, strict=True):
+        at = cone.neuron_.potential(cone.weights_, pattern, wanted, spikes=wanted)
+        assert at[0] == pytest.approx(cone.theta_0, abs=1e-6)
+        fired = cone.neuron_.run(cone.weights_, pattern, threshold=1 - 1e-5)
+        assert list(fired) == list(wanted)
+
+
+def test_a_pattern_without_targets_teaches_silence():
+    (pattern,), targets = examples(11, trains=40, patterns=1, targets=1)
+    # The same played faster: its potential comes higher, so the untaught neuron fires.
+    patterns = [pattern, SpikeTrains.from_lists([0.8 * train for train in pattern], stop=pattern.stop)]
+    loud = fitted(ConeR(lambdas=(0, 1, 0, 100, 1000), lb=-2.0, ub=2.0), patterns[:1], targets[:1])
+    taught = fitted(ConeR(lambdas=(0, 1, 0, 100, 1000), lb=-2.0, ub=2.0), patterns, [targets[0], []])
+    times = np.arange(0.0, patterns[1].stop)
+    assert taught.neuron_.potential(taught.weights_, patterns[1], times).max() <= 0.3 + 1e-6
+    assert loud.neuron_.potential(loud.weights_, patterns[1], times).max() > 0.3
+
+
+def test_a_target_out_of_reach_is_named_and_the_rest_is_fitted():
+    trains = SpikeTrains.from_lists([[20.0], [25.0], [80.0], [85.0]], stop=120.0)
+    cone = ConeR(lambdas=(0, 1e-3, 0, 100, 1), lb=-1.0, ub=1.0)
+    with pytest.warns(UserWarning, match="pattern 0 target 0 to the threshold; the rest was fitted"):
+        cone.fit([trains], [[10.0, 90.0]])
+    assert cone.unreachable_ == [(0, 0)]
+    assert cone.neuron_.potential(cone.weights_, trains, [90.0]) == pytest.approx(
+        0.3 + 0.2 * np.exp(-77 / 30), abs=1e-6
+    )
+
+
+def test_a_neuron_that_refires_on_its_training_data_warns_once_and_names_the_option():
+    trains = SpikeTrains.from_lists([[20.0 + n] for n in range(20)], stop=150.0)
+    options = {"tau": 30.0, "theta_plus": 0.0, "lambdas": (0, 1, 0, 1000, 0)}
+    with pytest.warns(UserWarning, match='after_spike is "keep"; "reset", a longer refractory') as said:
+        cone = ConeR(**options).fit([trains], [[45.0]])
+    assert len(said) == 1
+    assert cone.refires_ == len(cone.neuron_.run(cone.weights_, trains)) - 1 > 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ConeR(**options, after_spike="reset").fit([trains], [[45.0]])
+
+
+def test_progress_is_told_round_by_round_and_may_stop_the_fit_by_raising():
+    patterns, targets = examples(12, trains=40, patterns=4, targets=3, duration=300.0)
+    told = []
+    cone = fitted(ConeR(tau=12.0), patterns, targets, progress=lambda *round: told.append(round))
+    assert [r[0] for r in told] == list(range(1, cone.rounds_ + 1))
+    assert told[-1] == (cone.rounds_, cone.rows_, cone.objective_, cone.gap_)
+    with pytest.raises(ZeroDivisionError):
+        fitted(ConeR(tau=12.0), patterns, targets, progress=lambda *_: 1 / 0)
+
+
+def test_control_c_stops_a_fit_promptly():
+    patterns, targets = examples(13, trains=600, patterns=120, targets=5, duration=2000.0)
+    rows = ConeR(tau=40.0, tolerance=1e-9).prepare(patterns, targets)
+
+    def fit_for_ever():
+        for k in range(10_000):
+            rows.fit(ConeR(tau=40.0, tolerance=1e-9, kappa=1.2 + k / 1000))
+
+    threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
+    begun = time.monotonic()
+    with warnings.catch_warnings(), pytest.raises(KeyboardInterrupt):
+        warnings.simplefilter("ignore")
+        fit_for_ever()
+    assert time.monotonic() - begun < 60
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"tau": 0}, "tau is 0 ms: must be above 0"),
+        ({"tau": float("nan")}, "tau is nan: must be finite"),
+        ({"tau": "long"}, "tau is 'long'|invalid type"),
+        ({"theta_0": -1}, "theta_0 is -1"),
+        ({"theta_plus": -0.1}, "theta_plus is -0.1"),
+        ({"tau_rec": 0.0}, "tau_rec is 0"),
+        ({"refractory": -3}, "refractory is -3"),
+        ({"refractory": 0}, "refractory is 0 ms: must be above 0 unless after_spike"),
+        ({"after_spike": "forget"}, "unknown variant `forget`, expected one of `keep`, `ignore`, `reset`"),
+        ({"first_threshold": "none"}, "unknown variant `none`"),
+        ({"step_ms": 0}, "step_ms is 0"),
+        ({"kappa": 0}, "kappa is 0"),
+        ({"delta_t_ms": -1}, "delta_t_ms is -1"),
+        ({"lambdas": (1, 2, 3, 4)}, "length 4"),
+        ({"lambdas": (1, 2, 3, 4, -5)}, r"lambdas\[4\] is -5"),
+        ({"lambdas": (0, 0, 0, 0, 0)}, "lambdas are all 0"),
+        ({"lb": 0.3, "ub": 0.3}, "lb must lie below ub"),
+        ({"ub": float("inf")}, "ub is inf: must be finite"),
+        ({"divide_b_by": "two"}, "unknown variant `two`"),
+        ({"norm": "max"}, "unknown variant `max`"),
+        ({"margin": -0.1}, "margin is -0.1"),
+        ({"horizon": float("nan")}, "horizon is nan"),
+        ({"tolerance": 0}, "tolerance is 0: must lie between"),
+    ],
+)
+def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
+    with pytest.raises(ProblemError, match=said) as error:
+        ConeR(**options)
+    assert "\n" not in str(error.value)
+
+
+def lists(*times):
+    return SpikeTrains.from_lists(times, stop=100.0)
+
+
+@pytest.mark.parametrize(
+    ("patterns", "targets", "said"),
+    [
+        ([], [], "patterns: there is none"),
+        ([lists([1.0])], [], "targets: 0 lists for 1 patterns"),
+        ([lists([1.0])], [[]], "targets: no pattern has one"),
+        ([lists()], [[5.0]], "pattern 0: has no train"),
+        ([lists([], [])], [[5.0]], "pattern 0: has no spike"),
+        ([lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], "pattern 1: 2 trains, pattern 0 has 1"),
+        ([lists([1.0])], [[float("nan")]], "pattern 0, target 0: time is NaN"),
+        ([lists([1.0])], [[30.0, 20.0]], "pattern 0, target 1: 20 ms comes after 30 ms"),
+        (
+            [lists([1.0])],
+            [[30.0, 31.5]],
+            r"pattern 0, target 1 \(31.5 ms\): 1.5 ms after target 0, inside the refractory 3",
+        ),
+        ([lists([1.0])], [[130.0]], "pattern 0, target 0: 130 ms lies outside the pattern's window 0 to 100"),
+        ([lists([1.0])], [5.0], "targets of pattern 0 has 0 dimensions"),
+        ([lists([1.0])], [["soon"]], "targets of pattern 0: holds <U4, must hold numbers"),
+        (["spikes"], [[5.0]], "pattern 0 is a str: must be SpikeTrains"),
+        ([SpikeTrains.from_lists([[1.0]], stop=9.0, values=[[-1.0]])], [[5.0]], "pattern 0: spikes are signed"),
+    ],
+)
+def test_examples_that_make_no_sense_are_one_clear_error_each(patterns, targets, said):
+    with pytest.raises(ProblemError, match=said):
+        ConeR().fit(patterns, targets)
+
+
+def test_a_start_that_does_not_fit_is_one_clear_error():
+    for start, said in (([1.0, 2.0], "weights: 2 for 1 trains"), ([float("nan")], r"weights\[0\] is NaN")):
+        with pytest.raises(ProblemError, match=said):
+            ConeR().fit([lists([1.0])], [[5.0]], start=start)
+
+
+def test_a_last_target_behind_the_horizon_is_one_clear_error():
+    with pytest.raises(ProblemError, match="pattern 0: last target at 60 ms, the horizon is 50 ms"):
+        ConeR(horizon=50.0).fit([lists([1.0])], [[60.0]])
+
+
+def test_the_defaults_that_python_shows_are_those_of_the_core():
+    assert ConeR()._json() == ConeR()._json()
+    core = taxel._core.check_cone_r("{}")
+    assert taxel._core.check_cone_r(ConeR()._json()) == core
+
+
+@pytest.mark.parametrize("options", list(itertools.product(["keep", "reset"], ["norm", "square"])))
+def test_the_gap_is_a_bound_also_where_the_fit_stops_early(options):
+    patterns, targets = examples(14, trains=40, patterns=3, targets=2, duration=200.0)
+    after_spike, norm = options
+    common = {"tau": 12.0, "after_spike": after_spike, "norm": norm}
+    rough = fitted(ConeR(**common, tolerance=0.1), patterns, targets)
+    fine = fitted(ConeR(**common, tolerance=1e-8), patterns, targets)
+    assert fine.objective_ <= rough.objective_
+    assert rough.objective_ * (1 - rough.gap_) <= fine.objective_ * (1 + 1e-12)

@@ -10,13 +10,16 @@ use super::cone_program::{ConeProgram, Hinges};
 use super::cone_r::{Norm, Objective, Parts, Problem, Round};
 use crate::{Result, Stop};
 
-/// Rows of the first program: every 4th ms of the 60 ms before a target ...
+/// Rows of the first program: targets and every 4th ms of the 60 ms before them, of so many targets that it stays small.
 pub(super) const START_NEAR_MS: f64 = 60.0;
 const START_STRIDE_MS: f64 = 4.0;
-/// ... and no more than this, there and in any round.
+const START_ROWS: usize = 500;
+/// Rows of any later one.
 const MOST_ROWS: usize = 5000;
 /// A hinge is kept within this share of `theta_0` from its kink.
 const NEAR: f64 = 0.02;
+/// An objective below this share of that of no weights at all is 0: everything is met.
+const NOTHING: f64 = 1e-10;
 /// What the cone solver can do at best.
 const FINEST: f64 = 1e-12;
 /// Rounds end without a proof where the objective falls by less than this, relatively, and nothing else helps.
@@ -71,7 +74,7 @@ impl Problem {
     ) -> Result<Found> {
         let zero = self.point(objective, vec![0.0_f64.clamp(objective.lower, objective.upper); self.trains]);
         let scale = if zero.parts.sum() > 0.0 { 1.0 / zero.parts.sum() } else { 1.0 };
-        let mut accuracy = (0.01 * tolerance).min(1e-8);
+        let mut accuracy = (0.001 * tolerance).min(1e-9);
         let mut best = match start {
             Some(weights) => self.point(objective, weights),
             None => {
@@ -79,7 +82,8 @@ impl Problem {
                 self.better(objective, zero, answer.weights)
             }
         };
-        let (mut bound, mut rounds, near) = (f64::NEG_INFINITY, 0, NEAR * self.base.neuron.theta_0);
+        // No term of 6.14 is below 0.
+        let (mut bound, mut rounds, near) = (0.0_f64, 0, NEAR * self.base.neuron.theta_0);
         loop {
             rounds += 1;
             let states = self.states(&best, near);
@@ -94,7 +98,7 @@ impl Problem {
             let before = best.parts.sum();
             best = self.better(objective, best, answer.weights);
             let least = best.parts.sum();
-            let gap = (least - bound).max(0.0) / least.max(1e-12 / scale);
+            let gap = if least * scale <= NOTHING { 0.0 } else { (least - bound).max(0.0) / least };
             progress(Round { round: rounds, rows: kept.rows.len(), objective: least, gap });
             let stalled = before - least <= STALLED * least;
             if gap <= tolerance || (stalled && accuracy < FINEST) {
@@ -235,7 +239,7 @@ impl Problem {
     fn start(&self, objective: &Objective) -> Kept {
         let stride = (START_STRIDE_MS / self.base.neuron.step_ms).round().max(1.0) as usize;
         let of_a_target = self.silent.before_targets.iter().map(|r| r.len().div_ceil(stride)).max().unwrap_or(0) + 1;
-        let every = (self.targets.len() * of_a_target).div_ceil(MOST_ROWS).max(1);
+        let every = (self.targets.len() * of_a_target).div_ceil(START_ROWS).max(1);
         let mut rows = Vec::new();
         for before in self.silent.before_targets.iter().step_by(every) {
             rows.extend(before.clone().rev().step_by(stride).filter(|&row| self.silent.limit[row].is_finite()));
