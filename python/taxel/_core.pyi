@@ -156,7 +156,13 @@ def draw_scene(parts: tuple[Any, ...], seed: int, index: int, left_to_rest: bool
 def motion(json: str, step_us: float) -> tuple[NDArray[np.float32], NDArray[np.float32], _Contacts]: ...
 def truth(parts: tuple[Any, ...], preset: str, acts: list[_Act]) -> tuple[_Contacts, NDArray[np.float32]]: ...
 def play(
-    parts: tuple[Any, ...], preset: str, sensor: str, seed: int, acts: list[_Act], tare_ms: float
+    parts: tuple[Any, ...],
+    preset: str,
+    sensor: str,
+    seed: int,
+    acts: list[_Act],
+    tare_ms: float,
+    watch: Callable[[float], object],
 ) -> tuple[tuple[Any, ...], int, int]: ...
 def emulate(
     to: str,

@@ -140,3 +140,15 @@ def test_nonsense_gets_one_clear_line(wrong, error, said):
     with pytest.raises(error, match=said) as caught:
         wrong()
     assert "\n" not in str(caught.value)
+
+
+def test_what_watches_is_told_and_can_end_the_play():
+    shares = []
+    play([Silence(2_100.0)], seed=1, watch=shares.append)
+    assert shares == pytest.approx([1 / 2.1, 2 / 2.1], abs=1e-3)
+
+    def complain(_):
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        play([Silence(60_000.0)], seed=1, watch=complain)

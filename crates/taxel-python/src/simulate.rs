@@ -88,7 +88,10 @@ fn truth<'py>(
 
 /// Plays acts to a board that arms, is tared and starts; gives what a host decodes of its datagrams, and how many they
 /// were, with their words.
+///
+/// `watch` hears, once a second of the board's, what share is played; what it raises ends the play.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
 fn play<'py>(
     py: Python<'py>,
     parts: ArrayParts,
@@ -97,9 +100,11 @@ fn play<'py>(
     seed: u64,
     acts: Vec<ActIn<'py>>,
     tare_ms: f64,
+    watch: Py<PyAny>,
 ) -> PyResult<(EventsOut<'py>, u64, u64)> {
     let (array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
-    let (events, datagrams, words) = enter(py, |stop| {
+    let raised: Mutex<Option<PyErr>> = Mutex::new(None);
+    let played = enter(py, |stop| {
         let mut stage = ready(&array, registers, sensor, seed, &acts)?;
         let commands = session(&registers, tare_ms, stage.frames() as u64)?;
         let mut board = Board::new(registers, &array)?;
@@ -116,9 +121,21 @@ fn play<'py>(
         let mut first = vec![0; array.len()];
         stage.frame(&mut first)?;
         board.arm(&first)?;
-        board.play(|ticks| stage.frame(ticks), &commands, hear, stop)?;
+        let (frames, second) = (stage.frames(), (1e6 / registers.frame_us()) as usize);
+        let mut done = 0_usize;
+        let touch = |ticks: &mut [u16]| {
+            done += 1;
+            if done.is_multiple_of(second) {
+                tell(&raised, &watch, done as f64 / frames as f64);
+            }
+            stage.frame(ticks)
+        };
+        let ends = || stop.asked() || raised.lock().is_ok_and(|slot| slot.is_some());
+        board.play(touch, &commands, hear, Stop::when(&ends))?;
         Ok::<_, Error>((events, datagrams, words))
-    })?;
+    });
+    raised.into_inner().ok().flatten().map_or(Ok(()), Err)?;
+    let (events, datagrams, words) = played?;
     Ok((from_events(py, events), datagrams, words))
 }
 
@@ -144,13 +161,6 @@ fn emulate(
     let (array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
     let (to, control) = (address(to)?, control.map(address).transpose()?);
     let raised: Mutex<Option<PyErr>> = Mutex::new(None);
-    let tell = |callback: &Py<PyAny>, text: Option<String>| {
-        if let Err(error) = Python::attach(|py| callback.call1(py, (text,)).map(drop))
-            && let Ok(mut slot) = raised.lock()
-        {
-            slot.get_or_insert(error);
-        }
-    };
     let report = enter(py, |stop| {
         let mut stage = ready(&array, registers, sensor, seed, &acts)?;
         let commands = session(&registers, tare_ms, stage.frames() as u64)?;
@@ -160,7 +170,7 @@ fn emulate(
         board.arm(&first)?;
         let options = Options { control, commands, ..Options::to(to) };
         let mut emulator = Emulator::open(board, &array, options)?;
-        tell(&begun, emulator.control_address().map(|a| a.to_string()));
+        tell(&raised, &begun, emulator.control_address().map(|a| a.to_string()));
         let mut failed = Ok(());
         let mut touch = |ticks: &mut [u16]| {
             stage.frame(ticks).unwrap_or_else(|error| {
@@ -169,13 +179,22 @@ fn emulate(
             })
         };
         let ends = || stop.asked() || raised.lock().is_ok_and(|slot| slot.is_some());
-        let report = emulator.run(&mut touch, |report| tell(&watch, Some(json(report))), Stop::when(&ends))?;
+        let report = emulator.run(&mut touch, |report| tell(&raised, &watch, json(report)), Stop::when(&ends))?;
         failed?;
         Ok::<_, taxel_live::Error>(json(&report))
     })?;
     match raised.into_inner() {
         Ok(Some(error)) => Err(error),
         _ => Ok(report),
+    }
+}
+
+/// Calls a Python function; what it raises is kept, the first of all.
+fn tell<'a>(raised: &Mutex<Option<PyErr>>, callback: &Py<PyAny>, said: impl for<'py> IntoPyObject<'py> + 'a) {
+    if let Err(error) = Python::attach(|py| callback.call1(py, (said,)).map(drop))
+        && let Ok(mut slot) = raised.lock()
+    {
+        slot.get_or_insert(error);
     }
 }
 

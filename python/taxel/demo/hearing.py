@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,9 +71,14 @@ class Hearing:
         return float(told[-1]) if len(told) else None
 
 
-def hear(acts: Sequence[Act], readout: Readout, *, seed: int) -> Hearing:
-    """Play acts as fast as the board goes, and listen to what a host decodes of its datagrams."""
-    return listen(play(acts, seed=seed).events, acts, readout)
+def hear(
+    acts: Sequence[Act], readout: Readout, *, seed: int, watch: Callable[[float], object] = lambda _: None
+) -> Hearing:
+    """Play acts as fast as the board goes, and listen to what a host decodes of its datagrams.
+
+    `watch` is told which share is played.
+    """
+    return listen(play(acts, seed=seed, watch=watch).events, acts, readout)
 
 
 def listen(events: Events, acts: Sequence[Act], readout: Readout, found: Detections | None = None) -> Hearing:

@@ -144,6 +144,7 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
         goals=GOALS,
         within={label: _share(hearing.judged.within_goal(label)) for label in LABELS},
         guesses=GUESSES,
+        losses=_losses(material),
         live=material.live,
         footfall_note=material.footfall_note,
         written=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
@@ -198,6 +199,26 @@ def _split(hearing: Hearing) -> dict[str, dict[str, float]]:
                 zip(("physics", "kernel", "frame", "host"), medians.tolist(), strict=True)
             )
     return split
+
+
+def _losses(material: Material) -> list[tuple[str, int]]:
+    """Return where something could be lost, and how much was: the sender's own count first."""
+    if material.counters is None or material.emulator is None:
+        return []
+    capture, wire = material.counters["capture"], material.counters["wire"]
+    return [
+        ("datagrams that the board sent", material.emulator["datagrams"]),
+        ("datagrams that arrived", capture["datagrams"]),
+        ("messages dropped by the kernel", capture["dropped_by_kernel"]),
+        ("datagrams dropped by the queue", capture["dropped_by_queue"]),
+        ("changes dropped by the board's queue", material.emulator["dropped"]),
+        ("bytes skipped", wire["skipped"]),
+        ("words short, contradictory or outside", wire["short"] + wire["contradictory"] + wire["outside"]),
+        ("intensities without their change", wire["unpaired"]),
+        ("events", material.counters["events"]),
+        ("events dropped before the readout", material.counters["events_dropped"]),
+        ("events that came after the readout's time", material.counters["late"]),
+    ]
 
 
 def _table(judged: Judged) -> list[dict[str, str]]:

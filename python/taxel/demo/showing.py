@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 from rich.live import Live as Drawing
-from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from taxel._core import ProblemError
@@ -138,15 +138,17 @@ def _noise(seconds: float) -> list[Act]:
 
 
 def _busy(console: Console, said: str) -> Progress:
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
     bar.add_task(said, total=None)
     return bar
 
 
 def _hear(console: Console, said: str, acts: Sequence[Act], readout: Readout, seed: int) -> Hearing:
-    with _busy(console, said):
-        return hear(acts, readout, seed=seed)
+    with _busy(console, said) as bar:
+        return hear(
+            acts, readout, seed=seed, watch=lambda share: bar.update(bar.task_ids[0], completed=share, total=1.0)
+        )
 
 
 def _say(console: Console, hearing: Hearing, quiet: Hearing) -> None:

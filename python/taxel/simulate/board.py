@@ -130,6 +130,7 @@ def play(
     tare_ms: float = 50.0,
     array: Array | None = None,
     sensor: Mapping[str, float] | None = None,
+    watch: Callable[[float], object] = lambda _: None,
 ) -> Played:
     """Let an emulated board feel acts, as fast as it goes, and decode its datagrams.
 
@@ -148,6 +149,8 @@ def play(
     sensor : mapping, optional
         What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm, gain_spread,
         offset_mv, noise_ticks.
+    watch : function, optional
+        Called with the share that is played, once a second of the board's time.
 
     Raises
     ------
@@ -168,6 +171,7 @@ def play(
         whole("seed", seed, 0),
         parts,
         number("tare_ms", tare_ms),
+        watch,
     )
     return Played(Events._from_parts(events), datagrams, words)
 
