@@ -199,6 +199,12 @@ def test_an_encoder_comes_back_from_json(encoder):
     assert (again == 5) is False
 
 
+def test_a_tare_given_later_is_as_good_as_one_given_at_once():
+    for encoder in ENCODERS.values():
+        assert encoder.with_tare(rest(ARRAY)) == encoder
+    assert ContactArea(levels=[1, 2, 4, 8]).with_tare(rest(ARRAY)) == ENCODERS["area"]
+
+
 @each_encoder
 def test_an_encoder_says_its_trains_as_its_spikes_have_them(encoder):
     spikes = encoder.encode(touch(np.random.default_rng(16), ARRAY))
@@ -297,6 +303,8 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
         (lambda: ContactArea().encode(Frames(np.zeros((1, 3, 4)), [0])), "without a tare"),
         (lambda: ContactArea().stream(ARRAY), "without a tare"),
         (lambda: ENCODERS["area"].encode(Frames(np.zeros((1, 4, 3)), [0])), "tare of 3 x 4 taxels"),
+        (lambda: FA1().with_tare(5), "tare is 5"),
+        (lambda: ContactArea().with_tare(None), "tare is None"),
         (lambda: Encoder.from_json("{"), "encoder: not JSON"),
         (lambda: Encoder.from_json("[]"), r"encoder is \[\]: must be an object"),
         (lambda: Encoder.from_json("{}"), "without a name: must be one of change_events"),
