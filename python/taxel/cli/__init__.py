@@ -78,6 +78,7 @@ for _command in (
 ):
     import_module(f"taxel.cli.{_command}")
 # Each registers itself with `app`, so they stand at the end.
+# They stand at the end because each registers itself with `app`; one line for all.
 from taxel.cli import (  # noqa: E402
     bench,  # noqa: F401
     convert,  # noqa: F401
@@ -86,4 +87,12 @@ from taxel.cli import (  # noqa: E402
     info,  # noqa: F401
     live,  # noqa: F401
     record,  # noqa: F401
+    detect,  # noqa: F401
+    emulate,  # noqa: F401
+    encode,  # noqa: F401
+    info,  # noqa: F401
+    live,  # noqa: F401
+    record,  # noqa: F401
+    study,  # noqa: F401
+    train,  # noqa: F401
 )

@@ -1,0 +1,102 @@
+"""Pieces of walking as spikes: what a neuron is trained and judged on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.spikes import SpikeTrains
+
+__all__ = ["Piece", "joined"]
+
+#: No piece is cut nearer than this to a reference event, ms: the spikes that tell of an event stay with it.
+CLEAR_MS = 100.0
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Hold the spikes of one foot for a while, and what happened.
+
+    Attributes
+    ----------
+    name : str
+        Of the footfall or recording.
+    unit : str
+        The foot that results are summed for: "subj003", "GaCo02 left".
+    person, group : str
+    spikes : SpikeTrains
+        Unsigned trains; time counts from the piece's start.
+    truth : mapping from event to float64 times, ms
+        From the piece's start.
+    scored : (float, float), ms
+        Where the truth is complete.
+    sums : mapping from name to (times ms, values)
+        Running sums over the sensors, for the plain rules.
+    """
+
+    name: str
+    unit: str
+    person: str
+    group: str
+    spikes: SpikeTrains
+    truth: Mapping[str, NDArray[np.float64]]
+    scored: tuple[float, float]
+    sums: Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = field(default_factory=dict)
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, ms."""
+        return self.spikes.stop - self.spikes.start
+
+    def between(self, start: float, stop: float) -> Piece:
+        """Return a part, its time counted from its own start; both ends move on until no event is within 0.1 s."""
+        start, stop = (self._clear(t) for t in (max(start, 0.0), min(stop, self.duration)))
+        part = self.spikes.between(start, stop)
+        return replace(
+            self,
+            spikes=SpikeTrains(part.times - start, part.offsets, 0.0, stop - start),
+            truth={e: t[(t >= start) & (t < stop)] - start for e, t in self.truth.items()},
+            scored=(max(self.scored[0] - start, 0.0), min(self.scored[1], stop) - start),
+            sums={
+                name: (t[(t >= start) & (t < stop)] - start, values[(t >= start) & (t < stop)])
+                for name, (t, values) in self.sums.items()
+            },
+        )
+
+    def _clear(self, t: float) -> float:
+        if not 0 < t < self.duration:
+            return t
+        for event in np.sort(np.concatenate([np.empty(0), *self.truth.values()])):
+            if abs(event - t) < CLEAR_MS:
+                t = min(float(event) + CLEAR_MS, self.duration)
+        return t
+
+
+def joined(pieces: Sequence[Piece], name: str = "") -> Piece:
+    """Put pieces into one row, one after the other.
+
+    Times of spikes, events and sums move on by what lies before; the whole row is scored.
+    """
+    starts = np.concatenate([[0.0], np.cumsum([p.duration for p in pieces])])
+    times = np.concatenate([p.spikes.times + s for p, s in zip(pieces, starts, strict=False)])
+    trains = np.concatenate([np.repeat(np.arange(len(p.spikes)), p.spikes.counts) for p in pieces])
+    order = np.argsort(trains, kind="stable")
+    counts = np.sum([p.spikes.counts for p in pieces], axis=0)
+    first = pieces[0]
+    return replace(
+        first,
+        name=name or first.unit,
+        spikes=SpikeTrains(times[order], np.concatenate([[0], np.cumsum(counts)]), 0.0, float(starts[-1])),
+        truth={e: np.concatenate([p.truth[e] + s for p, s in zip(pieces, starts, strict=False)]) for e in first.truth},
+        scored=(0.0, float(starts[-1])),
+        sums={
+            name: (
+                np.concatenate([p.sums[name][0] + s for p, s in zip(pieces, starts, strict=False)]),
+                np.concatenate([p.sums[name][1] for p in pieces]),
+            )
+            for name in first.sums
+        },
+    )

@@ -1,0 +1,473 @@
+"""The study itself: what is run, in which folds, and what it comes to."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taxel import encode, formats, learn
+from taxel._core import FormatError, ProblemError
+from taxel.studies.gait import folds, insole, pieces, rules, sources
+from taxel.studies.gait import realise as realisation
+from taxel.studies.gait.folds import Scope
+from taxel.studies.gait.pieces import Piece
+from taxel.studies.gait.realise import TEST, Setting, realise
+from taxel.studies.gait.recipes import ENCODERS, NOTES, PRINTED, RULE_ENCODERS, SEARCH, TONIC, Point
+from taxel.studies.gait.rules import RULES
+from taxel.studies.gait.sources import SOURCES, encoded, fingerprint, present
+from taxel.studies.runner import Results, Task, code_digest, run
+
+__all__ = ["PROTOCOLS", "ROWS", "Outcome", "Protocol", "Unit", "study"]
+
+#: The three rows of the study, and what stands beside them.
+ROWS = {
+    "notes": "the notes' recipe (tuned on the shared people)",
+    "chosen": "parameters chosen inside the training folds",
+    "printed": "Table 6.2 as printed",
+    "tonic": "the notes' recipe with tonic inputs (extension)",
+    "others": "the notes' recipe, insole placed by other people's mean",
+    **{f"rule: {name}": f"plain rule: {text}" for name, text in RULES.items()},
+    **{f"encoder: {name}": f"encoder: {name}" for name in ENCODERS},
+}
+
+
+#: What a realisation uses.
+_CODE = (sources, insole, pieces, folds, realisation, rules, formats, encode, learn)
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """Say how a source is split and what is run on it.
+
+    Attributes
+    ----------
+    name, title : str
+    split : str
+        "people", "footfalls", "time" or "pieces".
+    folds : int
+    repeats : int
+        Of random splits.
+    rows : tuple of str
+        Of `ROWS`; "rules" and "encoders" stand for all of theirs.
+    train, search : dict
+        How much each piece or person trains, in the folds and inside them: ``seconds`` or ``count``.
+    """
+
+    name: str
+    title: str
+    split: str
+    folds: int
+    rows: tuple[str, ...]
+    train: Mapping[str, int]
+    search: Mapping[str, int]
+    repeats: int = 1
+
+    def scopes(self, all_pieces: Sequence[Piece]) -> list[Scope]:
+        """Split pieces as this protocol says."""
+        if self.split == "people":
+            return folds.by_person(all_pieces, self.folds, seed=1)
+        if self.split == "footfalls":
+            return folds.by_count(all_pieces, self.folds, self.repeats, seed=1)
+        if self.split == "time":
+            return folds.by_time(all_pieces, self.folds)
+        return folds.by_piece(all_pieces)
+
+
+PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
+    "plate": (
+        Protocol(
+            "people left out",
+            "each person is tested by what five others trained",
+            "people",
+            6,
+            ("notes", "chosen", "printed", "others", "rules"),
+            {"count": 40},
+            {"count": 20},
+        ),
+        Protocol(
+            "own footfalls",
+            "40 of a person's 60 footfalls train, 20 test; every footfall is tested once a split",
+            "footfalls",
+            3,
+            ("notes", "chosen", "printed"),
+            {"count": 60},
+            {"count": 60},
+        ),
+        Protocol(
+            "encoders compared",
+            "two people are tested by what four others trained; each encoder has the same number of points",
+            "people",
+            3,
+            ("encoders",),
+            {"count": 30},
+            {"count": 20},
+        ),
+    ),
+    "gaitpdb": (
+        Protocol(
+            "people left out",
+            "four folds by person, half healthy, half patients",
+            "people",
+            4,
+            ("notes", "chosen", "printed", "tonic", "rules"),
+            {"seconds": 30},
+            {"seconds": 15},
+        ),
+    ),
+    "gaitndd": (
+        Protocol(
+            "people left out",
+            "four folds by person, healthy people and patients spread",
+            "people",
+            4,
+            ("notes", "chosen", "printed", "rules"),
+            {"seconds": 120},
+            {"seconds": 60},
+        ),
+        Protocol(
+            "time within a person",
+            "four folds by time within each person (6.5.3)",
+            "time",
+            4,
+            ("notes", "chosen"),
+            {"seconds": 300},
+            {"seconds": 300},
+        ),
+    ),
+    "moticon": (
+        Protocol(
+            "one recording trains, the other tests",
+            "two recordings of one person",
+            "pieces",
+            2,
+            ("notes", "rules"),
+            {"seconds": 60},
+            {"seconds": 60},
+        ),
+    ),
+    "pedar": (
+        Protocol(
+            "one foot trains, the other tests",
+            "two feet of one person",
+            "pieces",
+            2,
+            ("notes", "rules"),
+            {"seconds": 60},
+            {"seconds": 60},
+        ),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What was found at one foot in one fold."""
+
+    name: str
+    person: str
+    group: str
+    events: int
+    false: int
+    minutes: float
+    errors: tuple[float, ...]
+    delays: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One row of the study: a source, a protocol, an event, a row's name, and every foot.
+
+    Attributes
+    ----------
+    points : list
+        The parameters of each fold, where they were chosen inside.
+    seconds : float
+        CPU time of the folds' own fits.
+    """
+
+    source: str
+    protocol: str
+    event: str
+    row: str
+    units: tuple[Unit, ...]
+    points: list[Any] = field(default_factory=list)
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """Everything that one source and protocol ask for."""
+
+    source: str
+    protocol: Protocol
+    scopes: list[Scope]
+    common: dict[str, Any]
+    testing: bool
+
+    def outer(self, scope: Scope) -> Iterator[list[int]]:
+        """Give the groups that each fold leaves out; none where another folder is judged."""
+        if self.testing:
+            yield []
+        else:
+            yield from ([g] for g in range(len(scope.groups)))
+
+    def inner(self, scope: Scope, left_out: list[int]) -> list[tuple[int, list[int]]]:
+        """List what chooses inside a fold: the group that is looked at, and what its fit leaves out."""
+        others = [g for g in range(len(scope.groups)) if g not in left_out]
+        return [(g, sorted([*left_out, g])) for g in others]
+
+    def neuron(self, scope: Scope, left_out: list[int], event: str, point: Point, *, inside: bool = False) -> Task:
+        """Name a neuron's fit."""
+        train = self.protocol.search if inside else self.protocol.train
+        params = {"kind": "neuron", "left_out": left_out, "event": event, "point": point, "train": dict(train)}
+        return Task(self.common | params | {"scope": scope.name, "placed": "own"}, seed=1)
+
+    def rule(self, scope: Scope, left_out: list[int], event: str, rule: str) -> Task:
+        """Name a plain rule's choice."""
+        encoder = RULE_ENCODERS[self.source][event]
+        params = {"kind": "rule", "left_out": left_out, "event": event, "rule": rule, "encoder": encoder}
+        train = dict(self.protocol.train)
+        return Task(self.common | params | {"scope": scope.name, "placed": "own", "train": train}, seed=1)
+
+
+def study(
+    data: Path,
+    test: Path | None = None,
+    *,
+    size: str = "full",
+    jobs: int = 1,
+    report: Path,
+    only: Sequence[str] = (),
+    quiet: bool = False,
+) -> dict[str, Any]:
+    """Run the gait study on a folder of recordings; what is in `report` from before is not run again.
+
+    Parameters
+    ----------
+    data : Path
+        Holds any of the sources' folders; those that are absent are skipped and said.
+    test : Path, optional
+        Other people: everything is trained on `data` and judged there, instead of by folds.
+    size : {"full", "toy"}
+    jobs : int
+        Processes.
+    report : Path
+        Folder for results (JSON lines), folds, and the report.
+    only : sequence of str
+        Sources to run; all that are there where it is empty.
+    quiet : bool
+        No progress lines.
+
+    Returns
+    -------
+    dict
+        As `report.summary` gives it, and as ``gait.json`` holds it.
+
+    Raises
+    ------
+    FormatError : `data` or `test` holds no source
+    ProblemError : a size or source that is none
+    """
+    from taxel.studies.gait.report import summary, write_report  # noqa: PLC0415  jinja2 and matplotlib load slowly
+
+    if size not in {"full", "toy"}:
+        raise ProblemError(f"size is {size!r}: must be full or toy")
+    unknown = [name for name in only if name not in SOURCES]
+    if unknown:
+        raise ProblemError(f"source {unknown[0]!r}: must be one of {', '.join(SOURCES)}")
+    folders = _sources(data, only)
+    tests = {} if test is None else _sources(test, only)
+    wanted = [name for name in SOURCES if name in folders and (test is None or name in tests)]
+    report.mkdir(parents=True, exist_ok=True)
+    plans = [plan for name in wanted for plan in _plans(name, folders[name], tests.get(name), size)]
+    _write_folds(report / "folds.json", plans)
+    setting = Setting(folders, tests, {f"{p.source}/{p.protocol.name}": p.scopes for p in plans})
+    results = Results(report / "results.jsonl", code_digest(_CODE))
+    call = partial(realise, setting=setting)
+    outcomes = []
+    for plan in plans:
+        title = f"{plan.source}, {plan.protocol.name}"
+        run(call, _first(plan, size), results, jobs=jobs, title=title, quiet=quiet)
+        run(call, _second(plan, size, results), results, jobs=jobs, title=f"{title}: chosen", quiet=quiet)
+        outcomes += _outcomes(plan, size, results)
+    skipped = [SOURCES[n].folder for n in SOURCES if n not in wanted and (not only or n in only)]
+    said = summary(
+        outcomes, plans=[(p.source, p.protocol) for p in plans], skipped=skipped, size=size, test=test is not None
+    )
+    write_report(report, said)
+    return said
+
+
+def _sources(folder: Path, only: Sequence[str]) -> dict[str, Path]:
+    if not folder.is_dir():
+        raise FileNotFoundError(2, "No such folder", str(folder))
+    found = {name: place for name, place in present(folder).items() if not only or name in only}
+    if not found:
+        names = ", ".join(SOURCES[name].folder for name in (only or SOURCES))
+        raise FormatError(f"{folder}: holds no recordings; must have one or more of the folders {names}")
+    return found
+
+
+def _plans(name: str, folder: Path, test: Path | None, size: str) -> Iterator[_Plan]:
+    encoder = next(iter(NOTES[name].values()))["encoder"]
+    all_pieces = list(encoded(folder, name, encoder).pieces.values())
+    data = [fingerprint(folder, name)] + ([fingerprint(test, name)] if test else [])
+    for protocol in PROTOCOLS[name]:
+        if test and protocol.split != "people":
+            continue
+        if size == "toy" and protocol.name != "people left out":
+            continue
+        scopes = [s for s in protocol.scopes(all_pieces) if len(s.groups) > (0 if test else 1)]
+        plain = json.dumps(folds.to_json(scopes))
+        common = {
+            "source": name,
+            "protocol": protocol.name,
+            "data": data,
+            "folds": hashlib.sha256(plain.encode()).hexdigest()[:16],
+        }
+        yield _Plan(name, protocol, scopes, common, test is not None)
+
+
+def _write_folds(path: Path, plans: Sequence[_Plan]) -> None:
+    """Write who is trained on and tested, so that other learners can be judged on the same."""
+    said = {f"{p.source}/{p.protocol.name}": folds.to_json(p.scopes) for p in plans}
+    part = path.with_suffix(".part")
+    part.write_text(json.dumps(said, indent=1) + "\n", encoding="utf-8")
+    part.replace(path)
+
+
+def _points(plan: _Plan, event: str, row: str, size: str) -> list[Point]:
+    """Return the points of a row: one, or those that it may choose from."""
+    few = slice(2) if size == "toy" else slice(None)
+    if row == "chosen":
+        return SEARCH[plan.source][event][few]
+    if row.startswith("encoder: "):
+        return ENCODERS[row.removeprefix("encoder: ")][event][few]
+    return [{"notes": NOTES, "others": NOTES, "printed": PRINTED, "tonic": TONIC}[row][plan.source][event]]
+
+
+def _rows(plan: _Plan, event: str) -> list[str]:
+    rows: list[str] = []
+    for row in plan.protocol.rows:
+        if row == "rules":
+            rows += [f"rule: {r}" for r in RULES if r != "sum" or event in SOURCES[plan.source].sums]
+        elif row == "encoders":
+            rows += [f"encoder: {name}" for name in ENCODERS]
+        elif row != "tonic" or event in TONIC.get(plan.source, {}):
+            rows.append(row)
+    return rows
+
+
+def _chooses(row: str) -> bool:
+    return row == "chosen" or row.startswith("encoder: ")
+
+
+def _fixed(plan: _Plan, scope: Scope, left_out: list[int], event: str, row: str, size: str) -> Task:
+    """Name the task of a row that chooses nothing between neurons."""
+    if row.startswith("rule: "):
+        return plan.rule(scope, left_out, event, row.removeprefix("rule: "))
+    task = plan.neuron(scope, left_out, event, _points(plan, event, row, size)[0])
+    return Task(task.params | {"placed": "others"}, task.seed) if row == "others" else task
+
+
+def _each(plan: _Plan) -> Iterator[tuple[Scope, str, str]]:
+    for event in SOURCES[plan.source].events:
+        for row in _rows(plan, event):
+            for scope in plan.scopes:
+                yield scope, event, row
+
+
+def _first(plan: _Plan, size: str) -> list[Task]:
+    """List everything that needs no choice: fixed rows, and the fits inside the folds."""
+    tasks = []
+    for scope, event, row in _each(plan):
+        for left_out in plan.outer(scope):
+            if not _chooses(row):
+                tasks.append(_fixed(plan, scope, left_out, event, row, size))
+                continue
+            for point in _points(plan, event, row, size):
+                tasks += [plan.neuron(scope, out, event, point, inside=True) for _, out in plan.inner(scope, left_out)]
+    return sorted({t.key(""): t for t in tasks}.values(), key=_by_encoder)
+
+
+def _by_encoder(task: Task) -> str:
+    """Order tasks so that one encoding serves many of them in a row."""
+    encoder = task.params["point"]["encoder"] if task.params["kind"] == "neuron" else task.params["encoder"]
+    return json.dumps([task.params["placed"], encoder, task.params["event"]])
+
+
+def _second(plan: _Plan, size: str, results: Results) -> list[Task]:
+    """List the folds' own fits with what was chosen inside."""
+    tasks = [
+        plan.neuron(scope, left_out, event, _chosen(plan, scope, left_out, event, row, size, results))
+        for scope, event, row in _each(plan)
+        if _chooses(row)
+        for left_out in plan.outer(scope)
+    ]
+    return sorted({t.key(""): t for t in tasks}.values(), key=_by_encoder)
+
+
+def _chosen(plan: _Plan, scope: Scope, left_out: list[int], event: str, row: str, size: str, results: Results) -> Point:
+    """Choose by missed + false inside the training folds first, then by root mean square error."""
+    best: tuple[tuple[float, float], Point] | None = None
+    for point in _points(plan, event, row, size):
+        wrong, errors = 0, []
+        for group, out in plan.inner(scope, left_out):
+            tested = results[plan.neuron(scope, out, event, point, inside=True)]["tested"]
+            for unit in tested[str(group)].values():
+                wrong += unit["events"] - len(unit["errors"]) + unit["false"]
+                errors += unit["errors"]
+        quality = (float(wrong), float(np.sqrt(np.mean(np.square(errors)))) if errors else float("inf"))
+        if best is None or quality < best[0]:
+            best = (quality, point)
+    if best is None:
+        raise ProblemError(f"{plan.source}, {event}: no point to choose from")
+    return best[1]
+
+
+def _outcomes(plan: _Plan, size: str, results: Results) -> list[Outcome]:
+    found: dict[tuple[str, str], Outcome] = {}
+    for scope, event, row in _each(plan):
+        units, points, tasks = [], [], []
+        for left_out in plan.outer(scope):
+            if _chooses(row):
+                point = _chosen(plan, scope, left_out, event, row, size, results)
+                points.append(point)
+                task = plan.neuron(scope, left_out, event, point)
+            else:
+                task = _fixed(plan, scope, left_out, event, row, size)
+                if row.startswith("rule: "):
+                    points.append(results[task]["fit"])
+            tasks.append(task)
+            for group in [TEST] if plan.testing else [str(g) for g in left_out]:
+                for name, unit in results[task]["tested"][group].items():
+                    units.append(
+                        Unit(
+                            name,
+                            unit["person"],
+                            unit["group"],
+                            unit["events"],
+                            unit["false"],
+                            unit["minutes"],
+                            tuple(unit["errors"]),
+                            tuple(unit["delays"]),
+                        )
+                    )
+        before = found.get((event, row))
+        found[event, row] = Outcome(
+            plan.source,
+            plan.protocol.name,
+            event,
+            row,
+            (*(before.units if before else ()), *units),
+            [*(before.points if before else []), *points],
+            (before.seconds if before else 0.0) + results.seconds(tasks),
+        )
+    return list(found.values())

@@ -1,0 +1,294 @@
+"""The recordings of the study: where each lies, what its truth can show, and its pieces as spikes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import taxel.encode
+from taxel import formats
+from taxel.array import Array
+from taxel.formats import Trial
+from taxel.frames import Frames
+from taxel.studies.gait import insole
+from taxel.studies.gait.pieces import Piece
+
+__all__ = ["SOURCES", "Source", "encoder_of", "fingerprint", "present", "trials_of"]
+
+#: Silence before each footfall of the plate, ms: random, so that no cut marks time.
+SILENCE_MS = (300, 900)
+#: A footfall's piece ends so long after foot-off, ms; the encoder and the delay have spoken by then.
+TAIL_MS = 100
+#: How long a row of footfalls stays silent at its end, ms.
+END_MS = 500
+
+
+@dataclass(frozen=True)
+class Source:
+    """Describe one set of recordings.
+
+    Attributes
+    ----------
+    folder : str
+        Its name under the study's data folder.
+    events : tuple of str
+    truth, shows : str
+        Where the truth comes from; what it can and cannot show.
+    sums : mapping from event to name of a sum
+        Whose threshold is a plain rule of its own; none where the sum is the truth.
+    """
+
+    name: str
+    folder: str
+    title: str
+    events: tuple[str, ...]
+    truth: str
+    shows: str
+    sums: Mapping[str, str]
+    by_minute: bool = True
+
+
+SOURCES = {
+    source.name: source
+    for source in (
+        Source(
+            "plate",
+            "plate",
+            "Footfalls on a plate, cut to an insole of 92 taxels",
+            ("contact", "heel_off", "foot_off"),
+            "The full plate itself: contact and foot-off are its first and last loaded frame (2 ms), heel-off the fall "
+            "of the heel region below 5 % of its own peak.",
+            "Whether 92 taxels without a view of the future find what the whole plate shows in hindsight. Not the "
+            "ground: the plate starts itself, so contact can never be early, and a sum over all taxels is near perfect "
+            "by construction. The placement looks at the first loaded frame and at the person's other footfalls.",
+            {"heel_off": "heel"},
+            by_minute=False,
+        ),
+        Source(
+            "gaitpdb",
+            "insole_gaitpdb",
+            "Continuous walking, 8 force sensors a foot (PhysioNet gaitpdb)",
+            ("contact", "foot_off"),
+            "The foot's own total force: contact above 50 N, foot-off below 25 N (100 Hz).",
+            "Contact and off in real walking with turns, healthy and sick, to within a sample of 10 ms. Not the true "
+            "time at the ground. The truth is a threshold on the sum of the inputs, so a counter or a sum can be near "
+            "perfect.",
+            {},
+        ),
+        Source(
+            "gaitndd",
+            "insole_gaitndd",
+            "Five minutes of walking, one channel, left foot (PhysioNet gaitndd)",
+            ("contact", "foot_off"),
+            "Step times of the data's authors, derived from this very channel (300 Hz).",
+            "Timing against step times that somebody else derived; not against the ground, and not independent of the "
+            "channel. Turns and long pauses are in it.",
+            {},
+        ),
+        Source(
+            "moticon",
+            "insole_moticon",
+            "Moticon insoles, one person, 32 steps",
+            ("contact", "foot_off"),
+            "The maker's step finder: neither the first nor the last loaded frame (100 Hz).",
+            "That the way works; 14 to 18 footfalls cannot train much.",
+            {"contact": "total", "foot_off": "total"},
+        ),
+        Source(
+            "pedar",
+            "pressure_formats",
+            "novel pedar insoles, 2 x 99 sensors, one person, 17 steps",
+            ("contact", "foot_off"),
+            "The insole's own sum, 10 % of its largest: it has no truth of its own (100 Hz).",
+            "That the way works on the nearest thing to the thesis' insole; 8 footfalls cannot train 198 weights.",
+            {},
+        ),
+    )
+}
+
+
+def present(folder: Path) -> dict[str, Path]:
+    """Find which sources a data folder holds.
+
+    Returns
+    -------
+    dict from source name to its folder
+    """
+    found = {}
+    for source in SOURCES.values():
+        place = folder / source.folder
+        if place.is_dir() and formats.FORMATS[source.name].files(place):
+            found[source.name] = place
+    return found
+
+
+def fingerprint(folder: Path, name: str) -> str:
+    """Return a short digest of a source's files: names, sizes and contents."""
+    digest = hashlib.sha256()
+    files = formats.FORMATS[name].files(folder)
+    beside = [f for f in sorted(folder.iterdir()) if f.suffix in {".csv", ".let", ".ts"}]
+    for file in [*files, *beside]:
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def encoder_of(said: Mapping[str, Any]) -> Any:
+    """Build an encoder from its class name and parameters: ``{"class": "LevelCrossing", "levels": [5.0]}``."""
+    parameters = dict(said)
+    return getattr(taxel.encode, parameters.pop("class"))(**parameters)
+
+
+@dataclass(frozen=True)
+class Encoded:
+    """Pieces of a source, and what the encoder costs.
+
+    Attributes
+    ----------
+    pieces : dict of Piece by name
+    latency_ms : float
+    levels : int
+        How many levels a sensor has, so that trains can be told apart; 1 where the encoder has none.
+    """
+
+    pieces: dict[str, Piece]
+    latency_ms: float
+    levels: int
+
+
+def encoded(folder: Path, name: str, encoder: Mapping[str, Any], placed: str = "own") -> Encoded:
+    """Return a source's pieces as one encoder tells them; kept in memory, as many fits ask for the same.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        Of `SOURCES`.
+    encoder : mapping
+        As `encoder_of` takes it.
+    placed : {"own", "others"}
+        Whose footfalls tell the insole's size and toe-out on the plate: the person's other ones, or other people's.
+    """
+    return _encoded(folder, name, json.dumps(encoder, sort_keys=True), placed)
+
+
+@lru_cache(maxsize=12)
+def _encoded(folder: Path, name: str, encoder: str, placed: str) -> Encoded:
+    said = json.loads(encoder)
+    built = encoder_of(said)
+    make = _footfalls if name == "plate" else _walks
+    pieces = {p.name: p for p in make(folder, name, built, placed)}
+    return Encoded(pieces, float(built.latency_ms), len(said.get("levels", [0])))
+
+
+@lru_cache(maxsize=4)
+def trials_of(folder: Path, name: str) -> tuple[Trial, ...]:
+    """Read a source's trials that have a truth, once."""
+    return tuple(t for t in formats.FORMATS[name].trials(folder) if any(len(times) for times in t.truth.values()))
+
+
+def _walks(folder: Path, name: str, encoder: Any, _placed: str) -> list[Piece]:
+    found = []
+    for trial in trials_of(folder, name):
+        start, stop = (float(t) / 1000 for t in (trial.frames.t[0], trial.frames.t[-1]))
+        spikes = encoder.encode(trial.frames).split_by_sign()
+        spikes = _moved(spikes, -start, stop - start)
+        assert trial.scored is not None
+        found.append(
+            Piece(
+                name=trial.name,
+                unit=trial.name,
+                person=trial.person,
+                group=trial.group,
+                spikes=spikes,
+                truth={e: times / 1000 - start for e, times in trial.truth.items()},
+                scored=(trial.scored[0] / 1000 - start, trial.scored[1] / 1000 - start),
+                sums={name: (trial.frames.t / 1000 - start, column) for name, column in trial.series.items()},
+            )
+        )
+    return found
+
+
+def _footfalls(folder: Path, name: str, encoder: Any, placed: str) -> list[Piece]:
+    cuts = _cuts(folder, name, placed)
+    found = []
+    for person in dict.fromkeys(c.person for c in cuts):
+        found += _row([c for c in cuts if c.person == person], encoder)
+    return found
+
+
+def _row(cuts: list[_Cut], encoder: Any) -> list[Piece]:
+    """Encode a person's footfalls as one row with random silences, and take it apart again into pieces."""
+    rng = np.random.default_rng([int.from_bytes(hashlib.sha256(cuts[0].person.encode()).digest()[:4])])
+    order = rng.permutation(len(cuts))
+    step = formats.plate.FRAME_US // 1000
+    silences = rng.integers(SILENCE_MS[0] // step, SILENCE_MS[1] // step + 1, len(cuts)) * step
+    lengths = np.array([(len(c.values) - 1) * step for c in cuts])
+    begins = np.cumsum(silences + np.concatenate([[0], lengths[order][:-1]]))
+    values = np.zeros(((int(begins[-1] + lengths[order[-1]]) + END_MS) // step, insole.TAXELS), np.float32)
+    for at, k in zip(begins, order, strict=True):
+        values[at // step : at // step + len(cuts[k].values)] = cuts[k].values
+    t = np.arange(len(values)) * formats.plate.FRAME_US
+    frames = Frames(values[:, None, :], t, unit="counts", array=Array(1, insole.TAXELS, name="insole"))
+    spikes = encoder.encode(frames).split_by_sign()
+    total, heel = values.sum(axis=1, dtype=np.float64), values[:, insole.HEEL].sum(axis=1, dtype=np.float64)
+    found = []
+    for at, silence, k in zip(begins, silences, order, strict=True):
+        start, stop = float(at - silence), float(at + lengths[k])
+        if at > silences[0]:  # the tail of the footfall before belongs to it
+            start += TAIL_MS
+        stop += TAIL_MS
+        rows = slice(int(start) // step, int(stop) // step)
+        part = spikes.between(start, stop)
+        found.append(
+            Piece(
+                name=cuts[k].name,
+                unit=cuts[k].person,
+                person=cuts[k].person,
+                group="healthy",
+                spikes=_moved(part, -start, stop - start),
+                truth={e: times + at - start for e, times in cuts[k].truth.items()},
+                scored=(0.0, stop - start),
+                sums={"total": (t[rows] / 1000 - start, total[rows]), "heel": (t[rows] / 1000 - start, heel[rows])},
+            )
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """One footfall as the insole feels it; truth in ms from its first frame."""
+
+    name: str
+    person: str
+    values: NDArray[np.float32]
+    truth: dict[str, NDArray[np.float64]]
+
+
+@lru_cache(maxsize=4)
+def _cuts(folder: Path, name: str, placed: str) -> tuple[_Cut, ...]:
+    """Cut every footfall; two passes over the files, as all pictures together would not fit in memory."""
+    prints = {t.name: (t.person, insole.footprint(t)) for t in formats.FORMATS[name].trials(folder)}
+    found = []
+    for trial in formats.FORMATS[name].trials(folder):
+        person, own = prints[trial.name]
+        others = [
+            f
+            for other, (whose, f) in prints.items()
+            if other != trial.name and (whose == person if placed == "own" else whose != person)
+        ]
+        frames = insole.cut(trial, own.origin_mm, insole.placement(others))
+        truth = {e: times / 1000 for e, times in trial.truth.items()}
+        found.append(_Cut(trial.name, person, frames.values[:, 0, :], truth))
+    return tuple(found)
+
+
+def _moved(spikes: Any, by: float, stop: float) -> Any:
+    return type(spikes)(np.clip(spikes.times + by, 0.0, stop), spikes.offsets, 0.0, stop)

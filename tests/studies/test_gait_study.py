@@ -1,0 +1,206 @@
+"""The gait study at toy size, on people made here: the whole way from files to the report."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from tests.formats.test_loaders import interpolated
+
+from taxel import FormatError, ProblemError
+from taxel.studies.gait import report, study
+from taxel.studies.gait.protocols import PROTOCOLS
+from taxel.studies.gait.recipes import ENCODERS, SEARCH
+
+
+def walker(folder: Path, name: str, seed: int) -> None:
+    """Write 12 s of walking in the manner of gaitpdb: eight sensors that load from heel to toe."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(1200) / 100
+    columns = [t]
+    for foot in (0.0, 0.55):
+        phase = (t + foot + 0.2 * rng.random()) % 1.1 / 1.1
+        for k in range(8):
+            rise, fall = 0.02 + 0.04 * k, 0.35 + 0.035 * k
+            load = 120 * np.clip((phase - rise) / 0.04, 0, 1) * np.clip((fall - phase) / 0.04, 0, 1)
+            columns.append(np.round(load * (0.8 + 0.4 * rng.random()) + rng.normal(0, 0.5, len(t)).clip(0), 2))
+    values = np.column_stack([*columns, sum(columns[1:9]), sum(columns[9:17])])
+    lines = ["\t".join(f"{v:.4f}" for v in row) for row in values]
+    (folder / f"{name}_01.txt").write_text("\n".join(lines) + "\n")
+
+
+def stepper(folder: Path, name: str, seed: int, count: int = 5) -> None:
+    """Write footfalls in the manner of the plate: a foot that rolls from heel to toes."""
+    rng = np.random.default_rng(seed)
+    with h5py.File(folder / f"{name}.h5", "w") as h5:
+        for n in range(count):
+            frames = int(rng.integers(150, 190))
+            rows, columns, t = np.mgrid[0:34, 0:16, 0:frames].astype(float)
+            outline = (np.abs(columns - 7.5 - 0.1 * rows) < 5) & (rows > 1)
+            centre = 4 + 26 * np.clip((t - 0.2 * frames) / (0.7 * frames), 0, 1)
+            width = 9 - 5 * t / frames
+            load = 900 * outline * np.exp(-(((rows - centre) / width) ** 2)) * np.sin(np.pi * (t + 2) / (frames + 3))
+            load = np.where(load > 25, load + rng.integers(0, 9, load.shape), 0).astype(np.int64)
+            image = np.zeros((60, 18, 220), np.uint16)
+            image[:, :16, :frames] = interpolated(load, 3 + n % 3, 60)
+            h5[f"img{n:03d}"] = image
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("data")
+    (folder / "insole_gaitpdb").mkdir()
+    for k, name in enumerate(("GaCo90", "GaCo91", "GaPt90", "GaPt91")):
+        walker(folder / "insole_gaitpdb", name, k)
+    (folder / "plate").mkdir()
+    for k in range(3):
+        stepper(folder / "plate", f"subj90{k}", k)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def ran(data, tmp_path_factory) -> tuple[Path, dict]:
+    folder = tmp_path_factory.mktemp("report")
+    return folder, study(data, size="toy", report=folder, quiet=True)
+
+
+def rows(said: dict, source: str, event: str) -> dict[str, dict]:
+    found = next(s for s in said["sources"] if s["source"] == source)
+    return {row["row"]: row for row in found["protocols"][0]["rows"] if row["event"] == event}
+
+
+def test_a_toy_study_has_all_its_rows_and_finds_easy_steps(ran):
+    _, said = ran
+    assert said["skipped"] == ["insole_gaitndd", "insole_moticon", "pressure_formats"]
+    contact = rows(said, "gaitpdb", "contact")
+    assert {"notes", "chosen", "printed", "tonic", "rule: spikes", "rule: state", "rule: level"} == set(contact)
+    assert contact["notes"]["figures"]["events"] >= 70
+    assert contact["notes"]["figures"]["found_percent"] >= 95
+    assert contact["chosen"]["figures"]["found_percent"] >= 95
+    assert contact["printed"]["figures"]["false"] > 10 * contact["notes"]["figures"]["false"]
+    footfall = rows(said, "plate", "contact")
+    assert {"notes", "chosen", "printed", "others", "rule: spikes", "rule: state", "rule: level"} == set(footfall)
+    assert footfall["notes"]["figures"]["events"] == 15
+    assert footfall["notes"]["figures"]["missed"] <= 1
+    assert "rule: sum" in rows(said, "plate", "heel_off")
+
+
+def test_every_figure_adds_up(ran):
+    _, said = ran
+    for source in said["sources"]:
+        for row in source["protocols"][0]["rows"]:
+            f = row["figures"]
+            assert f["found"] + f["missed"] == f["events"]
+            assert sum(p["events"] for p in row["by_person"].values()) == f["events"]
+            assert sum(p["false"] for p in row["by_person"].values()) == f["false"]
+
+
+def test_errors_take_off_the_delay_that_known_keeps(ran):
+    folder, _ = ran
+    for line in (folder / "results.jsonl").read_text().splitlines():
+        row = json.loads(line)
+        if row["params"]["kind"] == "neuron" and row["params"]["source"] == "gaitpdb":
+            for units in row["result"]["tested"].values():
+                for unit in units.values():
+                    late = np.subtract(unit["delays"], unit["errors"])
+                    assert np.allclose(late, row["params"]["point"]["delay_ms"], atol=0.2)
+
+
+def test_the_report_lies_beside_its_figures_and_folds(ran):
+    folder, said = ran
+    assert json.loads((folder / "gait.json").read_text()) == json.loads(json.dumps(said))
+    page = (folder / "gait.html").read_text()
+    assert "Table 6.2 as printed" in page
+    assert "a threshold on the sum of the inputs" in page
+    people = json.loads((folder / "folds.json").read_text())["gaitpdb/people left out"]
+    assert sum(len(group) for group in people[0]["groups"]) == 8
+
+
+def test_a_second_run_reckons_nothing_again(data, ran):
+    folder, said = ran
+    before = (folder / "results.jsonl").stat().st_size
+    assert study(data, size="toy", report=folder, quiet=True) == said
+    assert (folder / "results.jsonl").stat().st_size == before
+
+
+def test_other_people_are_judged_by_all_of_these(data, tmp_path):
+    other = tmp_path / "other"
+    (other / "insole_gaitpdb").mkdir(parents=True)
+    walker(other / "insole_gaitpdb", "SiPt99", 9)
+    said = study(data, other, size="toy", report=tmp_path / "report", quiet=True)
+    assert said["judged"] == "on another folder"
+    assert said["skipped"] == ["plate", "insole_gaitndd", "insole_moticon", "pressure_formats"]
+    contact = rows(said, "gaitpdb", "contact")
+    assert set(contact["chosen"]["by_person"]) == {"SiPt99"}
+    assert contact["chosen"]["figures"]["found_percent"] >= 90
+    assert contact["chosen"]["goal"]["found_percent"] == 98.0
+
+
+def test_ctrl_c_stops_the_command_and_the_next_run_goes_on(data, tmp_path):
+    command = [sys.executable, "-m", "taxel", "study", "gait", "--data", str(data), "--size", "toy"]
+    command += ["--report", str(tmp_path), "--only", "gaitpdb"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        lines = tmp_path / "results.jsonl"
+        while process.poll() is None and not (lines.exists() and lines.stat().st_size):
+            time.sleep(0.02)
+        if process.poll() is None:
+            os.kill(process.pid, signal.SIGINT)
+            assert process.wait(timeout=60) in (0, 130)
+    finally:
+        process.kill()
+        process.wait()
+    done = len(lines.read_text().splitlines())
+    said = study(data, size="toy", report=tmp_path, only=["gaitpdb"], quiet=True)
+    assert len(lines.read_text().splitlines()) >= done
+    assert rows(said, "gaitpdb", "contact")["notes"]["figures"]["found_percent"] >= 95
+
+
+def test_no_list_of_points_is_longer_than_24():
+    assert all(1 < len(points) <= 24 for events in SEARCH.values() for points in events.values())
+    assert len({len(points) for events in ENCODERS.values() for points in events.values()}) == 1
+    assert set(SEARCH) == {source for source, all_ in PROTOCOLS.items() if any("chosen" in p.rows for p in all_)}
+
+
+def test_no_delay_is_longer_than_12_ms():
+    points = [p for events in [*SEARCH.values(), *ENCODERS.values()] for points in events.values() for p in points]
+    assert max(p["delay_ms"] for p in points) <= 12
+
+
+def test_a_goal_is_met_only_where_every_part_of_it_is():
+    units = [report.Unit("a", "a", "", 10, 1, 1.0, (1.0,) * 10, (9.0,) * 10)]
+    f = report.figures(units)
+    assert report._met(f, {"found_percent": 100.0, "false_per_minute": 1.0, "within_10_ms_percent": 100.0})
+    assert not report._met(f, {"missed": 0, "false": 0})
+    assert not report._met(report.figures([]), {"found_percent": 98.0})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "said"),
+    [
+        ({"size": "huge"}, ProblemError, "size is 'huge': must be full or toy"),
+        ({"only": ["emed"]}, ProblemError, "source 'emed': must be one of plate"),
+        ({"jobs": 0}, ProblemError, "jobs is 0"),
+        (
+            {"only": ["pedar"]},
+            FormatError,
+            "holds no recordings; must have one or more of the folders pressure_formats",
+        ),
+    ],
+)
+def test_nonsense_is_refused(data, tmp_path, arguments, error, said):
+    with pytest.raises(error, match=said):
+        study(data, report=tmp_path, quiet=True, **({"size": "toy"} | arguments))
+
+
+def test_a_folder_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        study(tmp_path / "nothing", report=tmp_path, quiet=True)
