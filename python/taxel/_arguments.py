@@ -25,6 +25,7 @@ __all__ = [
     "numbers",
     "parameters",
     "path",
+    "rows",
     "several",
     "shown",
     "text",
@@ -128,7 +129,8 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
         if given.dtype.kind not in "biufO":
             raise ProblemError(f"{name}: holds {given.dtype}, must hold numbers")
         with np.errstate(invalid="ignore", over="ignore"):
-            array = np.ascontiguousarray(given, dtype).reshape(given.shape)
+            # A field of records may be contiguous (of one record) and still not aligned.
+            array = np.require(given, dtype, ["C", "A"]).reshape(given.shape)
     except (TypeError, ValueError, OverflowError) as error:
         raise ProblemError(f"{name}: {error}") from None
     if given.dtype != array.dtype:
@@ -158,6 +160,23 @@ def column(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
 def floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
     """Return a contiguous float64 array of one dimension; refuse what is none, by name."""
     return column(name, values, np.float64)
+
+
+def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
+    """Return a mask over all rows, or numbers of rows, as an index; refuse what is neither, by name."""
+    try:
+        index = np.asarray(chosen)
+    except ValueError:
+        index = np.empty(0, object)
+    if index.size == 0 and index.ndim == 1 and index.dtype.kind in "fi":
+        return index.astype(np.int64)
+    if index.ndim != 1 or index.dtype.kind not in "biu":
+        raise ProblemError(f"{name}[{shown(chosen)}]: choose by a slice, a mask or whole numbers")
+    if index.dtype.kind == "b" and len(index) != length:
+        raise ProblemError(f"{name}: the mask has {len(index)} entries, must have {length}")
+    if index.dtype.kind != "b" and not (-length <= index.min() and index.max() < length):
+        raise ProblemError(f"{name}: rows {index.min()} to {index.max()} are asked for, there are 0 to {length - 1}")
+    return index
 
 
 def fields(records: object, wanted: tuple[str, ...]) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import column, fields, instance, shown, window
+from taxel._arguments import column, fields, instance, rows, shown, window
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -108,16 +108,19 @@ class Events:
 
     def __getitem__(self, chosen: slice | NDArray[Any]) -> Events:
         """Return the chosen events (slice, mask or numbers); markers stay."""
-        if not isinstance(chosen, slice):
-            chosen = np.asarray(chosen)
+        places = chosen if isinstance(chosen, slice) else rows("events", chosen, len(self))
+        try:
+            t = self.t[places]
+        except (TypeError, ValueError) as error:
+            raise ProblemError(f"events[{shown(chosen)}]: {error}") from None
         return self._unchecked(
-            self.t[chosen],
-            self.x[chosen],
-            self.y[chosen],
-            self.p[chosen],
+            t,
+            self.x[places],
+            self.y[places],
+            self.p[places],
             self.array,
-            None if self.intensity is None else self.intensity[chosen],
-            None if self.present is None else self.present[chosen],
+            None if self.intensity is None else self.intensity[places],
+            None if self.present is None else self.present[places],
             self.markers,
         )
 
@@ -146,7 +149,15 @@ class Events:
         )
 
     def to_tonic(self) -> NDArray[np.void]:
-        """Return tonic's event array: records of ``x y t p`` (int16, int16, int64 us, bool)."""
+        """Return tonic's event array: records of ``x y t p`` (int16, int16, int64 us, bool).
+
+        Raises
+        ------
+        ProblemError : a column or row above 32767
+        """
+        for name in ("x", "y"):
+            if len(self) and getattr(self, name).max() > 32_767:
+                raise ProblemError(f"{name} reaches {getattr(self, name).max()}: tonic's records hold 32767 at most")
         records = np.empty(len(self), np.dtype([("x", "<i2"), ("y", "<i2"), ("t", "<i8"), ("p", "?")]))
         for name in ("x", "y", "t", "p"):
             records[name] = getattr(self, name)
@@ -166,8 +177,9 @@ class Events:
         """
         if len(self) and self.t.min() < 0:
             raise ProblemError(f"event {int(self.t.argmin())}: t is {int(self.t.min())} us, faery's times start at 0")
-        fields = [("t", "<u8"), ("x", "<u2"), ("y", "<u2"), ("on", "?")]
-        records = np.empty(len(self), np.dtype(fields))
+        # faery asks for exactly this type: `p` is a title, a second name, of `on`.
+        titled: list[Any] = [("t", "<u8"), ("x", "<u2"), ("y", "<u2"), (("p", "on"), "?")]
+        records = np.empty(len(self), np.dtype(titled))
         records["t"], records["x"], records["y"], records["on"] = self.t, self.x, self.y, self.p
         return records
 

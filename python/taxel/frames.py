@@ -58,6 +58,8 @@ class Frames:
             k = int(back[0])
             raise ProblemError(f"t[{k + 1}] is {self.t[k + 1]} us, not after t[{k}] = {self.t[k]} us")
         self.unit = text("unit", unit)
+        if not unit:
+            raise ProblemError("unit is '': must say what the values are in")
         self.array = Array(*self.values.shape[1:]) if array is None else instance("array", array, Array)
         if self.array.shape != self.values.shape[1:]:
             raise ProblemError(f"pictures have shape {self.values.shape[1:]}: the array has {self.array.shape}")
@@ -156,7 +158,7 @@ class Frames:
         return (
             (self.array, self.unit) == (other.array, other.unit)
             and np.array_equal(self.t, other.t)
-            and np.array_equal(self.values, other.values)
+            and np.array_equal(self.values, other.values, equal_nan=True)
         )
 
     __hash__ = None  # type: ignore[assignment]

@@ -99,8 +99,8 @@ class SpikeTrains:
         flat = np.concatenate(arrays) if arrays else np.empty(0)
         offsets = np.concatenate([[0], np.cumsum([len(a) for a in arrays])]).astype(np.int64)
         if stop is None:
-            begin = number("start", start)
-            stop = max(begin, float(flat.max())) if flat.size and np.isfinite(flat).all() else begin
+            # What is not finite is refused below, by its place.
+            stop = max(number("start", start), *flat[np.isfinite(flat)].tolist(), -np.inf)
         return cls(flat, offsets, start, stop, np.concatenate(signed) if signed else None)
 
     def __len__(self) -> int:

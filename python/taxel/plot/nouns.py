@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
+from taxel._arguments import instance, number, shown
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.events import Events
@@ -17,9 +18,19 @@ __all__ = ["detections", "event_picture", "pressure_map", "raster"]
 ON, OFF = "#c44e52", "#4c72b0"
 
 
+def axes(ax: Axes | None, size: tuple[float, float]) -> Axes:
+    """Return the axes to draw on; new ones (inches) where none are given."""
+    if ax is None:
+        return plt.subplots(figsize=size, layout="constrained")[1]
+    if not isinstance(ax, Axes):
+        raise ProblemError(f"ax is {shown(ax)}: must be matplotlib's Axes")
+    return ax
+
+
 def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
     """Draw spike times to the right (ms), trains upwards; ON and OFF in two colours where spikes are signed."""
-    ax = ax or plt.subplots(figsize=(8, 4), layout="constrained")[1]
+    instance("trains", trains, SpikeTrains)
+    ax = axes(ax, (8, 4))
     times, train = trains.to_numpy()
     size = float(np.clip(4000 / max(1, len(trains)), 4, 200))
     if trains.values is None:
@@ -35,10 +46,14 @@ def raster(trains: SpikeTrains, ax: Axes | None = None) -> Axes:
 
 def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) -> Axes:
     """Draw one picture: the last at or before `at` us, or the one with the largest sum."""
+    instance("frames", frames, Frames)
+    until = None if at is None else number("at", at)
     if not len(frames):
         raise ProblemError("no picture to draw: the frames are empty")
-    ax = ax or plt.subplots(figsize=(5, 4.4), layout="constrained")[1]
-    k = int(frames.total.argmax()) if at is None else max(0, int(np.searchsorted(frames.t, at, side="right")) - 1)
+    ax = axes(ax, (5, 4.4))
+    k = int(frames.total.argmax())
+    if until is not None:
+        k = max(0, int(np.searchsorted(frames.t, until, side="right")) - 1)
     exists = True if frames.array.exists is None else frames.array.exists
     values = np.where(exists, frames.values[k], np.nan)
     image = ax.imshow(values, origin="upper", cmap="magma", interpolation="nearest")
@@ -49,7 +64,8 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
 
 def event_picture(events: Events, ax: Axes | None = None) -> Axes:
     """Draw, at each taxel, rises less falls."""
-    ax = ax or plt.subplots(figsize=(5, 4.4), layout="constrained")[1]
+    instance("events", events, Events)
+    ax = axes(ax, (5, 4.4))
     picture = np.zeros(events.array.shape)
     np.add.at(picture, (events.y, events.x), np.where(events.p, 1, -1))
     limit = max(1.0, float(np.abs(picture).max()))
@@ -61,7 +77,8 @@ def event_picture(events: Events, ax: Axes | None = None) -> Axes:
 
 def detections(found: Detections, ax: Axes | None = None) -> Axes:
     """Draw each label's detections as marks over time (s), a row a label."""
-    ax = ax or plt.subplots(figsize=(8, 2.4), layout="constrained")[1]
+    instance("found", found, Detections)
+    ax = axes(ax, (8, 2.4))
     for row, label in enumerate(found.labels):
         ax.scatter(found[label].t / 1e6, np.full(len(found[label]), row), marker="|", s=400, color=f"C{row}")
     ax.set(xlabel="time (s)", yticks=range(len(found.labels)), yticklabels=found.labels)

@@ -9,6 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from taxel.plot.nouns import axes
+
 if TYPE_CHECKING:
     from taxel._health import Health
     from taxel.recording import Recording
@@ -50,7 +52,7 @@ def overview(recording: Recording) -> Figure:
 
 def health_map(health: Health, ax: Axes | None = None) -> Axes:
     """Draw the activity of each taxel, with those marked that are dead, stuck or noisy."""
-    ax = ax or plt.subplots(figsize=(5, 4.4), layout="constrained")[1]
+    ax = axes(ax, (5, 4.4))
     image = ax.imshow(np.log10(1.0 + health.activity), origin="upper", cmap="Greys", interpolation="nearest")
     ax.figure.colorbar(image, ax=ax, label="log10 (1 + events)")
     for name, places in health.named().items():

@@ -1,0 +1,79 @@
+"""Array: geometry, equality, and an error for every nonsense."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from taxel import Array
+from taxel._core import ProblemError
+
+
+@given(st.integers(1, 50), st.integers(1, 50))
+def test_indices_run_row_by_row(rows: int, columns: int) -> None:
+    array = Array(rows, columns)
+    y, x = np.mgrid[:rows, :columns]
+    assert np.array_equal(array.index(x.ravel(), y.ravel()), np.arange(rows * columns))
+    assert array.taxels == rows * columns
+    assert array.shape == (rows, columns)
+
+
+def test_equality_hash_and_repr() -> None:
+    exists = np.ones((2, 3), bool)
+    exists[0, 0] = False
+    a, b = Array(2, 3, 1.5, exists, "a"), Array(2, 3, 1.5, exists.copy(), "a")
+    assert a == b
+    assert hash(a) == hash(b)
+    assert a.taxels == 5
+    assert repr(a) == "Array(a: 2 rows x 3 columns, 5 taxels, 1.5 mm apart)"
+    for other in (Array(2, 3, 1.5, None, "a"), Array(2, 3, 2.0, exists, "a"), Array(2, 3, 1.5, exists, "b"), 3):
+        assert a != other
+
+
+def test_the_mask_is_a_copy_that_cannot_be_changed() -> None:
+    exists = np.ones((2, 2), bool)
+    array = Array(2, 2, exists=exists)
+    exists[0, 0] = False
+    assert array.taxels == 4
+    with pytest.raises(ValueError, match="read-only"):
+        array.exists[0, 0] = False
+
+
+def test_the_thesis_array_is_64_by_64() -> None:
+    assert Array.thesis() == Array(64, 64, 2.67, name="thesis 64x64")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((0, 5), "rows is 0"),
+        ((5, -1), "columns is -1"),
+        ((5, 65_536), "columns is 65536"),
+        ((5.5, 5), "rows is 5.5"),
+        (("5", 5), "rows is '5'"),
+        ((True, 5), "rows is True"),
+        ((None, 5), "rows is None"),
+        ((5, 5, 0), "pitch_mm is 0"),
+        ((5, 5, -1.0), "pitch_mm is -1"),
+        ((5, 5, float("nan")), "pitch_mm is nan"),
+        ((5, 5, float("inf")), "pitch_mm is inf"),
+        ((5, 5, "wide"), "pitch_mm is 'wide'"),
+        ((5, 5, 1.0, np.ones((4, 5), bool)), "exists has shape"),
+        ((5, 5, 1.0, "all"), "exists"),
+        ((2, 2, 1.0, [[2, 0], [0, 1]]), "exists"),
+        ((5, 5, 1.0, None, 3), "name is 3"),
+        ((5, 5, 1.0, None, None), "name is None"),
+    ],
+)
+def test_nonsense_is_one_error_that_names_the_argument(arguments: tuple, said: str) -> None:
+    with pytest.raises(ProblemError, match=said) as caught:
+        Array(*arguments)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("x", "y"), [(8, 0), (-1, 0), (0, 8), ("a", 0), ([0, 1], [0, 1, 2]), (0.5, 0), (None, 0)])
+def test_a_taxel_that_is_not_there_has_no_index(x: object, y: object) -> None:
+    with pytest.raises(ProblemError):
+        Array(8, 8).index(x, y)

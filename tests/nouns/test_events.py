@@ -1,0 +1,260 @@
+"""Events: laws of slicing and of conversions, and an error for every nonsense."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Events
+from taxel._core import ProblemError
+
+mpl.use("Agg")
+GRID = Array(8, 12, 2.0, name="grid")
+
+
+@st.composite
+def some(draw: st.DrawFn, first: int = -(10**6)) -> Events:
+    """Any events on the grid, in any order of time, with or without intensities."""
+    n = draw(st.integers(0, 40))
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    ticks = {}
+    if draw(st.booleans()):
+        ticks = {"intensity": rng.integers(0, 65_536, n), "present": rng.random(n) < 0.5}
+    markers = [(int(t), bool(t % 2)) for t in np.sort(rng.integers(first, 10**6, draw(st.integers(0, 3))))]
+    t = rng.integers(first, 10**6, n)
+    x, y, p = rng.integers(0, 12, n), rng.integers(0, 8, n), rng.random(n) < 0.5
+    return Events(t, x, y, p, array=GRID, markers=markers, **ticks)
+
+
+@given(some())
+def test_records_give_the_same_events_back(events: Events) -> None:
+    back = Events.from_numpy(events.to_numpy(), GRID)
+    events.markers = ()
+    assert back == events
+    assert repr(back) == repr(events)
+
+
+@given(some())
+def test_tonic_takes_our_array_and_gives_it_back(events: Events) -> None:
+    back = Events.from_tonic(events.to_tonic(), GRID)
+    for name in "txyp":
+        assert np.array_equal(getattr(back, name), getattr(events, name))
+
+
+def test_tonic_makes_the_same_pictures_of_our_events() -> None:
+    tonic = pytest.importorskip("tonic")
+    rng = np.random.default_rng(1)
+    t = np.sort(rng.integers(0, 10_000, 500))
+    events = Events(t, rng.integers(0, 12, 500), rng.integers(0, 8, 500), rng.random(500) < 0.5, array=GRID)
+    picture = tonic.transforms.ToImage(sensor_size=(12, 8, 2))(events.to_tonic())
+    expected = np.zeros((2, 8, 12))
+    np.add.at(expected, (events.p.astype(int), events.y, events.x), 1)
+    assert np.array_equal(picture, expected)
+    cropped = tonic.transforms.CenterCrop(sensor_size=(12, 8, 2), size=(4, 4))(events.to_tonic())
+    assert len(cropped) == len(events.region(slice(4, 8), slice(2, 6)))
+
+
+@given(some(first=0))
+def test_faery_takes_our_array_and_gives_it_back(events: Events) -> None:
+    back = Events.from_faery(events.to_faery(), GRID)
+    for name in "txyp":
+        assert np.array_equal(getattr(back, name), getattr(events, name))
+
+
+def test_faery_writes_our_events_and_reads_them_back(tmp_path) -> None:
+    faery = pytest.importorskip("faery")
+    rng = np.random.default_rng(2)
+    t = np.sort(rng.integers(0, 10_000, 500))
+    events = Events(t, rng.integers(0, 12, 500), rng.integers(0, 8, 500), rng.random(500) < 0.5, array=GRID)
+    path = tmp_path / "a.dat"
+    faery.events_stream_from_array(events.to_faery(), (12, 8)).to_file(path)
+    back = np.concatenate(list(faery.events_stream_from_file(path)))
+    assert Events.from_faery(back, GRID) == events
+
+
+def test_faery_times_do_not_start_before_zero() -> None:
+    with pytest.raises(ProblemError, match="event 1: t is -5 us"):
+        Events([3, -5], [0, 0], [0, 0], [1, 1], array=GRID).to_faery()
+
+
+@given(some(), st.integers(-(10**6), 10**6), st.integers(-(10**6), 10**6))
+def test_a_cut_in_time_gives_two_parts_that_make_the_whole(events: Events, start: int, stop: int) -> None:
+    start, stop = sorted((start, stop))
+    inside = events.between(start, stop)
+    assert ((inside.t >= start) & (inside.t < stop)).all()
+    before, after = events.between(-np.inf, start), events.between(stop, np.inf)
+    assert len(before) + len(inside) + len(after) == len(events)
+    assert len(before.markers) + len(inside.markers) + len(after.markers) == len(events.markers)
+    assert inside.between(start, stop) == inside
+
+
+@given(some(), st.integers(0, 12), st.integers(0, 12), st.integers(0, 8), st.integers(0, 8))
+def test_a_region_holds_its_taxels_and_nothing_else(events: Events, a: int, b: int, c: int, d: int) -> None:
+    (x0, x1), (y0, y1) = sorted((a, b)), sorted((c, d))
+    inside = events.region(slice(x0, x1), slice(y0, y1))
+    chosen = (events.x >= x0) & (events.x < x1) & (events.y >= y0) & (events.y < y1)
+    assert inside == events[chosen]
+    assert inside.array == events.array
+    assert events.region(slice(None), slice(None)) == events
+
+
+@given(some())
+def test_slices_masks_and_numbers_choose_the_same(events: Events) -> None:
+    n = len(events)
+    assert events[:] == events
+    assert events[n // 2 :] == events[np.arange(n) >= n // 2] == events[np.arange(n // 2, n)]
+    assert events[::-1][::-1] == events
+    assert events[[]] == events[:0]
+
+
+@given(some())
+def test_equal_events_are_equal_and_changed_ones_are_not(events: Events) -> None:
+    assert events == events[:]
+    assert events != events.to_numpy
+    if not len(events):
+        return
+    for name, other in (("t", 7), ("x", 11), ("y", 7), ("p", False)):
+        changed = events[:]
+        column = getattr(changed, name).copy()
+        column[0] = other if column[0] != other else (True if name == "p" else 0)
+        setattr(changed, name, column)
+        assert changed != events
+
+
+def test_what_did_not_come_has_no_value() -> None:
+    a = Events([0], [1], [2], [True], array=GRID, intensity=[5], present=[False])
+    b = Events([0], [1], [2], [True], array=GRID, intensity=[9], present=[False])
+    assert a == b
+    assert a != Events([0], [1], [2], [True], array=GRID)
+
+
+def test_columns_are_copied_or_kept_but_never_changed() -> None:
+    t = np.array([5, 6])
+    events = Events(t, [1, 2], [3, 4], [1, 0], array=GRID)
+    assert t.tolist() == events.t.tolist() == [5, 6]
+    assert (events.t.dtype, events.x.dtype, events.p.dtype) == (np.int64, np.uint16, np.bool_)
+
+
+def test_held_intensities_are_the_last_that_came_at_each_time() -> None:
+    events = Events(
+        [0, 100, 100, 250], [1, 1, 2, 1], [0, 0, 0, 0], [1, 1, 1, 0], array=GRID, intensity=[5, 6, 7, 0],
+        present=[True, True, True, False],
+    )  # fmt: skip
+    frames = events.held(100)
+    assert frames.t.tolist() == [0, 100, 200]
+    assert frames.values[:, 0, 1].tolist() == [5, 6, 6]
+    assert frames.values[:, 0, 2].tolist() == [0, 7, 7]
+    assert events.held(100, 50, 350).t.tolist() == [50, 150, 250]
+
+
+@given(some())
+def test_repr_is_one_line_and_names_the_count(events: Events) -> None:
+    assert repr(events).startswith(f"Events({len(events)} events, ")
+    assert "\n" not in repr(events)
+
+
+def test_every_noun_draws_itself() -> None:
+    import matplotlib.pyplot as plt
+
+    ax = plt.subplots()[1]
+    events = Events([0, 5], [1, 2], [3, 4], [1, 0], array=GRID, intensity=[3, 4])
+    assert events.plot(ax) is ax
+    assert events[:0].plot() is not None
+    plt.close("all")
+
+
+GOOD = {"t": [0, 5], "x": [1, 2], "y": [3, 4], "p": [True, False]}
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("t", [0, float("nan")], r"t\[1\] is nan"),
+        ("t", [0, 0.5], r"t\[1\] is 0.5"),
+        ("t", ["0", "5"], "t: holds"),
+        ("t", None, "t"),
+        ("t", [[0, 5]], "t has 2 dimensions"),
+        ("t", [0, 2**63], "t"),
+        ("t", [0], "entries"),
+        ("x", [1, -2], r"x\[1\] is -2"),
+        ("x", [1, 12], "x=12"),
+        ("x", [1, 70_000], r"x\[1\] is 70000"),
+        ("x", [1, 2.5], r"x\[1\] is 2.5"),
+        ("x", "ab", "x"),
+        ("y", [3, 8], "y=8"),
+        ("y", [3, 4, 5], "y has 3 entries"),
+        ("y", object(), "y"),
+        ("p", [2, 0], r"p\[0\] is 2"),
+        ("p", [0.5, 0], r"p\[0\] is 0.5"),
+        ("p", ["yes", "no"], "p: holds"),
+        ("p", [True], "p has 1 entries"),
+        ("array", None, "array is None"),
+        ("array", (8, 12), "array is"),
+        ("intensity", [1], "intensity has 1 entries"),
+        ("intensity", [1, -1], r"intensity\[1\] is -1"),
+        ("intensity", [1, 65_536], r"intensity\[1\]"),
+        ("present", [True, False], "present without intensity"),
+        ("markers", 3, "markers is 3"),
+        ("markers", [3], "markers is"),
+        ("markers", [(0.5, True)], "markers"),
+        ("markers", [("now", True)], "markers"),
+    ],
+)
+def test_nonsense_in_a_column_is_one_error_that_names_it(name: str, value: object, said: str) -> None:
+    arguments = {**GOOD, "array": GRID, name: value}
+    with pytest.raises(ProblemError, match=said) as caught:
+        Events(**arguments)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda e: e.between(2, 1),
+        lambda e: e.between("a", 3),
+        lambda e: e.between(0, float("nan")),
+        lambda e: e.between(None, None),
+        lambda e: e.region(3, slice(2)),
+        lambda e: e.region(slice(0, 8, 2), slice(2)),
+        lambda e: e.region(slice("a", "b"), slice(2)),
+        lambda e: e["t"],
+        lambda e: e[None],
+        lambda e: e[1.5],
+        lambda e: e[0],
+        lambda e: e[[0, 9]],
+        lambda e: e[np.array([True])],
+        lambda e: e[[[0, 1]]],
+        lambda e: e.held(0),
+        lambda e: e.held(-5),
+        lambda e: e.held("fast"),
+        lambda e: e.held(100, "a"),
+        lambda e: e.held(100, 0, float("nan")),
+        lambda e: e.held(1, 0, 10**15),
+        lambda e: Events([0], [1], [2], [1], array=GRID).held(100),
+        lambda e: Events.from_numpy(np.zeros(3), GRID),
+        lambda e: Events.from_numpy("abc", GRID),
+        lambda e: Events.from_numpy(e.to_numpy(), None),
+        lambda e: Events.from_tonic(np.zeros(3, [("x", "i4")]), GRID),
+        lambda e: Events.from_faery(e.to_numpy(), GRID),
+        lambda e: e.plot("here"),
+    ],
+)
+def test_nonsense_in_a_method_is_one_error(call) -> None:
+    events = Events(**GOOD, array=GRID, intensity=[1, 2])
+    with pytest.raises(ProblemError) as caught:
+        call(events)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_taxel_that_tonic_cannot_hold_is_refused() -> None:
+    wide = Events([0], [40_000], [0], [True], array=Array(1, 50_000))
+    with pytest.raises(ProblemError, match="32767"):
+        wide.to_tonic()
+
+
+def test_events_are_part_of_the_public_face() -> None:
+    assert taxel.Events is Events

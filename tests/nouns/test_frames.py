@@ -1,0 +1,139 @@
+"""Frames: laws of slicing, equality, and an error for every nonsense."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from taxel import Array, Events, Frames
+from taxel._core import ProblemError
+
+mpl.use("Agg")
+
+
+@st.composite
+def some(draw: st.DrawFn) -> Frames:
+    n, rows, columns = draw(st.integers(0, 6)), draw(st.integers(1, 4)), draw(st.integers(1, 5))
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    t = np.cumsum(rng.integers(1, 1000, n)) - 500
+    exists = rng.random((rows, columns)) < 0.8 if draw(st.booleans()) else None
+    return Frames(rng.normal(size=(n, rows, columns)), t, unit="kPa", array=Array(rows, columns, exists=exists))
+
+
+@given(some())
+def test_numpy_gives_the_same_frames_back(frames: Frames) -> None:
+    values, t = frames.to_numpy()
+    assert Frames(values, t, unit="kPa", array=frames.array) == frames
+    values += 1
+    assert np.array_equal(values - 1, frames.values) or np.allclose(values - 1, frames.values, atol=1e-6)
+
+
+@given(some(), st.integers(-1000, 6000), st.integers(-1000, 6000))
+def test_a_cut_in_time_gives_parts_that_make_the_whole(frames: Frames, start: int, stop: int) -> None:
+    start, stop = sorted((start, stop))
+    parts = [frames.between(-np.inf, start), frames.between(start, stop), frames.between(stop, np.inf)]
+    assert np.array_equal(np.concatenate([p.t for p in parts]), frames.t)
+    assert ((parts[1].t >= start) & (parts[1].t < stop)).all()
+    assert frames[:] == frames
+
+
+@given(some())
+def test_a_region_is_a_smaller_array_of_the_same_values(frames: Frames) -> None:
+    part = frames.region(slice(0, 1), slice(None))
+    assert part.array.shape == (frames.array.rows, 1)
+    assert np.array_equal(part.values[:, :, 0], frames.values[:, :, 0])
+    if frames.array.exists is not None:
+        assert np.array_equal(part.array.exists[:, 0], frames.array.exists[:, 0])
+    assert frames.region(slice(None), slice(None)) == frames
+
+
+@given(some())
+def test_the_total_is_the_sum_over_taxels(frames: Frames) -> None:
+    assert np.allclose(frames.total, frames.values.astype(np.float64).sum(axis=2).sum(axis=1))
+
+
+@given(some())
+def test_changed_frames_are_not_equal(frames: Frames) -> None:
+    assert frames != Frames(frames.values, frames.t, unit="N", array=frames.array)
+    assert frames != 3
+    if len(frames):
+        assert frames != Frames(frames.values + 1, frames.t, unit="kPa", array=frames.array)
+        assert frames != Frames(frames.values, frames.t + 1, unit="kPa", array=frames.array)
+
+
+def test_what_was_not_measured_is_equal_to_itself() -> None:
+    values = np.full((1, 2, 2), np.nan)
+    assert Frames(values, [0]) == Frames(values, [0])
+
+
+@given(some())
+def test_repr_is_one_line(frames: Frames) -> None:
+    assert repr(frames).startswith(f"Frames({len(frames)} pictures of {frames.array.rows} x {frames.array.columns} ")
+    assert "\n" not in repr(frames)
+
+
+def test_frames_draw_themselves() -> None:
+    frames = Frames(np.arange(12).reshape(3, 2, 2), [0, 10, 20])
+    ax = plt.subplots()[1]
+    assert frames.plot(ax=ax) is ax
+    for at, title in ((-5, "0.000 ms"), (0, "0.000 ms"), (15, "0.010 ms"), (99, "0.020 ms"), (None, "0.020 ms")):
+        assert frames.plot(at).get_title() == title
+        plt.close("all")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"values": np.zeros((2, 2))}, "must have three"),
+        ({"values": "abc"}, "values"),
+        ({"values": None}, "values"),
+        ({"values": [[["a"]]]}, "values"),
+        ({"values": np.zeros((2, 0, 3))}, "rows is 0"),
+        ({"t": [0]}, "t has shape"),
+        ({"t": [0, 0]}, r"t\[1\] is 0 us, not after"),
+        ({"t": [5, 3]}, "not after"),
+        ({"t": [0, 0.5]}, r"t\[1\] is 0.5"),
+        ({"t": [0, np.nan]}, r"t\[1\] is nan"),
+        ({"t": None}, "t"),
+        ({"t": ["a", "b"]}, "t: holds"),
+        ({"unit": 3}, "unit is 3"),
+        ({"unit": None}, "unit is None"),
+        ({"unit": ""}, "unit is ''"),
+        ({"array": 3}, "array is 3"),
+        ({"array": Array(9, 9)}, "the array has"),
+    ],
+)
+def test_nonsense_in_an_argument_is_one_error_that_names_it(arguments: dict, said: str) -> None:
+    good = {"values": np.zeros((2, 2, 3)), "t": [0, 1]}
+    with pytest.raises(ProblemError, match=said) as caught:
+        Frames(**{**good, **arguments})
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda f: f[0],
+        lambda f: f["a"],
+        lambda f: f[::-1],
+        lambda f: f.between(2, 1),
+        lambda f: f.between("a", 1),
+        lambda f: f.region(0, 0),
+        lambda f: f.region(slice(3, 3), slice(None)),
+        lambda f: f.region(slice("a", None), slice(None)),
+        lambda f: f.plot("now"),
+        lambda f: f.plot(ax=3),
+        lambda f: f[:0].plot(),
+        lambda f: Frames.from_events(f, 10),
+        lambda f: Frames.from_events("events", 10),
+        lambda f: Frames.from_events(Events([0], [0], [0], [1], array=Array(2, 2)), 10),
+    ],
+)
+def test_nonsense_in_a_method_is_one_error(call) -> None:
+    with pytest.raises(ProblemError) as caught:
+        call(Frames(np.zeros((2, 2, 3)), [0, 1]))
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,195 @@
+"""SpikeTrains: laws of slicing and of conversions, and an error for every nonsense."""
+
+from __future__ import annotations
+
+import matplotlib as mpl
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from taxel import SpikeTrains
+from taxel._core import ProblemError
+
+mpl.use("Agg")
+
+
+@st.composite
+def some(draw: st.DrawFn) -> SpikeTrains:
+    rng = np.random.default_rng(draw(st.integers(0, 10**6)))
+    lists = [np.sort(rng.uniform(0, 100, n)).round(3) for n in draw(st.lists(st.integers(0, 8), max_size=5))]
+    values = [rng.choice([-2.0, -1.0, 1.0, 3.0], len(t)) for t in lists] if draw(st.booleans()) else None
+    return SpikeTrains.from_lists(lists, -1.0, 101.0, values)
+
+
+@given(some())
+def test_lists_give_the_same_trains_back(trains: SpikeTrains) -> None:
+    values = None
+    if trains.values is not None:
+        values = np.split(trains.values, trains.offsets[1:-1]) if len(trains) else []
+    assert SpikeTrains.from_lists(list(trains), trains.start, trains.stop, values) == trains
+    assert sum(trains.counts) == len(trains.times)
+
+
+@given(some())
+def test_numpy_names_the_train_of_each_spike(trains: SpikeTrains) -> None:
+    times, train = trains.to_numpy()
+    for n in range(len(trains)):
+        assert np.array_equal(times[train == n], trains[n])
+        assert np.array_equal(trains[n - len(trains)], trains[n])
+
+
+@given(some())
+def test_neo_takes_our_trains_and_gives_them_back(trains: SpikeTrains) -> None:
+    pytest.importorskip("neo")
+    back = SpikeTrains.from_neo(trains.to_neo())
+    assert len(back) == len(trains)
+    assert np.allclose(back.times, trains.times, rtol=0, atol=1e-9)
+    assert np.array_equal(back.offsets, trains.offsets)
+    if len(trains):
+        assert (back.start, back.stop) == (trains.start, trains.stop)
+    if trains.values is not None and len(trains):
+        assert np.array_equal(back.values, trains.values)
+
+
+def test_neo_trains_of_other_units_and_windows_are_read_in_ms() -> None:
+    neo = pytest.importorskip("neo")
+    a = neo.SpikeTrain([0.001, 0.5], units="s", t_start=0.0, t_stop=1.0)
+    b = neo.SpikeTrain([20.0], units="ms", t_start=-5.0, t_stop=100.0)
+    trains = SpikeTrains.from_neo([a, b])
+    assert (trains.start, trains.stop) == (-5.0, 1000.0)
+    assert np.allclose(trains[0], [1.0, 500.0])
+    assert trains[1].tolist() == [20.0]
+
+
+def test_elephant_measures_our_trains() -> None:
+    distance = pytest.importorskip("elephant.spike_train_dissimilarity").victor_purpura_distance
+    import quantities as pq
+
+    trains = SpikeTrains.from_lists([[10.0, 20.0], [12.0, 20.0]], stop=100.0).to_neo()
+    assert distance(trains, cost_factor=0.1 / pq.ms)[0, 1] == pytest.approx(0.2)
+
+
+@given(some(), st.floats(-1, 101), st.floats(-1, 101))
+def test_a_cut_in_time_keeps_times_and_narrows_the_window(trains: SpikeTrains, a: float, b: float) -> None:
+    start, stop = sorted((a, b))
+    part = trains.between(start, stop)
+    assert (part.start, part.stop) == (start, stop)
+    assert len(part) == len(trains)
+    for n in range(len(trains)):
+        assert np.array_equal(part[n], trains[n][(trains[n] >= start) & (trains[n] < stop)])
+
+
+@given(some())
+def test_selected_trains_come_in_the_order_given(trains: SpikeTrains) -> None:
+    order = list(range(len(trains)))[::-1]
+    back = trains.select(order).select(order)
+    assert back == trains
+    assert trains.select(np.ones(len(trains), bool)) == trains
+    assert len(trains.select([])) == 0
+
+
+@given(some())
+def test_splitting_by_sign_keeps_every_spike_once(trains: SpikeTrains) -> None:
+    split = trains.split_by_sign()
+    if trains.values is None:
+        assert split == trains
+        return
+    assert len(split) == 2 * len(trains)
+    assert not split.signed
+    for n in range(len(trains)):
+        values = trains.values[trains.offsets[n] : trains.offsets[n + 1]]
+        assert np.array_equal(split[n], trains[n][values > 0])
+        assert np.array_equal(split[n + len(trains)], trains[n][values <= 0])
+
+
+@given(some())
+def test_changed_trains_are_not_equal(trains: SpikeTrains) -> None:
+    lists = list(trains)
+    assert trains != SpikeTrains.from_lists(lists, trains.start, trains.stop + 1)
+    assert trains != SpikeTrains.from_lists([*lists, []], trains.start, trains.stop)
+    assert trains != lists
+
+
+@given(some())
+def test_repr_is_one_line(trains: SpikeTrains) -> None:
+    assert repr(trains).startswith(f"SpikeTrains({len(trains)} trains, {len(trains.times)} spikes")
+    assert "\n" not in repr(trains)
+
+
+def test_trains_draw_themselves() -> None:
+    ax = plt.subplots()[1]
+    assert SpikeTrains.from_lists([[1.0], []], stop=5.0).plot(ax) is ax
+    SpikeTrains.from_lists([[1.0, 2.0]], values=[[1, -1]]).plot()
+    SpikeTrains.from_lists([]).plot()
+    plt.close("all")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (([[1.0, float("nan")]],), "train 0, spike 1: time is NaN"),
+        (([[1.0], [float("inf")]],), "train 1, spike 0"),
+        (([[5.0, 3.0]],), "train 0, spike 1"),
+        (([[5.0]], 6.0), "window"),
+        (([[5.0]], 0.0, 4.0), "outside the window"),
+        (([[5.0]], 0.0, float("nan")), "window"),
+        (([[5.0]], float("-inf"), 9.0), "window"),
+        (([[5.0]], "0"), "start is '0'"),
+        (([[5.0]], 0.0, "9"), "stop is '9'"),
+        (([["a"]],), r"times\[0\]"),
+        (([[[1.0, 2.0]]],), r"times\[0\]"),
+        ((3,), "times is 3"),
+        ((None,), "times is None"),
+        (([None],), "train 0, spike 0"),
+        (([[1.0]], 0.0, 2.0, [[1.0, 2.0]]), "values"),
+        (([[1.0]], 0.0, 2.0, 3), "values is 3"),
+        (([[1.0]], 0.0, 2.0, [["a"]]), r"values\[0\]"),
+    ],
+)
+def test_nonsense_in_an_argument_is_one_error_with_its_place(arguments: tuple, said: str) -> None:
+    with pytest.raises(ProblemError, match=said) as caught:
+        SpikeTrains.from_lists(*arguments)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("offsets", "values"),
+    [([0, 2, 1], None), ([1, 2], None), ([0, 3], None), ([], None), ([0, -1, 2], None), ([0, 2], [1.0]), ("ab", None)],
+)
+def test_offsets_and_values_must_fit(offsets: object, values: object) -> None:
+    with pytest.raises(ProblemError):
+        SpikeTrains([1.0, 2.0], offsets, 0.0, 5.0, values)
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda s: s["a"],
+        lambda s: s[1.0],
+        lambda s: s[True],
+        lambda s: s.between(3, 2),
+        lambda s: s.between("a", 2),
+        lambda s: s.between(float("nan"), 2),
+        lambda s: s.between(float("-inf"), 2),
+        lambda s: s.select([5]),
+        lambda s: s.select([-1]),
+        lambda s: s.select([True]),
+        lambda s: s.select("a"),
+        lambda s: s.select([0.5]),
+        lambda s: SpikeTrains.from_neo([3]),
+        lambda s: SpikeTrains.from_neo(3),
+        lambda s: s.plot("here"),
+    ],
+)
+def test_nonsense_in_a_method_is_one_error(call) -> None:
+    with pytest.raises(ProblemError) as caught:
+        call(SpikeTrains.from_lists([[1.0, 2.0], []], stop=5.0))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_train_that_is_not_there_is_an_index_error() -> None:
+    # Python's own error, so that a for loop over trains ends.
+    with pytest.raises(IndexError, match="train 2 of 2"):
+        SpikeTrains.from_lists([[], []])[2]
