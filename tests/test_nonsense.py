@@ -126,6 +126,7 @@ SOUND: dict[str, Sound] = {
     "taxel.Detections": plain(taxel.Detections, label=["a"], t=[1], known=[2], slope=[0.5], said=[3]),
     "taxel.Detections.between": method(FOUND, "between", start=0, stop=15),
     "taxel.Detections.from_numpy": plain(taxel.Detections.from_numpy, records=FOUND.to_numpy()),
+    "taxel.Detections.from_neo": plain(taxel.Detections.from_neo, events=FOUND.to_neo()),
     "taxel.Detections.to_csv": method(FOUND, "to_csv", path="found.csv", overwrite=True),
     "taxel.Detections.from_csv": plain(taxel.Detections.from_csv, path="here.csv"),
     "taxel.Tare.take": plain(taxel.Tare.take, x=FRAMES, start_us=0, stop_us=300, note="bench 2"),

@@ -177,6 +177,34 @@ class Detections:
         label, t, known, slope, said = zip(*rows, strict=True) if rows else ((), (), (), (), ())
         return cls(label, t, known, slope, said if _SAID in header else None)
 
+    def to_neo(self) -> Any:
+        """Return a ``neo.Event`` at `t`, with the label of each, and `known` (us) and `slope` as array annotations.
+
+        Raises
+        ------
+        ImportError : neo is not installed (``pip install taxel[neo]``)
+        """
+        from neo import Event  # noqa: PLC0415  heavy, and an extra
+
+        notes = {"known": self.known, "slope": self.slope}
+        if self.said is not None:
+            notes["said"] = self.said
+        return Event(self.t, labels=self.label, units="us", array_annotations=notes)
+
+    @classmethod
+    def from_neo(cls, events: Any) -> Detections:
+        """Build detections from a ``neo.Event`` of any time unit that `to_neo` made.
+
+        Raises
+        ------
+        ProblemError : no such event, or one without `known` (us)
+        """
+        notes = getattr(events, "array_annotations", None)
+        if notes is None or "known" not in notes:
+            raise ProblemError(f"events is {shown(events)}: must be a neo.Event with the array annotation known (us)")
+        t = np.rint(events.rescale("us").magnitude).astype(np.int64)
+        return cls(events.labels, t, notes["known"], notes.get("slope"), notes.get("said"))
+
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw each label's detections as marks over time (s)."""
         from taxel.plot import detections  # noqa: PLC0415  matplotlib loads slowly

@@ -8,6 +8,7 @@ import pytest
 from test_readout import recipe, tare, touches
 
 import taxel
+from taxel import _core
 from taxel.cli import main
 
 
@@ -121,6 +122,41 @@ def test_spikes_are_written_and_read_back(folder: Path, capsys) -> None:
     area = ("encode", folder / "1.npz", out, "--encoder", "contact_area", "--tare", 0.05, "--overwrite")
     assert call(capsys, *area)[0] == 0
     assert len(taxel.SpikeTrains.load(out)) == 10
+
+
+def write_noted(seed: int, path: Path, line_10ns: int) -> dict[str, list[int]]:
+    """Write a recording whose notes say what happened when, and whose registers say how long a frame lasts."""
+    events, truth = touches(seed)
+    taxel.convert(events, path)
+    array = {"rows": 8, "columns": 8, "pitch_mm": 2.67, "name": "small"}
+    registers = {**json.loads(_core.registers_preset("5.2 kHz")), "lines": 8, "line_period": line_10ns}
+    header = {"array": array, "registers": registers, "source": "test", "started_ns": 0}
+    writer = _core.RecordingWriter(path, json.dumps(header), "none", True)
+    writer.datagram(0, 0, taxel.wire.encode(events))
+    for label, times in truth.items():
+        for t in times:
+            writer.note(t * 1000, t, label)
+    writer.note(0, None, "a remark without a time is no event")
+    writer.finish("{}")
+    return truth
+
+
+def test_notes_can_be_the_labels_and_registers_give_the_frame(folder: Path, tmp_path: Path, capsys) -> None:
+    for seed in (1, 2):
+        write_noted(seed, tmp_path / f"{seed}.mcap", 2400)
+    tare = ("--tare", folder / "tare.json")
+    readout = tmp_path / "r.json"
+    plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0", "-o", readout)
+    assert call(capsys, "train", tmp_path / "1.mcap", tmp_path / "2.mcap", *plan, *tare)[0] == 0
+    for line_10ns, frame_us in ((2400, 192.0), (6248, 499.84)):
+        place = tmp_path / f"{frame_us}.mcap"
+        write_noted(9, place, line_10ns)
+        arguments = ("detect", place, "--readout", readout, *tare, "--truth", "notes", "--json")
+        code, out, _ = call(capsys, *arguments)
+        result = json.loads(out)
+        assert (code, result["score"]["found"], result["score"]["false"]) == (0, 12, 0)
+        frames = np.array([d["known_us"] for d in result["detections"]]) / frame_us
+        assert np.abs(frames - np.round(frames)).max() * frame_us < 1.0
 
 
 def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:

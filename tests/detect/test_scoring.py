@@ -142,6 +142,15 @@ def test_detections_come_back_from_numpy_and_csv(tmp_path) -> None:
     assert sorted(p.suffix for p in tmp_path.iterdir()) == [".csv"] * 3, "nothing half-written stays"
 
 
+def test_detections_come_back_from_neo() -> None:
+    found = some()
+    with_said = taxel.Detections(found.label, found.t, found.known, found.slope, said=[9, 8, 7])
+    for one in (found, with_said):
+        event = one.to_neo()
+        assert taxel.Detections.from_neo(event) == one
+        assert taxel.Detections.from_neo(event.rescale("ms")).t.tolist() == one.t.tolist()
+
+
 def test_a_slope_keeps_every_digit_in_a_table(tmp_path) -> None:
     found = taxel.Detections(['a,"b"\n'], [1], [2], [0.1 + 0.2])
     assert taxel.Detections.from_csv(found.to_csv(tmp_path / "a.csv")) == found

@@ -22,8 +22,8 @@ from taxel.encode import Encoder
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.neuron import Neuron
+from taxel.recording import Recording
 from taxel.tare import Tare
-from taxel.wire import Registers
 
 __all__ = ["Learner", "Readout", "ReadoutStream", "TrainedNeuron", "run"]
 
@@ -319,7 +319,7 @@ class ReadoutStream:
 
 def run(
     readout: Readout,
-    source: Events | Frames | Any,
+    source: Recording | Events | Frames,
     *,
     frame_us: float | None = None,
     tare: Tare | None = None,
@@ -360,22 +360,17 @@ def run(
     text = instance("readout", readout, Readout).to_json()
     period = None if frame_us is None else number("frame_us", frame_us)
     rest = _tare(tare)
-    if not isinstance(source, Events | Frames):
-        source, registers = _opened(source)
-        if period is None and registers:
-            period = registers.frame_us
+    if isinstance(source, Recording):
+        if period is None and source.registers is not None:
+            period = source.registers.frame_us
+        source = source.events if source.has_events else source.frames()
     if isinstance(source, Events):
         period = FRAME_US if period is None else period
         return Detections._from_parts(_core.readout_run_events(text, source._parts(), period, rest))
+    if not isinstance(source, Frames):
+        raise ProblemError(f"source is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     parts = source.array._parts(), source.t, source.values.reshape(-1)
     return Detections._from_parts(_core.readout_run_frames(text, *parts, period, rest))
-
-
-def _opened(source: Any) -> tuple[Events | Frames, Registers | None]:
-    """Return what a recording holds, and the board's registers."""
-    if not hasattr(source, "has_events"):
-        raise ProblemError(f"source is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
-    return source.events if source.has_events else source.frames(), source.registers
 
 
 def _tare(tare: Tare | None) -> str | None:
