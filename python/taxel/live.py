@@ -238,7 +238,8 @@ class Live:
 
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `events`, `read_out`, `events_dropped`,
-        `late`, `detections`, `detections_dropped`, `decode_latency` and `said_latency` (count, p50_us, p99_us, max_us),
+        `late` (out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence that was
+        none, because events came later than the guard), `detections_dropped`, `decode_latency` and `said_latency` (count, p50_us, p99_us, max_us),
         `offset` (board_us, host_ns, drift_ppm, or None), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
 
         Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with

@@ -60,6 +60,15 @@ pub trait Stream: Send {
     /// Says that nothing more will come: holds what came last for one period and the latency, so that all spikes that
     /// it owes come out. Gives the end of that, ms, or `None` where nothing ever came.
     fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64>;
+
+    /// A copy that goes on by itself: to see what would be said if nothing came.
+    fn fork(&self) -> Box<dyn Stream>;
+}
+
+impl Clone for Box<dyn Stream> {
+    fn clone(&self) -> Self {
+        self.fork()
+    }
 }
 
 /// Any encoder with its parameters; in JSON an object whose `name` says which.

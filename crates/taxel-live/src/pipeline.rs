@@ -4,6 +4,7 @@
 //! two of them is bounded, and what finds no room is counted where it was lost. A detection leaves from the thread that
 //! made it. Who looks on gets copies ([`Live::counters`], [`Live::picture`]) and slows nothing.
 
+mod ahead;
 mod decode;
 mod handover;
 mod read;
@@ -140,11 +141,14 @@ pub struct Counters {
     pub read_out: u64,
     /// Events that found no room before the readout.
     pub events_dropped: u64,
-    /// Events whose stamp lay behind the readout's time, which moves on by the host's clock in silence; they were heard
-    /// with that time as their stamp.
+    /// Events that came out of order, or more than 0.1 s after a silence that was believed: the readout heard them as of
+    /// the time that it had come to.
     pub late: u64,
     /// Detections that were said.
     pub detections: u64,
+    /// Those among them that were said in a silence that was none: an event came later than the guard, and what the
+    /// recording says was said after them.
+    pub wrong: u64,
     /// Detections that [`Live::next`] was too slow for; the sinks had them.
     pub detections_dropped: u64,
     /// From the kernel's stamp to the end of decoding, a datagram each.

@@ -98,8 +98,10 @@ def live(
         delay = counters["said_latency"]
         typer.echo(f"{counters['detections']} detections, {counters['events']} events in {counters['seconds']:.1f} s")
         typer.echo(f"from known to said: p50 {delay['p50_us']:.0f} us, p99 {delay['p99_us']:.0f} us")
+        if counters["wrong"]:
+            typer.echo(f"{counters['wrong']} were said too early: events came more than {guard_frames:g} frames late")
         if counters["late"]:
-            typer.echo(f"{counters['late']} events came later than {guard_frames:g} frames after silence was believed")
+            typer.echo(f"{counters['late']} events came out of order, or more than 0.1 s late")
         if summary.path is not None:
             typer.echo(f"recorded to {summary.path}")
         typer.echo(summary.verdict)

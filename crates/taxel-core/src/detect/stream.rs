@@ -15,6 +15,7 @@ const FARTHEST_US: i64 = 1 << 52;
 ///
 /// A crossing counts once nothing can come before it any more: when a later event has come, or the caller has moved time
 /// on with [`ReadoutStream::advance`]. Detections depend neither on where the input is cut nor on when time is moved.
+#[derive(Clone)]
 pub struct ReadoutStream {
     encoder: Box<dyn Stream>,
     array: Array,
@@ -28,6 +29,7 @@ pub struct ReadoutStream {
 }
 
 /// One neuron with its name.
+#[derive(Clone)]
 struct Voice {
     label: String,
     neuron: Neuron,
@@ -259,11 +261,15 @@ mod tests {
     use crate::neuron::{AfterSpike, Time};
 
     /// Says each event as a signed spike of its taxel's train at its stamp; a picture as a spike of each loaded taxel.
+    #[derive(Clone)]
     struct Plain {
         latency_ms: f64,
     }
 
     impl Stream for Plain {
+        fn fork(&self) -> Box<dyn Stream> {
+            Box::new(self.clone())
+        }
         fn trains(&self) -> usize {
             4
         }

@@ -3,6 +3,7 @@
 use super::sampled::{BLOCK, Block};
 
 /// For each channel the values `low <= value < high` that change nothing.
+#[derive(Clone)]
 pub(super) struct Bracket {
     low: Vec<Block>,
     high: Vec<Block>,

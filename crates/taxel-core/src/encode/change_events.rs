@@ -98,6 +98,7 @@ impl ChangeEvents {
     }
 }
 
+#[derive(Clone)]
 struct Changes {
     floor: f32,
     most: f32,

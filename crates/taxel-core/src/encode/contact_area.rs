@@ -116,6 +116,7 @@ wide! {
     }
 }
 
+#[derive(Clone)]
 struct Area {
     levels: Vec<u32>,
     rows: usize,
@@ -189,6 +190,10 @@ impl Area {
 }
 
 impl Stream for Area {
+    fn fork(&self) -> Box<dyn Stream> {
+        Box::new(self.clone())
+    }
+
     fn trains(&self) -> usize {
         2 * self.levels.len()
     }

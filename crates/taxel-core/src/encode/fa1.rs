@@ -136,6 +136,7 @@ struct Afferent {
     still: bool,
 }
 
+#[derive(Clone)]
 struct Afferents {
     alpha: f64,
     jump: f64,

@@ -116,6 +116,7 @@ struct State {
     since: i64,
 }
 
+#[derive(Clone)]
 struct Crossings {
     channels: usize,
     levels: Vec<f64>,
@@ -130,6 +131,7 @@ struct Crossings {
     window: Option<Window>,
 }
 
+#[derive(Clone)]
 struct Tonic {
     every: i64,
     level: usize,

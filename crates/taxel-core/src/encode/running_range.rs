@@ -67,6 +67,7 @@ impl RunningRange {
 }
 
 /// The samples of the last window.
+#[derive(Clone)]
 pub(super) struct Window {
     low: f64,
     high: f64,
@@ -81,6 +82,7 @@ pub(super) struct Window {
 }
 
 /// The first window, once it is full.
+#[derive(Clone)]
 pub(super) struct First {
     /// Low and high by channel.
     pub(super) ranges: Vec<(f64, f64)>,

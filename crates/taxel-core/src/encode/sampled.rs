@@ -16,7 +16,7 @@ pub(super) type Block = [f32; BLOCK];
 /// What an encoder does with samples; `sample` and `pass` are `#[inline(always)]`, to be compiled for wider vectors.
 ///
 /// Channels are the existing taxels in the order of their index. The last block is filled up with channels that always read 0 and must never spike.
-pub(super) trait Rule: Send {
+pub(super) trait Rule: Send + Clone + 'static {
     fn trains(&self) -> usize;
 
     /// The first sample: the encoder begins as if it had always been so.
@@ -68,6 +68,7 @@ wide! {
 }
 
 /// Which taxels are channels.
+#[derive(Clone)]
 pub(super) struct Channels {
     rows: u16,
     columns: u16,
@@ -168,6 +169,7 @@ pub(super) fn blocks(channels: usize) -> usize {
 }
 
 /// What a stream has been fed with; one stream takes events or frames, never both.
+#[derive(Clone)]
 pub(super) enum Source {
     Unknown,
     /// `present`: nothing comes before it any more.
@@ -200,6 +202,7 @@ impl Source {
 ///
 /// The samples of events stand at the first stamp plus whole periods, and each holds what came up to and at its time.
 /// A taxel reads 0 until it is heard. An event behind the latest stamp (reordered datagrams) counts as of that stamp.
+#[derive(Clone)]
 pub(super) struct Sampled<R> {
     rule: R,
     channels: Channels,
@@ -270,6 +273,10 @@ impl<R: Rule> Sampled<R> {
 }
 
 impl<R: Rule> Stream for Sampled<R> {
+    fn fork(&self) -> Box<dyn Stream> {
+        Box::new(self.clone())
+    }
+
     fn trains(&self) -> usize {
         self.rule.trains()
     }

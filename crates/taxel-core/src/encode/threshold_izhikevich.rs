@@ -191,6 +191,7 @@ impl Neurons {
     }
 }
 
+#[derive(Clone)]
 struct Pairs {
     model: Model,
     begin: Begin,

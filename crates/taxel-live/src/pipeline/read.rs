@@ -8,6 +8,7 @@ use taxel_core::Events;
 use taxel_core::detect::{Detection, Readout, ReadoutStream};
 use taxel_core::encode::TareBuilder;
 
+use super::ahead::Ahead;
 use super::handover::{Taken, append};
 use super::{Options, Said, Shared, Sink};
 use crate::Error;
@@ -34,7 +35,7 @@ pub(super) struct Reader {
 }
 
 enum State {
-    Reading(Box<ReadoutStream>),
+    Reading(Ahead),
     /// What was heard of the stretch so far.
     Taring {
         stretch_us: i64,
@@ -50,7 +51,7 @@ impl Reader {
         let events = Events::empty(options.array.clone());
         let state = match ear {
             Ear::Deaf => State::Idle,
-            Ear::Reading(stream) => State::Reading(stream),
+            Ear::Reading(stream) => State::Reading(Ahead::new(stream)),
             Ear::Taring(stretch_us, readout) => State::Taring { stretch_us, readout, heard: Box::new(events.clone()) },
         };
         Self { state, sinks, say, found: vec![], events, frame_us: options.registers.frame_us() }
@@ -73,10 +74,12 @@ impl Reader {
 
     fn hear(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
         match &mut self.state {
-            State::Reading(stream) => {
-                stream.push_events(&self.events, &mut self.found)?;
-                if let Some(t) = taken.quiet_until {
-                    stream.advance(t, &mut self.found)?;
+            State::Reading(readout) => {
+                readout.push(&self.events, &mut self.found)?;
+                match taken.quiet_until {
+                    Some(t) if taken.last => readout.advance(t, &mut self.found)?,
+                    Some(t) => readout.quiet(t, &mut self.found)?,
+                    None => {}
                 }
             }
             State::Taring { stretch_us, heard, .. } => {
@@ -87,11 +90,11 @@ impl Reader {
             }
             State::Idle => {}
         }
-        if !self.events.is_empty() {
+        if !self.events.is_empty() || taken.last {
             let counters = &mut shared.board().counters;
             counters.read_out += self.events.len() as u64;
-            if let State::Reading(stream) = &self.state {
-                counters.late = stream.late();
+            if let State::Reading(readout) = &self.state {
+                (counters.late, counters.wrong) = (readout.late(), readout.wrong());
             }
         }
         self.say_all(shared)
@@ -111,7 +114,7 @@ impl Reader {
         stream.advance(stretch.end, &mut self.found)?;
         // What is said of the rest itself is not meant: a board that was just reset tells of every taxel.
         self.found.retain(|d| d.known >= stretch.end);
-        self.state = State::Reading(stream);
+        self.state = State::Reading(Ahead::new(stream));
         let mut board = shared.board();
         board.counters.taring = false;
         board.tare = Some(tare);

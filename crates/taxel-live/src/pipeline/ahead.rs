@@ -1,0 +1,164 @@
+//! A readout that looks ahead in silence, and takes nothing back that the board's own time would say.
+
+use taxel_core::detect::{Detection, ReadoutStream};
+use taxel_core::{Events, Result};
+
+/// A silence that has lasted this long is settled, us: as far back as the decoder believes a stamp to be late.
+const SETTLED_US: i64 = 100_000;
+
+/// Two copies of a readout. One hears what came and nothing else, so it says what the recording will say. The other runs
+/// ahead of it where the host's clock says that nothing comes; it is thrown away when something does. So an event that
+/// comes later than the silence was believed changes nothing but what was said too early.
+pub(super) struct Ahead {
+    heard: Box<ReadoutStream>,
+    ahead: Option<Box<ReadoutStream>>,
+    /// What was said ahead and has not been heard yet.
+    early: Vec<Detection>,
+    wrong: u64,
+    found: Vec<Detection>,
+}
+
+impl Ahead {
+    pub(super) fn new(heard: Box<ReadoutStream>) -> Self {
+        Self { heard, ahead: None, early: vec![], wrong: 0, found: vec![] }
+    }
+
+    /// Takes the next events; adds to `out` what is certain now and was not said before.
+    pub(super) fn push(&mut self, events: &Events, out: &mut Vec<Detection>) -> Result<()> {
+        if !events.is_empty() {
+            self.ahead = None;
+            self.heard.push_events(events, &mut self.found)?;
+            self.settle(out);
+        }
+        Ok(())
+    }
+
+    /// Believes that nothing comes before `t` us; adds to `out` what is to be said then.
+    pub(super) fn quiet(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
+        let ahead = self.ahead.get_or_insert_with(|| self.heard.clone());
+        ahead.advance(t, &mut self.found)?;
+        for detection in self.found.drain(..) {
+            if !self.early.iter().any(|e| same(e, &detection)) {
+                self.early.push(detection.clone());
+                out.push(detection);
+            }
+        }
+        self.advance(t - SETTLED_US, out)
+    }
+
+    /// Knows that nothing comes before `t` us.
+    pub(super) fn advance(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
+        self.heard.advance(t, &mut self.found)?;
+        self.settle(out);
+        Ok(())
+    }
+
+    /// How many events came later than a silence that was settled, or out of order.
+    pub(super) fn late(&self) -> u64 {
+        self.heard.late()
+    }
+
+    /// How many detections were said in a silence that was none.
+    pub(super) fn wrong(&self) -> u64 {
+        self.wrong
+    }
+
+    /// What was heard is compared with what was said ahead of it.
+    fn settle(&mut self, out: &mut Vec<Detection>) {
+        for detection in self.found.drain(..) {
+            match self.early.iter().position(|e| same(e, &detection)) {
+                Some(k) => drop(self.early.swap_remove(k)),
+                None => out.push(detection),
+            }
+        }
+        let before = self.early.len();
+        let now = self.heard.now().unwrap_or(i64::MIN);
+        self.early.retain(|e| e.known > now);
+        self.wrong += (before - self.early.len()) as u64;
+    }
+}
+
+fn same(a: &Detection, b: &Detection) -> bool {
+    (&a.label, a.t, a.known) == (&b.label, b.t, b.known)
+}
+
+#[cfg(test)]
+mod tests {
+    use taxel_core::detect::{Readout, TrainedNeuron};
+    use taxel_core::encode::Encoder;
+    use taxel_core::neuron::{Neuron, Time};
+    use taxel_core::{Array, Intensities};
+
+    use super::*;
+
+    /// Speaks once, some 7 ms after a change at taxel 0.
+    fn readout() -> Ahead {
+        let neuron = Neuron { tau: 20.0, refractory: 500.0, theta_0: 0.3, ..Neuron::default() };
+        let one = TrainedNeuron { delay_ms: 0.0, weights: vec![1.2; 8], neuron };
+        let readout = Readout {
+            encoder: Encoder::from_json(r#"{"name": "change_events"}"#).unwrap(),
+            array: None,
+            time: Time::Continuous,
+            after_spike: one.neuron.after_spike,
+            run_threshold: 1.0,
+            neurons: [("touch".to_owned(), one)].into(),
+        };
+        Ahead::new(Box::new(readout.stream(&array(), 192.0, None).unwrap()))
+    }
+
+    fn array() -> Array {
+        Array::new(2, 2, 1.0, "four").unwrap()
+    }
+
+    fn event(t: i64, ticks: u16) -> Events {
+        let intensity = Some(Intensities { ticks: vec![ticks], present: vec![true] });
+        Events { t: vec![t], x: vec![0], y: vec![0], p: vec![true], intensity, ..Events::empty(array()) }
+    }
+
+    #[test]
+    fn what_is_said_in_silence_is_not_said_again_when_events_bear_it_out() {
+        let (mut ahead, mut out) = (readout(), vec![]);
+        ahead.push(&event(0, 10), &mut out).unwrap();
+        ahead.push(&event(1000, 20), &mut out).unwrap();
+        ahead.quiet(5000, &mut out).unwrap();
+        assert_eq!(out, []);
+        ahead.quiet(20_000, &mut out).unwrap();
+        assert_eq!(out.len(), 1);
+        ahead.push(&event(60_000, 22), &mut out).unwrap();
+        ahead.advance(60_000, &mut out).unwrap();
+        assert_eq!((out.len(), ahead.wrong(), ahead.late()), (1, 0, 0));
+    }
+
+    #[test]
+    fn an_event_that_comes_late_is_heard_in_its_own_time() {
+        let (mut ahead, mut out) = (readout(), vec![]);
+        ahead.push(&event(0, 10), &mut out).unwrap();
+        ahead.push(&event(1000, 20), &mut out).unwrap();
+        ahead.quiet(5000, &mut out).unwrap();
+        // 2 ms behind the silence that was believed.
+        ahead.push(&event(3000, 30), &mut out).unwrap();
+        ahead.quiet(150_000, &mut out).unwrap();
+        let mut straight = readout();
+        let mut expected = vec![];
+        for (t, ticks) in [(0, 10), (1000, 20), (3000, 30)] {
+            straight.push(&event(t, ticks), &mut expected).unwrap();
+        }
+        straight.advance(150_000, &mut expected).unwrap();
+        assert_eq!(out, expected);
+        assert_eq!((ahead.wrong(), ahead.late()), (0, 0));
+    }
+
+    #[test]
+    fn what_was_said_in_a_silence_that_was_none_is_counted() {
+        let (mut ahead, mut out) = (readout(), vec![]);
+        ahead.push(&event(0, 10), &mut out).unwrap();
+        ahead.push(&event(1000, 20), &mut out).unwrap();
+        ahead.quiet(20_000, &mut out).unwrap();
+        let early = out.clone();
+        // It came before the crossing, which therefore lay earlier: said anew, as the recording will say it.
+        ahead.push(&event(2000, 30), &mut out).unwrap();
+        ahead.advance(40_000, &mut out).unwrap();
+        assert_eq!((early.len(), out.len(), ahead.wrong(), ahead.late()), (1, 2, 1, 0));
+        assert!(out[1].t < out[0].t);
+    }
+}
