@@ -227,10 +227,13 @@ class Live:
 
     def __iter__(self) -> Iterator[Said]:
         """Yield detections as they come, until `stop` is called."""
-        while not self._core.is_over():
-            said = self.next(_WAIT_S)
+        while True:
+            over = self._core.is_over()
+            said = self.next(0.0 if over else _WAIT_S)
             if said is not None:
                 yield said
+            elif over:
+                return
 
     @property
     def counters(self) -> dict[str, Any]:

@@ -161,7 +161,14 @@ impl Live {
         loop {
             let left = until.map_or(LOOK_EVERY, |t| t.saturating_duration_since(Instant::now()));
             let (said, over) =
-                self.with(py, |pipeline| Ok((pipeline.next(left.min(LOOK_EVERY))?, pipeline.is_over())))?;
+                enter(py, |_| match self.pipeline.read().unwrap_or_else(PoisonError::into_inner).as_ref() {
+                    Some(pipeline) => {
+                        // Asked before: what ended it was then noted before, and `next` gives it.
+                        let over = pipeline.is_over();
+                        Ok::<_, taxel_live::Error>((pipeline.next(left.min(LOOK_EVERY))?, over))
+                    }
+                    None => Ok((None, true)),
+                })?;
             py.check_signals()?;
             if said.is_some() || over || left.is_zero() {
                 return Ok(said.map(said_parts));

@@ -1,0 +1,231 @@
+"""What receiving costs, what is lost, and how long arrival to decoded takes, beside faery's UDP receiver.
+
+Sender and receiver share this machine, over loopback, the sender a process of its own. Ours sends as the board does:
+each 192 us what a frame saw, in datagrams of at most 280 words, which the kernel cuts out of one train (UDP_SEGMENT).
+faery's receiver gets its own format ("t64_x16_y16_on8", 111 events a datagram), paced alike.
+
+Latency: ours from the kernel's stamp to the end of decoding, a datagram each; faery's from its sender's clock before
+the send to the packet in the reader's hands (it has no other stamp), which adds the sending.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from _rounds import stamp
+
+from taxel import Array, Events
+from taxel.live import Live
+from taxel.wire import encode
+
+#: The sensor's worst case, changes a second: 4096 taxels in each frame of 192 us.
+WORST = 21.3e6
+FRAME_US, DATAGRAM_WORDS = 192.0, 280
+RATES = (1e4, 1e6, 1e7)
+
+SEND = """
+import json, pickle, sys
+from taxel.live import send
+port, path, each, seconds, segment = int(sys.argv[1]), sys.argv[2], int(sys.argv[3]), float(sys.argv[4]), sys.argv[5]
+print(json.dumps(send(pickle.load(open(path, "rb")), port=port, each=each, seconds=seconds, segment=segment == "1")))
+"""
+
+FAERY_SEND = """
+import json, socket, sys, time
+import numpy as np
+port, rate, seconds = int(sys.argv[1]), float(sys.argv[2]), float(sys.argv[3])
+events = np.zeros(111, np.dtype([("t", "<u8"), ("x", "<u2"), ("y", "<u2"), ("on", "?")]))
+events["x"], events["y"] = np.arange(111) % 64, np.arange(111) // 64
+link = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+begun, sent = time.perf_counter(), 0
+while (passed := time.perf_counter() - begun) < seconds:
+    due = int(passed * rate / 111)
+    if sent >= due:
+        time.sleep(min(111 / rate, 192e-6))
+    while sent < due:
+        events["t"] = time.time_ns() // 1000
+        link.sendto(events.tobytes(), ("127.0.0.1", port))
+        sent += 1
+time.sleep(0.5)
+events["t"], events["on"] = time.time_ns() // 1000, True
+for _ in range(20):
+    link.sendto(events.tobytes(), ("127.0.0.1", port))
+    time.sleep(0.02)
+print(json.dumps({"events": sent * 111}))
+"""
+
+FAERY_RECEIVE = """
+import json, os, sys, time
+import faery, numpy as np
+port = int(sys.argv[1])
+late, events = [], 0
+stream = iter(faery.events_stream_from_udp((64, 64), ("127.0.0.1", port), format="t64_x16_y16_on8"))
+print("ready", flush=True)
+for packet in stream:
+    now = time.time_ns() // 1000
+    if packet["on"].any():
+        break
+    events += len(packet)
+    late.append(now - int(packet["t"][0]))
+p50, p99 = np.percentile(late, [50, 99]) if late else (0, 0)
+print(json.dumps({"events": events, "p50_us": float(p50), "p99_us": float(p99), "max_us": float(max(late, default=0)),
+                  "cpu_s": time.process_time()}), flush=True)
+os._exit(0)
+"""
+
+
+def datagrams(rate: float, frames: int) -> tuple[list[bytes], int]:
+    """Return the datagrams of `frames` frames at `rate` changes a second, and how many a frame has."""
+    changes = max(1, round(rate * FRAME_US / 1e6))
+    taxel = np.arange(changes * frames) % 4096
+    t = np.repeat(np.arange(frames) * 192 // 100 * 100, changes)
+    events = Events(t, taxel % 64, taxel // 64, np.ones(len(t), bool), array=Array(64, 64))
+    words = encode(events)
+    each = -(-changes // DATAGRAM_WORDS)
+    cut: list[bytes] = []
+    for frame in range(frames):
+        part = words[frame * changes * 5 : (frame + 1) * changes * 5]
+        cut += [part[k : k + DATAGRAM_WORDS * 5] for k in range(0, len(part), DATAGRAM_WORDS * 5)]
+    return cut, each
+
+
+def thread_seconds() -> dict[str, float]:
+    """Return the CPU time of each named thread of this process so far, s."""
+    seconds: dict[str, float] = {}
+    for task in Path("/proc/self/task").iterdir():
+        name = (task / "comm").read_text().strip()
+        seconds[name] = seconds.get(name, 0.0) + int((task / "schedstat").read_text().split()[0]) / 1e9
+    return seconds
+
+
+def ours(rate: float, seconds: float, scratch: Path, *, segment: bool = True) -> dict[str, Any]:
+    """Receive and decode what a sender of `rate` changes a second sends."""
+    cut, each = datagrams(rate, 4 if rate > 1e6 else 64)
+    payload = scratch / f"{rate:.0f}.pickle"
+    payload.write_bytes(pickle.dumps(cut))
+    before = thread_seconds()
+    with Live(0, host="127.0.0.1") as live:
+        port = live.address[1]
+        arguments = [str(port), str(payload), str(each), str(seconds), "1" if segment else "0"]
+        sender = subprocess.run([sys.executable, "-c", SEND, *arguments], capture_output=True, text=True, check=True)
+        time.sleep(0.2)
+        after = thread_seconds()
+        begun = time.perf_counter()
+        counters = live.stop().counters
+        stopped = time.perf_counter() - begun
+    sent, capture = json.loads(sender.stdout), counters["capture"]
+    assert sent["messages"] == capture["messages"] + capture["dropped_by_kernel"], "the sum at the socket closes"
+    assert capture["datagrams"] == counters["decoded"] + capture["dropped_by_queue"], "the sum behind it closes"
+    delay = counters["decode_latency"]
+    return {
+        "asked_events_per_s": rate,
+        "sent_events_per_s": sent["bytes"] / 5 / seconds,
+        "sent_mb_per_s": sent["bytes"] / 1e6 / seconds,
+        "segmenting": sent["segmenting"],
+        "gro": capture["gro"],
+        "lost_datagrams": sent["datagrams"] - counters["decoded"],
+        "dropped_by_kernel_messages": capture["dropped_by_kernel"],
+        "dropped_by_queue": capture["dropped_by_queue"],
+        "receive_cores": (after["taxel-receive"] - before.get("taxel-receive", 0.0)) / seconds,
+        "decode_cores": (after["taxel-decode"] - before.get("taxel-decode", 0.0)) / seconds,
+        "latency": {name: delay[f"{name}_us"] for name in ("p50", "p99", "max")},
+        "stop_s": stopped,
+    }
+
+
+def faery(rate: float, seconds: float, port: int) -> dict[str, Any]:
+    """Receive with faery what a sender of `rate` events a second sends in its format."""
+    receiver = subprocess.Popen([sys.executable, "-c", FAERY_RECEIVE, str(port)], stdout=subprocess.PIPE, text=True)
+    assert receiver.stdout is not None
+    receiver.stdout.readline()
+    time.sleep(0.3)
+    sender = subprocess.run(
+        [sys.executable, "-c", FAERY_SEND, str(port), str(rate), str(seconds)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    try:
+        said, _ = receiver.communicate(timeout=10 + seconds)
+    except subprocess.TimeoutExpired:
+        receiver.kill()
+        receiver.communicate()
+        return {"asked_events_per_s": rate, "failed": "its receiver never heard the end mark"}
+    sent, heard = json.loads(sender.stdout)["events"], json.loads(said.splitlines()[-1])
+    return {
+        "asked_events_per_s": rate,
+        "sent_events_per_s": sent / seconds,
+        "arrived": heard["events"] / max(sent, 1),
+        "cores": heard["cpu_s"] / seconds,
+        "latency": {"p50": heard["p50_us"], "p99": heard["p99_us"], "max": heard["max_us"]},
+    }
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    rounds, seconds = (1, 0.5) if quick else (5, 2.0)
+    load = os.getloadavg()[0]
+    with tempfile.TemporaryDirectory() as folder:
+        scratch = Path(folder)
+        worst = ours(WORST, 0.5 if quick else 10.0, scratch)
+        apart = ours(WORST, 0.5 if quick else 10.0, scratch, segment=False)
+        rows: dict[float, dict[str, list[dict[str, Any]]]] = {rate: {"taxel": [], "faery": []} for rate in RATES}
+        for turn in range(rounds):
+            for k, rate in enumerate(RATES):
+                rows[rate]["taxel"].append(ours(rate, seconds, scratch))
+                rows[rate]["faery"].append(faery(rate, seconds, 42_000 + 10 * turn + k))
+    latency = {
+        f"{rate:.0e} events/s": {name: _spread(row) for name, row in peers.items()} for rate, peers in rows.items()
+    }
+    p50s = [row["latency"]["p50"] for peers in rows.values() for row in peers["taxel"]]
+    return {
+        "question": (__doc__ or "").splitlines()[0],
+        **stamp("faery"),
+        "load_before": load,
+        "load_after": os.getloadavg()[0],
+        "worst_case": worst,
+        "worst_case_without_segments": apart,
+        "latency_us": latency,
+        "ratios": {
+            f"faery's p50 over ours at {name}": row["faery"]["p50"]["median"] / row["taxel"]["p50"]["median"]
+            for name, row in latency.items()
+            if "p50" in row["faery"]
+        },
+        "goals": {
+            "nothing lost at 21.3 M events/s": worst["lost_datagrams"] == 0
+            and worst["sent_events_per_s"] > 0.98 * WORST,
+            "receiving below 0.05 of a core": worst["receive_cores"] < 0.05,
+            "p50 below 50 us": all(row["taxel"]["p50"]["median"] < 50 for row in latency.values()),
+            "p99 below 1 ms": all(row["taxel"]["p99"]["median"] < 1000 for row in latency.values()),
+        },
+        "stable": bool(load < os.cpu_count() and max(p50s) < 3 * min(p50s)),
+    }
+
+
+def _spread(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return median and quartiles over the rounds of each latency, us, and of what arrived."""
+    rows = [row for row in rows if "latency" in row]
+    if not rows:
+        return {"failed": "no round came to its end"}
+
+    def over(values: list[float]) -> dict[str, Any]:
+        low, middle, high = np.percentile(values, [25, 50, 75])
+        return {"median": float(middle), "quartiles": [float(low), float(high)]}
+
+    spread: dict[str, Any] = {name: over([row["latency"][name] for row in rows]) for name in ("p50", "p99", "max")}
+    spread["sent_events_per_s"] = over([row["sent_events_per_s"] for row in rows])
+    if "arrived" in rows[0]:
+        spread["arrived"] = over([row["arrived"] for row in rows])
+        spread["cores"] = over([row["cores"] for row in rows])
+    else:
+        spread["lost_datagrams"] = over([float(row["lost_datagrams"]) for row in rows])
+        spread["cores"] = over([row["receive_cores"] + row["decode_cores"] for row in rows])
+    return spread

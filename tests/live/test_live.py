@@ -1,0 +1,360 @@
+"""What comes over the network is recorded and read out, and nothing is lost uncounted."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import Array, DeviceError, Events, Neuron, ProblemError, Readout, wire
+from taxel.encode import ChangeEvents, ContactArea
+from taxel.live import Live, Said, heard, send
+
+LOOPBACK = "127.0.0.1"
+SMALL = Array(4, 4, pitch_mm=2.0, name="small")
+
+
+def presses(presses: int) -> Events:
+    """Each 40 ms a taxel rises by 40 ticks in 2 ms and falls again."""
+    t, ticks, p = [], [], []
+    for press in range(presses):
+        for k in range(20):
+            t.append(press * 40_000 + k * 200 // 100 * 100)
+            ticks.append(60 + 4 * (k if k < 10 else 20 - k))
+            p.append(k < 10)
+    n = len(t)
+    return Events(t, np.full(n, 1), np.full(n, 2), p, array=SMALL, intensity=np.array(ticks))
+
+
+def datagrams(events: Events) -> list[bytes]:
+    return [wire.encode(events[events.t == t]) for t in np.unique(events.t)]
+
+
+def touch() -> Readout:
+    weights = np.where(np.arange(32) < 16, 0.5, 0.0)
+    return Readout(ChangeEvents(), {"touch": (Neuron(tau=2.0, refractory=15.0), weights)})
+
+
+def play(events: Events, port: int, *, pace: float = 0.0) -> int:
+    """Send a datagram a stamp; return how many."""
+    sent = datagrams(events)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        for one in sent:
+            link.sendto(one, (LOOPBACK, port))
+            if pace:
+                time.sleep(pace)
+    return len(sent)
+
+
+def wait_for(live: Live, decoded: int) -> None:
+    until = time.monotonic() + 30
+    while live.counters["decoded"] < decoded:
+        assert time.monotonic() < until, live.counters
+        time.sleep(0.002)
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "taxel", *map(str, arguments)]
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        link.bind((LOOPBACK, 0))
+        return int(link.getsockname()[1])
+
+
+def listening(process: subprocess.Popen[str]) -> None:
+    """Wait until a command says that it listens."""
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "listening" in line:
+            return
+    raise AssertionError("ended before it listened")
+
+
+@pytest.mark.parametrize("segment", [False, True])
+@pytest.mark.parametrize("gro", [False, True])
+def test_the_sums_close_with_the_senders_own_count(segment: bool, gro: bool) -> None:
+    with Live(0, host=LOOPBACK, gro=gro) as live:
+        sent = send(
+            [bytes.fromhex("c00005030 4".replace(" ", "")) * 280] * 7,
+            *live.address,
+            each=7,
+            seconds=0.1,
+            segment=segment,
+        )
+    counters = live.stop().counters
+    capture, words = counters["capture"], counters["wire"]
+    whole_trains = capture["gro"] and sent["segmenting"]
+    assert capture["messages"] + capture["dropped_by_kernel"] == sent["messages" if whole_trains else "datagrams"]
+    assert capture["datagrams"] == counters["decoded"] + capture["dropped_by_queue"]
+    assert words["bytes"] == 5 * words["words"] + words["skipped"]
+    assert capture["dropped_by_kernel"] or words["bytes"] == sent["bytes"]
+
+
+def test_what_is_recorded_is_what_was_sent(tmp_path: Path) -> None:
+    events = presses(5)
+    for name in ("walk.mcap", "walk.lsa"):
+        with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / name) as live:
+            wait_for(live, play(events, live.address[1])) if name.endswith("mcap") else play(events, live.address[1])
+        assert live.stop().lost == 0
+    assert taxel.open(tmp_path / "walk.mcap").events == events
+    assert (tmp_path / "walk.lsa").read_bytes() == wire.encode(events)
+    assert (tmp_path / "walk.lss").exists()
+
+
+def test_detections_come_live_and_are_those_of_the_recording(tmp_path: Path) -> None:
+    called: list[Said] = []
+    # A machine that stalls makes datagrams late: here the host's clock moves nothing on.
+    options = {"array": SMALL, "readout": touch(), "guard_frames": 1e6, "say": called.append}
+    with Live(0, host=LOOPBACK, record=tmp_path / "said.mcap", **options) as live:
+        thread = threading.Thread(target=play, args=(presses(6), live.address[1]), kwargs={"pace": 0.001})
+        thread.start()
+        iterated = []
+        for said in live:
+            iterated.append(said)
+            if len(iterated) == 5:
+                break
+        thread.join()
+        wait_for(live, len(datagrams(presses(6))))
+    live.stop()
+    recorded = taxel.open(tmp_path / "said.mcap")
+    again = taxel.detect.run(touch(), recorded)
+    assert len(again) == 6
+    for found in (heard(called), recorded.detections):
+        assert list(found.label) == ["touch"] * len(found)
+        assert len(found) >= 5
+        np.testing.assert_array_equal(found.t, again.t[: len(found)])
+        np.testing.assert_array_equal(found.known, again.known[: len(found)])
+    assert iterated == called[:5]
+    assert heard(called).said is not None
+
+
+def test_in_silence_what_is_owed_is_said() -> None:
+    events = presses(1)
+    with Live(0, host=LOOPBACK, array=SMALL, readout=touch()) as live:
+        play(events[:4], live.address[1])
+        said = live.next(30)
+    assert said is not None
+    assert said.t > events.t[3]
+
+
+def test_what_the_callers_function_raises_is_raised() -> None:
+    def refuse(said: Said) -> None:
+        raise LookupError(f"nothing to do with {said.label}")
+
+    with Live(0, host=LOOPBACK, array=SMALL, readout=touch(), say=refuse) as live:
+        play(presses(2), live.address[1])
+        with pytest.raises(LookupError, match="nothing to do with touch"):
+            list(live)
+        assert list(live) == [], "it has ended"
+
+
+def test_a_tare_is_taken_and_can_be_kept() -> None:
+    rest = Events(
+        np.arange(64) * 1000,
+        np.tile(np.arange(4), 16),
+        np.repeat(np.tile(np.arange(4), 4), 4),
+        np.ones(64, bool),
+        array=SMALL,
+        intensity=np.full(64, 40),
+    )
+    readout = Readout(ContactArea(), {"contact": (Neuron(tau=0.5), np.ones(10))})
+    with Live(0, host=LOOPBACK, array=SMALL, readout=readout, tare=0.05) as live:
+        assert live.tare is None
+        wait_for(live, play(rest, live.address[1]))
+        until = time.monotonic() + 30
+        while live.tare is None:
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        tare = live.tare
+    np.testing.assert_array_equal(tare.rest, np.full((4, 4), 40.0))
+    assert (tare.start_us, tare.stop_us) == (0, 50_000)
+
+
+def test_a_readout_that_needs_a_tare_and_has_none_is_refused() -> None:
+    readout = Readout(ContactArea(), {"contact": (Neuron(), np.ones(10))})
+    with pytest.raises(ProblemError, match="tare"):
+        Live(0, host=LOOPBACK, readout=readout)
+
+
+def test_the_picture_shows_what_the_taxels_hold() -> None:
+    with Live(0, host=LOOPBACK, array=SMALL) as live:
+        play(presses(1), live.address[1])
+        until = time.monotonic() + 30
+        while live.picture[2, 1] == 0:
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        assert np.count_nonzero(live.picture) == 1
+
+
+def test_notes_and_markers_are_kept(tmp_path: Path) -> None:
+    marked = Events([], [], [], [], array=SMALL, markers=[(1000, True), (5000, False)])
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "noted.mcap") as live:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            link.sendto(wire.encode(marked), live.address)
+        wait_for(live, 1)
+        assert live.take_markers() == [(1000, True), (5000, False)]
+        assert live.take_markers() == []
+        live.note("the left foot")
+    recorded = taxel.open(tmp_path / "noted.mcap")
+    assert [note.text for note in recorded.notes] == ["the left foot"]
+    assert recorded.events.markers == marked.markers
+
+
+def test_a_live_that_ended_says_its_summary_again_and_refuses_the_rest() -> None:
+    live = Live(0, host=LOOPBACK)
+    summary = live.stop()
+    assert live.stop() is summary
+    assert live.counters is summary.counters
+    with pytest.raises(ProblemError, match="has been stopped"):
+        live.note("too late")
+    assert live.next(1.0) is None
+    assert list(live) == []
+
+
+@pytest.mark.parametrize(
+    ("argument", "value", "kind", "said"),
+    [
+        ("port", 70_000, ProblemError, "port is 70000: must be a whole number from 0 to 65535"),
+        ("host", "no such host", ProblemError, 'host is "no such host"'),
+        ("host", 3, ProblemError, "host is 3: must be a text"),
+        ("array", "64x64", ProblemError, "array is '64x64': must be a taxel.Array"),
+        ("registers", "fast", ProblemError, 'preset "fast"'),
+        ("registers", 4, ProblemError, "registers is 4"),
+        ("differences", 1, ProblemError, "differences is 1: must be True or False"),
+        ("readout", "r.json", ProblemError, "readout is 'r.json': must be a taxel.Readout"),
+        ("tare", 1.0, ProblemError, "tare without a readout"),
+        ("record", 3, ProblemError, "record is 3: must be a path"),
+        ("record", "a.txt", ProblemError, "a.txt: a recording is named .mcap"),
+        ("guard_frames", -1, ProblemError, "guard_frames is -1: must be 0 or more"),
+        ("guard_frames", float("nan"), ProblemError, "guard_frames is nan"),
+        ("say", 3, ProblemError, "say is 3"),
+        ("lines", "yes", ProblemError, "lines is 'yes'"),
+        ("queue_bytes", 10, ProblemError, "queue_bytes is 10: must be 65536 or more"),
+        ("readout_events", 0, ProblemError, "readout_events is 0"),
+        ("kernel_buffer_bytes", -5, ProblemError, "kernel_buffer_bytes is -5"),
+        ("gro", 2, ProblemError, "gro is 2"),
+    ],
+)
+def test_nonsense_is_refused_by_name(argument: str, value: object, kind: type[Exception], said: str) -> None:
+    with pytest.raises(kind) as refused:
+        Live(**{"port": 0, "host": LOOPBACK, argument: value})  # type: ignore[arg-type]
+    assert said in str(refused.value)
+
+
+def test_registers_that_break_a_rule_for_the_array_are_refused() -> None:
+    with pytest.raises(DeviceError):
+        Live(0, host=LOOPBACK, array=Array(64, 32), registers=wire.Registers.preset("5.2 kHz"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"datagrams": []}, "one datagram or more"),
+        ({"each": 0}, "each is 0"),
+        ({"period_us": -1.0}, "period_us is -1"),
+        ({"seconds": float("inf")}, "seconds is inf"),
+        ({"port": 0}, "port is 0"),
+    ],
+)
+def test_nonsense_is_not_sent(arguments: dict[str, object], said: str) -> None:
+    with pytest.raises(ProblemError) as refused:
+        send(**{"datagrams": [b"x"], "port": 9, **arguments})  # type: ignore[arg-type]
+    assert said in str(refused.value)
+
+
+def test_ctrl_c_ends_a_wait_for_detections() -> None:
+    with Live(0, host=LOOPBACK, array=SMALL, readout=touch()) as live:
+        threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+        with pytest.raises(KeyboardInterrupt):
+            live.next(60)
+
+
+def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path: Path) -> None:
+    port, file, events = free_port(), tmp_path / "walk.mcap", presses(3)
+    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--array", "4x4")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        listening(process)
+        play(events, port)
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        said, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert said.splitlines()[-1].startswith("nothing lost after arrival")
+    assert taxel.open(file).events == events
+    again = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert again.returncode == 2
+    assert again.stderr.strip().splitlines() == [f"taxel: {file}: file exists"]
+
+
+def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:
+    port, file = free_port(), tmp_path / "marked.mcap"
+    marked = Events([], [], [], [], array=SMALL, markers=[(1000, True), (5000, False)])
+    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--markers", "--seconds", 60, "--json")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            while process.poll() is None:
+                link.sendto(wire.encode(marked), (LOOPBACK, port))
+                time.sleep(0.05)
+        said, _ = process.communicate(timeout=60)
+    summary = json.loads(said)
+    assert process.returncode == 0
+    assert summary["counters"]["markers"] >= 2
+    assert summary["path"] == str(file)
+
+
+def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> None:
+    automatic = ["--length", 0.2, "--countdown", 0, "--start-index", 7, "--trials", 2]
+    arguments = command("record", tmp_path / "step.lsa", "--host", LOOPBACK, "--port", free_port(), *automatic)
+    done = subprocess.run(arguments, capture_output=True, text=True, check=True)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["step7.lsa", "step7.lss", "step8.lsa", "step8.lss"]
+    assert done.stdout.count("nothing lost after arrival") == 2
+    again = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert (again.returncode, again.stderr.strip()) == (2, f"taxel: {tmp_path / 'step7.lsa'}: file exists")
+
+
+def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
+    with Live(0, host=LOOPBACK) as holder:
+        port = holder.address[1]
+        with pytest.raises(OSError, match="in use"):
+            Live(port, host=LOOPBACK)
+        arguments = command("record", tmp_path / "a.mcap", "--host", LOOPBACK, "--port", port)
+        done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (3, f"taxel: UDP {LOOPBACK}:{port}: address already in use\n")
+    assert not (tmp_path / "a.mcap").exists()
+
+
+def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path) -> None:
+    port, events = free_port(), presses(4)
+    touch().save(tmp_path / "touch.json")
+    files = ["--readout", tmp_path / "touch.json", "--record", tmp_path / "live.mcap"]
+    arguments = command("live", *files, "--host", LOOPBACK, "--port", port, "--array", "4x4", "--json", "--seconds", 60)
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
+        while not (tmp_path / "live.mcap").exists():
+            assert process.poll() is None
+            time.sleep(0.02)
+        play(events, port, pace=0.002)
+        assert process.stdout is not None
+        lines = [json.loads(process.stdout.readline()) for _ in range(4)]
+        process.send_signal(signal.SIGINT)
+        assert process.communicate(timeout=60)[0] == ""
+    assert process.returncode == 0
+    assert [set(line) for line in lines] == [{"label", "t", "known", "slope", "said", "said_ns"}] * 4
+    np.testing.assert_array_equal([line["t"] for line in lines], taxel.open(tmp_path / "live.mcap").detections.t)
+
+
+def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:
+    touch().save(tmp_path / "touch.json")
+    arguments = command("live", "--readout", tmp_path / "touch.json", "--save-tare", tmp_path / "tare.json")
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == "taxel: save_tare without a fresh tare: give --tare SECONDS\n"
