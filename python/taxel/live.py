@@ -102,7 +102,8 @@ class Live:
     array : Array
         The sensor; by default the readout's own, or the thesis' 64 x 64.
     registers : str or taxel.wire.Registers
-        What the board's registers hold: themselves, or a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz".
+        What the board's registers hold: themselves, or a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz", of
+        which a smaller array drives fewer lines.
     differences : bool
         Whether the board sends differences for intensities (the panel's "delta intensity").
     readout : Readout, optional

@@ -11,8 +11,8 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use taxel_core::detect::Readout;
 use taxel_core::encode::Tare;
-use taxel_core::problem;
 use taxel_core::wire::Registers;
+use taxel_core::{Array, problem};
 use taxel_live::capture::{self, SendCounts, Sender};
 use taxel_live::pipeline::{Ear, Lines, Live as Pipeline, Options, Record, Said, Sink};
 
@@ -38,9 +38,14 @@ struct Chosen {
 }
 
 impl Chosen {
-    fn registers(&self) -> PyResult<Registers> {
+    fn registers(&self, array: &Array) -> PyResult<Registers> {
         match &self.registers {
-            Value::String(name) => Registers::preset(name).map_err(core),
+            Value::String(name) => {
+                let preset = Registers::preset(name).map_err(core)?;
+                // A smaller array has fewer lines to drive.
+                let lines = u8::try_from(array.columns).map_or(preset.lines, |columns| preset.lines.min(columns));
+                Ok(Registers { lines, ..preset })
+            }
             held => Registers::deserialize(held).map_err(|e| ProblemError::new_err(format!("registers: {e}"))),
         }
     }
@@ -111,7 +116,7 @@ impl Live {
         };
         let usual = Options::new(to_array(parts)?);
         let options = Options {
-            registers: chosen.registers()?,
+            registers: chosen.registers(&usual.array)?,
             differences: chosen.differences,
             guard_frames: chosen.guard_frames,
             readout_events: chosen.readout_events.unwrap_or(usual.readout_events),
