@@ -96,3 +96,4 @@ from taxel.cli import (  # noqa: E402
     study,  # noqa: F401
     train,  # noqa: F401
 )
+from taxel.cli import bench, convert, demo, detect, emulate, encode, info, live, record, train  # noqa: E402, F401

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import errno
 from collections import deque
 from pathlib import Path
 from typing import Annotated
@@ -58,9 +60,8 @@ def live(
     if save_tare is not None and not isinstance(rest, float):
         raise ProblemError("save_tare without a fresh tare: give --tare SECONDS")
     if save_tare is not None and save_tare.exists():
-        raise FileExistsError(17, "File exists", str(save_tare))
+        raise FileExistsError(errno.EEXIST, "File exists", str(save_tare))
     console = Console(stderr=True, quiet=as_json)
-    shown: deque[Said] = deque(maxlen=_SHOWN)
     with Live(
         port,
         host=host,
@@ -72,22 +73,9 @@ def live(
         guard_frames=guard_frames,
         lines=as_json,
     ) as pipeline:
-        console.print(f"listening on UDP {pipeline.address[0]}:{pipeline.address[1]}; Ctrl-C ends")
-        with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
-            before = pipeline.counters
-            try:
-                while seconds is None or before["seconds"] < seconds:
-                    said = pipeline.next(_REDRAW)
-                    while said is not None:
-                        shown.append(said)
-                        said = pipeline.next(0.0)
-                    now = pipeline.counters
-                    if now["seconds"] - before["seconds"] >= _REDRAW:
-                        display.update(Group(counters_table(before, now), _state(now, shown)))
-                        before = now
-            except (KeyboardInterrupt, BrokenPipeError):
-                # Whoever reads our lines has enough: as good an end as Ctrl-C.
-                pass
+        # Whoever reads our lines and has enough is as good an end as Ctrl-C.
+        with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
+            _watch(pipeline, seconds, console)
         taken = pipeline.tare
         summary = pipeline.stop()
     if save_tare is not None and taken is not None:
@@ -109,6 +97,23 @@ def live(
         raise ProblemError(f"tare: not complete after {summary.counters['seconds']:.1f} s; {save_tare} was not written")
     if summary.lost or summary.counters["events_dropped"]:
         raise typer.Exit(3)
+
+
+def _watch(pipeline: Live, seconds: float | None, console: Console) -> None:
+    """Show what comes and what is said until the time is over."""
+    shown: deque[Said] = deque(maxlen=_SHOWN)
+    console.print(f"listening on UDP {pipeline.address[0]}:{pipeline.address[1]}; Ctrl-C ends")
+    with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
+        before = pipeline.counters
+        while seconds is None or before["seconds"] < seconds:
+            said = pipeline.next(_REDRAW)
+            while said is not None:
+                shown.append(said)
+                said = pipeline.next(0.0)
+            now = pipeline.counters
+            if now["seconds"] - before["seconds"] >= _REDRAW:
+                display.update(Group(counters_table(before, now), _state(now, shown)))
+                before = now
 
 
 def _tare(said: str | None) -> Tare | float | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import time
 from dataclasses import asdict
@@ -94,7 +95,7 @@ def _automatic(
     while trials is None or done < trials:
         name = Path(_core.numbered_path(file, index + done))
         if name.exists() and not live["overwrite"]:
-            raise FileExistsError(17, "File exists", str(name))
+            raise FileExistsError(errno.EEXIST, "File exists", str(name))
         try:
             _count_down(name, countdown, console)
         except KeyboardInterrupt:
@@ -121,25 +122,29 @@ def _one(
     file: Path, options: dict[str, Any], seconds: float | None, markers: bool, console: Console
 ) -> tuple[Summary, bool]:
     """Record one file until its time is over, the board marks a stop, or Ctrl-C; return whether it was that."""
-    stopped = False
     with Live(record=file, **options) as live:
-        console.print(f"listening on UDP {live.address[0]}:{live.address[1]}, recording to {file}; Ctrl-C ends")
-        begun = time.monotonic()
-        with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
-            before, over = live.counters, False
-            try:
-                while not over:
-                    live.next(_REDRAW)
-                    now = live.counters
-                    for t, start in live.take_markers():
-                        console.print(f"{t / 1e6:.4f} s: {'start' if start else 'stop'} marked")
-                        over |= markers and not start
-                    display.update(counters_table(before, now))
-                    before = now
-                    over |= seconds is not None and time.monotonic() - begun >= seconds
-            except KeyboardInterrupt:
-                stopped = True
+        try:
+            console.print(f"listening on UDP {live.address[0]}:{live.address[1]}, recording to {file}; Ctrl-C ends")
+            _watch(live, seconds, markers, console)
+            stopped = False
+        except KeyboardInterrupt:
+            stopped = True
         return live.stop(), stopped
+
+
+def _watch(live: Live, seconds: float | None, markers: bool, console: Console) -> None:
+    """Show what comes until the time is over or, if `markers` count, a stop was marked."""
+    with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
+        before = live.counters
+        while seconds is None or before["seconds"] < seconds:
+            live.next(_REDRAW)
+            for t, start in live.take_markers():
+                console.print(f"{t / 1e6:.4f} s: {'start' if start else 'stop'} marked")
+                if markers and not start:
+                    return
+            now = live.counters
+            display.update(counters_table(before, now))
+            before = now
 
 
 def _say(summary: Summary, as_json: bool) -> None:
