@@ -22,15 +22,12 @@ from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.tare import Tare
-from taxel.wire import Registers
+from taxel.wire import _THESIS, Registers
 
 __all__ = ["PORT", "Live", "Said", "Summary", "heard", "send"]
 
 #: Where the board's datagrams go (reading: the thesis names no port).
 PORT = 5208
-
-#: The thesis' array (chapter 4).
-_THESIS = Array(64, 64, pitch_mm=2.67, name="thesis 64x64")
 
 #: How long an iteration waits at a time.
 _WAIT_S = 0.5
@@ -242,9 +239,10 @@ class Live:
 
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `events`, `read_out`, `events_dropped`,
-        `late` (out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence that was
-        none, because events came later than the guard), `detections_dropped`, `decode_latency` and `said_latency` (count, p50_us, p99_us, max_us),
-        `offset` (board_us, host_ns, drift_ppm, or None), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
+        `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence
+        that was none, because events came later than the guard), `detections_dropped`, `decode_latency` and
+        `said_latency` (count, p50_us, p99_us, max_us), `offset` (board_us, host_ns, drift_ppm, or None), `board_us`,
+        `markers`, `marked_start`, `seconds`, `taring`.
 
         Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
         `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +

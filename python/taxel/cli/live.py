@@ -14,6 +14,7 @@ from rich.live import Live as Display
 from rich.text import Text
 
 from taxel._core import ProblemError
+from taxel.cable import Cable
 from taxel.cli import app
 from taxel.cli.board import HostOption, PortOption, PresetOption, counters_table, geometry
 from taxel.detect import Readout
@@ -39,6 +40,10 @@ def live(
     tare: Annotated[
         str | None, typer.Option(help="Seconds at rest for a fresh one, or the file of an earlier one (JSON).")
     ] = None,
+    control: Annotated[
+        str | None,
+        typer.Option(help="The board's serial line (/dev/ttyUSB0, host:port): floor 0 while the tare is taken."),
+    ] = None,
     save_tare: Annotated[Path | None, typer.Option(help="Keep the fresh tare in a new file (JSON).")] = None,
     record: Annotated[Path | None, typer.Option(help="Keep everything in a new file (.mcap or .lsa).")] = None,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
@@ -61,23 +66,28 @@ def live(
         raise ProblemError("save_tare without a fresh tare: give --tare SECONDS")
     if save_tare is not None and save_tare.exists():
         raise FileExistsError(errno.EEXIST, "File exists", str(save_tare))
+    if control is not None and not isinstance(rest, float):
+        raise ProblemError("control without a fresh tare: give --tare SECONDS")
     console = Console(stderr=True, quiet=as_json)
-    with Live(
-        port,
-        host=host,
-        array=None if array is None else geometry(array),
-        registers=preset,
-        readout=heard,
-        tare=rest,
-        record=record,
-        guard_frames=guard_frames,
-        lines=as_json,
-    ) as pipeline:
-        # Whoever reads our lines and has enough is as good an end as Ctrl-C.
-        with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
-            _watch(pipeline, seconds, console)
-        taken = pipeline.tare
-        summary = pipeline.stop()
+    with contextlib.ExitStack() as at_rest:
+        if control is not None:
+            at_rest.enter_context(at_rest.enter_context(Cable(control)).floor(0))
+        with Live(
+            port,
+            host=host,
+            array=None if array is None else geometry(array),
+            registers=preset,
+            readout=heard,
+            tare=rest,
+            record=record,
+            guard_frames=guard_frames,
+            lines=as_json,
+        ) as pipeline:
+            # Whoever reads our lines and has enough is as good an end as Ctrl-C.
+            with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
+                _watch(pipeline, seconds, console, at_rest)
+            taken = pipeline.tare
+            summary = pipeline.stop()
     if save_tare is not None and taken is not None:
         taken.save(save_tare)
         console.print(f"tare written to {save_tare}")
@@ -99,8 +109,8 @@ def live(
         raise typer.Exit(3)
 
 
-def _watch(pipeline: Live, seconds: float | None, console: Console) -> None:
-    """Show what comes and what is said until the time is over."""
+def _watch(pipeline: Live, seconds: float | None, console: Console, at_rest: contextlib.ExitStack) -> None:
+    """Show what comes and what is said until the time is over; what holds `at_rest` ends with the tare."""
     shown: deque[Said] = deque(maxlen=_SHOWN)
     console.print(f"listening on UDP {pipeline.address[0]}:{pipeline.address[1]}; Ctrl-C ends")
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
@@ -111,6 +121,8 @@ def _watch(pipeline: Live, seconds: float | None, console: Console) -> None:
                 shown.append(said)
                 said = pipeline.next(0.0)
             now = pipeline.counters
+            if not now["taring"]:
+                at_rest.close()
             if now["seconds"] - before["seconds"] >= _REDRAW:
                 display.update(Group(counters_table(before, now), _state(now, shown)))
                 before = now
