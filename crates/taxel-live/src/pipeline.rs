@@ -9,6 +9,7 @@ mod decode;
 mod handover;
 mod read;
 mod recorder;
+mod rest;
 
 use std::net::SocketAddr;
 use std::path::PathBuf;

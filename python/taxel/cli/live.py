@@ -100,6 +100,8 @@ def live(
             typer.echo(f"{counters['wrong']} were said too early: events came more than {guard_frames:g} frames late")
         if counters["late"]:
             typer.echo(f"{counters['late']} events came out of order, or more than 0.1 s late")
+        if counters["events_dropped"]:
+            typer.echo(f"{counters['events_dropped']} events were dropped because the readout was too slow")
         if summary.path is not None:
             typer.echo(f"recorded to {summary.path}")
         typer.echo(summary.verdict)

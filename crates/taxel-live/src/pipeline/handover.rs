@@ -96,7 +96,7 @@ pub(super) fn clear(events: &mut Events) {
 }
 
 /// Appends the first `n` events of `more`, and all its markers.
-pub(super) fn append(to: &mut Events, more: &Events, n: usize) {
+fn append(to: &mut Events, more: &Events, n: usize) {
     let rows = to.len();
     to.t.extend_from_slice(&more.t[..n]);
     to.x.extend_from_slice(&more.x[..n]);

@@ -1,15 +1,14 @@
 //! The third thread: encodes, reads out, and says.
 
-use std::ops::Range;
 use std::sync::atomic::Ordering;
 
 use crossbeam_channel::Sender;
 use taxel_core::Events;
 use taxel_core::detect::{Detection, Readout, ReadoutStream};
-use taxel_core::encode::TareBuilder;
 
 use super::ahead::Ahead;
-use super::handover::{Taken, append};
+use super::handover::Taken;
+use super::rest::Rest;
 use super::{Options, Said, Shared, Sink};
 use crate::Error;
 use crate::recording::now_ns;
@@ -36,12 +35,7 @@ pub(super) struct Reader {
 
 enum State {
     Reading(Ahead),
-    /// What was heard of the stretch so far.
-    Taring {
-        stretch_us: i64,
-        readout: Box<Readout>,
-        heard: Box<Events>,
-    },
+    Taring(Box<Rest>),
     /// Between the two, and after an error.
     Idle,
 }
@@ -52,13 +46,13 @@ impl Reader {
         let state = match ear {
             Ear::Deaf => State::Idle,
             Ear::Reading(stream) => State::Reading(Ahead::new(stream)),
-            Ear::Taring(stretch_us, readout) => State::Taring { stretch_us, readout, heard: Box::new(events.clone()) },
+            Ear::Taring(stretch_us, readout) => State::Taring(Box::new(Rest::new(stretch_us, readout, &options.array))),
         };
         Self { state, sinks, say, found: vec![], events, frame_us: options.registers.frame_us() }
     }
 
     pub(super) fn run(mut self, shared: &Shared) {
-        shared.board().counters.taring = matches!(self.state, State::Taring { .. });
+        shared.board().counters.taring = matches!(self.state, State::Taring(_));
         loop {
             let taken = shared.handover.take(&mut self.events);
             if let Err(error) = self.hear(shared, taken) {
@@ -82,10 +76,9 @@ impl Reader {
                     None => {}
                 }
             }
-            State::Taring { stretch_us, heard, .. } => {
-                append(heard, &self.events, self.events.len());
-                if let Some(stretch) = at_rest(heard, *stretch_us, taken.quiet_until) {
-                    self.begin(shared, stretch)?;
+            State::Taring(rest) => {
+                if let Some((stop, inside)) = rest.hear(&self.events, taken.quiet_until)? {
+                    self.begin(shared, stop, inside)?;
                 }
             }
             State::Idle => {}
@@ -100,21 +93,13 @@ impl Reader {
         self.say_all(shared)
     }
 
-    /// The stretch at rest is over: makes the readout, which hears all that came, so that it knows what taxels hold.
-    fn begin(&mut self, shared: &Shared, stretch: Range<i64>) -> crate::Result<()> {
-        let State::Taring { readout, heard, .. } = std::mem::replace(&mut self.state, State::Idle) else {
-            return Ok(());
-        };
-        let inside = heard.t.iter().position(|&t| t >= stretch.end).unwrap_or(heard.len());
-        let mut builder = TareBuilder::new(&heard.array, Some(stretch.start));
-        builder.push_events(&heard.piece(0..inside))?;
-        let tare = builder.finish(stretch.end, "taken live")?;
-        let mut stream = Box::new(readout.stream(&heard.array, self.frame_us, Some(&tare))?);
-        stream.push_events(&heard, &mut self.found)?;
-        stream.advance(stretch.end, &mut self.found)?;
-        // What is said of the rest itself is not meant: a board that was just reset tells of every taxel.
-        self.found.retain(|d| d.known >= stretch.end);
-        self.state = State::Reading(Ahead::new(stream));
+    /// The rest is over: begins to read with the first event after it.
+    fn begin(&mut self, shared: &Shared, stop: i64, inside: usize) -> crate::Result<()> {
+        let State::Taring(rest) = std::mem::replace(&mut self.state, State::Idle) else { return Ok(()) };
+        let (tare, stream) = rest.finish(stop, self.frame_us)?;
+        let mut readout = Ahead::new(Box::new(stream));
+        readout.push(&self.events.piece(inside..self.events.len()), &mut self.found)?;
+        self.state = State::Reading(readout);
         let mut board = shared.board();
         board.counters.taring = false;
         board.tare = Some(tare);
@@ -140,13 +125,4 @@ impl Reader {
         }
         Ok(())
     }
-}
-
-/// The stretch at rest, once it is over: from the first event on for `stretch_us`, or until a start was marked.
-fn at_rest(heard: &Events, stretch_us: i64, quiet_until: Option<i64>) -> Option<Range<i64>> {
-    let first = *heard.t.first()?;
-    let marked = heard.markers.iter().find(|m| m.start && m.t > first).map(|m| m.t);
-    let stop = marked.unwrap_or(i64::MAX).min(first + stretch_us);
-    let now = heard.t.last().copied().max(quiet_until).max(marked)?;
-    (now >= stop).then_some(first..stop)
 }

@@ -1,0 +1,81 @@
+//! A sensor at rest: what a fresh tare is made of.
+
+use taxel_core::detect::{Readout, ReadoutStream};
+use taxel_core::encode::{Tare, TareBuilder};
+use taxel_core::{Events, Intensities, Result};
+
+/// Takes a tare from the first event on for a stretch of the board's time, or until the board marks a start. However
+/// long that is, of what came it keeps the last event of each taxel: what the taxel holds.
+pub(super) struct Rest {
+    stretch_us: i64,
+    readout: Box<Readout>,
+    builder: TareBuilder,
+    first: Option<i64>,
+    last: Vec<Option<Last>>,
+    array: taxel_core::Array,
+}
+
+#[derive(Clone, Copy)]
+struct Last {
+    t: i64,
+    p: bool,
+    ticks: u16,
+}
+
+impl Rest {
+    pub(super) fn new(stretch_us: i64, readout: Box<Readout>, array: &taxel_core::Array) -> Self {
+        let builder = TareBuilder::new(array, None);
+        Self { stretch_us, readout, builder, first: None, last: vec![None; array.len()], array: array.clone() }
+    }
+
+    /// Takes the next events and says, once the rest is over, when it ended (us) and how many of them belong to it.
+    pub(super) fn hear(&mut self, events: &Events, quiet_until: Option<i64>) -> Result<Option<(i64, usize)>> {
+        if self.first.is_none() {
+            self.first = events.t.first().copied();
+        }
+        let Some(first) = self.first else { return Ok(None) };
+        let marked = events.markers.iter().find(|m| m.start && m.t > first).map(|m| m.t);
+        let stop = marked.unwrap_or(i64::MAX).min(first + self.stretch_us);
+        let inside = events.t.iter().position(|&t| t >= stop).unwrap_or(events.len());
+        let piece = events.piece(0..inside);
+        if !piece.is_empty() {
+            self.builder.push_events(&piece)?;
+        }
+        if let Some(intensity) = &piece.intensity {
+            for k in (0..inside).filter(|&k| intensity.present[k]) {
+                let last = Last { t: piece.t[k], p: piece.p[k], ticks: intensity.ticks[k] };
+                self.last[self.array.index(piece.x[k], piece.y[k])] = Some(last);
+            }
+        }
+        let over = inside < events.len() || marked.is_some() || quiet_until.is_some_and(|t| t >= stop);
+        Ok(over.then_some((stop, inside)))
+    }
+
+    /// The tare, and the readout that uses it and knows what the taxels hold at `stop` us.
+    pub(super) fn finish(self, stop: i64, frame_us: f64) -> Result<(Tare, ReadoutStream)> {
+        let tare = self.builder.finish(stop, "taken live")?;
+        let mut stream = self.readout.stream(&self.array, frame_us, Some(&tare))?;
+        let mut held: Vec<(usize, Last)> =
+            self.last.iter().enumerate().filter_map(|(taxel, last)| last.map(|last| (taxel, last))).collect();
+        held.sort_by_key(|(_, last)| last.t);
+        let columns = usize::from(self.array.columns);
+        // A taxel's index lies on the array, whose sides fit.
+        #[allow(clippy::cast_possible_truncation)]
+        let events = Events {
+            t: held.iter().map(|(_, last)| last.t).collect(),
+            x: held.iter().map(|(taxel, _)| (taxel % columns) as u16).collect(),
+            y: held.iter().map(|(taxel, _)| (taxel / columns) as u16).collect(),
+            p: held.iter().map(|(_, last)| last.p).collect(),
+            intensity: Some(Intensities {
+                ticks: held.iter().map(|(_, last)| last.ticks).collect(),
+                present: vec![true; held.len()],
+            }),
+            ..Events::empty(self.array)
+        };
+        // What is said of the rest itself is not meant.
+        let mut unsaid = vec![];
+        stream.push_events(&events, &mut unsaid)?;
+        stream.advance(stop, &mut unsaid)?;
+        Ok((tare, stream))
+    }
+}
