@@ -79,7 +79,7 @@ class Summary:
 
     @property
     def lost(self) -> int:
-        """How many datagrams were lost after they had arrived."""
+        """How much was lost after it had arrived: messages in the kernel, datagrams in our queue; 0 is nothing."""
         capture = self.counters["capture"]
         return int(capture["dropped_by_kernel"] + capture["dropped_by_queue"])
 
