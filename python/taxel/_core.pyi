@@ -182,6 +182,7 @@ def emulate(
 
 WIRE_STAMP_US: int
 
+@final
 class WireDecoder:
     def __new__(cls, array: tuple[Any, ...], pairing: str, differences: bool) -> WireDecoder: ...
     def most_rows(self, bytes: int) -> int: ...  # noqa: A002
@@ -192,6 +193,7 @@ class WireDecoder:
     def finish(self) -> tuple[Any, ...]: ...
     def counts(self) -> list[int]: ...
 
+@final
 class WireBoard:
     def __new__(
         cls, registers: str, array: tuple[Any, ...], previous: str, intensity: str, queue: int

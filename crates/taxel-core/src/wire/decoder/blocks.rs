@@ -16,6 +16,7 @@ use crate::wire::v1::WORD_BYTES;
 pub(super) const BLOCK_WORDS: usize = 32;
 
 /// Stamps ahead of the latest time that are surely ahead: see [`super::FARTHEST_BACK`].
+#[cfg(target_arch = "x86_64")]
 const FARTHEST_AHEAD: u16 = (super::TURN - super::FARTHEST_BACK - 1) as u16;
 
 /// Vector instructions that a decoder may use.
@@ -73,6 +74,7 @@ impl Instructions {
 
     /// Decodes plain blocks from the start of `bytes` into `sheet`, up to the first block that is not plain; gives how
     /// many bytes they had.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
     pub(super) fn blocks(
         self,
         bytes: &[u8],
@@ -105,6 +107,7 @@ impl Instructions {
 }
 
 /// The 16 bits of value in the word at `at`; the bytes are in place, as the caller has checked.
+#[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn value(bytes: &[u8], at: usize) -> u16 {
     u16::from(bytes[at]) << 14 | u16::from(bytes[at + 1]) << 7 | u16::from(bytes[at + 2])
