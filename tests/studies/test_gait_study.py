@@ -90,7 +90,6 @@ def test_a_toy_study_has_all_its_rows_and_finds_easy_steps(ran):
     assert {"notes", "chosen", "printed", "others", "rule: spikes", "rule: state", "rule: level"} == set(footfall)
     assert footfall["notes"]["figures"]["events"] == 15
     assert footfall["notes"]["figures"]["missed"] <= 1
-    assert "rule: sum" in rows(said, "plate", "heel_off")
 
 
 def test_every_figure_adds_up(ran):
@@ -204,3 +203,21 @@ def test_nonsense_is_refused(data, tmp_path, arguments, error, said):
 def test_a_folder_that_is_not_there_is_told(tmp_path):
     with pytest.raises(FileNotFoundError):
         study(tmp_path / "nothing", report=tmp_path, quiet=True)
+
+
+def test_too_few_people_to_choose_inside_are_said(data, tmp_path):
+    few = tmp_path / "few"
+    (few / "insole_gaitpdb").mkdir(parents=True)
+    for name in ("GaCo90", "GaPt90"):
+        (few / "insole_gaitpdb" / f"{name}_01.txt").symlink_to(data / "insole_gaitpdb" / f"{name}_01.txt")
+    said = study(few, size="toy", report=tmp_path / "report", quiet=True)
+    assert "gaitpdb, people left out: chosen inside (too few people)" in said["skipped"]
+    assert "chosen" not in rows(said, "gaitpdb", "contact")
+
+
+def test_one_person_alone_is_said(data, tmp_path):
+    (tmp_path / "plate").mkdir()
+    (tmp_path / "plate" / "subj900.h5").symlink_to(data / "plate" / "subj900.h5")
+    said = study(tmp_path, size="toy", report=tmp_path / "report", quiet=True)
+    assert said["skipped"][-1] == "plate (too few people or recordings)"
+    assert said["sources"] == []

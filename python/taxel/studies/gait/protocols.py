@@ -210,6 +210,12 @@ class _Plan:
     scopes: list[Scope]
     common: dict[str, Any]
     testing: bool
+    events: tuple[str, ...]
+
+    @property
+    def can_choose(self) -> bool:
+        """Whether a group is left to train on when a fold leaves one out and the choice inside it another."""
+        return min(len(scope.groups) for scope in self.scopes) > (1 if self.testing else 2)
 
     def outer(self, scope: Scope) -> Iterator[list[int]]:
         """Give the groups that each fold leaves out; none where another folder is judged."""
@@ -256,6 +262,7 @@ def study(
     test : Path, optional
         Other people: everything is trained on `data` and judged there, instead of by folds.
     size : {"full", "toy"}
+        Toy: people left out only, the first event only, two points to choose from.
     jobs : int
         Processes.
     report : Path
@@ -291,15 +298,31 @@ def study(
     setting = Setting(folders, tests, {f"{p.source}/{p.protocol.name}": p.scopes for p in plans})
     results = Results(report / "results.jsonl", code_digest(_CODE))
     call = partial(realise, setting=setting)
-    outcomes = []
+    outcomes, seconds = [], 0.0
     for plan in plans:
         title = f"{plan.source}, {plan.protocol.name}"
-        run(call, _first(plan, size), results, jobs=jobs, title=title, quiet=quiet)
-        run(call, _second(plan, size, results), results, jobs=jobs, title=f"{title}: chosen", quiet=quiet)
+        first = _first(plan, size)
+        run(call, first, results, jobs=jobs, title=title, quiet=quiet)
+        second = _second(plan, size, results)
+        run(call, second, results, jobs=jobs, title=f"{title}: chosen", quiet=quiet)
         outcomes += _outcomes(plan, size, results)
+        seconds += results.seconds([*first, *second])
     skipped = [SOURCES[n].folder for n in SOURCES if n not in wanted and (not only or n in only)]
+    skipped += [
+        f"{SOURCES[n].folder} (too few people or recordings)" for n in wanted if n not in {p.source for p in plans}
+    ]
+    skipped += [
+        f"{p.source}, {p.protocol.name}: chosen inside (too few people)"
+        for p in plans
+        if not p.can_choose and any(_chooses(row) for row in p.protocol.rows)
+    ]
     said = summary(
-        outcomes, plans=[(p.source, p.protocol) for p in plans], skipped=skipped, size=size, test=test is not None
+        outcomes,
+        plans=[(p.source, p.protocol) for p in plans],
+        skipped=skipped,
+        size=size,
+        test=test is not None,
+        cpu_seconds=seconds,
     )
     write_report(report, said)
     return said
@@ -320,7 +343,7 @@ def _plans(name: str, folder: Path, test: Path | None, size: str) -> Iterator[_P
     all_pieces = list(encoded(folder, name, encoder).pieces.values())
     data = [fingerprint(folder, name)] + ([fingerprint(test, name)] if test else [])
     for protocol in PROTOCOLS[name]:
-        if test and protocol.split != "people":
+        if test and protocol.split not in {"people", "pieces"}:
             continue
         if size == "toy" and protocol.name != "people left out":
             continue
@@ -332,7 +355,10 @@ def _plans(name: str, folder: Path, test: Path | None, size: str) -> Iterator[_P
             "data": data,
             "folds": hashlib.sha256(plain.encode()).hexdigest()[:16],
         }
-        yield _Plan(name, protocol, scopes, common, test is not None)
+        if not scopes:
+            continue
+        events = SOURCES[name].events[: 1 if size == "toy" else None]
+        yield _Plan(name, protocol, scopes, common, test is not None, events)
 
 
 def _write_folds(path: Path, plans: Sequence[_Plan]) -> None:
@@ -356,6 +382,8 @@ def _points(plan: _Plan, event: str, row: str, size: str) -> list[Point]:
 def _rows(plan: _Plan, event: str) -> list[str]:
     rows: list[str] = []
     for row in plan.protocol.rows:
+        if _chooses(row) and not plan.can_choose:
+            continue
         if row == "rules":
             rows += [f"rule: {r}" for r in RULES if r != "sum" or event in SOURCES[plan.source].sums]
         elif row == "encoders":
@@ -366,7 +394,7 @@ def _rows(plan: _Plan, event: str) -> list[str]:
 
 
 def _chooses(row: str) -> bool:
-    return row == "chosen" or row.startswith("encoder: ")
+    return row == "chosen" or row.startswith("encoder")
 
 
 def _fixed(plan: _Plan, scope: Scope, left_out: list[int], event: str, row: str, size: str) -> Task:
@@ -378,7 +406,7 @@ def _fixed(plan: _Plan, scope: Scope, left_out: list[int], event: str, row: str,
 
 
 def _each(plan: _Plan) -> Iterator[tuple[Scope, str, str]]:
-    for event in SOURCES[plan.source].events:
+    for event in plan.events:
         for row in _rows(plan, event):
             for scope in plan.scopes:
                 yield scope, event, row

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._core import ProblemError
 from taxel.detect import score
 from taxel.detections import Detections
 from taxel.learn import ConeR
@@ -121,7 +122,9 @@ def _neuron(
     if not SOURCES[params["source"]].by_minute:
         rng = np.random.default_rng([seed, 2])
         patterns = [joined([training[k] for k in rng.permutation(len(training))])]
-    patterns = [p for p in patterns if len(p.truth[event])]
+    patterns = [p for p in patterns if len(p.truth[event]) and len(p.spikes.times)]
+    if not patterns:
+        raise ProblemError(f"{params['source']}, {event}: no event with a spike in what should train")
     cone = ConeR(**point["neuron"], **point["learn"], step_ms=STEP_MS)
     with warnings.catch_warnings():  # what the learner warns of is kept in the result
         warnings.simplefilter("ignore", UserWarning)

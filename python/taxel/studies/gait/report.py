@@ -98,8 +98,9 @@ def summary(
     skipped: Sequence[str],
     size: str,
     test: bool,
+    cpu_seconds: float,
 ) -> dict[str, Any]:
-    """Put all outcomes into plain values, as ``gait.json`` holds them."""
+    """Put all outcomes into plain values, as ``gait.json`` holds them; `cpu_seconds` is that of every single fit."""
     sources = []
     for name in dict.fromkeys(source for source, _ in plans):
         source = SOURCES[name]
@@ -112,7 +113,8 @@ def summary(
                     "title": "trained on one folder, judged on the other" if test else protocol.title,
                     "train": dict(protocol.train),
                     "search": dict(protocol.search),
-                    "rows": [_row(o, protocol, test) for o in rows],
+                    "rows": (said := [_row(o, protocol, test) for o in rows]),
+                    "beside": _beside(said),
                 }
             )
         sources.append(
@@ -133,7 +135,7 @@ def summary(
         "taxel": __version__,
         "python": platform.python_version(),
         "machine": platform.machine(),
-        "cpu_seconds": round(sum(o.seconds for o in outcomes), 1),
+        "cpu_seconds": round(cpu_seconds, 1),
         "search_points": {s: {e: len(points) for e, points in events.items()} for s, events in SEARCH.items()},
         "sources": sources,
     }
@@ -153,6 +155,11 @@ def _row(outcome: Outcome, protocol: Protocol, test: bool) -> dict[str, Any]:
         "by_group": {g: figures([u for u in outcome.units if u.group == g]) for g in groups},
         "by_person": {p: figures([u for u in outcome.units if u.person == p]) for p in people},
         "worst_feet": worst[:5],
+        "feet": {
+            "all": len(feet),
+            "below_95_percent_found": sum((f["found_percent"] or 100.0) < 95.0 for f in feet),
+            "over_3_false_per_minute": sum((f["false_per_minute"] or 0.0) > 3.0 for f in feet),
+        },
         "chosen": outcome.points,
         "cpu_seconds": round(outcome.seconds, 1),
     }
@@ -161,6 +168,26 @@ def _row(outcome: Outcome, protocol: Protocol, test: bool) -> dict[str, Any]:
         row["goal"] = goal
         row["goal_met"] = _met(all_feet, goal)
     return row
+
+
+def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Say, event by event, how the neuron stands beside the plain rules: by missed + false, then by % within 10 ms."""
+    said = []
+    for event in dict.fromkeys(row["event"] for row in rows):
+        here = {row["row"]: row["figures"] for row in rows if row["event"] == event}
+        neuron = here.get("chosen", here.get("notes"))
+        rules = {name.removeprefix("rule: "): f for name, f in here.items() if name.startswith("rule: ")}
+        if neuron is None or not rules:
+            continue
+        wrong = neuron["missed"] + neuron["false"]
+        ahead = [f"{n} ({f['missed'] + f['false']})" for n, f in rules.items() if f["missed"] + f["false"] < wrong]
+        behind = [f"{n} ({f['missed'] + f['false']})" for n, f in rules.items() if f["missed"] + f["false"] >= wrong]
+        said.append(
+            f"{EVENTS[event]}: the neuron has {wrong} missed and false; "
+            + (f"better than it: {', '.join(ahead)}" if ahead else "no plain rule is better")
+            + (f"; not better: {', '.join(behind)}." if behind else ".")
+        )
+    return said
 
 
 def _names(units: Sequence[Unit]) -> list[str]:

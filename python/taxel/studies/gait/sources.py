@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -274,20 +274,26 @@ class _Cut:
 
 @lru_cache(maxsize=4)
 def _cuts(folder: Path, name: str, placed: str) -> tuple[_Cut, ...]:
-    """Cut every footfall; two passes over the files, as all pictures together would not fit in memory."""
-    prints = {t.name: (t.person, insole.footprint(t)) for t in formats.FORMATS[name].trials(folder)}
+    """Cut every footfall, once all footprints are known."""
+    feet = [_boxed(t) for t in formats.FORMATS[name].trials(folder)]
+    prints = [insole.footprint(t) for t in feet]
     found = []
-    for trial in formats.FORMATS[name].trials(folder):
-        person, own = prints[trial.name]
+    for k, trial in enumerate(feet):
         others = [
-            f
-            for other, (whose, f) in prints.items()
-            if other != trial.name and (whose == person if placed == "own" else whose != person)
+            prints[n] for n, other in enumerate(feet) if n != k and (other.person == trial.person) == (placed == "own")
         ]
-        frames = insole.cut(trial, own.origin_mm, insole.placement(others))
+        frames = insole.cut(trial, prints[k].origin_mm, insole.placement(others))
         truth = {e: times / 1000 for e, times in trial.truth.items()}
-        found.append(_Cut(trial.name, person, frames.values[:, 0, :], truth))
+        found.append(_Cut(trial.name, trial.person, frames.values[:, 0, :], truth))
     return tuple(found)
+
+
+def _boxed(trial: Trial) -> Trial:
+    """Return a footfall without the plate around it: the pictures of all people together have to fit in memory."""
+    loaded = trial.frames.values.any(axis=0)
+    rows, columns = (np.flatnonzero(loaded.any(axis=axis)) for axis in (1, 0))
+    y, x = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+    return replace(trial, frames=trial.frames.region(x, y))
 
 
 def _moved(spikes: Any, by: float, stop: float) -> Any:
