@@ -89,7 +89,16 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
             6,
             ("notes", "chosen", "printed", "others", "rules"),
             {"count": 40},
+            {"count": 10},
+        ),
+        Protocol(
+            "encoders compared",
+            "two people are tested by what four others trained; each encoder has the same number of points",
+            "people",
+            3,
+            ("encoders",),
             {"count": 20},
+            {"count": 10},
         ),
         Protocol(
             "own footfalls",
@@ -99,15 +108,6 @@ PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
             ("notes", "chosen", "printed"),
             {"count": 60},
             {"count": 60},
-        ),
-        Protocol(
-            "encoders compared",
-            "two people are tested by what four others trained; each encoder has the same number of points",
-            "people",
-            3,
-            ("encoders",),
-            {"count": 30},
-            {"count": 20},
         ),
     ),
     "gaitpdb": (

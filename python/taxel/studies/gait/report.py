@@ -160,7 +160,7 @@ def _row(outcome: Outcome, protocol: Protocol, test: bool) -> dict[str, Any]:
             "below_95_percent_found": sum((f["found_percent"] or 100.0) < 95.0 for f in feet),
             "over_3_false_per_minute": sum((f["false_per_minute"] or 0.0) > 3.0 for f in feet),
         },
-        "chosen": outcome.points,
+        "chosen": _counted(outcome.points),
         "cpu_seconds": round(outcome.seconds, 1),
     }
     goal = GOALS.get(outcome.source, {}).get(outcome.event)
@@ -168,6 +168,15 @@ def _row(outcome: Outcome, protocol: Protocol, test: bool) -> dict[str, Any]:
         row["goal"] = goal
         row["goal_met"] = _met(all_feet, goal)
     return row
+
+
+def _counted(points: Sequence[Any]) -> list[dict[str, Any]]:
+    """Return each different point once, with the number of folds that chose it, the most frequent first."""
+    times: dict[str, int] = {}
+    for point in points:
+        said = json.dumps(point, sort_keys=True)
+        times[said] = times.get(said, 0) + 1
+    return [{"folds": n, "point": json.loads(said)} for said, n in sorted(times.items(), key=lambda item: -item[1])]
 
 
 def _beside(rows: Sequence[dict[str, Any]]) -> list[str]:
