@@ -44,6 +44,14 @@ def test_what_belongs_to_no_touch_is_false():
     assert judged.false["lift"].tolist() == []
 
 
+def test_a_press_said_far_too_late_is_missed_and_false_and_counted_as_within():
+    press = touch("hand", start=100_000.0, stop=400_000.0, peak=2.0)
+    judged = judge(said(170_000), [press])
+    assert judged.row("pressed by hand, 1 N", "contact").found == 0
+    assert judged.false["contact"].tolist() == [170_000]
+    assert judged.false_within == {"contact": 1, "lift": 0}
+
+
 def test_a_goal_counts_the_missed_as_well():
     contacts = [touch(start=1e6 * k, stop=1e6 * k + 15_000) for k in range(1, 5)]
     found = said(1_000_300, 2_000_300, 3_001_500)

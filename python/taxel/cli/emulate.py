@@ -48,7 +48,7 @@ def emulate(
     # Drawn anew from the seed: what is played can be told before it is.
     contacts, force = truth(acts, preset=preset)
     console = Console(stderr=True, quiet=as_json)
-    console.print(f"seed {seed}: {scenes} scenes, {len(contacts)} touches, to {host}:{port} at {preset}")
+    console.print(f"seed {seed}: {len(contacts)} touches in {scenes} scene(s), to {host}:{port} at {preset}")
     bar = Progress(
         TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}"), TimeRemainingColumn(),
         console=console, transient=True, disable=as_json,

@@ -74,6 +74,8 @@ class Judged(NamedTuple):
     rows: list[Row]
     false: dict[str, NDArray[np.int64]]
     """By label: when something was said that belongs to no touch, us."""
+    false_within: dict[str, int]
+    """How many of these lie within a touch all the same: a press that was said more than 50 ms off."""
 
     def row(self, name: str, label: str) -> Row:
         """Return one row; its name may be cut short."""
@@ -95,6 +97,7 @@ class Judged(NamedTuple):
             "classes": table,
             "first_within_goal": {label: {"goal_ms": GOALS[label], "share": goals[label]} for label in LABELS},
             "false": {label: len(times) for label, times in self.false.items()},
+            "false_within_a_touch": self.false_within,
         }
 
 
@@ -112,7 +115,9 @@ def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
     Judged
     """
     windows = [_IMPACT_MS if c.kind in ("first", "bounce") else _PRESS_MS for c in contacts]
-    rows, false = [], {}
+    rows: list[Row] = []
+    false: dict[str, NDArray[np.int64]] = {}
+    within: dict[str, int] = {}
     for label, begin in (("contact", True), ("lift", False)):
         true = np.array([c.start_us if begin else c.stop_us for c in contacts], np.float64)
         mine = found[label]
@@ -126,7 +131,8 @@ def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
             places = np.column_stack([touch[chosen], said[chosen]])
             rows.append(Row(name, label, int(of_class.sum()), errors[chosen], delays[chosen], places))
         false[label] = mine.t[result.false_detections]
-    return Judged(rows, false)
+        within[label] = sum(any(c.start_us <= t <= c.stop_us for c in contacts) for t in false[label])
+    return Judged(rows, false, within)
 
 
 def plain_rule(area: SpikeTrains, frame_us: float) -> Detections:

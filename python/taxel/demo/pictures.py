@@ -208,7 +208,9 @@ def delay_split(parts: Mapping[str, Mapping[str, float]]) -> Figure:
     for place, split in enumerate(parts.values()):
         left = 0.0
         for name, value in split.items():
-            axis.barh(place, value, left=left, color=colours[name], height=0.7, label=name if place == 0 else None)
+            # Below 0, as where the base loses the ball before it leaves: thin, and over what starts there.
+            shape = {"height": 0.7} if value >= 0 else {"height": 0.25, "zorder": 3}
+            axis.barh(place, value, left=left, color=colours[name], label=name if place == 0 else None, **shape)
             left += value
     axis.set_yticks(range(len(parts)), list(parts))
     axis.invert_yaxis()
@@ -228,5 +230,6 @@ def noise(hearing: Hearing) -> Figure:
         for at in hearing.found[label].t:
             axis.axvline((at - hearing.start_us) * 1e-6, color=_SAID[label])
     said: Sequence[str] = [f"{len(hearing.found[label])} times {label}" for label in LABELS]
+    axis.set_xlim(0.0, seconds[-1] + 1.0)
     axis.set(xlabel="board time (s)", ylabel="events/s", title=f"Noise alone: said {' and '.join(said)}")
     return figure

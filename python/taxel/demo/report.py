@@ -17,6 +17,7 @@ import matplotlib as mpl
 import numpy as np
 from markupsafe import Markup
 
+import taxel
 from taxel.demo import pictures
 from taxel.demo.hearing import FRAME_US, Hearing
 from taxel.demo.judging import GOALS, LABELS, Judged, Row
@@ -282,4 +283,10 @@ def _machine() -> dict[str, Any]:
             line.split(":", 1)[1].strip() for line in info.read_text().splitlines() if line.startswith("model name")
         ]
         name = names[0] if names else name
-    return {"cpu": name, "cores": os.cpu_count(), "load": os.getloadavg()[0], "python": platform.python_version()}
+    return {
+        "cpu": name,
+        "cores": os.cpu_count(),
+        "load": os.getloadavg()[0],
+        "python": platform.python_version(),
+        "taxel": taxel.__version__,
+    }

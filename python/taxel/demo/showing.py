@@ -84,7 +84,7 @@ def show(
         folder = Path(f"taxel-demo-{datetime.now().astimezone():%Y%m%d-%H%M%S}-{seed}")
     folder.mkdir(parents=True)
     began = time.monotonic()
-    console.print(f"[bold]taxel demo[/bold]: {scenes} scenes of seed [bold]{seed}[/bold]")
+    console.print(f"[bold]taxel demo[/bold]: {scenes} scene(s) of seed [bold]{seed}[/bold]")
     counters: dict[str, Any] = {}
     if not live:
         hearing = _hear(console, f"playing {scenes} scenes without the clock", script(seed, scenes), heard_by, seed)
@@ -165,4 +165,6 @@ def _say(console: Console, hearing: Hearing, quiet: Hearing) -> None:
     console.print("[dim]error: said minus true, mean; known: minus true, median / 95 %[/dim]")
     false = sum(len(times) for times in hearing.judged.false.values())
     noise_s = (quiet.stop_us - quiet.start_us) * 1e-6
-    console.print(f"said of nothing: {false} in the scenes, {len(quiet.found)} in {noise_s:.0f} s of noise")
+    within = sum(hearing.judged.false_within.values())
+    off = f" ({within} within a press, more than 50 ms off)" if within else ""
+    console.print(f"said of nothing: {false} in the scenes{off}, {len(quiet.found)} in {noise_s:.0f} s of noise")

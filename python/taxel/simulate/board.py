@@ -20,6 +20,9 @@ from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence, _thesis
 __all__ = ["EmulatorReport", "Played", "emulate", "play", "truth"]
 
 
+_QUANTILES = {"p50": "median", "p99": "99 %", "max": "at most"}
+
+
 class Played(NamedTuple):
     """What a host decoded of a board's datagrams."""
 
@@ -67,8 +70,8 @@ class EmulatorReport:
     @property
     def verdict(self) -> str:
         """One line: whether the rate was held, or by how much not, and how late frames were."""
-        late = f"late by {self.late_us['p50']:.0f} us (median), {self.late_us['p99']:.0f} us (99 %), "
-        late += f"{self.late_us['max'] / 1000.0:.1f} ms at most; {self.late_frames} of {self.frames} by a frame or more"
+        late = ", ".join(f"{self.late_us[q] / 1000.0:.2f} ms ({said})" for q, said in _QUANTILES.items())
+        late = f"late by {late}; {self.late_frames} of {self.frames} by a frame or more"
         if self.held:
             whole = "held" if self.late_frames <= 0.01 * self.frames else "held on the whole, but not frame by frame"
             return f"{self.wanted_hz:.0f} frames/s {whole}; frames were {late}"

@@ -32,10 +32,13 @@ pub enum Act {
 /// The board's lines are read in four groups a frame, each as the touch then is.
 const GROUPS: usize = 4;
 
+/// The fabric answers so much later, us (thesis 4.4.1).
+const FABRIC_US: f64 = 50.0;
+
 /// Acts, made ready to be played frame by frame.
 ///
-/// The fabric answers after 50 us (thesis 4.4.1): a group of lines, read during a quarter of a frame, shows the force of
-/// the quarter before. Lines are read from left to right (a driven line is a column of the sensor).
+/// A group of lines, read during a quarter of a frame, shows the force that was in the quarter's middle less the fabric's
+/// delay. Lines are read from left to right (a driven line is a column of the sensor).
 #[derive(Debug)]
 pub struct Stage {
     taxels: Taxels,
@@ -145,16 +148,17 @@ impl Stage {
         match &mut part.what {
             What::Silence => {}
             What::Ball { motion, footprint, reach, pressed } => {
+                let lag = FABRIC_US / (self.frame_us / GROUPS as f64) - 0.5;
                 for group in 0..GROUPS {
-                    let now = (GROUPS * self.frame + group).min(motion.force_n.len() - 1);
-                    let before = now.saturating_sub(1);
-                    let force = f32::midpoint(motion.force_n[now], motion.force_n[before]);
+                    let place = ((GROUPS * self.frame + group) as f64 - lag).max(0.0);
+                    let (before, share) = ((place as usize).min(motion.force_n.len() - 2), place.fract() as f32);
+                    let between = |v: &[f32]| v[before] + share * (v[before + 1] - v[before]);
+                    let force = between(&motion.force_n);
                     if force == 0.0 && !pressed[group] {
                         continue;
                     }
                     pressed[group] = force > 0.0;
-                    let depth = f32::midpoint(motion.depth_mm[now], motion.depth_mm[before]);
-                    footprint.profile(f64::from(depth), &mut self.profile);
+                    footprint.profile(f64::from(between(&motion.depth_mm)), &mut self.profile);
                     self.drive.clear();
                     self.drive.extend(self.profile.iter().map(|stress| self.taxels.drive(stress * force)));
                     for at in &reach[group] {
@@ -193,6 +197,9 @@ fn part(array: &Array, frame_us: f64, act: &Act) -> Result<(Part, Vec<Contact>)>
         }
         Act::Ball(scene) => {
             let mut motion = Motion::of(scene, frame_us / GROUPS as f64)?;
+            if motion.force_n.len() < 2 {
+                return Err(Error::Scene(format!("scene: shorter than a quarter of a frame, {frame_us} us")));
+            }
             let footprint = Footprint::new(&scene.foam, scene.ball.radius_mm)?;
             let mut reach = [const { Vec::new() }; GROUPS];
             for y in 0..array.rows {
