@@ -72,7 +72,7 @@ def test_a_refusal_names_the_rule(line: tuple[str, Board]) -> None:
 
 def test_a_line_without_a_board_is_said() -> None:
     ours, theirs = pty.openpty()
-    with Cable(os.ttyname(theirs), timeout=0.05) as cable, pytest.raises(DeviceError, match=r"no answer within 0\.05 s"):
+    with Cable(os.ttyname(theirs), timeout=0.05) as cable, pytest.raises(DeviceError, match="no answer within"):
         cable.read(5)
     os.close(ours)
     os.close(theirs)
