@@ -74,26 +74,7 @@ for _command in (
     "info",
     "live",
     "record",
+    "study",
     "train",
 ):
     import_module(f"taxel.cli.{_command}")
-# Each registers itself with `app`, so they stand at the end.
-# They stand at the end because each registers itself with `app`; one line for all.
-from taxel.cli import (  # noqa: E402
-    bench,  # noqa: F401
-    convert,  # noqa: F401
-    demo,  # noqa: F401
-    emulate,  # noqa: F401
-    info,  # noqa: F401
-    live,  # noqa: F401
-    record,  # noqa: F401
-    detect,  # noqa: F401
-    emulate,  # noqa: F401
-    encode,  # noqa: F401
-    info,  # noqa: F401
-    live,  # noqa: F401
-    record,  # noqa: F401
-    study,  # noqa: F401
-    train,  # noqa: F401
-)
-from taxel.cli import bench, convert, demo, detect, emulate, encode, info, live, record, train  # noqa: E402, F401

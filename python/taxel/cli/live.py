@@ -16,7 +16,7 @@ from rich.text import Text
 from taxel._core import ProblemError
 from taxel.cable import Cable
 from taxel.cli import app
-from taxel.cli.board import HostOption, PortOption, PresetOption, counters_table, geometry
+from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, geometry
 from taxel.detect import Readout
 from taxel.live import Live, Said
 from taxel.tare import Tare

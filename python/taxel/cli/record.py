@@ -16,7 +16,7 @@ from rich.live import Live as Display
 from taxel import _core
 from taxel._core import ProblemError
 from taxel.cli import app
-from taxel.cli.board import ArrayOption, HostOption, PortOption, PresetOption, counters_table, geometry
+from taxel.cli._board import ArrayOption, HostOption, PortOption, PresetOption, counters_table, geometry
 from taxel.live import Live, Summary
 
 __all__ = ["record"]
