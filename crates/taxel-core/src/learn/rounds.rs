@@ -15,9 +15,9 @@ pub(super) const START_NEAR_MS: f64 = 60.0;
 const START_STRIDE_MS: f64 = 4.0;
 const START_ROWS: usize = 500;
 /// Rows of any later one.
-const MOST_ROWS: usize = 5000;
+const MOST_ROWS: usize = 2000;
 /// A hinge is kept within this share of `theta_0` from its kink.
-const NEAR: f64 = 0.02;
+const NEAR: f64 = 0.006;
 /// An objective below this share of that of no weights at all is 0: everything is met.
 const NOTHING: f64 = 1e-10;
 /// What the cone solver can do at best.
@@ -74,7 +74,7 @@ impl Problem {
     ) -> Result<Found> {
         let zero = self.point(objective, vec![0.0_f64.clamp(objective.lower, objective.upper); self.trains]);
         let scale = if zero.parts.sum() > 0.0 { 1.0 / zero.parts.sum() } else { 1.0 };
-        let mut accuracy = (0.001 * tolerance).min(1e-9);
+        let mut accuracy = (0.001 * tolerance).min(1e-7);
         let mut best = match start {
             Some(weights) => self.point(objective, weights),
             None => {
