@@ -372,6 +372,31 @@ def test_a_folder_of_no_or_of_several_formats_is_refused(tmp_path):
         list(formats.trials(tmp_path / "nothing"))
 
 
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: list(formats.trials(3)), "path is 3"),
+        (lambda: list(plate.trials(None)), "path is None"),
+        (lambda: list(gaitpdb.trials(3.5)), "path is 3.5"),
+        (lambda: list(gaitndd.trials(b"")), "path is"),
+        (lambda: list(moticon.trials([])), "path is"),
+        (lambda: list(pedar.trials({})), "path is"),
+        (lambda: gaitndd.step_times(3), "path is 3"),
+        (lambda: gaitndd.format_212("text"), "data is 'text'"),
+        (lambda: gaitpdb.contacts("text"), "total"),
+        (lambda: pedar.contacts([[1.0], [2.0]]), "total"),
+        (lambda: plate.sensor_rows(np.zeros((9, 4, 5))), "image has shape"),
+        (lambda: plate.events(np.ones((9, 4))), "image has shape"),
+        (lambda: plate.events("text"), "image"),
+        (lambda: formats.Trial("a", "a", frames=3, truth={}, source=""), "frames is 3"),
+    ],
+)
+def test_nonsense_in_an_argument_is_one_clear_error(call, said):
+    with pytest.raises(ProblemError, match=said) as error:
+        call()
+    assert "\n" not in str(error.value)
+
+
 @pytest.mark.parametrize("write", [write_gaitpdb, write_moticon, write_pedar])
 @given(at=st.integers(0, 3000), byte=st.integers(0, 255))
 def test_one_changed_byte_never_crashes(write, tmp_path_factory, at, byte):

@@ -185,9 +185,11 @@ def test_a_goal_is_met_only_where_every_part_of_it_is():
 @pytest.mark.parametrize(
     ("arguments", "error", "said"),
     [
-        ({"size": "huge"}, ProblemError, "size is 'huge': must be full or toy"),
-        ({"only": ["emed"]}, ProblemError, "source 'emed': must be one of plate"),
+        ({"size": "huge"}, ProblemError, "size is 'huge'"),
+        ({"only": ["emed"]}, ProblemError, "only is 'emed'"),
+        ({"only": 3}, ProblemError, "only is 3"),
         ({"jobs": 0}, ProblemError, "jobs is 0"),
+        ({"jobs": "two"}, ProblemError, "jobs is 'two'"),
         (
             {"only": ["pedar"]},
             FormatError,
@@ -198,6 +200,12 @@ def test_a_goal_is_met_only_where_every_part_of_it_is():
 def test_nonsense_is_refused(data, tmp_path, arguments, error, said):
     with pytest.raises(error, match=said):
         study(data, report=tmp_path, quiet=True, **({"size": "toy"} | arguments))
+
+
+@pytest.mark.parametrize("name", ["data", "test", "report"])
+def test_a_path_that_is_none_is_refused(data, tmp_path, name):
+    with pytest.raises(ProblemError, match=f"{name} is 3"):
+        study(**({"data": data, "report": tmp_path, "quiet": True} | {name: 3}))
 
 
 def test_a_folder_that_is_not_there_is_told(tmp_path):

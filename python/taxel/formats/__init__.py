@@ -68,6 +68,7 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
     Raises
     ------
     FormatError : no format, or several, or a file that does not hold what it should (names file and line)
+    ProblemError : a format that is none
     FileNotFoundError : nothing is there
     """
     place = Path(checked_path("path", path))

@@ -13,7 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._core import FormatError
+from taxel import _arguments as arguments
+from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.trial import MARGIN_US, Trial
@@ -50,7 +51,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that does not hold what it should (names file and line or byte)
     """
-    place = Path(path)
+    place = Path(arguments.path("path", path))
     found = files(place)
     if not found:
         raise FormatError(f"{place}: no NAME.hea with NAME.let in it")
@@ -109,6 +110,8 @@ def format_212(data: bytes, name: str = "data") -> NDArray[np.int16]:
     >>> format_212(bytes([0x01, 0x80, 0xFF]))
     array([   1, -1793], dtype=int16)
     """
+    if not isinstance(data, bytes | bytearray | memoryview):
+        raise ProblemError(f"data is {arguments.shown(data)}: must be bytes")
     if len(data) % 3:
         raise FormatError(f"{name}: {len(data)} bytes; format 212 has two samples in three bytes, so a multiple of 3")
     b = np.frombuffer(data, np.uint8).reshape(-1, 3).astype(np.int16)
@@ -134,6 +137,7 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     ------
     FormatError : a line that has not 13 numbers, or times that do not ascend (names file and line)
     """
+    path = Path(arguments.path("path", path))
     rows = [line.split() for line in text.lines(path)]
     values = text.numbers(rows, path, 1, _TS_COLUMNS)
     if not len(values):

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _arguments as arguments
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
@@ -51,7 +52,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that does not hold what it should (names file, line and column)
     """
-    place = Path(path)
+    place = Path(arguments.path("path", path))
     found = files(place)
     if not found:
         raise FormatError(f"{place}: no file such as GaCo02_01.txt in it")
@@ -117,6 +118,7 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     >>> contacts(np.repeat([0.0, 60.0, 30.0, 0.0], 30))
     array([[30, 90]])
     """
+    total = arguments.floats("total", total)
     # +1 above 50, -1 below 25, 0 between: the state is the last one that is not 0.
     said = (total > 50).astype(np.int64) - (total < 25)
     last = np.maximum.accumulate(np.where(said != 0, np.arange(len(total)), -1))

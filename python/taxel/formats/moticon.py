@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _arguments as arguments
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
@@ -59,7 +60,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that does not hold what it should (names file, line and column)
     """
-    place = Path(path)
+    place = Path(arguments.path("path", path))
     found = files(place)
     if not found:
         raise FormatError(f"{place}: no Moticon text export in it (lines of # that name the sensor insoles)")

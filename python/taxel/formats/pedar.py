@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _arguments as arguments
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats import text
@@ -43,7 +44,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that does not hold what it should (names file, line and column)
     """
-    place = Path(path)
+    place = Path(arguments.path("path", path))
     found = files(place)
     if not found:
         raise FormatError(f"{place}: no pedar .asc in it")
@@ -120,6 +121,7 @@ def contacts(total: NDArray[np.float64]) -> NDArray[np.int64]:
     >>> contacts(np.array([9.0, 0.0, 5.0, 10.0, 1.0, 0.5, 0.0]))
     array([[2, 5]])
     """
+    total = arguments.floats("total", total)
     loaded = (total >= 0.1 * total.max()).astype(np.int64) if len(total) else np.zeros(0, np.int64)
     edges = np.diff(loaded)
     ups, downs = np.flatnonzero(edges > 0) + 1, np.flatnonzero(edges < 0) + 1

@@ -15,7 +15,8 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._core import FormatError
+from taxel import _arguments as arguments
+from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.trial import Trial
@@ -58,7 +59,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that does not hold what it should
     """
-    place = Path(path)
+    place = Path(arguments.path("path", path))
     found = files(place)
     if not found:
         raise FormatError(f"{place}: no file subjNNN.h5 in it")
@@ -134,6 +135,7 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     Raises
     ------
     FormatError : the rows were not made three from two
+    ProblemError : no counts of rows x columns x frames, or none above 0
 
     Notes
     -----
@@ -141,7 +143,7 @@ def sensor_rows(image: NDArray[np.int32]) -> NDArray[np.int32]:
     on the straight line to S[2k+1] and from there to S[2k+2], cut down to whole counts. The phase is that of the three
     under which the fewest cells break |3 (b - c) - (a - d)| <= 3. It looks at the whole trial: part of reading it.
     """
-    y = np.asarray(image, np.int32)
+    y = _loaded(image)
     rows = y.shape[0]
     padded = np.concatenate([y, np.zeros((6, *y.shape[1:]), np.int32)])
     breaks = []
@@ -180,7 +182,12 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
         after the last in which the first 30 % of the rows ever loaded carry at least 5 % of their own largest sum;
         ``p5``, ``p10``: the first frame with 5 %, 10 % of the largest sum, ``peak_sum``; ``flicker``: 1 where a frame
         between is wholly unloaded.
+
+    Raises
+    ------
+    ProblemError : no counts of rows x columns x frames, or none above 0
     """
+    image = _loaded(image)
     total = image.sum(axis=(0, 1), dtype=np.int64)
     loaded = np.flatnonzero(total > 0)
     rows = np.flatnonzero(image.any(axis=(1, 2)))
@@ -196,6 +203,13 @@ def events(image: NDArray[np.int32]) -> dict[str, int]:
         "peak_sum": peak,
         "flicker": int(len(loaded) < loaded[-1] - loaded[0] + 1),
     }
+
+
+def _loaded(image: NDArray[np.int32]) -> NDArray[np.int32]:
+    counts: NDArray[np.int32] = arguments.numbers("image", image, np.int32)
+    if counts.ndim != 3 or not counts.any() or counts.min() < 0:
+        raise ProblemError(f"image has shape {counts.shape}: must be rows x columns x frames of counts, loaded once")
+    return counts
 
 
 def _events_table(path: Path) -> dict[tuple[str, int], dict[str, int]]:

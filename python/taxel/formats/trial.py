@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _arguments as arguments
 from taxel._core import ProblemError
 from taxel.frames import Frames
 
@@ -60,7 +61,9 @@ class Trial:
     about: Mapping[str, str | float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        arguments.instance("frames", self.frames, Frames)
         for event, times in self.truth.items():
+            arguments.column(event, times, np.int64)
             back = np.flatnonzero(np.diff(times) <= 0)
             if len(back):
                 k = int(back[0])

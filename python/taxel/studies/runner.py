@@ -19,6 +19,7 @@ from typing import Any
 import joblib
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from taxel import _arguments as arguments
 from taxel import _core
 from taxel._core import ProblemError
 
@@ -144,8 +145,7 @@ def run(
     ------
     ProblemError : `jobs` below 1
     """
-    if jobs < 1:
-        raise ProblemError(f"jobs is {jobs}: must be 1 or more")
+    jobs = arguments.whole("jobs", jobs, 1)
     wanted = list({t.key(results.code): t for t in tasks if t not in results}.values())
     if not wanted:
         return

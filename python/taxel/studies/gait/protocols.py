@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from taxel import _arguments as arguments
 from taxel import encode, formats, learn
 from taxel._core import FormatError, ProblemError
 from taxel.studies.gait import folds, insole, pieces, rules, sources
@@ -284,11 +285,11 @@ def study(
     """
     from taxel.studies.gait.report import summary, write_report  # noqa: PLC0415  jinja2 and matplotlib load slowly
 
-    if size not in {"full", "toy"}:
-        raise ProblemError(f"size is {size!r}: must be full or toy")
-    unknown = [name for name in only if name not in SOURCES]
-    if unknown:
-        raise ProblemError(f"source {unknown[0]!r}: must be one of {', '.join(SOURCES)}")
+    data, report = Path(arguments.path("data", data)), Path(arguments.path("report", report))
+    test = None if test is None else Path(arguments.path("test", test))
+    arguments.text("size", size, ("full", "toy"))
+    only = [arguments.text("only", name, SOURCES) for name in arguments.several("only", only)]
+    jobs = arguments.whole("jobs", jobs, 1)
     folders = _sources(data, only)
     tests = {} if test is None else _sources(test, only)
     wanted = [name for name in SOURCES if name in folders and (test is None or name in tests)]
