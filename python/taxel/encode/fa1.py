@@ -39,7 +39,9 @@ class FA1(Encoder):
 
     Notes
     -----
-    Thesis 5.4.2. The choices that it leaves open stand on the page *Readings*.
+    Thesis 5.4.2. The choices that it leaves open stand on the page *Readings*. One spike's rise of the threshold takes
+    ``period_ms * a / b`` samples to decay (0.4 s at 1 ms, 1.6 s at 2 ms), so what came seconds before still counts:
+    touches in one long recording give fewer spikes than the same touches one by one.
 
     Examples
     --------
