@@ -76,7 +76,9 @@ def figures(material: Material) -> dict[str, Any]:
         "what": "taxel demo",
         "seed": material.seed,
         "scenes": material.scenes,
-        "clock": "real time, over UDP" if material.live else "none: board time as fast as it goes, no socket",
+        "clock": "in real time, over UDP"
+        if material.live
+        else "without the clock: board time as fast as it goes, no socket",
         "board_seconds": seconds,
         "machine": _machine(),
         "neuron": hearing.judged.to_dict(),
