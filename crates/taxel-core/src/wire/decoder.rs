@@ -7,7 +7,7 @@ use std::mem::MaybeUninit;
 use serde::{Deserialize, Serialize};
 
 pub use blocks::Instructions;
-use blocks::{BLOCK_WORDS, State};
+use blocks::State;
 
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
 use crate::{Array, Events, Intensities, Marker, Result, problem};
@@ -320,28 +320,14 @@ impl Decoder {
             at += 1;
         }
         while at < bytes.len() {
-            at += self.blocks(&bytes[at..], arrived, &mut sheet);
-            // An odd number, so that pairs that lie across the blocks' edges come to lie inside.
-            let mut words = if self.ready(arrived) { BLOCK_WORDS - 1 } else { 1 };
-            while words > 0 && at < bytes.len() {
-                match bytes[at..].first_chunk::<WORD_BYTES>() {
-                    Some(word) if is_whole(*word) => {
-                        self.counts.bytes += WORD_BYTES as u64;
-                        self.counts.words += 1;
-                        self.word(Word::from_bytes(*word), arrived, &mut sheet, markers);
-                        at += WORD_BYTES;
-                    }
-                    _ => {
-                        // Damage, or the end: byte by byte to the next place.
-                        self.byte(bytes[at], arrived, &mut sheet, markers);
-                        at += 1;
-                        while self.have > 0 && at < bytes.len() {
-                            self.byte(bytes[at], arrived, &mut sheet, markers);
-                            at += 1;
-                        }
-                    }
+            at += self.plain(&bytes[at..], arrived, &mut sheet);
+            // What is not plain: one word, or damage byte by byte to the next place.
+            for &byte in &bytes[at..] {
+                self.byte(byte, arrived, &mut sheet, markers);
+                at += 1;
+                if self.have == 0 {
+                    break;
                 }
-                words -= 1;
             }
         }
         if sheet.open {
@@ -350,20 +336,17 @@ impl Decoder {
         Filled { rows: sheet.rows, paired: sheet.paired }
     }
 
-    /// Whether stamps alone unwrap what comes: a first one is known, and this arrival has been reckoned with.
-    fn ready(&self, arrived: Option<i64>) -> bool {
-        self.clock.latest.is_some() && self.clock.heard == arrived
-    }
-
-    /// Decodes as many plain blocks as lie ahead; gives how many bytes they had.
-    fn blocks(&mut self, bytes: &[u8], arrived: Option<i64>, sheet: &mut Sheet<'_>) -> usize {
+    /// Decodes the plain words that lie ahead; gives how many bytes they had.
+    ///
+    /// None where stamps alone do not unwrap them: before the first, and until this arrival has been reckoned with.
+    fn plain(&mut self, bytes: &[u8], arrived: Option<i64>, sheet: &mut Sheet<'_>) -> usize {
         if self.by_taxel.is_some() || self.held.is_some() || self.clock.heard != arrived {
             return 0;
         }
         let Some(latest) = self.clock.latest else { return 0 };
         let mut state = State { latest, intensities: 0, unpaired: 0 };
         let before = sheet.rows;
-        let done = self.instructions.blocks(bytes, self.array.columns, self.array.rows, &mut state, sheet);
+        let done = self.instructions.plain(bytes, self.array.columns, self.array.rows, &mut state, sheet);
         self.clock.latest = Some(state.latest);
         self.counts.bytes += done as u64;
         self.counts.words += (done / WORD_BYTES) as u64;
@@ -398,7 +381,6 @@ impl Decoder {
         self.have = 0;
     }
 
-    #[inline]
     fn word(&mut self, word: Word, arrived: Option<i64>, sheet: &mut Sheet<'_>, markers: &mut Vec<Marker>) {
         let open = std::mem::take(&mut sheet.open);
         match word {
@@ -447,11 +429,6 @@ impl Decoder {
         self.counts.back += u64::from(back);
         time * STAMP_US
     }
-}
-
-/// Whether five bytes are a word: the first byte's top bit set, no other's.
-fn is_whole(b: [u8; WORD_BYTES]) -> bool {
-    b[0] & FIRST != 0 && (b[1] | b[2] | b[3] | b[4]) & FIRST == 0
 }
 
 /// Columns to be filled; all equally long.

@@ -1,22 +1,22 @@
 //! Plain stretches of a stream, many words at a time, with what instructions the machine has.
 //!
-//! A block is plain when all its bytes are in place, it holds changes and intensities on the array only, and its stamps
-//! do not fall. Anything else stops the block loop, and the word-by-word decoder goes on from there: it alone says what
-//! damage means, so every set of instructions gives the same events and counts.
+//! Words are plain when all their bytes are in place, they are changes and intensities on the array, and their stamps do
+//! not fall. Anything else stops the loop, and the decoder takes the next word by itself: it alone says what damage,
+//! markers and steps back mean, so every set of instructions gives the same events and counts.
 
 #[cfg(target_arch = "x86_64")]
 mod avx2;
 #[cfg(target_arch = "x86_64")]
 mod avx512;
+mod scalar;
 
 use super::Sheet;
 use crate::wire::v1::WORD_BYTES;
 
 /// Words of the longest block.
-pub(super) const BLOCK_WORDS: usize = 32;
+const BLOCK_WORDS: usize = 32;
 
 /// Stamps ahead of the latest time that are surely ahead: see [`super::FARTHEST_BACK`].
-#[cfg(target_arch = "x86_64")]
 const FARTHEST_AHEAD: u16 = (super::TURN - super::FARTHEST_BACK - 1) as u16;
 
 /// Vector instructions that a decoder may use.
@@ -72,10 +72,9 @@ impl Instructions {
         }
     }
 
-    /// Decodes plain blocks from the start of `bytes` into `sheet`, up to the first block that is not plain; gives how
-    /// many bytes they had.
-    #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
-    pub(super) fn blocks(
+    /// Decodes plain words from the start of `bytes` into `sheet`, up to the first that is not plain; gives how many
+    /// bytes they had.
+    pub(super) fn plain(
         self,
         bytes: &[u8],
         columns: u16,
@@ -83,6 +82,22 @@ impl Instructions {
         state: &mut State,
         sheet: &mut Sheet<'_>,
     ) -> usize {
+        let mut done = 0;
+        loop {
+            done += self.blocks(&bytes[done..], columns, rows, state, sheet);
+            // An odd number, so that pairs that lie across the blocks' edges come to lie inside.
+            let most = if self == Self::Scalar { usize::MAX } else { BLOCK_WORDS - 1 };
+            let words = scalar::words(&bytes[done..], columns, rows, state, sheet, most);
+            done += words * WORD_BYTES;
+            if words < most {
+                return done;
+            }
+        }
+    }
+
+    /// As [`Self::plain`], whole blocks only.
+    #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
+    fn blocks(self, bytes: &[u8], columns: u16, rows: u16, state: &mut State, sheet: &mut Sheet<'_>) -> usize {
         let room = &sheet.room;
         let most = sheet.rows + bytes.len() / WORD_BYTES;
         assert!(
@@ -107,7 +122,6 @@ impl Instructions {
 }
 
 /// The 16 bits of value in the word at `at`; the bytes are in place, as the caller has checked.
-#[cfg(target_arch = "x86_64")]
 #[inline(always)]
 fn value(bytes: &[u8], at: usize) -> u16 {
     u16::from(bytes[at]) << 14 | u16::from(bytes[at + 1]) << 7 | u16::from(bytes[at + 2])

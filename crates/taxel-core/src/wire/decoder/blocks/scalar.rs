@@ -1,0 +1,68 @@
+//! Plain words one by one, on any machine.
+
+use super::{FARTHEST_AHEAD, State, value};
+use crate::wire::decoder::Sheet;
+use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES};
+
+/// See [`super::Instructions::blocks`]; at most `most` words. The first pair of a sheet counts as not plain.
+pub(super) fn words(
+    bytes: &[u8],
+    columns: u16,
+    rows: u16,
+    state: &mut State,
+    sheet: &mut Sheet<'_>,
+    most: usize,
+) -> usize {
+    let words = most.min(bytes.len() / WORD_BYTES);
+    let (first, paired, mut open) = (sheet.rows, sheet.paired, sheet.open);
+    let mut last = if open { sheet.last_taxel() } else { (0, 0) };
+    // Places of rows from here on: there are never more rows than words.
+    let place = first..first + words;
+    let (t, p) = (&mut sheet.room.t[place.clone()], &mut sheet.room.p[place.clone()]);
+    let (x, y) = (&mut sheet.room.x[place.clone()], &mut sheet.room.y[place]);
+    // Intensities may belong to the row before.
+    let back = usize::from(first > 0);
+    let ticks = &mut sheet.room.ticks[first - back..first + words];
+    let present = &mut sheet.room.present[first - back..first + words];
+    let (mut latest, mut n, mut done) = (state.latest, 0, 0);
+    for word in bytes.chunks_exact(WORD_BYTES).take(words) {
+        let taxel = (u16::from(word[3] & 0x3f), u16::from(word[4] & 0x3f));
+        let ahead = value(word, 0).wrapping_sub(latest as u16);
+        let in_place = word[0] & FIRST != 0 && (word[1] | word[2] | word[3] | word[4]) & FIRST == 0;
+        if !in_place || word[0] & 0x08 != 0 || taxel.0 >= columns || taxel.1 >= rows {
+            break;
+        }
+        if word[0] & 0x20 == 0 {
+            if ahead > FARTHEST_AHEAD {
+                break;
+            }
+            latest += i64::from(ahead);
+            t[n].write(latest * STAMP_US);
+            x[n].write(taxel.0);
+            y[n].write(taxel.1);
+            p[n].write(word[0] & 0x40 != 0);
+            if paired {
+                ticks[n + back].write(0);
+                present[n + back].write(false);
+            }
+            n += 1;
+            (open, last) = (true, taxel);
+        } else if open && last == taxel {
+            if !paired {
+                break;
+            }
+            ticks[n + back - 1].write(value(word, 0));
+            present[n + back - 1].write(true);
+            state.intensities += 1;
+            open = false;
+        } else {
+            state.unpaired += 1;
+            open = false;
+        }
+        done += 1;
+    }
+    sheet.rows = first + n;
+    sheet.open = open;
+    state.latest = latest;
+    done
+}
