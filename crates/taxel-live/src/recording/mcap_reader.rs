@@ -34,11 +34,9 @@ const RECORD_HEAD: u64 = 9;
 /// A recording of the live format, opened.
 #[derive(Debug)]
 pub struct Reader {
-    path: PathBuf,
-    file: File,
+    blocks: Blocks,
     header: Header,
     ending: Option<Ending>,
-    blocks: Vec<Block>,
     rebuilt: Rebuilt,
 }
 
@@ -151,30 +149,15 @@ impl Reader {
         walk.magic()?;
         walk.records()?;
         let Walk { begin, end, ending, blocks, rebuilt, .. } = walk;
-        let mut reader = Self {
-            path: path.to_owned(),
-            file,
-            header: Header {
-                array: taxel_core::Array::thesis(),
-                registers: None,
-                difference: false,
-                origin_us: 0,
-                source: String::new(),
-                started_ns: 0,
-            },
-            ending,
-            blocks,
-            rebuilt,
-        };
+        let blocks = Blocks { path: path.to_owned(), file, places: blocks };
         // The copy beside the datagrams' channel has a checksum, the others have not.
-        let Some(header) = reader.checked_header()?.or(end).or(begin) else {
+        let Some(header) = blocks.header()?.or(end).or(begin) else {
             return Err(format(
                 path,
                 "an MCAP file without the header of a taxel recording (metadata record \"taxel\")",
             ));
         };
-        reader.header = header;
-        Ok(reader)
+        Ok(Self { blocks, header, ending, rebuilt })
     }
 
     /// What the recording says of itself.
@@ -204,10 +187,10 @@ impl Reader {
         let mut topics: BTreeMap<u16, Option<Topic>> = BTreeMap::new();
         let (mut bad, mut last) = (0, 0_u64);
         let mut bytes = Vec::new();
-        for block in &self.blocks {
+        for block in &self.blocks.places {
             stop.check()?;
             let mut wrong = None;
-            let sound = self.records(*block, &mut bytes, |record| {
+            let sound = self.blocks.records(*block, &mut bytes, |record| {
                 match record {
                     Record::Channel(channel) => {
                         topics.insert(channel.id, Topic::of_name(&channel.topic));
@@ -317,11 +300,21 @@ impl Reader {
         decoded.bad_chunks = bad;
         Ok(decoded)
     }
+}
 
+/// Where the messages of a file are.
+#[derive(Debug)]
+struct Blocks {
+    path: PathBuf,
+    file: File,
+    places: Vec<Block>,
+}
+
+impl Blocks {
     /// The header's copy in the first chunk that has one.
-    fn checked_header(&self) -> Result<Option<Header>> {
+    fn header(&self) -> Result<Option<Header>> {
         let (mut bytes, mut header) = (Vec::new(), None);
-        for block in &self.blocks {
+        for block in &self.places {
             self.records(*block, &mut bytes, |record| {
                 if let Record::Channel(channel) = record {
                     header = channel.metadata.get("header").and_then(|text| serde_json::from_str(text).ok());

@@ -321,7 +321,11 @@ impl Shared {
 impl Broken {
     fn of(error: McapError) -> Self {
         match error {
-            McapError::Io(error) => Self { code: error.raw_os_error(), text: error.to_string() },
+            McapError::Io(error) => {
+                let said = error.to_string();
+                let text = said.split(" (os error").next().unwrap_or(&said).to_owned();
+                Self { code: error.raw_os_error(), text }
+            }
             other => Self { code: None, text: other.to_string() },
         }
     }
