@@ -333,6 +333,20 @@ def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
     assert not (tmp_path / "a.mcap").exists()
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is always full")
+@pytest.mark.parametrize("name", ["full.mcap", "full.lsa"])
+def test_a_full_disk_is_one_clear_error(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).symlink_to("/dev/full")
+
+    def record() -> None:
+        with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / name, overwrite=True) as live:
+            play(presses(300), live.address[1])
+            list(live)
+
+    with pytest.raises(OSError, match="No space left on device"):
+        record()
+
+
 def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path) -> None:
     port, events = free_port(), presses(5)
     touch().save(tmp_path / "touch.json")
