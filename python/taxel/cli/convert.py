@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from taxel.cli import app
 
@@ -30,7 +31,9 @@ def convert(
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
 
-    lost = taxel.convert(source, target, frames_hz=frames, compression=compression, overwrite=overwrite)
+    # Shown on a terminal only, and gone when done.
+    with Console(stderr=True).status(f"{source} to {target}"):
+        lost = taxel.convert(source, target, frames_hz=frames, compression=compression, overwrite=overwrite)
     if as_json:
         typer.echo(json.dumps({"source": str(source), "target": str(target), "lost": lost}))
         return

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 import typer
+from rich.console import Console
 
 from taxel._core import ProblemError
 from taxel.cli import app
@@ -42,8 +43,10 @@ def info(
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
-    recording = taxel.open(file)
-    said = about(recording)
+    # Shown on a terminal only, and gone when done.
+    with Console(stderr=True).status(f"reading {file}"):
+        recording = taxel.open(file)
+        said = about(recording)
     if picture is not None:
         import matplotlib as mpl  # noqa: PLC0415  loads slowly
 
