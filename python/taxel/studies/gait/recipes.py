@@ -193,10 +193,10 @@ SEARCH: dict[str, dict[str, list[Point]]] = {
         "foot_off": [
             _LIFTED,
             changed(_LIFTED, tau=160.0),
-            changed(_LIFTED, tau=130.0),
             changed(_LIFTED, kappa=1.2),
             changed(_LIFTED, kappa=1.4),
-            changed(_LIFTED, tau=160.0, kappa=1.2),
+            changed(_LIFTED, tau=160.0, kappa=1.4),
+            changed(_LIFTED, delay_ms=12.0),
         ],
     },
     "gaitpdb": {
@@ -205,7 +205,7 @@ SEARCH: dict[str, dict[str, list[Point]]] = {
             changed(point, theta_plus=1.0),
             changed(point, kappa=1.5),
             changed(point, tau=20.0),
-            changed(point, tau=45.0),
+            changed(point, tau=45.0 if event == "contact" else 25.0),
             changed(point, **_RESET, refractory=250.0 if event == "contact" else 120.0),
         ]
         for event, point in NOTES["gaitpdb"].items()
