@@ -313,6 +313,7 @@ SOUND: dict[str, Sound] = {
         tare_ms=3.0,
         array=None,
         sensor={},
+        watch=lambda _: None,
     ),
     "taxel.simulate.truth": plain(
         taxel.simulate.truth, acts=[taxel.simulate.Silence(10.0)], preset="5.2 kHz", array=None
@@ -324,7 +325,7 @@ SOUND: dict[str, Sound] = {
 }
 
 #: Functions to be called: a function of another kind is the caller's to blame, and its own error comes out.
-CALLED = {"progress", "say"}
+CALLED = {"progress", "say", "watch"}
 
 #: What is not tried, and why.
 LEFT_OUT = {

@@ -368,7 +368,7 @@ def lists(*times):
         ([lists([1.0])], [[130.0]], "pattern 0, target 0: 130 ms lies outside the pattern's window 0 to 100"),
         ([lists([1.0])], [5.0], "targets of pattern 0 has 0 dimensions"),
         ([lists([1.0])], [["soon"]], "targets of pattern 0: holds <U4, must hold numbers"),
-        (["spikes"], [[5.0]], "pattern 0 is a str: must be SpikeTrains"),
+        (["spikes"], [[5.0]], "pattern 0 is 'spikes': must be a taxel.SpikeTrains"),
         ([SpikeTrains.from_lists([[1.0]], stop=9.0, values=[[-1.0]])], [[5.0]], "pattern 0: spikes are signed"),
     ],
 )

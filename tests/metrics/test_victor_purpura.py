@@ -11,7 +11,8 @@ from taxel import ProblemError
 from taxel.metrics import victor_purpura
 
 times = st.lists(st.floats(0, 500, allow_nan=False), max_size=12).map(sorted)
-costs = st.floats(0, 5)
+# Elephant takes the least subnormal cost for infinite.
+costs = st.just(0.0) | st.floats(1e-9, 5)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import mapping, number, parameters, several, shown, text, whole
+from taxel._arguments import callback, mapping, number, parameters, several, shown, text, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -174,7 +174,7 @@ def play(
         whole("seed", seed, 0),
         parts,
         number("tare_ms", tare_ms),
-        watch,
+        callback("watch", watch),
     )
     return Played(Events._from_parts(events), datagrams, words)
 
@@ -224,8 +224,8 @@ def emulate(
         _parts(acts, _thesis(array)),
         number("tare_ms", tare_ms),
         None if control is None else text("control", control),
-        begun,
-        lambda said: watch(EmulatorReport._from_json(said)),
+        callback("begun", begun),
+        lambda said: callback("watch", watch)(EmulatorReport._from_json(said)),
     )
     return EmulatorReport._from_json(report)
 
