@@ -212,8 +212,11 @@ def test_weights_that_make_no_sense_are_one_clear_error(arguments, said):
 
 def test_other_arguments_that_make_no_sense_are_one_clear_error_each():
     trains = SpikeTrains.from_lists([[1.0]], stop=10.0)
+    signed = SpikeTrains.from_lists([[1.0]], stop=10.0, values=[[-1.0]])
     for call, said in (
         (lambda: Neuron().run([1.0], "spikes"), "trains is a str: must be SpikeTrains"),
+        (lambda: Neuron().run([1.0], signed), "trains: spikes are signed, split them into ON and OFF trains first"),
+        (lambda: Neuron().potential([1.0], signed, [1.0]), "trains: spikes are signed"),
         (lambda: Neuron().run([1.0], trains, threshold=0), "threshold factor is 0: must be above 0"),
         (lambda: Neuron().run([1.0], trains, threshold="high"), "threshold is 'high': must be a number"),
         (lambda: Neuron().run([1.0], trains, threshold=float("nan")), "threshold factor is NaN"),

@@ -168,8 +168,7 @@ impl Neuron {
         threshold: f64,
         stop: Stop<'_>,
     ) -> Result<Vec<OutputSpike>> {
-        trains.check()?;
-        self.check_weights(weights, trains.len())?;
+        self.check_inputs(weights, trains)?;
         let mut stream = self.stream(weights, threshold, trains.start)?;
         let mut out = Vec::new();
         for (k, spike) in trains.by_time().iter().enumerate() {
@@ -192,8 +191,7 @@ impl Neuron {
     /// `Problem` for parameters, weights or trains that make no sense, or times that do not ascend.
     pub fn potential(&self, weights: &[f64], trains: &SpikeTrains, times: &[f64], spikes: &[f64]) -> Result<Vec<f64>> {
         self.check()?;
-        trains.check()?;
-        self.check_weights(weights, trains.len())?;
+        self.check_inputs(weights, trains)?;
         for (name, list) in [("times", times), ("spikes", spikes)] {
             if let Some(k) = list.iter().position(|t| !t.is_finite()) {
                 return Err(problem!("{name}[{k}] is {}: must be finite", list[k]));
@@ -208,6 +206,14 @@ impl Neuron {
             }
         }
         Ok(srm0::potential(self, weights, trains, times, spikes))
+    }
+
+    fn check_inputs(&self, weights: &[f64], trains: &SpikeTrains) -> Result<()> {
+        trains.check()?;
+        if trains.values.is_some() {
+            return Err(problem!("trains: spikes are signed, split them into ON and OFF trains first"));
+        }
+        self.check_weights(weights, trains.len())
     }
 
     pub(crate) fn check_weights(&self, weights: &[f64], trains: usize) -> Result<()> {

@@ -85,7 +85,7 @@ class ConeR:
     >>> cone = ConeR(tau=10.0, lb=-1.0, ub=1.0, after_spike="reset").fit([trains], [[20.0]])
     >>> cone.status_
     'solved'
-    >>> cone.neuron_.run(cone.weights_, trains)
+    >>> cone.neuron_.run(cone.weights_, trains, threshold=0.999)  # a target is met to rounding, from below as well
     array([20.])
     """
 

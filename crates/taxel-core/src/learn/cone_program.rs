@@ -96,15 +96,20 @@ impl ConeProgram<'_> {
         let sign = if self.lower >= 0.0 { 1.0 } else { -1.0 };
         let normed = self.l2 > 0.0 && self.norm == Norm::Norm;
 
-        // Variables: w, the hinges' slacks, |w| by synapse, |w|_2, B w.
-        let (slack, size, length, image) = (n, n + m, n + m + if absolute { n } else { 0 }, 0);
-        let image = image + length + usize::from(normed);
+        // Variables: w; from there on the hinges' slacks, |w| by synapse, |w|_2, B w.
+        let slack = n;
+        let size = slack + m;
+        let length = size + if absolute { n } else { 0 };
+        let image = length + usize::from(normed);
         let variables = image + if factored { k } else { 0 };
-        // Rows: B w - y = 0; r w - slack <= limit; slack >= 0; bounds; -|w| <= w <= |w|; the cone of |w|_2.
+        // Rows: B w - y = 0; from there on r w - slack <= limit; slack >= 0; w <= upper; -w <= -lower; w - |w| <= 0;
+        // -w - |w| <= 0; the cone of |w|_2.
         let hinge = if factored { k } else { 0 };
         let positive = hinge + m;
-        let (above, below) = (positive + m, positive + m + n);
-        let (plus, minus) = (below + n, below + 2 * n);
+        let above = positive + m;
+        let below = above + n;
+        let plus = below + n;
+        let minus = plus + n;
         let cone = if absolute { minus + n } else { plus };
         let rows = cone + if normed { n + 1 } else { 0 };
 

@@ -144,12 +144,17 @@ pub enum Status {
 
 /// The five terms of 6.14, weighted and normalised: their sum is the objective.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[allow(non_snake_case, missing_docs)]
+#[allow(non_snake_case)]
 pub struct Parts {
+    /// Sum of absolute weights.
     pub l1: f64,
+    /// Length of the weights, or its square.
     pub l2: f64,
+    /// Missed lift behind the targets (6.10).
     pub B: f64,
+    /// Missed targets (6.12).
     pub C: f64,
+    /// Broken silence (6.13).
     pub D: f64,
 }
 

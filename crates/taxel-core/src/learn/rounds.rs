@@ -22,8 +22,9 @@ const NEAR: f64 = 0.006;
 const NOTHING: f64 = 1e-10;
 /// What the cone solver can do at best.
 const FINEST: f64 = 1e-12;
-/// Rounds end without a proof where the objective falls by less than this, relatively, and nothing else helps.
+/// Rounds end without a proof where the objective falls by less than this, relatively, and nothing else helps; and at last.
 const STALLED: f64 = 1e-10;
+const MOST_ROUNDS: usize = 500;
 
 /// What the rounds came to.
 pub(super) struct Found {
@@ -101,7 +102,7 @@ impl Problem {
             let gap = if least * scale <= NOTHING { 0.0 } else { (least - bound).max(0.0) / least };
             progress(Round { round: rounds, rows: kept.rows.len(), objective: least, gap });
             let stalled = before - least <= STALLED * least;
-            if gap <= tolerance || (stalled && accuracy < FINEST) {
+            if gap <= tolerance || (stalled && accuracy < FINEST) || rounds == MOST_ROUNDS {
                 let Point { weights, parts, .. } = best;
                 return Ok(Found { weights, parts, gap, rounds, rows: kept.rows.len() });
             }
