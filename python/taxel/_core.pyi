@@ -272,6 +272,7 @@ _Fit = tuple[
 
 def check_cone_r(parameters: str) -> str: ...
 
+@final
 class ConeRProblem:
     def __new__(
         cls, parameters: str, patterns: list[tuple[Any, ...]], targets: list[NDArray[np.float64]]
