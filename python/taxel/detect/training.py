@@ -107,7 +107,9 @@ class Recipe:
                 raise ProblemError(f"recipe: no key {shown(key)}: there are {', '.join(known)}")
         encoder = values.get("encoder")
         if not isinstance(encoder, Mapping):
-            raise ProblemError("recipe: says no encoder: name one, as --encoder contact_area or [encoder] in the recipe")
+            raise ProblemError(
+                "recipe: says no encoder: name one, as --encoder contact_area or [encoder] in the recipe"
+            )
         return cls(**{**values, "encoder": Encoder.from_json(parameters(encoder))})
 
     @classmethod
