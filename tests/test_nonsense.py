@@ -52,6 +52,7 @@ EVENTS = taxel.Events(
 )
 FRAMES = taxel.Frames(np.ones((3, 4, 4)), [0, 192, 384], array=ARRAY)
 TRAINS = taxel.SpikeTrains.from_lists([[1.0, 2.0], [3.0]], 0.0, 20.0, [[1.0, -1.0], [1.0]])
+UNSIGNED = taxel.SpikeTrains.from_lists([[1.0, 2.0], [3.0]], 0.0, 20.0)
 FOUND = taxel.Detections(["a", "b"], [10, 20], [11, 22], [0.5, 0.5])
 TARE = taxel.Tare.take(FRAMES)
 LEVELS = taxel.encode.LevelCrossing([0.5])
@@ -145,9 +146,9 @@ SOUND: dict[str, Sound] = {
         time="grid",
         step_ms=0.5,
     ),
-    "taxel.Neuron.run": method(taxel.Neuron(), "run", weights=[1.0] * 2, trains=TRAINS, threshold=1.0),
+    "taxel.Neuron.run": method(taxel.Neuron(), "run", weights=[1.0] * 2, trains=UNSIGNED, threshold=1.0),
     "taxel.Neuron.potential": method(
-        taxel.Neuron(), "potential", weights=[1.0] * 2, trains=TRAINS, times=[1.0, 5.0], spikes=[2.0]
+        taxel.Neuron(), "potential", weights=[1.0] * 2, trains=UNSIGNED, times=[1.0, 5.0], spikes=[2.0]
     ),
     "taxel.Readout": plain(
         taxel.Readout, encoder=LEVELS, neurons=READOUT.neurons, array=ARRAY, delay_ms={"a": 1.0}, run_threshold=0.9
