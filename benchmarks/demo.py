@@ -1,0 +1,34 @@
+"""Does the main job reach its goals over 100 scenes without the clock? Peer: the plain rule, two loaded taxels."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from _rounds import stamp
+from rich.console import Console
+
+from taxel.demo.showing import show
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    with tempfile.TemporaryDirectory() as place:
+        values, _ = show(
+            Console(quiet=True),
+            scenes=2 if quick else 100,
+            seed=1,
+            live=False,
+            noise_s=5.0 if quick else None,
+            data=None,
+            readout=None,
+            folder=Path(place) / "demo",
+            result=None,
+        )
+    ratios = {}
+    for touch in ("first impact", "bounce, 0.4 m/s and more"):
+        for said in ("contact", "lift"):
+            ours, rule = (values[way]["classes"][touch][said] for way in ("neuron", "plain_rule"))
+            ratios[f"{touch}, {said}: found, of {ours['touches']}"] = ours["found"]
+            ratios[f"{touch}, {said}: plain rule's delay over ours"] = rule["known_ms"]["p50"] / ours["known_ms"]["p50"]
+    return stamp() | values | {"ratios": ratios}
