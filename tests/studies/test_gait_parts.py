@@ -197,4 +197,6 @@ def test_a_sum_has_its_threshold_and_its_release():
 def test_every_point_of_a_grid_is_one_that_can_be_said():
     for rule in rules.RULES:
         for numbers in rules.grid(rule, levels=1, channels=2, largest=10.0):
-            said(rule, numbers)
+            times = said(rule, numbers)
+            assert times == sorted(times), (rule, numbers)
+            assert np.isfinite(times).all(), (rule, numbers)

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
 use super::{Stream, micros, ms};
+pub use crate::board::Previous;
 use crate::{Array, Result, Spike, problem};
 
 /// Change events: U = value - previous value in units of the noise floor, saturating at +-(2^bits - 1).
@@ -29,17 +30,6 @@ pub struct ChangeEvents {
     /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
     #[serde(default = "super::stamp_period")]
     pub period_ms: f64,
-}
-
-/// What a sample is compared with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Previous {
-    /// The value at the last event (wire.md, section 3, rule 2): slow changes show too.
-    #[default]
-    LastSent,
-    /// The last sample, as thesis 4.3 words it.
-    LastSample,
 }
 
 /// How U / theta_0 becomes whole.
