@@ -16,7 +16,7 @@ __all__ = ["Neuron"]
 
 
 class Neuron:
-    """Describe a neuron of the simplified Spike Response Model (SRM0) with alpha kernel; run it on spike trains.
+    """Describe a neuron of the simplified Spike Response Model (SRM0); run it on spike trains.
 
     The defaults are those of Table 6.1; Table 6.2 (gait) differs in `tau`: 70 ms for contact, 190 ms for foot-off.
 
@@ -41,6 +41,11 @@ class Neuron:
         Crossings are found exactly, or looked for at the points ``start + k * step_ms``.
     step_ms : float, ms, above 0
         Step of the grid.
+    kernel : {"alpha", "double_exponential", "exponential"}
+        What an input does to the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))`` with its
+        largest value 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential only jumps, at inputs.
+    tau_s : float, ms, above 0 and below `tau`, optional
+        Synaptic time constant of the double exponential; ``tau / 4`` where left out.
 
     Raises
     ------
@@ -72,6 +77,8 @@ class Neuron:
         first_threshold: Literal["theta_0", "printed"] = "theta_0",
         time: Literal["continuous", "grid"] = "continuous",
         step_ms: float = 1.0,
+        kernel: Literal["alpha", "double_exponential", "exponential"] = "alpha",
+        tau_s: float | None = None,
     ) -> None:
         self.tau = tau
         self.theta_0 = theta_0
@@ -82,6 +89,8 @@ class Neuron:
         self.first_threshold = first_threshold
         self.time = time
         self.step_ms = step_ms
+        self.kernel = kernel
+        self.tau_s = tau_s
         _core.check_neuron(self._json())
 
     def run(self, weights: ArrayLike, trains: SpikeTrains, *, threshold: float = 1.0) -> NDArray[np.float64]:

@@ -8,7 +8,8 @@ mod kernel;
 mod srm0;
 mod streaming;
 
-pub use kernel::{State, alpha};
+pub use kernel::{Kernel, Shape, State, Step};
+
 pub use streaming::{NeuronStream, OutputSpike};
 
 use serde::{Deserialize, Serialize};
@@ -57,12 +58,16 @@ pub enum Time {
     Grid,
 }
 
-/// Parameters of an SRM0 neuron with alpha kernel; the defaults are those of Table 6.1.
+/// Parameters of an SRM0 neuron; the defaults are those of Table 6.1.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Neuron {
+    /// What an input spike does to the potential.
+    pub kernel: Kernel,
     /// Membrane time constant, ms.
     pub tau: f64,
+    /// Synaptic time constant of the double exponential kernel, ms; `tau/4` where left out, as the Tempotron has it.
+    pub tau_s: Option<f64>,
     /// Baseline threshold, mV.
     pub theta_0: f64,
     /// Rise of the threshold by a spike, mV.
@@ -84,7 +89,9 @@ pub struct Neuron {
 impl Default for Neuron {
     fn default() -> Self {
         Self {
+            kernel: Kernel::Alpha,
             tau: 15.0,
+            tau_s: None,
             theta_0: 0.3,
             theta_plus: 0.2,
             tau_rec: None,
@@ -108,6 +115,7 @@ impl Neuron {
             ("tau", self.tau, "ms"),
             ("theta_0", self.theta_0, "mV"),
             ("tau_rec", self.tau_rec(), "ms"),
+            ("tau_s", self.tau_s(), "ms"),
             ("step_ms", self.step_ms, "ms"),
         ];
         for (name, value, unit) in above_0 {
@@ -119,6 +127,15 @@ impl Neuron {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(problem!("{name} is {value} {unit}: must be 0 or more and finite"));
             }
+        }
+        if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
+            return Err(problem!("tau_s is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
+        }
+        if self.kernel == Kernel::Exponential && self.time == Time::Continuous {
+            return Err(problem!(
+                "kernel is \"exponential\" and time \"continuous\": its potential only jumps, at inputs, so it never crosses \
+                 the threshold at a time of its own; take time \"grid\" or another kernel"
+            ));
         }
         if self.refractory == 0.0 && self.after_spike != AfterSpike::Reset {
             return Err(problem!(
@@ -132,6 +149,18 @@ impl Neuron {
     #[must_use]
     pub fn tau_rec(&self) -> f64 {
         self.tau_rec.unwrap_or(2.0 * self.tau)
+    }
+
+    /// The synaptic time constant, ms.
+    #[must_use]
+    pub fn tau_s(&self) -> f64 {
+        self.tau_s.unwrap_or(0.25 * self.tau)
+    }
+
+    /// The kernel with its constants.
+    #[must_use]
+    pub fn shape(&self) -> Shape {
+        Shape::new(self.kernel, self.tau, self.tau_s())
     }
 
     /// The threshold `since` ms after the last spike (6.8), or before the first one, mV.

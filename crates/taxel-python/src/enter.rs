@@ -20,10 +20,50 @@ where
     T: Send,
     E: IntoPyErr + Send,
 {
+    match guarded(py, None, work) {
+        (_, Some(signal)) => Err(signal),
+        (outcome, None) => outcome,
+    }
+}
+
+/// As [`enter`], for work that keeps the best so far when it is stopped: by Ctrl-C, or after `max_seconds`.
+///
+/// Gives its result together with the signal's exception, which the caller raises once the result is kept.
+#[allow(dead_code)]
+pub(crate) fn enter_keeping<T, E>(
+    py: Python<'_>,
+    max_seconds: Option<f64>,
+    work: impl FnOnce(Stop<'_>) -> Result<T, E> + Send,
+) -> PyResult<(T, Option<Py<PyAny>>)>
+where
+    T: Send,
+    E: IntoPyErr + Send,
+{
+    match guarded(py, max_seconds, work) {
+        (Ok(value), signal) => Ok((value, signal.map(|s| s.into_value(py).into_any()))),
+        (Err(_), Some(signal)) => Err(signal),
+        (Err(error), None) => Err(error),
+    }
+}
+
+/// What the work gave, and the exception of a signal that came meanwhile.
+fn guarded<T, E>(
+    py: Python<'_>,
+    max_seconds: Option<f64>,
+    work: impl FnOnce(Stop<'_>) -> Result<T, E> + Send,
+) -> (PyResult<T>, Option<PyErr>)
+where
+    T: Send,
+    E: IntoPyErr + Send,
+{
     let signal: Mutex<Option<PyErr>> = Mutex::new(None);
-    let asked = Mutex::new(Instant::now());
+    let begun = Instant::now();
+    let asked = Mutex::new(begun);
     let outcome = py.detach(|| {
         let stop = || {
+            if max_seconds.is_some_and(|most| begun.elapsed().as_secs_f64() >= most) {
+                return true;
+            }
             let Ok(mut last) = asked.try_lock() else { return false };
             if last.elapsed() < ASK_EVERY {
                 return signal.lock().is_ok_and(|s| s.is_some());
@@ -38,10 +78,7 @@ where
         };
         catch_unwind(AssertUnwindSafe(|| work(Stop::when(&stop))))
     });
-    if let Some(error) = signal.into_inner().unwrap_or(None) {
-        return Err(error);
-    }
-    match outcome {
+    let outcome = match outcome {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(error)) => Err(error.into_py_err()),
         Err(panic) => {
@@ -52,5 +89,6 @@ where
                 .unwrap_or_else(|| "no message".to_owned());
             Err(Error::new_err(format!("a bug in taxel, please report it: {said}")))
         }
-    }
+    };
+    (outcome, signal.into_inner().unwrap_or(None))
 }

@@ -16,7 +16,18 @@ from taxel.spikes import SpikeTrains
 
 __all__ = ["ConeR", "ConeRProblem"]
 
-_NEURON = ("tau", "theta_0", "theta_plus", "tau_rec", "refractory", "after_spike", "first_threshold", "step_ms")
+_NEURON = (
+    "tau",
+    "theta_0",
+    "theta_plus",
+    "tau_rec",
+    "refractory",
+    "after_spike",
+    "first_threshold",
+    "step_ms",
+    "kernel",
+    "tau_s",
+)
 
 
 class ConeR:
@@ -27,7 +38,7 @@ class ConeR:
 
     Parameters
     ----------
-    tau, theta_0, theta_plus, tau_rec, refractory, after_spike, first_threshold, step_ms
+    tau, theta_0, theta_plus, tau_rec, refractory, after_spike, first_threshold, step_ms, kernel, tau_s
         The neuron, as in `taxel.Neuron`; `step_ms` is also the step of the silent rows.
     kappa : float, above 0
         What the potential shall reach behind a target, in thresholds.
@@ -112,6 +123,8 @@ class ConeR:
         after_spike: Literal["keep", "ignore", "reset"] = "keep",
         first_threshold: Literal["theta_0", "printed"] = "theta_0",
         step_ms: float = 1.0,
+        kernel: Literal["alpha", "double_exponential", "exponential"] = "alpha",
+        tau_s: float | None = None,
         kappa: float = 1.2,
         delta_t_ms: float | None = None,
         lambdas: Sequence[float] = (2.8, 1.2, 100.0, 100.0, 80.0),
@@ -131,6 +144,8 @@ class ConeR:
         self.after_spike: Literal["keep", "ignore", "reset"] = after_spike
         self.first_threshold: Literal["theta_0", "printed"] = first_threshold
         self.step_ms = step_ms
+        self.kernel: Literal["alpha", "double_exponential", "exponential"] = kernel
+        self.tau_s = tau_s
         self.kappa = kappa
         self.delta_t_ms = delta_t_ms
         self.lambdas = lambdas

@@ -5,11 +5,8 @@
 //! Silent rows are never stored: one sweep over the grid gives the potential on all of them (the kernel needs two numbers
 //! a pattern), one sweep backwards gives a weighted sum of all of them.
 
-use crate::neuron::{AfterSpike, FirstThreshold, Neuron, alpha};
+use crate::neuron::{AfterSpike, FirstThreshold, Neuron, Shape, State, Step};
 use crate::{Result, SpikeTrains, Stop};
-
-/// Beyond this many time constants an alpha kernel is below the rounding of its largest value.
-const FORGOTTEN: f64 = 45.0;
 
 /// Rounding of a grid point on the very edge of a refractory time, ms.
 const EDGE: f64 = 1e-9;
@@ -54,9 +51,10 @@ struct Sheet {
 pub(super) struct SilentRows {
     sheets: Vec<Sheet>,
     trains: usize,
-    /// One grid step, as `x = step/tau` and `e^{-x}`.
-    x: f64,
-    decay: f64,
+    shape: Shape,
+    step_ms: f64,
+    /// One grid step.
+    step: Step,
     /// What the potential must not exceed, mV; infinite where nothing is asked.
     pub(super) limit: Vec<f64>,
     /// The rows (by number) of each target's pattern that lie in the `near_ms` before it.
@@ -100,14 +98,15 @@ pub(super) fn target_rows(
 
 /// The coefficients of the weights at `t`, the neuron having fired at `earlier` targets only.
 fn coefficients(neuron: &Neuron, pattern: &SpikeTrains, earlier: &[f64], t: f64) -> Vec<f64> {
-    let oldest = t - FORGOTTEN * neuron.tau;
+    let shape = neuron.shape();
+    let oldest = t - shape.forgotten();
     (0..pattern.len())
         .map(|n| {
             let train = pattern.train(n);
             let from = train.partition_point(|&s| s < oldest);
             let heard = train[from..].iter().take_while(|&&s| s < t);
             let kept = heard.filter(|&&s| !lost(neuron, earlier, s, t));
-            kept.map(|&s| alpha(t - s, neuron.tau)).sum()
+            kept.map(|&s| shape.value(t - s)).sum()
         })
         .collect()
 }
@@ -133,7 +132,7 @@ impl SilentRows {
         stop: Stop<'_>,
     ) -> Result<Self> {
         let step = neuron.step_ms;
-        let x = step / neuron.tau;
+        let shape = neuron.shape();
         let (mut sheets, mut limit, mut before_targets) = (Vec::new(), Vec::new(), Vec::new());
         for (pattern, targets) in patterns.iter().zip(targets) {
             stop.check()?;
@@ -163,10 +162,12 @@ impl SilentRows {
             let mut inputs = Vec::with_capacity(pattern.times.len());
             for spike in pattern.by_time() {
                 let point = ((spike.t - pattern.start) / step).ceil();
-                if point < points as f64 && !lost(neuron, targets, spike.t, time(point)) {
-                    let x = (time(point) - spike.t).max(0.0) / neuron.tau;
-                    let a = (-x).exp();
-                    inputs.push(GridInput { point: point as u32, train: spike.train, a, b: a * x });
+                // An input on a point itself is felt behind it; where its kernel begins above 0, from the next point on.
+                let late = time(point) - spike.t <= 0.0 && shape.input().b != 0.0;
+                let felt = if late { point + 1.0 } else { point };
+                if felt < points as f64 && !lost(neuron, targets, spike.t, time(felt)) {
+                    let State { a, b } = shape.after(shape.input(), (time(felt) - spike.t).max(0.0));
+                    inputs.push(GridInput { point: felt as u32, train: spike.train, a, b });
                 }
             }
             let resets = match neuron.after_spike {
@@ -175,7 +176,8 @@ impl SilentRows {
             };
             sheets.push(Sheet { inputs, resets, first, points });
         }
-        Ok(Self { sheets, trains: patterns[0].len(), x, decay: (-x).exp(), limit, before_targets })
+        let trains = patterns[0].len();
+        Ok(Self { sheets, trains, shape, step_ms: step, step: shape.step(step), limit, before_targets })
     }
 
     /// How many rows, those at which nothing is asked included.
@@ -191,7 +193,7 @@ impl SilentRows {
             let (mut a, mut b) = (0.0, 0.0);
             let (mut input, mut reset) = (sheet.inputs.iter().peekable(), sheet.resets.iter().peekable());
             for point in 0..sheet.points as u32 {
-                (a, b) = (a * self.decay, (b + a * self.x) * self.decay);
+                (a, b) = (a * self.step.aa, b * self.step.bb + a * self.step.ba);
                 while reset.next_if(|&&r| r == point).is_some() {
                     (a, b) = (0.0, 0.0);
                 }
@@ -218,7 +220,7 @@ impl SilentRows {
                 while reset.next_if(|&&r| r >= point).is_some() {
                     (a, b) = (0.0, 0.0);
                 }
-                (a, b) = ((a + b * self.x) * self.decay, b * self.decay);
+                (a, b) = (a * self.step.aa + b * self.step.ba, b * self.step.bb);
             }
         }
     }
@@ -244,19 +246,17 @@ impl SilentRows {
                         input += 1;
                     }
                 } else {
-                    let x = f64::from(point - at) * self.x;
-                    let decay = (-x).exp();
+                    let step = self.shape.step(f64::from(point - at) * self.step_ms);
                     for (a, b) in a.iter_mut().zip(&mut b) {
-                        *b = (*b + *a * x) * decay;
-                        *a *= decay;
+                        *b = *b * step.bb + *a * step.ba;
+                        *a *= step.aa;
                     }
                 }
                 while input < sheet.inputs.len() && sheet.inputs[input].point <= point {
                     let i = sheet.inputs[input];
-                    let x = f64::from(point - i.point) * self.x;
-                    let decay = (-x).exp();
-                    a[i.train as usize] += i.a * decay;
-                    b[i.train as usize] += (i.b + i.a * x) * decay;
+                    let now = self.shape.after(State { a: i.a, b: i.b }, f64::from(point - i.point) * self.step_ms);
+                    a[i.train as usize] += now.a;
+                    b[i.train as usize] += now.b;
                     input += 1;
                 }
                 out[place * n..(place + 1) * n].copy_from_slice(&b);

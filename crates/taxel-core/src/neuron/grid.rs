@@ -1,12 +1,14 @@
 //! The neuron on a grid: potential and threshold are compared at the points `start + k step` only.
 
+use super::srm0::TOUCH;
 use super::streaming::{OutputSpike, Threshold};
-use super::{AfterSpike, Neuron, State};
+use super::{AfterSpike, Neuron, Shape, State, Step};
 
 /// The grid neuron at work.
 #[derive(Debug, Clone)]
 pub(super) struct GridStream {
     neuron: Neuron,
+    shape: Shape,
     pub(super) threshold: Threshold,
     start: f64,
     /// The potential at grid point `point`; inputs of the interval before it are in already.
@@ -16,24 +18,23 @@ pub(super) struct GridStream {
     point: f64,
     /// Whether that point has been compared with the threshold.
     compared: bool,
-    /// One step, as `x = step/tau` and `e^{-x}`.
-    x: f64,
-    decay: f64,
+    /// One step of the grid.
+    step: Step,
 }
 
 impl GridStream {
     pub(super) fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
-        let x = neuron.step_ms / neuron.tau;
+        let shape = neuron.shape();
         Self {
             neuron: neuron.clone(),
+            shape,
             threshold: Threshold::new(neuron, factor, start),
             start,
             state: State::default(),
             arriving: 0.0,
             point: 0.0,
             compared: false,
-            x,
-            decay: (-x).exp(),
+            step: shape.step(neuron.step_ms),
         }
     }
 
@@ -48,7 +49,7 @@ impl GridStream {
         if !self.neuron.loses(t, self.threshold.fired) {
             let age = self.time(self.point) - t;
             if age > 0.0 {
-                self.state.add(weight, age, self.neuron.tau);
+                self.shape.add(&mut self.state, weight, age);
             } else {
                 self.arriving += weight;
             }
@@ -65,7 +66,11 @@ impl GridStream {
     }
 
     pub(super) fn potential(&self, t: f64) -> f64 {
-        self.leaving().after((t - self.time(self.point)).max(0.0), self.neuron.tau).b
+        {
+            let since = t - self.time(self.point);
+            // An input at the point itself moves nothing before the point is left.
+            if since > 0.0 { self.shape.after(self.leaving(), since).b } else { self.state.b }
+        }
     }
 
     fn time(&self, point: f64) -> f64 {
@@ -77,22 +82,24 @@ impl GridStream {
     /// Where it could not, the state stays behind and catches up in one jump at the next input. What is done depends on
     /// the state alone, so that a stream cut elsewhere gives the same bits.
     fn step_through(&mut self, last: f64, out: &mut Vec<OutputSpike>) {
-        while self.point < last && self.leaving().bound() >= self.threshold.base {
+        while self.point < last && self.shape.bound(self.leaving()) >= self.threshold.base - TOUCH {
             self.jump(self.point + 1.0);
             self.compare(out);
         }
     }
 
     fn leaving(&self) -> State {
-        State { a: self.state.a + self.arriving, b: self.state.b }
+        let mut state = self.state;
+        self.shape.add(&mut state, self.arriving, 0.0);
+        state
     }
 
     fn jump(&mut self, point: f64) {
         let steps = point - self.point;
         self.state = if steps > 1.0 {
-            self.leaving().after(steps * self.neuron.step_ms, self.neuron.tau)
+            self.shape.after(self.leaving(), steps * self.neuron.step_ms)
         } else {
-            self.leaving().decayed(self.x, self.decay)
+            self.step.apply(self.leaving())
         };
         self.arriving = 0.0;
         self.point = point;
@@ -100,14 +107,14 @@ impl GridStream {
     }
 
     fn compare(&mut self, out: &mut Vec<OutputSpike>) {
-        if std::mem::replace(&mut self.compared, true) || self.state.b < self.threshold.base {
+        if std::mem::replace(&mut self.compared, true) || self.state.b < self.threshold.base - TOUCH {
             return;
         }
         let t = self.time(self.point);
-        if self.threshold.silent_at(t) || self.state.b < self.threshold.base + self.threshold.rise(t) {
+        if self.threshold.silent_at(t) || self.state.b < self.threshold.base + self.threshold.rise(t) - TOUCH {
             return;
         }
-        out.push(OutputSpike { t, slope: self.state.slope(self.neuron.tau) });
+        out.push(OutputSpike { t, slope: self.shape.slope(self.state) });
         self.threshold.fire(t);
         if self.neuron.after_spike == AfterSpike::Reset {
             self.state = State::default();

@@ -1,53 +1,147 @@
-//! The alpha kernel (6.5) and the two numbers that carry a sum of them through time.
+//! The kernels, and the two numbers that carry a weighted sum of them through time.
 
-/// The alpha kernel `t/tau e^{-t/tau}` (6.5), 0 before `t = 0`; its largest value is `1/e`, at `t = tau`.
-#[must_use]
-pub fn alpha(t: f64, tau: f64) -> f64 {
-    if t <= 0.0 { 0.0 } else { t / tau * (-t / tau).exp() }
+use serde::{Deserialize, Serialize};
+
+/// What an input spike does to the potential.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kernel {
+    /// `t/tau e^{-t/tau}` (6.5); its largest value is `1/e`, at `tau`.
+    #[default]
+    Alpha,
+    /// `V0 (e^{-t/tau} - e^{-t/tau_s})`, the Tempotron's; `V0` makes its largest value 1.
+    DoubleExponential,
+    /// `e^{-t/tau}`: the potential jumps, just after the input.
+    Exponential,
 }
 
-/// A weighted sum of alpha kernels, as it goes on without further input: `U(s) = e^{-s/tau} (a s/tau + b)`.
+/// A kernel with its constants.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Shape {
+    pub(crate) kernel: Kernel,
+    pub(crate) tau: f64,
+    pub(crate) tau_s: f64,
+    /// `V0`.
+    pub(crate) scale: f64,
+    /// `1/tau_s - 1/tau`.
+    pub(crate) rate: f64,
+}
+
+/// A weighted sum of kernels, as it goes on without further input.
 ///
-/// This stepwise form neither overflows nor loses digits after a long time, as the form `e^{-t/tau} (A t/tau - B)` does.
+/// This stepwise form neither overflows nor loses digits after a long time, as `e^{-t/tau} (A t/tau - B)` does.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct State {
-    /// The sum of the decayed weights, mV.
+    /// The sum of the decayed weights, which drives the potential, mV; unused where the input itself moves the potential.
     pub a: f64,
     /// The potential, mV.
     pub b: f64,
 }
 
-impl State {
+/// What a stretch of time without input does to a [`State`]: `a' = aa a`, `b' = ba a + bb b`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// From `a` to `a`.
+    pub aa: f64,
+    /// From `a` to `b`.
+    pub ba: f64,
+    /// From `b` to `b`.
+    pub bb: f64,
+}
+
+impl Step {
+    /// The state after this stretch.
+    #[must_use]
+    #[inline]
+    pub fn apply(&self, state: State) -> State {
+        State { a: state.a * self.aa, b: state.b * self.bb + state.a * self.ba }
+    }
+}
+
+impl Shape {
+    /// A kernel with its time constants, ms; `tau_s` matters for [`Kernel::DoubleExponential`] alone.
+    #[must_use]
+    pub fn new(kernel: Kernel, tau: f64, tau_s: f64) -> Self {
+        let rate = 1.0 / tau_s - 1.0 / tau;
+        let peak = (tau / tau_s).ln() / rate;
+        let scale = 1.0 / ((-peak / tau).exp() - (-peak / tau_s).exp());
+        Self { kernel, tau, tau_s, scale, rate }
+    }
+
+    /// What one input of weight 1 makes of a state of 0, just after it.
+    #[must_use]
+    #[inline]
+    pub fn input(&self) -> State {
+        match self.kernel {
+            Kernel::Alpha | Kernel::DoubleExponential => State { a: 1.0, b: 0.0 },
+            Kernel::Exponential => State { a: 0.0, b: 1.0 },
+        }
+    }
+
+    /// What `dt` ms without input do.
+    #[must_use]
+    #[inline]
+    pub fn step(&self, dt: f64) -> Step {
+        let x = dt / self.tau;
+        let decay = (-x).exp();
+        match self.kernel {
+            Kernel::Alpha => Step { aa: decay, ba: x * decay, bb: decay },
+            Kernel::DoubleExponential => {
+                Step { aa: decay, ba: -self.scale * decay * (-dt * self.rate).exp_m1(), bb: (-dt / self.tau_s).exp() }
+            }
+            Kernel::Exponential => Step { aa: decay, ba: 0.0, bb: decay },
+        }
+    }
+
     /// The state `dt` ms later.
     #[must_use]
-    pub fn after(self, dt: f64, tau: f64) -> Self {
-        self.decayed(dt / tau, (-dt / tau).exp())
+    #[inline]
+    pub fn after(&self, state: State, dt: f64) -> State {
+        self.step(dt).apply(state)
     }
 
-    /// The state later by `x = dt/tau`, with `decay = e^{-x}` given.
+    /// Adds an input of this weight that came `age` ms ago, 0 or more.
+    #[inline]
+    pub fn add(&self, state: &mut State, weight: f64, age: f64) {
+        let one = self.after(self.input(), age);
+        state.a += weight * one.a;
+        state.b += weight * one.b;
+    }
+
+    /// The kernel itself, `age` ms after the input; 0 up to the input's own time.
     #[must_use]
-    pub fn decayed(self, x: f64, decay: f64) -> Self {
-        Self { a: self.a * decay, b: (self.b + self.a * x) * decay }
-    }
-
-    /// Adds an input of this weight that came `age` ms ago.
-    pub fn add(&mut self, weight: f64, age: f64, tau: f64) {
-        let x = age / tau;
-        let v = weight * (-x).exp();
-        self.a += v;
-        self.b += v * x;
+    #[inline]
+    pub fn value(&self, age: f64) -> f64 {
+        if age <= 0.0 { 0.0 } else { self.after(self.input(), age).b }
     }
 
     /// How steeply the potential rises now, mV/ms.
     #[must_use]
-    pub fn slope(self, tau: f64) -> f64 {
-        (self.a - self.b) / tau
+    #[inline]
+    pub fn slope(&self, state: State) -> f64 {
+        match self.kernel {
+            Kernel::Alpha => (state.a - state.b) / self.tau,
+            Kernel::DoubleExponential => self.scale * self.rate * state.a - state.b / self.tau_s,
+            Kernel::Exponential => -state.b / self.tau,
+        }
     }
 
     /// A value that the potential will not exceed while no input comes, mV.
     #[must_use]
-    pub fn bound(self) -> f64 {
+    #[inline]
+    pub fn bound(&self, state: State) -> f64 {
         const ONE_OVER_E: f64 = 0.367_879_441_171_442_33;
-        self.b.max(0.0) + self.a.max(0.0) * ONE_OVER_E
+        let largest = match self.kernel {
+            Kernel::Alpha => ONE_OVER_E,
+            Kernel::DoubleExponential => 1.0,
+            Kernel::Exponential => 0.0,
+        };
+        state.b.max(0.0) + state.a.max(0.0) * largest
+    }
+
+    /// Beyond this many ms a kernel is below the rounding of its largest value.
+    #[must_use]
+    pub fn forgotten(&self) -> f64 {
+        45.0 * self.tau
     }
 }

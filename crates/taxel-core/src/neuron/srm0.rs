@@ -1,37 +1,46 @@
 //! The exact event-driven neuron, and the potential with given spikes.
 //!
-//! Between input spikes `U(s) = e^{-s/tau} (a s/tau + b)` and the threshold is `theta + c e^{-s/tau_rec}`. Then
-//! `f(s) = e^{s/tau} d(U - threshold)/ds` is a straight line and a convex exponential: at most two zeros. Where `f` ends
-//! above 0 the potential rises towards `-theta` below the threshold, so it can only cross before the *first* zero.
+//! Between input spikes potential less threshold, `g(s) = U(s) - theta - c e^{-s/tau_rec}`, is a sum of few exponentials, and
+//! ends at `-theta`. Its derivative changes sign twice at most, so that `g` has one inner maximum at most, with a rise
+//! before it: the only stretch in which the threshold can be crossed from below.
 
-use super::{AfterSpike, Neuron, State};
+use super::{AfterSpike, Kernel, Neuron, Shape, State};
 use crate::SpikeTrains;
 
 /// How far below the threshold a maximum may lie and still count as reaching it, mV: rounding of a potential that was
 /// trained to touch the threshold there.
-const TOUCH: f64 = 1e-12;
+pub(super) const TOUCH: f64 = 1e-12;
+
+/// The inner maximum of potential less threshold, ms from now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Peak {
+    /// Where the rise towards it begins.
+    pub(crate) from: f64,
+    /// Where it is.
+    pub(crate) at: f64,
+}
 
 /// Where the potential first reaches the threshold, ms from now, if no input comes; `rise` decays with `tau_rec`.
-pub(super) fn next_crossing(state: State, tau: f64, theta: f64, rise: f64, tau_rec: f64) -> Option<f64> {
-    if state.bound() < theta - TOUCH {
+pub(super) fn next_crossing(shape: &Shape, state: State, theta: f64, rise: f64, tau_rec: f64) -> Option<f64> {
+    if shape.bound(state) < theta - TOUCH {
         return None;
     }
-    let above = |s: f64| state.after(s, tau).b - theta - rise * (-s / tau_rec).exp();
+    let above = |s: f64| shape.after(state, s).b - theta - rise * (-s / tau_rec).exp();
     if above(0.0) >= 0.0 {
         return Some(0.0);
     }
-    let peak = first_maximum(state, tau, rise, tau_rec)?;
-    let top = above(peak);
+    let peak = peak(shape, state, rise, tau_rec)?;
+    let top = above(peak.at);
     if top < -TOUCH {
         return None;
     }
     if top <= 0.0 {
-        return Some(peak);
+        return Some(peak.at);
     }
-    // From 0 to the peak U - threshold rises: one root. Newton, kept inside the bracket.
-    let (mut low, mut high, mut s) = (0.0, peak, 0.5 * peak);
+    // Up to the peak there is one root. Newton, kept inside the bracket.
+    let (mut low, mut high, mut s) = (peak.from, peak.at, f64::midpoint(peak.from, peak.at));
     for _ in 0..100 {
-        let now = state.after(s, tau);
+        let now = shape.after(state, s);
         let risen = rise * (-s / tau_rec).exp();
         let value = now.b - theta - risen;
         if value < 0.0 {
@@ -39,7 +48,7 @@ pub(super) fn next_crossing(state: State, tau: f64, theta: f64, rise: f64, tau_r
         } else {
             high = s;
         }
-        let newton = s - value / (now.slope(tau) + risen / tau_rec);
+        let newton = s - value / (shape.slope(now) + risen / tau_rec);
         let next = if low < newton && newton < high { newton } else { f64::midpoint(low, high) };
         if (next - s).abs() <= 2.0 * f64::EPSILON * next {
             return Some(next);
@@ -49,8 +58,18 @@ pub(super) fn next_crossing(state: State, tau: f64, theta: f64, rise: f64, tau_r
     Some(s)
 }
 
-/// The first maximum of potential less threshold after now, ms; `None` where it falls first or rises for ever.
-fn first_maximum(state: State, tau: f64, rise: f64, tau_rec: f64) -> Option<f64> {
+/// The inner maximum of potential less threshold; `None` where it falls from now on, or rises for ever.
+pub(crate) fn peak(shape: &Shape, state: State, rise: f64, tau_rec: f64) -> Option<Peak> {
+    match shape.kernel {
+        Kernel::Alpha => alpha_peak(state, shape.tau, rise, tau_rec).map(|at| Peak { from: 0.0, at }),
+        Kernel::DoubleExponential => double_exponential_peak(shape, state, rise, tau_rec),
+        // Nothing rises between inputs but what is left below 0, and that never reaches a threshold.
+        Kernel::Exponential => None,
+    }
+}
+
+/// With `f(s) = e^{s/tau} g'(s)`, a straight line and a convex exponential: the first of its zeros.
+fn alpha_peak(state: State, tau: f64, rise: f64, tau_rec: f64) -> Option<f64> {
     let State { a, b } = state;
     let line = -a / (tau * tau);
     if rise == 0.0 {
@@ -83,6 +102,65 @@ fn first_maximum(state: State, tau: f64, rise: f64, tau_rec: f64) -> Option<f64>
     Some(s)
 }
 
+/// With `f(s) = e^{s/tau_s} g'(s) = B/tau_s - A/tau e^{p s} + c/tau_rec e^{q s}`, which turns once at most.
+fn double_exponential_peak(shape: &Shape, state: State, rise: f64, tau_rec: f64) -> Option<Peak> {
+    let Shape { tau, tau_s, scale, rate: p, .. } = *shape;
+    let slow = scale * state.a;
+    let (constant, fall, height, q) =
+        ((slow - state.b) / tau_s, slow / tau, rise / tau_rec, 1.0 / tau_s - 1.0 / tau_rec);
+    if rise == 0.0 {
+        // Rises now, and what lasts pulls it down: one zero, in closed form.
+        return (fall > 0.0 && constant > fall).then(|| Peak { from: 0.0, at: (constant / fall).ln() / p });
+    }
+    // Scaled by its fastest exponential: the same sign, and no overflow.
+    let m = p.max(q);
+    let f = |s: f64| constant * (-m * s).exp() - fall * ((p - m) * s).exp() + height * ((q - m) * s).exp();
+    // Where f turns: fall p e^{p s} = height q e^{q s}.
+    let turn = ((height * q) / (fall * p)).ln() / (p - q);
+    let turn = (turn.is_finite() && turn > 0.0).then_some(turn);
+    let now = f(0.0);
+    let (low, from) = match turn {
+        // Rises at once: the maximum is where f first falls through 0, before or behind its turn.
+        _ if now > 0.0 => (0.0, 0.0),
+        // Falls first: a rise begins only if f comes up to its turn.
+        Some(turn) if f(turn) > 0.0 => (turn, if now < 0.0 { zero(f, 0.0, turn) } else { 0.0 }),
+        _ => return None,
+    };
+    let high = match turn {
+        Some(turn) if turn > low && f(turn) < 0.0 => turn,
+        // Behind its turn f keeps its direction: look ahead until it is below 0, or sure never to be.
+        _ => {
+            let mut reach = turn.unwrap_or(0.0).max(low) + tau_s;
+            while f(reach) >= 0.0 {
+                // What is left of every term is below rounding there.
+                if reach > 50.0 * tau.max(tau_rec) {
+                    return None;
+                }
+                reach *= 2.0;
+            }
+            reach
+        }
+    };
+    Some(Peak { from, at: zero(f, low, high) })
+}
+
+/// The zero of `f` between two places of opposite sign, by bisection to rounding.
+fn zero(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
+    let below = f(low) < 0.0;
+    for _ in 0..200 {
+        let middle = f64::midpoint(low, high);
+        if middle <= low || middle >= high {
+            break;
+        }
+        if (f(middle) < 0.0) == below {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    f64::midpoint(low, high)
+}
+
 /// The potential at ascending `times` of a neuron that fired at ascending `spikes`.
 pub(super) fn potential(
     neuron: &Neuron,
@@ -91,7 +169,7 @@ pub(super) fn potential(
     times: &[f64],
     spikes: &[f64],
 ) -> Vec<f64> {
-    let inputs = trains.by_time();
+    let (inputs, shape) = (trains.by_time(), neuron.shape());
     let (mut state, mut at) = (State::default(), trains.start);
     let (mut next_input, mut next_spike, mut last) = (0, 0, None);
     let mut out = Vec::with_capacity(times.len());
@@ -99,13 +177,13 @@ pub(super) fn potential(
         // A spike takes effect after its own time, an input from it on; at equal times the spike sees the input (as 0).
         loop {
             let spike = spikes.get(next_spike).copied().filter(|&s| s < t);
-            let input = inputs.get(next_input).filter(|i| i.t <= t && spike.is_none_or(|s| i.t <= s));
+            let input = inputs.get(next_input).filter(|i| i.t < t && spike.is_none_or(|s| i.t <= s));
             if let Some(input) = input {
                 next_input += 1;
                 if !neuron.loses(input.t, last) {
-                    state = state.after(input.t - at, neuron.tau);
+                    state = shape.after(state, input.t - at);
                     at = input.t;
-                    state.a += weights[input.train as usize];
+                    shape.add(&mut state, weights[input.train as usize], 0.0);
                 }
             } else if let Some(spike) = spike {
                 next_spike += 1;
@@ -118,7 +196,7 @@ pub(super) fn potential(
             }
         }
         let refractory = last.is_some_and(|s| t <= s + neuron.refractory);
-        out.push(if refractory { 0.0 } else { state.after((t - at).max(0.0), neuron.tau).b });
+        out.push(if refractory { 0.0 } else { shape.after(state, (t - at).max(0.0)).b });
     }
     out
 }

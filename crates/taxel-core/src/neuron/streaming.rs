@@ -2,7 +2,7 @@
 
 use super::grid::GridStream;
 use super::srm0::next_crossing;
-use super::{AfterSpike, FirstThreshold, Neuron, State, Time};
+use super::{AfterSpike, FirstThreshold, Neuron, Shape, State, Time};
 use crate::{Result, problem};
 
 /// A spike of the neuron.
@@ -83,7 +83,7 @@ impl NeuronStream {
     #[must_use]
     pub fn potential(&self) -> f64 {
         let (refractory, value) = match &self.clock {
-            Clock::Continuous(s) => (&s.threshold, s.state.after((self.now - s.at).max(0.0), s.neuron.tau).b),
+            Clock::Continuous(s) => (&s.threshold, s.shape.after(s.state, (self.now - s.at).max(0.0)).b),
             Clock::Grid(s) => (&s.threshold, s.potential(self.now)),
         };
         if refractory.silent_at(self.now) { 0.0 } else { value }
@@ -147,6 +147,7 @@ impl Threshold {
 #[derive(Debug, Clone)]
 struct ContinuousStream {
     neuron: Neuron,
+    shape: Shape,
     threshold: Threshold,
     /// The potential at `at`.
     state: State,
@@ -168,7 +169,8 @@ impl ContinuousStream {
     fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
         let threshold = Threshold::new(neuron, factor, start);
         let edge = threshold.edge();
-        Self { neuron: neuron.clone(), threshold, state: State::default(), at: start, edge, next: Next::Never }
+        let (shape, state) = (neuron.shape(), State::default());
+        Self { neuron: neuron.clone(), shape, threshold, state, at: start, edge, next: Next::Never }
     }
 
     fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
@@ -177,12 +179,12 @@ impl ContinuousStream {
             return;
         }
         self.move_to(t);
-        self.state.a += weight;
+        self.shape.add(&mut self.state, weight, 0.0);
     }
 
     fn move_to(&mut self, t: f64) {
         if t > self.at {
-            self.state = self.state.after(t - self.at, self.neuron.tau);
+            self.state = self.shape.after(self.state, t - self.at);
             self.at = t;
         }
         self.next = Next::Unknown;
@@ -212,12 +214,12 @@ impl ContinuousStream {
     fn crossing(&self) -> Next {
         // Before the printed first rise sets in there is none; it is an edge of its own.
         let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(self.at) };
-        let found = next_crossing(self.state, self.neuron.tau, self.threshold.base, rise, self.threshold.tau_rec);
+        let found = next_crossing(&self.shape, self.state, self.threshold.base, rise, self.threshold.tau_rec);
         found.map_or(Next::Never, |s| Next::At(self.at + s))
     }
 
     fn fire(&mut self, t: f64, out: &mut Vec<OutputSpike>) {
-        let slope = self.state.after(t - self.at, self.neuron.tau).slope(self.neuron.tau);
+        let slope = self.shape.slope(self.shape.after(self.state, t - self.at));
         out.push(OutputSpike { t, slope });
         self.threshold.fire(t);
         self.edge = self.threshold.edge();
