@@ -37,8 +37,19 @@ class Plain:
                 alive &= self.s > end
             if self.n.after_spike == "ignore":
                 alive &= ~((spike < self.s) & (self.s <= end))
-        x = d[alive] / self.n.tau
-        return float((self.w[alive] * x * np.exp(-x)).sum())
+        d = d[alive]
+        return float((self.w[alive] * self.kernel(d)).sum())
+
+    def kernel(self, d):
+        tau = self.n.tau
+        if self.n.kernel == "alpha":
+            return d / tau * np.exp(-d / tau)
+        if self.n.kernel == "exponential":
+            return np.exp(-d / tau)
+        tau_s = tau / 4 if self.n.tau_s is None else self.n.tau_s
+        peak = tau * tau_s / (tau - tau_s) * np.log(tau / tau_s)
+        value = np.exp(-d / tau) - np.exp(-d / tau_s)
+        return value / (np.exp(-peak / tau) - np.exp(-peak / tau_s))
 
     def threshold(self, t, spikes):
         spike = spikes[-1] if spikes else (self.start if self.n.first_threshold == "printed" else -np.inf)
@@ -115,6 +126,43 @@ def test_on_a_grid_the_first_point_at_or_above_the_threshold_fires(kind, step_ms
         weights, trains = random_trains(seed + 10, whole_ms=seed % 2 == 0)
         expected = Plain(neuron, weights, trains).run_grid(trains.stop, step_ms)
         assert neuron.run(weights, trains) == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda k: "-".join(str(v) for v in k.values()))
+@pytest.mark.parametrize("tau_s", [None, 0.5, 6.5])
+def test_with_a_double_exponential_each_spike_is_the_root_that_brent_finds(kind, tau_s):
+    fired = 0
+    for seed in range(3):
+        neuron = Neuron(
+            tau=7.0, tau_s=tau_s, kernel="double_exponential", theta_0=0.5, tau_rec=[None, 3.0, 40.0][seed], **kind
+        )
+        weights, trains = random_trains(seed + 30)
+        expected = Plain(neuron, weights, trains).run_continuous(trains.stop)
+        assert neuron.run(weights, trains) == pytest.approx(expected, abs=1e-9)
+        fired += len(expected)
+    assert fired > 5
+
+
+@pytest.mark.parametrize("kernel", ["double_exponential", "exponential"])
+@pytest.mark.parametrize("kind", KINDS, ids=lambda k: "-".join(str(v) for v in k.values()))
+def test_on_a_grid_every_kernel_fires_at_the_first_point_at_or_above_the_threshold(kernel, kind):
+    for seed in range(4):
+        neuron = Neuron(tau=7.0, kernel=kernel, theta_0=0.4, time="grid", **kind)
+        weights, trains = random_trains(seed + 40, whole_ms=seed % 2 == 0)
+        expected = Plain(neuron, weights, trains).run_grid(trains.stop, 1.0)
+        assert len(expected) > 1
+        assert neuron.run(weights, trains) == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_exponential_kernel_is_refused_in_continuous_time():
+    with pytest.raises(ProblemError, match="only jumps"):
+        Neuron(kernel="exponential")
+
+
+@pytest.mark.parametrize("tau_s", [7.0, 8.0, 0.0, -1.0])
+def test_a_synaptic_time_constant_out_of_range_is_refused(tau_s):
+    with pytest.raises(ProblemError, match="tau_s is"):
+        Neuron(kernel="double_exponential", tau=7.0, tau_s=tau_s)
 
 
 @pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
