@@ -42,7 +42,7 @@ class Neuron:
     step_ms : float, ms, above 0
         Step of the grid.
     kernel : {"alpha", "double_exponential", "exponential"}
-        What an input does to the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))`` with its
+        What an input does to the potential: ``t/tau * exp(-t/tau)`` (6.5); ``V0 * (exp(-t/tau) - exp(-t/tau_s))``, its
         largest value 1 (the Tempotron's); ``exp(-t/tau)``, on a grid only, as that potential only jumps, at inputs.
     tau_s : float, ms, above 0 and below `tau`, optional
         Synaptic time constant of the double exponential; ``tau / 4`` where left out.
