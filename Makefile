@@ -22,7 +22,7 @@ check:
 $(VENV)/.installed: pyproject.toml | check
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.16,<2"
-	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]; print("\n".join(p["dependencies"] + e["test"] + e["lint"] + e["docs"] + e["bench"]))' > $(VENV)/wanted.txt
+	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]; print("\n".join(p["dependencies"] + sum((e[x] for x in ("test", "lint", "docs", "bench", "neo", "nir", "nwb", "cluster")), [])))' > $(VENV)/wanted.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/wanted.txt
 	@touch $@
 
@@ -58,7 +58,13 @@ format:
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: build
+# The peers that are large, or that want an older NumPy, are installed for the benchmarks alone.
+$(VENV)/.peers: $(VENV)/.installed
+	$(BIN)/python -c 'import tomllib; print("\n".join(tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"]))' > $(VENV)/peers.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/peers.txt
+	@touch $@
+
+bench: build $(VENV)/.peers
 	$(BIN)/taxel bench all
 
 docs: build
