@@ -7,6 +7,7 @@ without a sound call fails the first test, so that nothing public stays untried.
 import inspect
 import math
 from collections.abc import Callable, Iterator
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -121,6 +122,11 @@ SOUND: dict[str, Sound] = {
     ),
     "taxel.SpikeTrains.between": method(TRAINS, "between", start=0.0, stop=2.0),
     "taxel.SpikeTrains.select": method(TRAINS, "select", trains=[1]),
+    "taxel.SpikeTrains.delayed": method(TRAINS, "delayed", delays_ms=[0.0, 2.0]),
+    "taxel.SpikeTrains.to_nwb": method(
+        TRAINS, "to_nwb", path="trains.nwb", begun=datetime(2020, 1, 1), description="a walk", overwrite=True
+    ),
+    "taxel.SpikeTrains.from_nwb": plain(taxel.SpikeTrains.from_nwb, path="here.nwb", start=0.0, stop=30.0),
     "taxel.SpikeTrains.from_neo": plain(taxel.SpikeTrains.from_neo, trains=TRAINS.to_neo()),
     "taxel.SpikeTrains.save": method(TRAINS, "save", path="trains.npz", overwrite=True),
     "taxel.SpikeTrains.load": plain(taxel.SpikeTrains.load, path="here.npz"),
@@ -136,7 +142,9 @@ SOUND: dict[str, Sound] = {
     "taxel.Tare.load": plain(taxel.Tare.load, path="here_tare.json"),
     "taxel.Neuron": plain(
         taxel.Neuron,
+        kernel="double_exponential",
         tau=10.0,
+        tau_s=2.0,
         theta_0=0.3,
         theta_plus=0.2,
         tau_rec=20.0,
@@ -151,7 +159,17 @@ SOUND: dict[str, Sound] = {
         taxel.Neuron(), "potential", weights=[1.0] * 2, trains=UNSIGNED, times=[1.0, 5.0], spikes=[2.0]
     ),
     "taxel.Readout": plain(
-        taxel.Readout, encoder=LEVELS, neurons=READOUT.neurons, array=ARRAY, delay_ms={"a": 1.0}, run_threshold=0.9
+        taxel.Readout,
+        encoder=LEVELS,
+        neurons=READOUT.neurons,
+        array=ARRAY,
+        delay_ms={"a": 1.0},
+        run_threshold=0.9,
+        delays_ms=[0.0],
+    ),
+    "taxel.Readout.to_nir": method(READOUT, "to_nir", path="readout.nir", spike_ms=0.1, overwrite=True),
+    "taxel.Readout.from_nir": plain(
+        taxel.Readout.from_nir, path="here.nir", encoder=LEVELS, neuron=taxel.Neuron(), spike_ms=0.1
     ),
     "taxel.Readout.from_json": plain(taxel.Readout.from_json, text=READOUT.to_json()),
     "taxel.Readout.save": method(READOUT, "save", path="readout.json", overwrite=True),
@@ -418,6 +436,8 @@ def somewhere(tmp_path, monkeypatch):
     TRAINS.save("here.npz")
     TARE.save("here_tare.json")
     READOUT.save("here_readout.json")
+    READOUT.to_nir("here.nir")
+    TRAINS.to_nwb("here.nwb")
     taxel.convert(EVENTS, "here_events.npz")
     (tmp_path / "here.toml").write_text('[encoder]\nname = "fa1"\n')
     (tmp_path / "here_labels.csv").write_text("label,t_us\na,5\n")

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
+from warnings import catch_warnings, filterwarnings
 from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import column, floats, number, shown, window
+from taxel._arguments import column, floats, number, shown, text, window
 from taxel._arguments import path as checked_path
 from taxel._core import FormatError, ProblemError
-from taxel._files import write_whole
+from taxel._files import whole_file, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -167,6 +171,41 @@ class SpikeTrains:
             values = [self.values[self.offsets[n] : self.offsets[n + 1]] for n in numbers]
         return SpikeTrains.from_lists([self[n] for n in numbers], self.start, self.stop, values)
 
+    def delayed(self, delays_ms: ArrayLike) -> SpikeTrains:
+        """Return every train once at each delay: what a learner needs to choose among delays.
+
+        Parameters
+        ----------
+        delays_ms : float64, shape (delays,), ms, 0 or more, ascending
+
+        Returns
+        -------
+        SpikeTrains
+            First all trains at the first delay, then all at the second: train `n` at delay `d` is number
+            ``d * len(trains) + n``, so ``weights.reshape(delays, trains)`` has the weights by delay and train. The
+            window ends later by the longest delay.
+
+        Raises
+        ------
+        ProblemError : delays that are negative, not finite or do not ascend
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[1.0], [4.0]], stop=5.0)
+        >>> list(trains.delayed([0.0, 2.5]))
+        [array([1.]), array([4.]), array([3.5]), array([6.5])]
+        """
+        delays = floats("delays_ms", delays_ms)
+        wrong = np.flatnonzero(~(np.isfinite(delays) & (delays >= 0)))
+        if len(wrong):
+            raise ProblemError(f"delays_ms[{wrong[0]}] is {delays[wrong[0]]}: must be 0 or more and finite")
+        if not len(delays) or (np.diff(delays) <= 0).any():
+            raise ProblemError("delays_ms: must ascend, one delay or more")
+        times = np.add.outer(delays, self.times).reshape(-1)
+        offsets = np.add.outer(np.arange(len(delays)) * len(self.times), self.offsets[:-1]).reshape(-1)
+        values = None if self.values is None else np.tile(self.values, len(delays))
+        return SpikeTrains(times, [*offsets, len(times)], self.start, self.stop + delays[-1], values)
+
     def _where(self, keep: NDArray[np.bool_], start: float, stop: float) -> SpikeTrains:
         offsets = np.concatenate([[0], np.cumsum(keep)])[self.offsets]
         values = None if self.values is None else self.values[keep]
@@ -214,6 +253,107 @@ class SpikeTrains:
         if all("value" in t.array_annotations for t in trains):
             values = [np.asarray(t.array_annotations["value"], np.float32) for t in trains]
         return cls.from_lists(times, start, stop, values)
+
+    def to_nwb(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        begun: datetime | None = None,
+        description: str = "spike trains of taxel",
+        overwrite: bool = False,
+    ) -> Path:
+        """Write the trains to an NWB file, one unit a train; return its path.
+
+        The window becomes each unit's observation interval, signed values a column ``value``. NWB counts in seconds.
+
+        Parameters
+        ----------
+        path : path
+            NWB's own tools want it to end in ``.nwb``.
+        begun : datetime, optional
+            When time 0 was (NWB insists on it); now, where it is left out. Without a zone, local time.
+        description : str
+            What the session was (NWB insists on it).
+        overwrite : bool
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        ImportError : pynwb is not installed (``pip install taxel[nwb]``)
+        """
+        from pynwb import NWBHDF5IO, NWBFile  # noqa: PLC0415  heavy, and an extra
+
+        if begun is None:
+            begun = datetime.now()
+        if not isinstance(begun, datetime):
+            raise ProblemError(f"begun is {shown(begun)}: must be a datetime")
+        try:
+            begun = begun.astimezone()
+        except (OverflowError, ValueError, OSError):
+            raise ProblemError(f"begun is {begun}: must be a date that this machine's clock knows") from None
+        if "\0" in text("description", description):
+            raise ProblemError(f"description is {shown(description)}: NWB takes no zero in a text")
+        file = NWBFile(description, str(uuid4()), begun)
+        if self.values is not None:
+            file.add_unit_column("value", "signed value of each spike: polarity or bits", index=True)
+        window_s = np.array([[self.start, self.stop]]) / 1000.0
+        for n in range(len(self)):
+            signed = {} if self.values is None else {"value": self.values[self.offsets[n] : self.offsets[n + 1]]}
+            file.add_unit(id=n, spike_times=self[n] / 1000.0, obs_intervals=window_s, **signed)
+        with whole_file(path, overwrite=overwrite) as part, _quiet_about_names(), NWBHDF5IO(part, "w") as io:
+            io.write(file)
+        return Path(path)
+
+    @classmethod
+    def from_nwb(
+        cls, path: str | os.PathLike[str], *, start: float | None = None, stop: float | None = None
+    ) -> SpikeTrains:
+        """Read the units of an NWB file, one train a unit in the order of its table.
+
+        Parameters
+        ----------
+        path : path
+        start, stop : float, ms, optional
+            The window. Left out: the widest of the units' observation intervals; where the file has none, from 0 or the
+            first spike before it to the last.
+
+        Raises
+        ------
+        FormatError : no NWB file, one without units, or units without spike times (names the file)
+        FileNotFoundError : no such file
+        ImportError : pynwb is not installed (``pip install taxel[nwb]``)
+        """
+        from pynwb import NWBHDF5IO  # noqa: PLC0415  heavy, and an extra
+
+        place = checked_path("path", path)
+        window_ms = [None if edge is None else number(name, edge) for name, edge in (("start", start), ("stop", stop))]
+        open(place, "rb").close()  # a missing file is Python's own error
+        try:
+            with _quiet_about_names(), NWBHDF5IO(place, "r") as io:
+                units = io.read().units
+                columns = () if units is None else units.colnames
+                if "spike_times" not in columns:
+                    raise FormatError(f"{place}: an NWB file without spike times in a table of units")
+                times = [1000.0 * np.asarray(units["spike_times"][n], np.float64) for n in range(len(units))]
+                values = None
+                if "value" in columns:
+                    values = [np.asarray(units["value"][n], np.float32) for n in range(len(units))]
+                watched = np.empty((0, 2))
+                if "obs_intervals" in columns and len(units):
+                    watched = 1000.0 * np.concatenate([np.reshape(i, (-1, 2)) for i in units["obs_intervals"][:]])
+        except FormatError:
+            raise
+        except Exception as error:  # whatever h5py and pynwb say of a foreign or broken file
+            raise FormatError(f"{place}: no NWB file that can be read: {shown(str(error))}") from None
+        every = np.concatenate([*times, [0.0]])
+        widest = (watched[:, 0].min(), watched[:, 1].max()) if len(watched) else (every.min(), every.max())
+        first, last = (float(found) if said is None else said for said, found in zip(window_ms, widest, strict=True))
+        try:
+            return cls.from_lists(times, first, last, values)
+        except ProblemError as error:
+            # With the caller's own window the fault may be the window's, else it is the file's.
+            kind = FormatError if start is None and stop is None else ProblemError
+            raise kind(f"{place}: {error}") from None
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the trains to a .npz (``times offsets start stop``, and ``values`` of signed ones); return its path.
@@ -284,3 +424,11 @@ def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> list[N
     except TypeError:
         raise ProblemError(f"{name} is {shown(lists)}: must be one list a train") from None
     return [column(f"{name}[{n}]", np.atleast_1d(np.asarray(entry, object)), dtype) for n, entry in enumerate(entries)]
+
+
+@contextmanager
+def _quiet_about_names() -> Iterator[None]:
+    """Keep pynwb from complaining that the file beside its place has another name, and of columns of one's own."""
+    with catch_warnings():
+        filterwarnings("ignore", category=UserWarning, module="pynwb|hdmf")
+        yield

@@ -78,6 +78,39 @@ def plain(encoder: taxel.encode.Encoder, array: taxel.Array, seed: int = 0, **ne
     return Readout(encoder, neurons, array=array)
 
 
+@pytest.mark.parametrize("encoder", [ChangeEvents(), ContactArea(levels=(2, 4, 8)).with_tare(tare())])
+@pytest.mark.parametrize("time", ["grid", "continuous"])
+def test_delayed_copies_are_heard_live_as_a_learner_saw_them(encoder: taxel.encode.Encoder, time: str) -> None:
+    delays_ms = [0.0, 3.3, 40.0]
+    events, _ = touches(31, count=9)
+    trains = encoder.encode(events).split_by_sign().delayed(delays_ms)
+    neuron = taxel.Neuron(tau=3.0, refractory=5.0, time=time, step_ms=0.1)
+    weights = np.random.default_rng(5).normal(0.0, 1.0, len(trains))
+    readout = Readout(encoder, {"a": (neuron, weights)}, array=ARRAY, delays_ms=delays_ms)
+    found = run(readout, events)
+    assert len(found) > 5, "something must be said to compare"
+    # A readout's grid begins at the frame of its first spike, a multiple of the step like the start of the trains.
+    fired = neuron.run(weights, trains) - encoder.latency_ms
+    assert np.abs(found.t[: len(fired)] / 1000.0 - fired).max() < 1e-3
+    pieces, stream = [], readout.stream(ARRAY)
+    for start in range(0, 4_000_000, 7919):
+        pieces += list(stream.push(events.between(start, start + 7919)).t)
+    pieces += list(stream.advance(int(events.t[-1]) + 1_100_000).t)
+    assert pieces == found.t.tolist()
+    assert Readout.from_json(readout.to_json()).delays_ms.tolist() == delays_ms
+
+
+@pytest.mark.parametrize("delays_ms", [[], [-1.0], [3.0, 2.0], [1.0, 1.0], [math.nan], [1e9], [[0.0]], "a", None])
+def test_delays_that_make_no_sense_are_one_error(delays_ms: object) -> None:
+    with pytest.raises(taxel.ProblemError, match="delays_ms"):
+        Readout(LevelCrossing([0.5]), {"a": (taxel.Neuron(), [0.1] * 2)}, delays_ms=delays_ms)
+
+
+def test_weights_must_be_one_a_copy() -> None:
+    with pytest.raises(taxel.ProblemError, match=r"8 weights, .* at 2 delays"):
+        Readout(LevelCrossing([0.5]), {"a": (taxel.Neuron(), [0.1] * 8)}, array=taxel.Array(2, 2), delays_ms=[0.0, 1.0])
+
+
 def test_events_that_were_never_seen_are_found_by_what_was_learnt(readout: Readout) -> None:
     for seed in (11, 12):
         events, truth = touches(seed)

@@ -98,6 +98,7 @@ fn of(encoder: &str, one: TrainedNeuron) -> Readout {
         time: Time::Continuous,
         after_spike: one.neuron.after_spike,
         run_threshold: 1.0,
+        delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), one)].into(),
     }
 }

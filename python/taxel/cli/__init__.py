@@ -71,6 +71,7 @@ for _command in (
     "detect",
     "emulate",
     "encode",
+    "export",
     "info",
     "live",
     "record",

@@ -52,6 +52,10 @@ pub struct Readout {
     /// intended; that price is paid for inputs a little weaker than the weakest trained one, which only just touches it.
     #[serde(default = "one")]
     pub run_threshold: f64,
+    /// Each train of the encoder is heard once at each of these delays, ms, ascending: first all trains at the first
+    /// delay, then all at the second (`SpikeTrains.delayed`). One delay of 0 where left out.
+    #[serde(default = "at_once", skip_serializing_if = "is_at_once")]
+    pub delays_ms: Vec<f64>,
     /// By label.
     pub neurons: BTreeMap<String, TrainedNeuron>,
 }
@@ -59,6 +63,17 @@ pub struct Readout {
 fn one() -> f64 {
     1.0
 }
+
+fn at_once() -> Vec<f64> {
+    vec![0.0]
+}
+
+fn is_at_once(delays_ms: &[f64]) -> bool {
+    delays_ms == [0.0]
+}
+
+/// The longest delay that is taken, ms.
+const LONGEST_DELAY_MS: f64 = 60_000.0;
 
 impl Readout {
     /// Checks that parts make sense and belong together.
@@ -71,6 +86,7 @@ impl Readout {
         if !(self.run_threshold.is_finite() && self.run_threshold > 0.0) {
             return Err(problem!("run_threshold is {}: must be above 0 and finite", self.run_threshold));
         }
+        self.check_delays()?;
         if self.neurons.is_empty() {
             return Err(problem!("readout without a neuron: needs one or more"));
         }
@@ -87,8 +103,11 @@ impl Readout {
                 let (its, mine) = (word(&one.neuron.after_spike), word(&self.after_spike));
                 return Err(problem!("{label}: trained for after_spike {its}, this readout is for after_spike {mine}"));
             }
-            if !(0.0..=60_000.0).contains(&one.delay_ms) {
-                return Err(problem!("{label}: delay_ms is {}: must lie between 0 and 60000", one.delay_ms));
+            if !(0.0..=LONGEST_DELAY_MS).contains(&one.delay_ms) {
+                return Err(problem!(
+                    "{label}: delay_ms is {}: must lie between 0 and {LONGEST_DELAY_MS}",
+                    one.delay_ms
+                ));
             }
             if let Some(n) = one.weights.iter().position(|w| !w.is_finite()) {
                 return Err(problem!("{label}: weights[{n}] is {}: must be finite", one.weights[n]));
@@ -100,16 +119,33 @@ impl Readout {
         Ok(())
     }
 
+    fn check_delays(&self) -> Result<()> {
+        if self.delays_ms.is_empty() {
+            return Err(problem!("delays_ms is empty: must hold one delay or more"));
+        }
+        for (k, &delay) in self.delays_ms.iter().enumerate() {
+            if !(0.0..=LONGEST_DELAY_MS).contains(&delay) {
+                return Err(problem!("delays_ms[{k}] is {delay}: must lie between 0 and {LONGEST_DELAY_MS}"));
+            }
+            if k > 0 && delay <= self.delays_ms[k - 1] {
+                return Err(problem!("delays_ms[{k}] is {delay}, after {}: must ascend", self.delays_ms[k - 1]));
+            }
+        }
+        Ok(())
+    }
+
     fn check_weights(&self, label: &str, one: &TrainedNeuron, array: &Array) -> Result<()> {
-        let inputs = self.encoder.trains(array) * if self.encoder.signed() { 2 } else { 1 };
+        let copies = self.delays_ms.len();
+        let inputs = self.encoder.trains(array) * if self.encoder.signed() { 2 } else { 1 } * copies;
         if one.weights.len() == inputs {
             return Ok(());
         }
         let (rows, columns, signed) = (array.rows, array.columns, self.encoder.signed());
         Err(problem!(
-            "{label}: {} weights, the encoder speaks on {inputs} trains{} for {rows} x {columns} taxels: must be one each",
+            "{label}: {} weights, the encoder speaks on {inputs} trains{}{} for {rows} x {columns} taxels: must be one each",
             one.weights.len(),
-            if signed { ", ON and OFF," } else { "" }
+            if signed { ", ON and OFF," } else { "" },
+            if copies > 1 { format!(" at {copies} delays") } else { String::new() }
         ))
     }
 
@@ -187,7 +223,13 @@ impl Readout {
         let encoder = tare.map_or_else(|| self.encoder.clone(), |tare| self.encoder.with_tare(tare));
         let neurons = self.neurons.iter().map(|(label, one)| (label.clone(), one.clone()));
         let (encoder, clock) = (encoder.stream(array)?, FrameClock::new(frame_us)?);
-        Ok(ReadoutStream::new(encoder, array.clone(), clock, self.run_threshold, neurons))
+        let delays_ms = self.delays_ms.clone();
+        Ok(ReadoutStream::new(encoder, array.clone(), clock, self.run_threshold, delays_ms, neurons))
+    }
+
+    /// How long is listened on after the end of a recording, us.
+    fn silence_us(&self) -> i64 {
+        SILENCE_US + (1000.0 * self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64
     }
 
     /// What is said of a whole recording of events, and of a second of silence after it.
@@ -205,7 +247,7 @@ impl Readout {
         let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
         let mut stream = self.stream(&events.array, frame_us, tare)?;
         let mut found = stream.push_recording(events, stop)?;
-        stream.advance(last.saturating_add(SILENCE_US), &mut found)?;
+        stream.advance(last.saturating_add(self.silence_us()), &mut found)?;
         Ok(found)
     }
 
@@ -231,7 +273,7 @@ impl Readout {
         let last = t.last().copied().unwrap_or(0);
         let mut stream = self.stream(array, frame_us, tare)?;
         let mut found = stream.push_pictures(array, t, values, stop)?;
-        stream.advance(last.saturating_add(SILENCE_US), &mut found)?;
+        stream.advance(last.saturating_add(self.silence_us()), &mut found)?;
         Ok(found)
     }
 }
@@ -273,6 +315,7 @@ mod tests {
             time: Time::Grid,
             after_spike: AfterSpike::Keep,
             run_threshold: 0.9,
+            delays_ms: vec![0.0],
             neurons: [("contact".to_owned(), one(0.2, 3.0)), ("lift".to_owned(), one(0.5, -0.1))].into(),
         }
     }

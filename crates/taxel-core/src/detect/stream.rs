@@ -23,7 +23,11 @@ pub struct ReadoutStream {
     clock: FrameClock,
     /// Nothing comes before it any more, us.
     now: Option<i64>,
-    /// Spikes that the encoder gave already and that others may still come before.
+    /// Each train is heard once at each of these delays, ms.
+    delays_ms: Vec<f64>,
+    /// What the encoder just said.
+    heard: Vec<Spike>,
+    /// Spikes by the neurons' inputs that are known already and that others may still come before.
     waiting: Vec<Spike>,
     late: u64,
 }
@@ -48,6 +52,7 @@ impl ReadoutStream {
         array: Array,
         clock: FrameClock,
         threshold: f64,
+        delays_ms: Vec<f64>,
         neurons: impl Iterator<Item = (String, TrainedNeuron)>,
     ) -> Self {
         let latency_ms = encoder.latency_ms();
@@ -60,7 +65,8 @@ impl ReadoutStream {
             stream: None,
             crossings: vec![],
         });
-        Self { voices: voices.collect(), encoder, array, clock, now: None, waiting: vec![], late: 0 }
+        let voices = voices.collect();
+        Self { voices, encoder, array, clock, now: None, delays_ms, heard: vec![], waiting: vec![], late: 0 }
     }
 
     /// Takes the next events; adds what is certain now to `out`.
@@ -77,11 +83,10 @@ impl ReadoutStream {
         for &t in &events.t {
             check_time(t)?;
         }
-        let mut spikes = std::mem::take(&mut self.waiting);
         let mut latest = self.now.map_or(first, |now| now.max(first));
         let in_order = latest == first && rest.iter().is_sorted() && rest.first().is_none_or(|&t| t >= first);
         if in_order {
-            self.encoder.push_events(events, &mut spikes)?;
+            self.encoder.push_events(events, &mut self.heard)?;
         } else {
             let mut events = events.clone();
             for t in &mut events.t {
@@ -89,9 +94,8 @@ impl ReadoutStream {
                 latest = latest.max(*t);
                 *t = latest;
             }
-            self.encoder.push_events(&events, &mut spikes)?;
+            self.encoder.push_events(&events, &mut self.heard)?;
         }
-        self.waiting = spikes;
         self.settle(events.t[events.len() - 1].max(latest), out)
     }
 
@@ -103,7 +107,7 @@ impl ReadoutStream {
     /// beyond 2^52 us.
     pub fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Detection>) -> Result<()> {
         check_time(t)?;
-        self.encoder.push_frame(t, values, &mut self.waiting)?;
+        self.encoder.push_frame(t, values, &mut self.heard)?;
         self.settle(t, out)?;
         self.clock.picture(t);
         Ok(())
@@ -117,7 +121,7 @@ impl ReadoutStream {
     pub fn advance(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
         check_time(t)?;
         if self.now.is_none_or(|now| t > now) {
-            self.encoder.advance(t, &mut self.waiting);
+            self.encoder.advance(t, &mut self.heard);
             self.settle(t, out)?;
         }
         Ok(())
@@ -185,16 +189,13 @@ impl ReadoutStream {
     fn settle(&mut self, until: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.now = Some(self.now.map_or(until, |now| now.max(until)));
         let until_ms = until as f64 / 1000.0;
+        self.take_in();
         self.waiting.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         let certain = self.waiting.partition_point(|spike| spike.t < until_ms);
-        let trains = u32::try_from(self.encoder.trains()).unwrap_or(u32::MAX);
-        let signed = self.encoder.signed();
         let mut crossings: Vec<(f64, usize, f64)> = Vec::new();
         for (k, voice) in self.voices.iter_mut().enumerate() {
             for spike in &self.waiting[..certain] {
-                // Signed trains as the learner saw them: all ON trains, then all OFF (`SpikeTrains::split_by_sign`).
-                let input = if signed && spike.value <= 0.0 { trains + spike.train } else { spike.train };
-                voice.push(spike.t, input)?;
+                voice.push(spike.t, spike.train)?;
             }
             if let Some(stream) = &mut voice.stream {
                 stream.advance(until_ms, &mut voice.crossings);
@@ -210,6 +211,22 @@ impl ReadoutStream {
             slope,
         }));
         Ok(())
+    }
+
+    /// Sorts what the encoder said to the neurons' inputs.
+    ///
+    /// Trains come as the learner saw them: of signed ones all ON, then all OFF (`SpikeTrains::split_by_sign`), and all of
+    /// these once a delay.
+    fn take_in(&mut self) {
+        let trains = u32::try_from(self.encoder.trains()).unwrap_or(u32::MAX);
+        let signed = self.encoder.signed();
+        let inputs = if signed { 2 * trains } else { trains };
+        for spike in self.heard.drain(..) {
+            let input = if signed && spike.value <= 0.0 { trains + spike.train } else { spike.train };
+            for (copy, delay) in (0_u32..).zip(&self.delays_ms) {
+                self.waiting.push(Spike { t: spike.t + delay, train: copy * inputs + input, ..spike });
+            }
+        }
     }
 
     fn check_shape(&self, other: &Array) -> Result<()> {
@@ -310,6 +327,7 @@ mod tests {
             array(),
             FrameClock::new(period_us).unwrap(),
             0.9,
+            vec![0.0],
             neurons.into_iter().map(|(label, weights, delay_ms)| {
                 (label.to_owned(), TrainedNeuron { neuron: neuron.clone(), weights, delay_ms })
             }),

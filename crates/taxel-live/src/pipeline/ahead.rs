@@ -101,6 +101,7 @@ mod tests {
             time: Time::Continuous,
             after_spike: one.neuron.after_spike,
             run_threshold: 1.0,
+            delays_ms: vec![0.0],
             neurons: [("touch".to_owned(), one)].into(),
         };
         Ahead::new(Box::new(readout.stream(&array(), 192.0, None).unwrap()))

@@ -1,0 +1,51 @@
+"""``taxel export``: readouts for other simulators and for chips."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from taxel.cli import app
+
+__all__ = ["nir"]
+
+_export = typer.Typer(no_args_is_help=True, help="Write a readout for other simulators and for chips.")
+app.add_typer(_export, name="export")
+
+
+@_export.callback()
+def _root() -> None:
+    """Write a readout for other simulators and for chips."""
+
+
+@_export.command()
+def nir(
+    readout: Annotated[Path, typer.Argument(help="A readout, as taxel train writes it.")],
+    out: Annotated[Path, typer.Argument(help="Where the NIR graph goes: a .nir.")],
+    spike_ms: Annotated[
+        float | None,
+        typer.Option(metavar="MS", help="The reader's step, where it adds 1 in the step of a spike (snnTorch: 0.1)."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Write a readout as a NIR graph, in SI units, and say what NIR cannot hold.
+
+    Example: taxel export nir walk.json walk.nir
+    """
+    from taxel._core import Error  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect import Readout  # noqa: PLC0415
+
+    try:
+        lost = Readout.load(readout).to_nir(out, spike_ms=spike_ms, overwrite=overwrite)
+    except ModuleNotFoundError as error:
+        raise Error(f"{error}: pip install taxel[nir]") from None
+    if as_json:
+        typer.echo(json.dumps({"readout": str(readout), "written": str(out), "lost": lost}))
+        return
+    typer.echo(f"written to {out}")
+    for what in lost:
+        typer.echo(f"  NIR cannot hold: {what}")

@@ -1,0 +1,295 @@
+"""Readouts to and from NIR, the exchange format of neuromorphic simulators and chips.
+
+NIR (Pedersen et al. 2024, Nat Commun 15:8122) describes a network by nodes with differential equations, in SI units. A
+readout becomes: input -> [a delay ->] weights -> leaky neurons -> output. The kernels are solutions of NIR's equations,
+where an input spike adds ``w_in / tau_syn`` to the current times the spike's area (see `_gains`):
+
+- alpha: ``CubaLIF`` with ``tau_syn = tau_mem = tau``, as two leaky integrators of equal time constant in a row give it;
+- double exponential: ``CubaLIF`` with ``tau_syn = tau_s``;
+- exponential: ``LIF``.
+
+What NIR has no words for stands in the graph's metadata, so that taxel reads back the very same readout.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._arguments import instance, number, shown
+from taxel._arguments import path as checked_path
+from taxel._core import FormatError, ProblemError
+from taxel._files import whole_file
+from taxel.encode import Encoder
+from taxel.neuron import Neuron
+
+if TYPE_CHECKING:
+    from nir import NIRGraph
+
+    from taxel.detect.readout import Readout, TrainedNeuron
+
+__all__ = ["lost", "read_nir", "write_nir"]
+
+#: Where in the graph's metadata the readout itself lies, and the length of a spike in s (0: a Dirac pulse).
+READOUT, SPIKE = "taxel_readout", "taxel_spike_s"
+
+
+def write_nir(readout: Readout, path: str | os.PathLike[str], *, spike_ms: float | None, overwrite: bool) -> list[str]:
+    """Write the graph of a readout to a file; return what NIR cannot hold."""
+    import nir  # noqa: PLC0415  an extra
+
+    graph = _graph(readout, _spike(spike_ms))
+    with whole_file(path, overwrite=overwrite) as part:
+        nir.write(part, graph)
+    return lost(readout)
+
+
+def lost(readout: Readout) -> list[str]:
+    """Return what NIR's nodes cannot say of a readout, one line each."""
+    neurons = [one.neuron for one in readout.neurons.values()]
+    said = [
+        "the encoder: the graph's inputs are its spike trains",
+        "labels and trained delays: outputs come in the order of the labels",
+    ]
+    if any(neuron.refractory > 0 for neuron in neurons):
+        said.append("the refractory time: a NIR neuron may fire again at once")
+    if any(neuron.theta_plus > 0 for neuron in neurons):
+        said.append("the rise of the threshold by a spike")
+    said.append(
+        f'after_spike="{readout.after_spike}": a NIR neuron falls to 0 and keeps its current; first spikes agree, later'
+        " ones need not"
+    )
+    if readout.time == "continuous":
+        said.append("continuous time: each simulator has a step of its own, and fires as late as that")
+    return said
+
+
+def read_nir(
+    path: str | os.PathLike[str], *, encoder: Encoder | None, neuron: Neuron | None, spike_ms: float | None
+) -> Readout:
+    """Read a readout from a file; what the nodes say wins over the metadata."""
+    import nir  # noqa: PLC0415  an extra
+
+    from taxel.detect.readout import Readout  # noqa: PLC0415  which imports this file
+
+    place, spike_ms = checked_path("path", path), _spike(spike_ms)
+    encoder = None if encoder is None else instance("encoder", encoder, Encoder)
+    neuron = None if neuron is None else instance("neuron", neuron, Neuron)
+    open(place, "rb").close()  # a missing file is Python's own error
+    try:
+        graph = nir.read(place)
+    except Exception as error:  # whatever h5py and nir say of a foreign or broken file
+        raise FormatError(f"{place}: no NIR graph that can be read: {shown(str(error))}") from None
+    held = graph.metadata.get(READOUT)
+    try:
+        own = None if held is None else Readout.from_json(held if isinstance(held, str) else bytes(held).decode())
+        if spike_ms is None and SPIKE in graph.metadata:
+            spike_ms = _spike(1000.0 * float(graph.metadata[SPIKE]) or None)
+        if own is not None and encoder is None and neuron is None and _same(graph, _graph(own, spike_ms)):
+            return own
+        return _readout(graph, own, encoder, neuron, spike_ms)
+    except (FormatError, ProblemError) as error:
+        raise type(error)(f"{place}: {error}") from None
+
+
+def _spike(spike_ms: object) -> float | None:
+    if spike_ms is None:
+        return None
+    length = number("spike_ms", spike_ms)
+    if not 1e-6 <= length <= 1000.0:
+        raise ProblemError(f"spike_ms is {length:g}: must lie between 0.000001 and 1000")
+    return length
+
+
+def _gains(neuron: Neuron, spike_s: float | None) -> tuple[str, dict[str, float], float]:
+    """Return a neuron's node, its parameters (SI), and the factor from weights in V to those of the graph.
+
+    A spike of area A (1 for a Dirac pulse, `spike_s` for a value of 1 that lasts so long) through CubaLIF gives
+    ``A w_in r (e^{-t/tau_mem} - e^{-t/tau_syn}) / (tau_mem - tau_syn)``, for equal constants
+    ``A w_in r t e^{-t/tau} / tau^2``; through LIF ``A r e^{-t/tau} / tau``.
+    """
+    tau = neuron.tau / 1000.0
+    area = 1.0 if spike_s is None else spike_s
+    # A simulator that steps adds 1 a step: it wants r = tau/step, and reads best what leaves inputs unscaled.
+    r = tau if spike_s is None else tau / spike_s
+    if neuron.kernel == "exponential":
+        return "LIF", {"tau": tau, "r": r}, tau / (area * r)
+    if neuron.kernel == "alpha":
+        tau_syn, height = tau, tau
+    else:
+        tau_syn = (neuron.tau / 4.0 if neuron.tau_s is None else neuron.tau_s) / 1000.0
+        height = _peak_one(tau, tau_syn) * (tau - tau_syn)
+    w_in = 1.0 if spike_s is None else tau_syn / spike_s
+    return "CubaLIF", {"tau_mem": tau, "tau_syn": tau_syn, "r": r, "w_in": w_in}, height / (area * w_in * r)
+
+
+def _peak_one(tau: float, tau_s: float) -> float:
+    """Return the factor that lifts ``e^{-t/tau} - e^{-t/tau_s}`` to a peak of 1."""
+    ratio = tau_s / tau
+    return float(1.0 / (ratio ** (ratio / (1.0 - ratio)) - ratio ** (1.0 / (1.0 - ratio))))
+
+
+def _graph(readout: Readout, spike_ms: float | None) -> NIRGraph:
+    import nir  # noqa: PLC0415  an extra
+
+    spike_s = None if spike_ms is None else spike_ms / 1000.0
+    neurons = list(readout.neurons.values())
+    nodes = [_gains(one.neuron, spike_s) for one in neurons]
+    kinds = sorted({kind for kind, _, _ in nodes})
+    if len(kinds) > 1:
+        raise ProblemError("NIR: exponential kernels and others need different nodes; export them as readouts apart")
+    columns = {name: np.array([node[1][name] for node in nodes]) for name in nodes[0][1]}
+    threshold = np.array([one.neuron.theta_0 * readout.run_threshold / 1000.0 for one in neurons])
+    zero = np.zeros(len(neurons))
+    cells = getattr(nir, kinds[0])(v_leak=zero, v_threshold=threshold, v_reset=zero, **columns)
+    weights = np.array([one.weights / 1000.0 * node[2] for one, node in zip(neurons, nodes, strict=True)])
+    delays = readout.delays_ms
+    inputs = weights.shape[1] // len(delays)
+    parts: dict[str, Any] = {"input": nir.Input({"input": np.array([inputs])})}
+    edges = []
+    for k, delay in enumerate(delays):
+        name = "weights" if len(delays) == 1 else f"weights_{k}"
+        parts[name] = nir.Linear(weight=weights[:, k * inputs : (k + 1) * inputs])
+        source = "input"
+        if delay > 0:
+            source = f"delay_{k}"
+            parts[source] = nir.Delay(delay=np.full(inputs, delay / 1000.0))
+            edges.append(("input", source))
+        edges += [(source, name), (name, "neurons")]
+    parts |= {"neurons": cells, "output": nir.Output({"output": np.array([len(neurons)])})}
+    edges.append(("neurons", "output"))
+    metadata = {READOUT: readout.to_json(), SPIKE: spike_s or 0.0}
+    return nir.NIRGraph(nodes=parts, edges=edges, metadata=metadata)
+
+
+def _same(a: NIRGraph, b: NIRGraph) -> bool:
+    """Whether two graphs hold the same nodes, to the last bit, and edges."""
+
+    def values(node: Any) -> dict[str, Any]:
+        return {name: v for name, v in node.to_dict().items() if name != "metadata"}
+
+    def equal(x: Any, y: Any) -> bool:
+        if isinstance(x, dict) and isinstance(y, dict):
+            return x.keys() == y.keys() and all(equal(x[k], y[k]) for k in x)
+        return bool(np.array_equal(x, y))
+
+    return (
+        sorted(map(tuple, a.edges)) == sorted(map(tuple, b.edges))
+        and a.nodes.keys() == b.nodes.keys()
+        and all(equal(values(a.nodes[name]), values(b.nodes[name])) for name in a.nodes)
+    )
+
+
+def _readout(
+    graph: NIRGraph, own: Readout | None, encoder: Encoder | None, neuron: Neuron | None, spike_ms: float | None
+) -> Readout:
+    """Build a readout from nodes; what they do not say comes from the caller, the metadata, or by default."""
+    from taxel.detect.readout import Readout, TrainedNeuron  # noqa: PLC0415  which imports this file
+
+    encoder = encoder or (own.encoder if own is not None else None)
+    if encoder is None:
+        raise ProblemError("NIR holds no encoder: say which with encoder=")
+    weights, delays_ms, cells = _layers(graph)
+    spike_s = None if spike_ms is None else spike_ms / 1000.0
+    templates: list[TrainedNeuron | None] = [None] * len(weights)
+    labels = [f"output {k}" for k in range(len(weights))]
+    if own is not None and len(own.labels) == len(weights):
+        labels, templates = list(own.labels), list(own.neurons.values())
+    trained = {}
+    for k, (label, template, row) in enumerate(zip(labels, templates, weights, strict=True)):
+        rest = neuron or (template.neuron if template is not None else Neuron())
+        said, factor = _kernel(cells, k, spike_s)
+        said["theta_0"] = _threshold(cells, k)
+        if own is not None and neuron is None:
+            # The nodes' threshold holds the factor already.
+            said["theta_plus"] = rest.theta_plus * own.run_threshold
+        one = Neuron(**{**rest._parameters(), **said})
+        trained[label] = TrainedNeuron(one, 1000.0 * row * factor, 0.0 if template is None else template.delay_ms)
+    array = None if own is None else own.array
+    return Readout(encoder, trained, array=array, delays_ms=delays_ms)
+
+
+def _kernel(cells: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], float]:
+    """Return the kernel of cell `k` with its constants in ms, and the factor from the graph's weights to V."""
+
+    def value(name: str) -> float:
+        return float(getattr(cells, name)[k])
+
+    said: dict[str, Any]
+    if type(cells).__name__ == "LIF":
+        # Such a potential only jumps, so taxel compares it on a grid.
+        tau, said = value("tau"), {"kernel": "exponential", "tau_s": None, "time": "grid"}
+    else:
+        tau, tau_syn = value("tau_mem"), value("tau_syn")
+        if not (np.isfinite(tau_syn) and 0 < tau_syn <= tau):
+            raise FormatError(
+                f"neurons[{k}]: tau_syn is {tau_syn} s: taxel's kernels need 0 < tau_syn <= tau_mem = {tau}"
+            )
+        said = {"kernel": "double_exponential", "tau_s": 1000.0 * tau_syn}
+        if abs(tau_syn - tau) <= 1e-9 * tau:
+            said = {"kernel": "alpha", "tau_s": None}
+    if not (np.isfinite(tau) and tau > 0):
+        raise FormatError(f"neurons[{k}]: time constant {tau} s: must be above 0")
+    said["tau"] = 1000.0 * tau
+    _, ours, gain = _gains(Neuron(**said), spike_s)
+    # `gain` holds for our own r and w_in; theirs may be shared out otherwise.
+    scale = value("r") / ours["r"] * (value("w_in") / ours["w_in"] if "w_in" in ours else 1.0)
+    return said, scale / gain
+
+
+def _threshold(cells: Any, k: int) -> float:
+    leak, threshold = float(cells.v_leak[k]), float(cells.v_threshold[k])
+    if not threshold > leak:
+        raise FormatError(f"neurons[{k}]: threshold {threshold} V lies not above the rest, {leak} V")
+    # Potentials count from rest.
+    return 1000.0 * (threshold - leak)
+
+
+def _layers(graph: NIRGraph) -> tuple[NDArray[np.float64], list[float], Any]:
+    """Return weights by neuron and input (copy after copy), the copies' delays in ms, and the node of neurons."""
+    nodes: dict[str, Any] = graph.nodes
+    into: dict[str, list[str]] = {}
+    for source, target in graph.edges:
+        into.setdefault(target, []).append(source)
+    kinds = {name: type(node).__name__ for name, node in nodes.items()}
+
+    def only(kind: str) -> str:
+        named = [name for name, k in kinds.items() if k == kind]
+        if len(named) != 1:
+            raise FormatError(f"{len(named)} nodes of kind {kind}: a readout has one")
+        return named[0]
+
+    def alone(name: str) -> str | None:
+        return into[name][0] if len(into.get(name, [])) == 1 else None
+
+    source, target = only("Input"), only("Output")
+    cells = into.get(target, [])
+    if len(cells) != 1 or kinds[cells[0]] not in ("LIF", "CubaLIF"):
+        raise FormatError("the output must come from one node of kind LIF or CubaLIF: a readout is a single layer")
+    branches = []
+    for name in into.get(cells[0], []):
+        node, kind = nodes[name], kinds[name]
+        if kind not in ("Linear", "Affine") or np.ndim(node.weight) != 2:
+            raise FormatError(f"{name}: {kind} before the neurons, must be Linear (or Affine without bias)")
+        if kind == "Affine" and np.any(node.bias):
+            raise FormatError(f"{name}: has a bias, which a readout has not")
+        before, delay_ms = alone(name), 0.0
+        if before is not None and kinds[before] == "Delay":
+            delays = np.unique(np.asarray(nodes[before].delay, np.float64))
+            if len(delays) != 1:
+                raise FormatError(f"{before}: delays its inputs differently, must delay all alike")
+            delay_ms = 1000.0 * float(delays[0])
+            before = alone(before)
+        if before != source:
+            raise FormatError(f"{name}: does not come from the input, directly or through one Delay")
+        branches.append((delay_ms, np.asarray(node.weight, np.float64)))
+    if not branches:
+        raise FormatError("nothing leads to the neurons")
+    branches.sort(key=lambda branch: branch[0])
+    cell = nodes[cells[0]]
+    if any(np.shape(w) != (np.size(cell.v_threshold), np.shape(branches[0][1])[1]) for _, w in branches):
+        raise FormatError("weights and neurons differ in number")
+    return np.hstack([w for _, w in branches]), [delay for delay, _ in branches], cell
