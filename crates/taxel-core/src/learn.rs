@@ -2,10 +2,12 @@
 
 mod cone_program;
 mod cone_r;
+mod dual_active_set;
 mod rounds;
 mod rows;
 
 pub use cone_r::{ConeR, Divisor, Fit, Norm, Parts, Problem, Round, Status};
+pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
 
 use crate::neuron::Neuron;
 use crate::{Result, SpikeTrains, problem};

@@ -1,0 +1,180 @@
+//! Cholesky factor of the Gram matrix of the active rows: rows are appended by the block and removed by rotations.
+
+use faer::linalg::matmul::matmul;
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Accum, MatMut, MatRef, Par};
+
+use super::kernels::{Aligned, LANES, backward, forward, rotate};
+
+/// L with `L L' = G` over the active rows, in the order in which they came.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Factor {
+    /// By columns; above the diagonal anything, below the last row 0 to the end of the line.
+    l: Aligned,
+    stride: usize,
+    /// One over the diagonal.
+    inverse: Vec<f64>,
+}
+
+impl Factor {
+    /// How many rows it holds.
+    pub(super) fn len(&self) -> usize {
+        self.inverse.len()
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.inverse.clear();
+    }
+
+    /// The length that vectors must have for `solve`: the rows, to the end of the line.
+    pub(super) fn padded(&self) -> usize {
+        self.len().next_multiple_of(LANES)
+    }
+
+    /// `x = L^-1 x`.
+    pub(super) fn forward(&self, x: &mut [f64]) {
+        forward(&self.l, self.stride, &self.inverse, self.len(), x);
+    }
+
+    /// `x = L^-T x`.
+    pub(super) fn backward(&self, x: &mut [f64]) {
+        backward(&self.l, self.stride, &self.inverse, self.len(), x);
+    }
+
+    /// Appends a row whose `L^-1 g` is `d` and whose pivot is `pivot`.
+    pub(super) fn push(&mut self, d: &[f64], pivot: f64) {
+        let m = self.len();
+        self.reserve(m + 1);
+        for (k, &d) in d[..m].iter().enumerate() {
+            self.write(m, k, d);
+        }
+        self.write(m, m, pivot);
+        self.inverse.push(1.0 / pivot);
+    }
+
+    /// Appends rows, but none whose squared pivot is `least` or below, nor more than `most` in all; says which it took.
+    ///
+    /// `products` has a column a new row: its products with the rows here, then with all the new ones.
+    pub(super) fn append(&mut self, products: &mut [f64], rows: usize, least: f64, most: usize) -> Vec<usize> {
+        let m = self.len();
+        self.reserve(m + rows);
+        let mut schur = vec![0.0; rows * rows];
+        for (column, products) in schur.chunks_exact_mut(rows).zip(products.chunks_exact(m + rows)) {
+            column.copy_from_slice(&products[m..]);
+        }
+        if m > 0 {
+            let l = MatRef::from_column_major_slice_with_stride(&self.l[..], m, m, self.stride);
+            let mut d = MatMut::from_column_major_slice_with_stride_mut(products, m, rows, m + rows);
+            solve_lower_triangular_in_place(l, d.as_mut(), Par::Seq);
+            let schur = MatMut::from_column_major_slice_mut(&mut schur, rows, rows);
+            matmul(schur, Accum::Add, d.as_ref().transpose(), d.as_ref(), -1.0, Par::Seq);
+        }
+        let mut taken: Vec<usize> = Vec::with_capacity(rows);
+        for k in 0..rows {
+            let pivot = schur[k * rows + k];
+            if pivot <= least || self.len() >= most {
+                continue;
+            }
+            let pivot = pivot.sqrt();
+            let at = self.len();
+            for (j, &d) in products[k * (m + rows)..][..m].iter().enumerate() {
+                self.write(at, j, d);
+            }
+            for (j, &other) in taken.iter().enumerate() {
+                self.write(at, m + j, schur[other * rows + k]);
+            }
+            self.write(at, at, pivot);
+            self.inverse.push(1.0 / pivot);
+            taken.push(k);
+            let (before, after) = schur.split_at_mut((k + 1) * rows);
+            let column = &mut before[k * rows + k + 1..];
+            for d in &mut *column {
+                *d /= pivot;
+            }
+            for (i, other) in after.chunks_exact_mut(rows).enumerate() {
+                let by = column[i];
+                for (product, d) in other[k + 1 + i..].iter_mut().zip(&column[i..]) {
+                    *product -= by * d;
+                }
+            }
+        }
+        taken
+    }
+
+    /// Removes the rows at these places (ascending); `d`, a row not yet pushed, is turned with the rest.
+    pub(super) fn remove(&mut self, places: &[usize], mut d: Option<&mut Vec<f64>>) {
+        let Some(&first) = places.first() else { return };
+        let (m, stride) = (self.len(), self.stride);
+        let left = m - places.len();
+        let width = m.next_multiple_of(LANES);
+        for column in self.l.chunks_exact_mut(stride).take(first) {
+            close_up(column, m, places);
+        }
+        let mut carries: Vec<Vec<f64>> = Vec::with_capacity(places.len());
+        let mut tails = Vec::with_capacity(places.len());
+        for k in first..m {
+            let column = &mut self.l[k * stride..][..width];
+            if places.get(carries.len()) == Some(&k) {
+                carries.push(column.to_vec());
+                tails.push(d.as_ref().map_or(0.0, |d| d[k]));
+                continue;
+            }
+            for (carry, tail) in carries.iter_mut().zip(&mut tails) {
+                let r = column[k].hypot(carry[k]);
+                let (c, s) = (column[k] / r, carry[k] / r);
+                rotate(c, s, &mut column[k..], &mut carry[k..]);
+                if let Some(d) = d.as_deref_mut() {
+                    (d[k], *tail) = (c * d[k] + s * *tail, c * *tail - s * d[k]);
+                }
+            }
+            let to = k - carries.len();
+            if let Some(d) = d.as_deref_mut() {
+                d[to] = d[k];
+            }
+            let diagonal = column[k];
+            close_up(column, m, &places[carries.len()..]);
+            // Rows k and later stand `carries.len()` places too low; those above the diagonal do not matter.
+            let shift = carries.len();
+            self.l.copy_within(k * stride + k..k * stride + m - (places.len() - shift), to * stride + to);
+            self.l[to * stride + left..][..left.next_multiple_of(LANES) - left].fill(0.0);
+            self.inverse[to] = 1.0 / diagonal;
+        }
+        self.inverse.truncate(left);
+        if let Some(d) = d {
+            d.truncate(left);
+            d.resize(left.next_multiple_of(LANES), 0.0);
+        }
+    }
+
+    fn write(&mut self, row: usize, column: usize, value: f64) {
+        let line = &mut self.l[column * self.stride..][row..(row + 1).next_multiple_of(LANES)];
+        line.fill(0.0);
+        line[0] = value;
+    }
+
+    fn reserve(&mut self, rows: usize) {
+        if rows <= self.stride {
+            return;
+        }
+        // A stride that is no power of two, so that columns do not fall into the same cache sets.
+        let stride = (rows + rows / 2).max(64).next_multiple_of(LANES);
+        let stride = if stride.is_multiple_of(64) { stride + LANES } else { stride };
+        let mut l = Aligned::zeros(stride * stride);
+        for (new, old) in l.chunks_exact_mut(stride).zip(self.l.chunks_exact(self.stride.max(1))).take(self.len()) {
+            new[..self.stride].copy_from_slice(old);
+        }
+        (self.l, self.stride) = (l, stride);
+    }
+}
+
+/// Takes the entries at `places` out of a column of `m` and sets what is freed to 0.
+fn close_up(column: &mut [f64], m: usize, places: &[usize]) {
+    let Some(&first) = places.first() else { return };
+    let mut to = first;
+    for (i, &place) in places.iter().enumerate() {
+        let end = places.get(i + 1).copied().unwrap_or(m);
+        column.copy_within(place + 1..end, to);
+        to += end - place - 1;
+    }
+    column[to..m].fill(0.0);
+}
