@@ -3,6 +3,8 @@
 mod cone_program;
 mod cone_r;
 mod dual_active_set;
+#[allow(dead_code)]
+mod mixed;
 mod rounds;
 mod rows;
 

@@ -1,7 +1,7 @@
 //! The convex program over a few rows, as a cone program for Clarabel.
 //!
 //! Minimise `linear.w + l1 |w|_1 + l2 |w|_2 (or |w|_2^2) + quadratic |B w|^2 + sum_i weight_i max(r_i.w - limit_i, 0)` over
-//! `lower <= w <= upper`. Each hinge gets one slack variable, so a dense row stands in the matrix once.
+//! a box, equality rows and hard inequality rows. Each hinge gets one slack variable, so a dense row stands in the matrix once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,6 +24,15 @@ pub(super) struct Hinges {
     pub(super) weight: Vec<f64>,
 }
 
+/// Rows that must be met, one after the other: `equal.w = equal_to`, `below.w <= limit`.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct HardRows<'a> {
+    pub(super) equal: &'a [f64],
+    pub(super) equal_to: &'a [f64],
+    pub(super) below: &'a [f64],
+    pub(super) limit: &'a [f64],
+}
+
 /// The whole program.
 #[derive(Debug)]
 pub(super) struct ConeProgram<'a> {
@@ -36,9 +45,10 @@ pub(super) struct ConeProgram<'a> {
     pub(super) behind: &'a [f64],
     /// `B'B`, column by column.
     pub(super) gram: &'a [f64],
-    pub(super) lower: f64,
-    pub(super) upper: f64,
+    /// Least and largest value of each weight.
+    pub(super) bounds: Vec<[f64; 2]>,
     pub(super) hinges: &'a Hinges,
+    pub(super) hard: HardRows<'a>,
 }
 
 /// What the solver found; whether it is the optimum, the caller finds out.
@@ -47,6 +57,9 @@ pub(super) struct Answer {
     pub(super) weights: Vec<f64>,
     /// One multiplier a hinge, between 0 and its weight.
     pub(super) multipliers: Vec<f64>,
+    /// One multiplier a hard row; those of inequalities at least 0.
+    pub(super) equality: Vec<f64>,
+    pub(super) inequality: Vec<f64>,
     /// The slope that stands for `l2 |w|_2` in the dual, no longer than `l2`; zeros without that term.
     pub(super) pull: Vec<f64>,
 }
@@ -91,38 +104,39 @@ impl ConeProgram<'_> {
         // B as a dense n x n block costs nothing where the hinges fill that block anyway; else its few rows are cheaper.
         let factored = quadratic > 0.0 && m + k < n;
         let dense = quadratic > 0.0 && !factored;
-        let of_one_sign = self.lower >= 0.0 || self.upper <= 0.0;
-        let absolute = self.l1 > 0.0 && !of_one_sign;
-        let sign = if self.lower >= 0.0 { 1.0 } else { -1.0 };
+        // Where a weight has one sign only, its absolute value is linear.
+        let astride = |[lower, upper]: [f64; 2]| self.l1 > 0.0 && lower < 0.0 && upper > 0.0;
+        let absolute: Vec<usize> = (0..n).filter(|&j| astride(self.bounds[j])).collect();
         let normed = self.l2 > 0.0 && self.norm == Norm::Norm;
 
         // Variables: w; from there on the hinges' slacks, |w| by synapse, |w|_2, B w.
         let slack = n;
         let size = slack + m;
-        let length = size + if absolute { n } else { 0 };
+        let length = size + absolute.len();
         let image = length + usize::from(normed);
         let variables = image + if factored { k } else { 0 };
-        // Rows: B w - y = 0; from there on r w - slack <= limit; slack >= 0; w <= upper; -w <= -lower; w - |w| <= 0;
-        // -w - |w| <= 0; the cone of |w|_2.
-        let hinge = if factored { k } else { 0 };
+        // Rows: B w - y = 0; from there on equalities; r w - slack <= limit; slack >= 0; hard r w <= limit; w <= upper;
+        // -w <= -lower; w - |w| <= 0; -w - |w| <= 0; the cone of |w|_2.
+        let equal = if factored { k } else { 0 };
+        let hinge = equal + self.hard.equal_to.len();
         let positive = hinge + m;
-        let above = positive + m;
+        let hard = positive + m;
+        let above = hard + self.hard.limit.len();
         let below = above + n;
         let plus = below + n;
-        let minus = plus + n;
-        let cone = if absolute { minus + n } else { plus };
+        let minus = plus + absolute.len();
+        let cone = minus + absolute.len();
         let rows = cone + if normed { n + 1 } else { 0 };
 
         let mut q = vec![0.0; variables];
-        for (q, &c) in q.iter_mut().zip(self.linear) {
-            *q = scale * (c + if self.l1 > 0.0 && of_one_sign { sign * self.l1 } else { 0.0 });
+        for ((q, &c), &bounds) in q.iter_mut().zip(self.linear).zip(&self.bounds) {
+            let sign = if bounds[0] >= 0.0 { 1.0 } else { -1.0 };
+            *q = scale * (c + if astride(bounds) { 0.0 } else { sign * self.l1 });
         }
         for (q, &c) in q[slack..size].iter_mut().zip(&self.hinges.weight) {
             *q = scale * c;
         }
-        if absolute {
-            q[size..length].fill(scale * self.l1);
-        }
+        q[size..length].fill(scale * self.l1);
         if normed {
             q[length] = scale * self.l2;
         }
@@ -148,20 +162,28 @@ impl ConeProgram<'_> {
         }
 
         let mut a = Columns::new();
+        let mut next = 0;
         for j in 0..n {
             if factored {
                 for i in 0..k {
                     a.put(i, self.behind[i * n + j]);
                 }
             }
+            for i in 0..self.hard.equal_to.len() {
+                a.put(equal + i, self.hard.equal[i * n + j]);
+            }
             for i in 0..m {
                 a.put(hinge + i, self.hinges.rows[i * n + j]);
             }
+            for i in 0..self.hard.limit.len() {
+                a.put(hard + i, self.hard.below[i * n + j]);
+            }
             a.put(above + j, 1.0);
             a.put(below + j, -1.0);
-            if absolute {
-                a.put(plus + j, 1.0);
-                a.put(minus + j, -1.0);
+            if absolute.get(next) == Some(&j) {
+                a.put(plus + next, 1.0);
+                a.put(minus + next, -1.0);
+                next += 1;
             }
             if normed {
                 a.put(cone + 1 + j, -1.0);
@@ -173,12 +195,10 @@ impl ConeProgram<'_> {
             a.put(positive + i, -1.0);
             a.end();
         }
-        if absolute {
-            for j in 0..n {
-                a.put(plus + j, -1.0);
-                a.put(minus + j, -1.0);
-                a.end();
-            }
+        for j in 0..absolute.len() {
+            a.put(plus + j, -1.0);
+            a.put(minus + j, -1.0);
+            a.end();
         }
         if normed {
             a.put(cone, -1.0);
@@ -192,13 +212,17 @@ impl ConeProgram<'_> {
         }
 
         let mut b = vec![0.0; rows];
+        b[equal..hinge].copy_from_slice(self.hard.equal_to);
         b[hinge..positive].copy_from_slice(&self.hinges.limit);
-        b[above..below].fill(self.upper);
-        b[below..plus].fill(-self.lower);
+        b[hard..above].copy_from_slice(self.hard.limit);
+        for (j, [lower, upper]) in self.bounds.iter().enumerate() {
+            b[above + j] = *upper;
+            b[below + j] = -lower;
+        }
 
         let mut cones: Vec<SupportedConeT<f64>> = Vec::new();
-        if factored {
-            cones.push(ZeroConeT(k));
+        if hinge > 0 {
+            cones.push(ZeroConeT(hinge));
         }
         cones.push(NonnegativeConeT(cone - hinge));
         if normed {
@@ -218,7 +242,7 @@ impl ConeProgram<'_> {
         };
         let (p, a) = (p.matrix(variables), a.matrix(rows));
         let (x, z) = solve_stoppable(&p, &q, &a, &b, &cones, settings, stop)?;
-        let weights = x[..n].iter().map(|w| w.clamp(self.lower, self.upper)).collect();
+        let weights = x[..n].iter().zip(&self.bounds).map(|(w, [lower, upper])| w.clamp(*lower, *upper)).collect();
         let hinged = z[hinge..positive].iter().zip(&self.hinges.weight);
         let multipliers = hinged.map(|(z, &most)| (z / scale).clamp(0.0, most)).collect();
         let mut pull = vec![0.0; n];
@@ -228,7 +252,9 @@ impl ConeProgram<'_> {
             let shrink = (self.l2 / length.max(f64::MIN_POSITIVE)).min(1.0 / scale);
             pull.iter_mut().zip(dual).for_each(|(p, z)| *p = -z * shrink);
         }
-        Ok(Answer { weights, multipliers, pull })
+        let equality = z[equal..hinge].iter().map(|z| z / scale).collect();
+        let inequality = z[hard..above].iter().map(|z| (z / scale).max(0.0)).collect();
+        Ok(Answer { weights, multipliers, equality, inequality, pull })
     }
 }
 

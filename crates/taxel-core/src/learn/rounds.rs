@@ -6,7 +6,7 @@
 //! minimises lies below 6.14 and touches it at those weights: its minimum is a lower bound, and the way there goes down. An
 //! exact line search on 6.14 keeps the next round from overshooting where hinges change state on the way.
 
-use super::cone_program::{ConeProgram, Hinges};
+use super::cone_program::{ConeProgram, HardRows, Hinges};
 use super::cone_r::{Norm, Objective, Parts, Problem, Round};
 use crate::{Result, Stop};
 
@@ -269,9 +269,9 @@ impl Problem {
             quadratic: objective.b,
             behind: &self.behind,
             gram: &self.gram,
-            lower: objective.lower,
-            upper: objective.upper,
+            bounds: vec![[objective.lower, objective.upper]; self.trains],
             hinges: &kept.hinges,
+            hard: HardRows::default(),
         }
     }
 

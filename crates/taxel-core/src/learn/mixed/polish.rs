@@ -1,0 +1,272 @@
+//! From near the optimum to rounding: zeros, bounds and binding rows taken as equalities, one accurate solve.
+//!
+//! The guess comes from the interior point. Where signs come out wrong (a multiplier below 0, a weight across 0 or a
+//! bound, a row broken) the guess is mended and solved again.
+
+use faer::Mat;
+
+use super::dense::{Cholesky, Lu, add_gram, add_sum, dot, outer, times};
+use super::{Place, Point, Program};
+use crate::Stop;
+use crate::learn::cone_r::Norm;
+
+const MOST_GUESSES: usize = 12;
+const MOST_REFINEMENTS: usize = 12;
+/// What makes a singular guess solvable; refinement takes its effect out again.
+const SOFT: f64 = 1e-11;
+/// Rows and bounds count as met within this, in units of rows of length 1.
+pub(super) const MET: f64 = 2e-14;
+/// Multipliers and slopes of the wrong sign count from here.
+const WRONG: f64 = 1e-11;
+
+/// A guess of what binds.
+#[derive(Debug, Clone)]
+pub(super) struct Guess {
+    pub(super) places: Vec<Place>,
+    pub(super) binding: Vec<bool>,
+}
+
+/// Solves for the guess, mends it, and so on; gives the points that meet all rows and bounds, best last.
+pub(super) fn polish(program: &Program, near: &Point, guess: Guess, tolerance: f64, stop: Stop<'_>) -> Option<Point> {
+    let mut polish = Polish::new(program, near, guess);
+    let mut best: Option<(f64, Point)> = None;
+    for _ in 0..MOST_GUESSES {
+        if stop.asked() {
+            break;
+        }
+        polish.solve()?;
+        let point = polish.point();
+        if program.met(&point.weights) {
+            let gap = program.gap(&point);
+            if best.as_ref().is_none_or(|b| gap < b.0) {
+                best = Some((gap, point));
+            }
+            if gap <= 1e-3 * tolerance {
+                break;
+            }
+        }
+        if !polish.mend() {
+            break;
+        }
+    }
+    best.map(|b| b.1)
+}
+
+/// The nearest point at which equality rows are met to rounding, weights moving the less the nearer they are to a wall.
+pub(super) fn meet(program: &Program, near: &Point) -> Option<Point> {
+    let n = program.width();
+    let mut w = near.weights.clone();
+    let walls = |k: usize| [program.lower[k], program.upper[k], if program.l1 > 0.0 { 0.0 } else { program.lower[k] }];
+    let room: Vec<f64> = (0..n).map(|k| walls(k).iter().map(|wall| (w[k] - wall).abs()).fold(1.0, f64::min)).collect();
+    let mut scaled = program.equal.clone();
+    scaled.chunks_exact_mut(n.max(1)).for_each(|row| row.iter_mut().zip(&room).for_each(|(v, r)| *v *= r));
+    let mut matrix = outer(&scaled, n);
+    let most = (0..matrix.nrows()).map(|i| matrix[(i, i)]).fold(0.0, f64::max);
+    (0..matrix.nrows()).for_each(|i| matrix[(i, i)] += 1e-13 * most);
+    if matrix.nrows() > 0 {
+        let factors = Cholesky::new(matrix)?;
+        for _ in 0..4 {
+            let mut off: Vec<f64> =
+                times(&program.equal, &w).iter().zip(&program.equal_to).map(|(u, e)| e - u).collect();
+            factors.solve(&mut off);
+            let mut step = vec![0.0; n];
+            add_sum(&scaled, &off, &mut step);
+            for k in 0..n {
+                w[k] = (w[k] + room[k] * step[k]).clamp(program.lower[k], program.upper[k]);
+            }
+        }
+    }
+    Some(Point { weights: w, ..near.clone() })
+}
+
+struct Polish<'a> {
+    program: &'a Program,
+    guess: Guess,
+    /// The sign of each weight that is not 0, for the slope of l1.
+    sign: Vec<f64>,
+    w: Vec<f64>,
+    equality: Vec<f64>,
+    inequality: Vec<f64>,
+}
+
+impl<'a> Polish<'a> {
+    fn new(program: &'a Program, near: &Point, guess: Guess) -> Self {
+        let w = near.weights.clone();
+        let mut out = Self {
+            program,
+            sign: w.iter().map(|w| w.signum()).collect(),
+            guess,
+            w,
+            equality: near.equality.clone(),
+            inequality: near.inequality.clone(),
+        };
+        out.snap();
+        out
+    }
+
+    /// Puts what does not move where the guess says.
+    fn snap(&mut self) {
+        for (k, place) in self.guess.places.iter().enumerate() {
+            match place {
+                Place::Free => {}
+                Place::Zero => self.w[k] = 0.0,
+                Place::Lower => self.w[k] = self.program.lower[k],
+                Place::Upper => self.w[k] = self.program.upper[k],
+            }
+        }
+        for (z, binding) in self.inequality.iter_mut().zip(&self.guess.binding) {
+            if !binding {
+                *z = 0.0;
+            }
+        }
+    }
+
+    fn pull(&self) -> Vec<f64> {
+        self.program.pull(&self.w)
+    }
+
+    /// The slope of all but l1.
+    fn gradient(&self) -> Vec<f64> {
+        let mut gradient = self.program.slope(&self.w);
+        gradient.iter_mut().zip(self.pull()).for_each(|(g, p)| *g += p);
+        add_sum(&self.program.equal, &self.equality, &mut gradient);
+        add_sum(&self.program.below, &self.inequality, &mut gradient);
+        gradient
+    }
+
+    fn point(&self) -> Point {
+        let program = self.program;
+        Point {
+            weights: self
+                .w
+                .iter()
+                .zip(program.lower.iter().zip(&program.upper))
+                .map(|(w, (l, u))| w.clamp(*l, *u))
+                .collect(),
+            equality: self.equality.clone(),
+            inequality: self.inequality.iter().map(|z| z.max(0.0)).collect(),
+            pull: self.pull(),
+        }
+    }
+
+    /// Newton steps on the conditions of the guess, until rounding stops them. None where nothing finite comes out.
+    fn solve(&mut self) -> Option<()> {
+        let program = self.program;
+        let n = program.width();
+        let free: Vec<usize> = (0..n).filter(|&k| self.guess.places[k] == Place::Free).collect();
+        let binding: Vec<usize> = (0..program.limit.len()).filter(|&i| self.guess.binding[i]).collect();
+        let (f, p) = (free.len(), program.equal_to.len());
+        let size = f + p + binding.len();
+        let mut matrix = Mat::zeros(size, size);
+        if program.lift > 0.0 {
+            let columns: Vec<Vec<f64>> =
+                program.behind.chunks_exact(n).map(|row| free.iter().map(|&k| row[k]).collect()).collect();
+            let flat: Vec<f64> = columns.into_iter().flatten().collect();
+            let mut gram = Mat::zeros(f, f);
+            add_gram(&flat, f, 2.0 * program.lift, &mut gram);
+            for j in 0..f {
+                for i in j..f {
+                    matrix[(i, j)] = gram[(i, j)];
+                    matrix[(j, i)] = gram[(i, j)];
+                }
+            }
+        }
+        let length = dot(&self.w, &self.w).sqrt();
+        if program.norm == Norm::Square {
+            (0..f).for_each(|j| matrix[(j, j)] += 2.0 * program.l2);
+        } else if program.l2 > 0.0 && length > 0.0 {
+            let curve = program.l2 / length;
+            for j in 0..f {
+                let along = curve * self.w[free[j]] / (length * length);
+                for i in 0..f {
+                    matrix[(i, j)] -= along * self.w[free[i]];
+                }
+                matrix[(j, j)] += curve;
+            }
+        }
+        let rows =
+            program.equal.chunks_exact(n.max(1)).chain(binding.iter().map(|i| &program.below[i * n..(i + 1) * n]));
+        for (i, row) in rows.enumerate() {
+            for (j, &k) in free.iter().enumerate() {
+                matrix[(f + i, j)] = row[k];
+                matrix[(j, f + i)] = row[k];
+            }
+        }
+        (0..f).for_each(|j| matrix[(j, j)] += SOFT);
+        (f..size).for_each(|j| matrix[(j, j)] -= SOFT);
+        let factors = Lu::new(matrix);
+        let mut least = f64::INFINITY;
+        for _ in 0..MOST_REFINEMENTS {
+            let gradient = self.gradient();
+            let mut right = Vec::with_capacity(size);
+            right.extend(free.iter().map(|&k| -gradient[k] - program.l1 * self.sign[k]));
+            right.extend(times(&program.equal, &self.w).iter().zip(&program.equal_to).map(|(u, e)| e - u));
+            let below = times(&program.below, &self.w);
+            right.extend(binding.iter().map(|&i| program.limit[i] - below[i]));
+            let off = right.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+            if !off.is_finite() {
+                return None;
+            }
+            if off <= 1e-16 || off > 0.7 * least {
+                break;
+            }
+            least = off;
+            factors.solve(&mut right);
+            free.iter().zip(&right).for_each(|(&k, d)| self.w[k] += d);
+            self.equality.iter_mut().zip(&right[f..]).for_each(|(u, d)| *u += d);
+            binding.iter().zip(&right[f + p..]).for_each(|(&i, d)| self.inequality[i] += d);
+        }
+        Some(())
+    }
+
+    /// Exchanges what has the wrong sign; false where nothing has.
+    fn mend(&mut self) -> bool {
+        let program = self.program;
+        let gradient = self.gradient();
+        let mut changed = 0;
+        for k in 0..program.width() {
+            let (lower, upper) = (program.lower[k], program.upper[k]);
+            if lower == upper {
+                continue;
+            }
+            let split = program.l1 > 0.0 && lower < 0.0 && upper > 0.0;
+            let g = gradient[k];
+            let place = self.guess.places[k];
+            let next = match place {
+                Place::Free if self.w[k] < lower => Place::Lower,
+                Place::Free if self.w[k] > upper => Place::Upper,
+                Place::Free if split && self.w[k] * self.sign[k] < 0.0 => Place::Zero,
+                Place::Zero if g.abs() > program.l1 + WRONG => {
+                    self.sign[k] = -g.signum();
+                    Place::Free
+                }
+                Place::Lower if g + program.l1 * if lower < 0.0 { -1.0 } else { 1.0 } < -WRONG => {
+                    self.sign[k] = if lower < 0.0 { -1.0 } else { 1.0 };
+                    Place::Free
+                }
+                Place::Upper if g + program.l1 * if upper > 0.0 { 1.0 } else { -1.0 } > WRONG => {
+                    self.sign[k] = if upper > 0.0 { 1.0 } else { -1.0 };
+                    Place::Free
+                }
+                same => same,
+            };
+            if next != place {
+                self.guess.places[k] = next;
+                changed += 1;
+            }
+        }
+        let below = times(&program.below, &self.w);
+        for (i, u) in below.iter().enumerate() {
+            let binding = &mut self.guess.binding[i];
+            if *binding && self.inequality[i] < -WRONG {
+                *binding = false;
+                changed += 1;
+            } else if !*binding && u - program.limit[i] > MET {
+                *binding = true;
+                changed += 1;
+            }
+        }
+        self.snap();
+        changed > 0
+    }
+}
