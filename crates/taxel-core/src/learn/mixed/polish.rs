@@ -224,13 +224,12 @@ impl<'a> Polish<'a> {
         let program = self.program;
         let gradient = self.gradient();
         let mut changed = 0;
-        for k in 0..program.width() {
+        for (k, g) in gradient.into_iter().enumerate() {
             let (lower, upper) = (program.lower[k], program.upper[k]);
             if lower == upper {
                 continue;
             }
             let split = program.l1 > 0.0 && lower < 0.0 && upper > 0.0;
-            let g = gradient[k];
             let place = self.guess.places[k];
             let next = match place {
                 Place::Free if self.w[k] < lower => Place::Lower,
