@@ -3,20 +3,157 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from taxel._core import ProblemError
 from taxel.cli import app
+from taxel.studies import STUDIES, load
 
 studies = typer.Typer(help="Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.")
 app.add_typer(studies, name="study", no_args_is_help=True)
+
+Jobs = Annotated[int, typer.Option(help="Processes.")]
+Backend = Annotated[str, typer.Option(help="Who runs them: loky (processes here), dask or ray (a cluster).")]
+Scheduler = Annotated[
+    str | None, typer.Option(help="Address of a Dask or Ray cluster that runs already; else one starts here.")
+]
+Report = Annotated[Path, typer.Option(help="Folder for the page, pictures and all results; resumes what is in it.")]
+Size = Annotated[str, typer.Option(help="full, or toy (shows that it runs); some studies have more.")]
+Realisations = Annotated[int | None, typer.Option(help="How many, instead of the size's.")]
+Changes = Annotated[
+    list[str] | None, typer.Option("--set", help="NAME=VALUE: another value (JSON) of a parameter; may be repeated.")
+]
+Data = Annotated[
+    Path | None, typer.Option(help="Folder of recordings, for the studies that need some (or TAXEL_DATA names it).")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and no progress.")]
+
+REPORT = Path("taxel-studies")
 
 
 @studies.callback()
 def _studies() -> None:
     """Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was."""
+
+
+@studies.command(name="all")
+def every(
+    size: Size = "full",
+    realisations: Realisations = None,
+    data: Data = None,
+    jobs: Jobs = 1,
+    backend: Backend = "loky",
+    scheduler: Scheduler = None,
+    report: Report = REPORT,
+    as_json: AsJson = False,
+) -> None:
+    """Run every study, the cheap ones first, and make one page of them.
+
+    Studies on recordings are left out, and said to be, where no recordings are.
+
+    Example: taxel study all --report figures --jobs 2
+    """
+    changes = {} if realisations is None else {"realisations": realisations}
+    said = {}
+    try:
+        for name in STUDIES:
+            study = load(name)
+            own = {k: v for k, v in changes.items() if k in study.parameters}
+            where = _data(data)
+            if study.data and (where is None or not any((where / folder).is_dir() for folder in study.data)):
+                typer.echo(f"{name}: left out, it needs any of {', '.join(study.data)} (--data)", err=True)
+                continue
+            said[name] = study.run(
+                report,
+                size=size if size in study.sizes else "full",
+                changes=own,
+                data=where,
+                workers=_workers(jobs, backend, scheduler),
+                quiet=as_json,
+            )
+    finally:
+        # Whatever stopped it: the page shows what was run, and names the rest.
+        page = _page(report)
+    if as_json:
+        typer.echo(json.dumps(said))
+        return
+    for section in said.values():
+        _tell(section)
+    typer.echo(f"page: {page}")
+
+
+def _add(name: str, title: str) -> None:
+    def one(
+        size: Size = "full",
+        realisations: Realisations = None,
+        changes: Changes = None,
+        data: Data = None,
+        jobs: Jobs = 1,
+        backend: Backend = "loky",
+        scheduler: Scheduler = None,
+        report: Report = REPORT,
+        as_json: AsJson = False,
+    ) -> None:
+        study = load(name)
+        section = study.run(
+            report,
+            size=size,
+            changes=_changes(changes or [], realisations),
+            data=_data(data),
+            workers=_workers(jobs, backend, scheduler),
+            quiet=as_json,
+        )
+        page = _page(report)
+        if as_json:
+            typer.echo(json.dumps(section))
+            return
+        _tell(section)
+        typer.echo(f"page: {page}  picture: {report / name}  numbers: {report / name / 'summary.json'}")
+
+    text = f"{title[0].upper()}{title[1:]}.\n\nExample: taxel study {name} --report figures --jobs 2"
+    studies.command(name=name, help=text, short_help=title)(one)
+
+
+def _workers(jobs: int, backend: str, scheduler: str | None) -> Any:
+    from taxel.studies.runner import Workers  # noqa: PLC0415  joblib loads slowly
+
+    return Workers(jobs, backend, scheduler)
+
+
+def _page(report: Path) -> Path | None:
+    from taxel.studies.page import write_page  # noqa: PLC0415  jinja2 loads slowly
+
+    return write_page(report) if report.is_dir() else None
+
+
+def _data(data: Path | None) -> Path | None:
+    named = os.environ.get("TAXEL_DATA")
+    return data or (Path(named) if named else None)
+
+
+def _changes(said: list[str], realisations: int | None) -> dict[str, Any]:
+    changes: dict[str, Any] = {} if realisations is None else {"realisations": realisations}
+    for text in said:
+        name, equals, value = text.partition("=")
+        if not equals:
+            raise ProblemError(f"--set {text}: must be NAME=VALUE")
+        try:
+            changes[name] = json.loads(value)
+        except ValueError:
+            changes[name] = value
+    return changes
+
+
+def _tell(section: dict[str, Any]) -> None:
+    typer.echo(f"\n{section['name']}, size {section['size']}: {section['title']}")
+    for s in section["statements"]:
+        holds = {True: "holds", False: "does not hold", None: "not judged"}[s["holds"]]
+        typer.echo(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
+        typer.echo(f"    published: {s['published']}\n    ours: {s['ours']}")
 
 
 @studies.command()
@@ -31,22 +168,25 @@ def gait(
         Path | None, typer.Option(help="Such a folder of other people: train on DATA, judge on TEST.")
     ] = None,
     size: Annotated[str, typer.Option(help="full, or toy (shows that it runs).")] = "full",
-    jobs: Annotated[int, typer.Option(help="Processes.")] = 1,
+    jobs: Jobs = 1,
+    backend: Backend = "loky",
+    scheduler: Scheduler = None,
     report: Annotated[
         Path, typer.Option(help="Folder for the report, the folds and all results; resumes what is in it.")
     ] = Path("taxel-study-gait"),
     only: Annotated[
         list[str] | None, typer.Option(help="One source (plate, gaitpdb, gaitndd, moticon, pedar); may be repeated.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and no progress.")] = False,
+    as_json: AsJson = False,
 ) -> None:
-    """Find gait events in walking recordings with one neuron an event (thesis 6.5).
+    """Find gait events in walking recordings with one neuron an event (thesis 6.5, figures 6.12 to 6.14).
 
     Example: taxel study gait --data recordings --jobs 2 --report gait-report
     """
     from taxel.studies.gait import study  # noqa: PLC0415  the learner and its libraries load slowly
 
-    said = study(data, test, size=size, jobs=jobs, report=report, only=only or (), quiet=as_json)
+    workers = _workers(jobs, backend, scheduler)
+    said = study(data, test, size=size, workers=workers, report=report, only=only or (), quiet=as_json)
     if as_json:
         typer.echo(json.dumps(said))
         return
@@ -95,3 +235,7 @@ def _show(said: dict[str, Any]) -> None:
 
 def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.1f}"
+
+
+for _name, _title in STUDIES.items():
+    _add(_name, _title)

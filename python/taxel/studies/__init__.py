@@ -1,1 +1,26 @@
-"""Studies: a protocol, its parameters, the published values as data, and a runner that gives all of them the rest."""
+"""Studies: a protocol, its parameters, the published values as data, and a runner that gives all of them the rest.
+
+A study is a file of this folder whose `STUDY` is a `taxel.studies.study.Study`, and a line in `STUDIES`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from taxel.studies.study import Study
+
+__all__ = ["STUDIES", "load"]
+
+#: One line on every study, by name, in the order of the page; "fig6.1" lies in ``fig6_1.py``. They load when asked for.
+STUDIES = {
+    "fig6.10": "dense against sparse weights under jitter, background and shunting",
+    "fig6.11": "how the weights are distributed, trained without noise and with it",
+}
+
+
+def load(name: str) -> Study:
+    """Return a study by its name in `STUDIES`."""
+    study: Study = import_module(f"taxel.studies.{name.replace('.', '_')}").STUDY
+    return study

@@ -1,4 +1,4 @@
-"""Runs the realisations of a study: progress, resuming after a stop, jobs.
+"""Runs the realisations of a study: progress, resuming after a stop, jobs here or on a cluster.
 
 A study hands over one pure function of parameters and seed, and the list of what to run. Each result is one JSON line,
 keyed by parameters, seed and a digest of the code, so what is there already is not reckoned again, and a stop (Ctrl-C,
@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from time import process_time
 from types import ModuleType
@@ -21,9 +24,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from taxel import _arguments as arguments
 from taxel import _core
-from taxel._core import ProblemError
+from taxel._core import DeviceError, ProblemError
 
-__all__ = ["Results", "Task", "code_digest", "run"]
+__all__ = ["BACKENDS", "HERE", "Results", "Task", "Workers", "code_digest", "run"]
+
+#: Who may run realisations: loky's processes on this machine, or a cluster's.
+BACKENDS = ("loky", "dask", "ray")
 
 
 @dataclass(frozen=True)
@@ -117,12 +123,118 @@ def code_digest(modules: Sequence[ModuleType]) -> str:
     return digest.hexdigest()[:16]
 
 
+@dataclass(frozen=True)
+class Workers:
+    """Say who runs realisations.
+
+    Parameters
+    ----------
+    jobs : int, 1 or more
+        Processes. With 1 of loky's everything stays in this one. Of a cluster that runs already, all are taken.
+    backend : {"loky", "dask", "ray"}
+        Through joblib: processes here, or a cluster's.
+    scheduler : str, optional
+        The address of a cluster that runs already; without it Dask and Ray start one on this machine.
+
+    Raises
+    ------
+    ProblemError : nonsense in a parameter; a backend that is not installed
+
+    Examples
+    --------
+    >>> Workers(jobs=2).backend
+    'loky'
+    """
+
+    jobs: int = 1
+    backend: str = "loky"
+    scheduler: str | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "jobs", arguments.whole("jobs", self.jobs, 1))
+        arguments.text("backend", self.backend, BACKENDS)
+        if self.scheduler is not None:
+            arguments.text("scheduler", self.scheduler)
+            if self.backend == "loky":
+                raise ProblemError('scheduler is for the backends "dask" and "ray": loky has its processes here')
+        package = {"dask": "distributed", "ray": "ray"}.get(self.backend)
+        if package is not None and find_spec(package) is None:
+            raise ProblemError(
+                f'backend "{self.backend}" needs the package {package}: install it by pip install "taxel[cluster]"'
+            )
+
+    @contextmanager
+    def joblib(self) -> Iterator[joblib.Parallel]:
+        """Give joblib's way to them, for the time of a ``with`` block."""
+        if self.backend == "dask":
+            with _dask(self.jobs, self.scheduler), joblib.parallel_config(backend="dask"):
+                yield joblib.Parallel(n_jobs=-1, return_as="generator_unordered", batch_size=1)
+        elif self.backend == "ray":
+            with _ray(self.jobs, self.scheduler) as jobs, joblib.parallel_config(backend="ray"):
+                yield joblib.Parallel(n_jobs=jobs, batch_size=1)
+        else:
+            try:
+                yield joblib.Parallel(n_jobs=self.jobs, return_as="generator_unordered", batch_size=1)
+            except KeyboardInterrupt:
+                joblib.externals.loky.get_reusable_executor().shutdown(wait=False, kill_workers=True)
+                raise
+
+
+@contextmanager
+def _dask(jobs: int, scheduler: str | None) -> Iterator[None]:
+    from distributed import Client, LocalCluster  # noqa: PLC0415  an extra
+
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout="5s")  # type: ignore[no-untyped-call]
+        except (OSError, ValueError) as error:
+            raise DeviceError(f"{scheduler}: no Dask scheduler answers there ({error})") from None
+        with client:
+            yield
+        return
+    with (
+        LocalCluster(  # type: ignore[no-untyped-call]
+            n_workers=jobs,
+            threads_per_worker=1,
+            host="127.0.0.1",
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster),  # type: ignore[no-untyped-call]
+    ):
+        yield
+
+
+@contextmanager
+def _ray(jobs: int, scheduler: str | None) -> Iterator[int]:
+    import ray  # noqa: PLC0415  an extra
+    from ray.util.joblib import register_ray  # noqa: PLC0415
+
+    quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": logging.ERROR}
+    try:
+        if scheduler is None:
+            ray.init(num_cpus=jobs, include_dashboard=False, _node_ip_address="127.0.0.1", **quiet)
+        else:
+            ray.init(address=scheduler, **quiet)
+    except (ConnectionError, ValueError, RuntimeError) as error:
+        raise DeviceError(f"Ray does not start: {' '.join(str(error).split())}") from None
+    try:
+        register_ray()  # type: ignore[no-untyped-call]
+        yield int(ray.cluster_resources().get("CPU", jobs))  # type: ignore[no-untyped-call]
+    finally:
+        ray.shutdown()
+
+
+#: This process alone.
+HERE = Workers()
+
+
 def run(
     realise: Callable[[dict[str, Any], int], Any],
     tasks: Sequence[Task],
     results: Results,
     *,
-    jobs: int = 1,
+    workers: Workers = HERE,
     title: str = "",
     quiet: bool = False,
 ) -> None:
@@ -133,9 +245,9 @@ def run(
     realise : function of (params, seed)
         Pure: the same arguments give the same result, which JSON can hold.
     tasks : sequence of Task
+        Begun in this order: the longest first where they differ much.
     results : Results
-    jobs : int, 1 or more
-        Processes. With 1 everything stays in this one.
+    workers : Workers
     title : str
         What the progress line says.
     quiet : bool
@@ -143,35 +255,33 @@ def run(
 
     Raises
     ------
-    ProblemError : `jobs` below 1
+    DeviceError : a cluster that does not answer
     """
-    jobs = arguments.whole("jobs", jobs, 1)
     wanted = list({t.key(results.code): t for t in tasks if t not in results}.values())
     if not wanted:
         return
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, TimeRemainingColumn(), disable=quiet) as progress:
         bar = progress.add_task(title, total=len(tasks), completed=len(tasks) - len(wanted))
-        for task, result, seconds in _realised(realise, wanted, jobs):
+        for task, result, seconds in _realised(realise, wanted, workers):
             results.add(task, result, seconds)
             progress.advance(bar)
 
 
 def _realised(
-    realise: Callable[[dict[str, Any], int], Any], tasks: Sequence[Task], jobs: int
+    realise: Callable[[dict[str, Any], int], Any], tasks: Sequence[Task], workers: Workers
 ) -> Iterator[tuple[Task, Any, float]]:
-    if jobs == 1:
+    if workers == HERE:
         for task in tasks:
             yield (task, *_one(realise, task))
         return
-    parallel = joblib.Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1)
-    calls = (joblib.delayed(_numbered)(realise, k, task) for k, task in enumerate(tasks))
-    try:
-        for k, result, seconds in parallel(calls):
-            yield tasks[k], result, seconds
-    except KeyboardInterrupt:
-        joblib.externals.loky.get_reusable_executor().shutdown(wait=False, kill_workers=True)
-        raise
+    calls = [joblib.delayed(_numbered)(realise, k, task) for k, task in enumerate(tasks)]
+    with workers.joblib() as parallel:
+        # joblib gives Ray's results in a list at the end of a call only: a call for a few of them at a time.
+        size = 8 * parallel.n_jobs if workers.backend == "ray" else len(calls)
+        for first in range(0, len(calls), size):
+            for k, result, seconds in parallel(calls[first : first + size]):
+                yield tasks[k], result, seconds
 
 
 def _one(realise: Callable[[dict[str, Any], int], Any], task: Task) -> tuple[Any, float]:

@@ -23,7 +23,7 @@ from taxel.studies.gait.realise import TEST, Setting, realise
 from taxel.studies.gait.recipes import ENCODERS, NOTES, PRINTED, RULE_ENCODERS, SEARCH, TONIC, Point
 from taxel.studies.gait.rules import RULES
 from taxel.studies.gait.sources import SOURCES, encoded, fingerprint, present
-from taxel.studies.runner import Results, Task, code_digest, run
+from taxel.studies.runner import HERE, Results, Task, Workers, code_digest, run
 
 __all__ = ["PROTOCOLS", "ROWS", "Outcome", "Protocol", "Unit", "study"]
 
@@ -249,7 +249,7 @@ def study(
     test: Path | None = None,
     *,
     size: str = "full",
-    jobs: int = 1,
+    workers: Workers = HERE,
     report: Path,
     only: Sequence[str] = (),
     quiet: bool = False,
@@ -264,8 +264,7 @@ def study(
         Other people: everything is trained on `data` and judged there, instead of by folds.
     size : {"full", "toy"}
         Toy: people left out only, the first event only, two points to choose from.
-    jobs : int
-        Processes.
+    workers : Workers
     report : Path
         Folder for results (JSON lines), folds, and the report.
     only : sequence of str
@@ -289,7 +288,6 @@ def study(
     test = None if test is None else Path(arguments.path("test", test))
     arguments.text("size", size, ("full", "toy"))
     only = [arguments.text("only", name, SOURCES) for name in arguments.several("only", only)]
-    jobs = arguments.whole("jobs", jobs, 1)
     folders = _sources(data, only)
     tests = {} if test is None else _sources(test, only)
     wanted = [name for name in SOURCES if name in folders and (test is None or name in tests)]
@@ -303,9 +301,9 @@ def study(
     for plan in plans:
         title = f"{plan.source}, {plan.protocol.name}"
         first = _first(plan, size)
-        run(call, first, results, jobs=jobs, title=title, quiet=quiet)
+        run(call, first, results, workers=workers, title=title, quiet=quiet)
         second = _second(plan, size, results)
-        run(call, second, results, jobs=jobs, title=f"{title}: chosen", quiet=quiet)
+        run(call, second, results, workers=workers, title=f"{title}: chosen", quiet=quiet)
         outcomes += _outcomes(plan, size, results)
         seconds += results.seconds([*first, *second])
     skipped = [SOURCES[n].folder for n in SOURCES if n not in wanted and (not only or n in only)]

@@ -1,0 +1,153 @@
+"""Figure 6.10: dense against sparse weights under three noises (thesis 6.4.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel import learn, metrics, neuron
+from taxel.studies import waves
+from taxel.studies.runner import Task
+from taxel.studies.study import Parameters, Row, Said, Statement, Study
+from taxel.studies.waves import NOISES, READINGS, TRAINED_AT, realise
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "realisations": 100,
+    "ratios": [[0.0, 4.0], [1.0, 3.0], [2.0, 2.0], [3.0, 1.0], [4.0, 0.0]],
+    "kappa": 1.08,
+    "rest": [100.0, 100.0, 100.0],
+    "readings": ["targets", "B_max"],
+    "levels": {noise: list(levels) for noise, levels in waves.LEVELS.items()},
+    "repetitions": waves.REPETITIONS,
+}
+TOY: dict[str, Any] = {
+    "realisations": 2,
+    "ratios": [[0.0, 4.0], [4.0, 0.0]],
+    "levels": {"jitter": [0, 3, 6], "background": [0, 3, 30], "shunting": [0, 3, 30]},
+    "repetitions": 5,
+}
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List the realisations: CONE-R in both trainings."""
+    settings = [{"kappa": p["kappa"], "lambdas": [*ratio, *p["rest"]]} for ratio in p["ratios"]]
+    return waves.tasks(p, settings, settings, "cone_r")
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Average the distances."""
+    return {"curves": waves.curves(p, rows)}
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 6.4.7 says, in each reading of B."""
+    found = []
+    for reading in p["readings"]:
+        curves = said["curves"][reading]
+        why = READINGS[reading]
+        clean = curves["clean"]
+        if "jitter" in clean:
+            dense, sparse = _ends(clean["jitter"], lambda level: level > 0)
+            found.append(_compared("Noise-free training: dense is best against jitter.", dense, sparse, True, why))
+        if "background" in clean:
+            dense, sparse = _ends(clean["background"], lambda level: level > 0)
+            found.append(
+                _compared("Noise-free training: sparse is best against background.", dense, sparse, False, why)
+            )
+        if "shunting" in clean:
+            dense, sparse = _ends(clean["shunting"], lambda level: 0 < level <= 10)
+            found.append(
+                _compared("Noise-free training, weak shunting (up to 10 %): sparse is worse.", dense, sparse, True, why)
+            )
+            dense, sparse = _ends(clean["shunting"], lambda level: level >= 20)
+            found.append(
+                _compared(
+                    "Noise-free training, strong shunting (20 % and more): sparse is better.", dense, sparse, False, why
+                )
+            )
+        spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
+        found.append(
+            Statement(
+                "Trained with noise, sparsity matters less.",
+                "results of sparsity were less evident",
+                "largest less smallest distance between ratios, mean over levels and noises: "
+                f"{spread['clean']:.2f} noise-free, {spread['noisy']:.2f} noisy",
+                spread["noisy"] < spread["clean"],
+                why,
+            )
+        )
+    return found
+
+
+def _ends(curve: dict[str, Any], wanted: Any) -> tuple[float, float]:
+    columns = [k for k, level in enumerate(curve["levels"]) if wanted(level)]
+    mean = np.array(curve["mean"])[:, columns].mean(axis=1)
+    return float(mean[0]), float(mean[-1])
+
+
+def _compared(says: str, dense: float, sparse: float, dense_is_better: bool, why: str) -> Statement:
+    holds = dense < sparse if dense_is_better else sparse < dense
+    return Statement(
+        says,
+        "dense below sparse" if dense_is_better else "sparse below dense",
+        f"distance, mean: {dense:.2f} dense (0 : 4), {sparse:.2f} sparse (4 : 0)",
+        bool(holds),
+        why,
+    )
+
+
+def _spread(curves: dict[str, Any]) -> float:
+    spreads = []
+    for curve in curves.values():
+        columns = [k for k, level in enumerate(curve["levels"]) if level >= TRAINED_AT]
+        mean = np.array(curve["mean"])[:, columns]
+        spreads.append(float((mean.max(axis=0) - mean.min(axis=0)).mean()))
+    return float(np.mean(spreads))
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw 6.10 once a reading: left noise-free, right noisy training; rows jitter, background, shunting."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(7.5 * len(p["readings"]), 8.5), layout="constrained")
+    parts = figure.subfigures(1, len(p["readings"]), squeeze=False)[0]
+    for part, reading in zip(parts, p["readings"], strict=True):
+        part.suptitle(READINGS[reading])
+        axes = part.subplots(len(p["levels"]), 2, squeeze=False)
+        for row, noise in enumerate(p["levels"]):
+            for column, training in enumerate(("clean", "noisy")):
+                curve = said["curves"][reading][training][noise]
+                for k, ratio in enumerate(p["ratios"]):
+                    label = f"{ratio[0]:g} : {ratio[1]:g}"
+                    axes[row, column].errorbar(curve["levels"], curve["mean"][k], curve["sem"][k], label=label, lw=1.2)
+                axes[row, column].set_xlabel(f"{noise}, {NOISES[noise]}")
+                axes[row, column].set_ylabel("distance")
+                axes[row, column].set_ylim(bottom=0)
+        axes[0, 0].set_title("trained without noise")
+        axes[0, 1].set_title("trained with noise")
+        axes[0, 0].legend(title="lambda 1 : lambda 2", fontsize="small")
+    return figure
+
+
+STUDY = Study(
+    name="fig6.10",
+    title="dense against sparse weights under jitter, background and shunting",
+    where="thesis 6.4.7, figure 6.10",
+    protocol=waves.PROTOCOL
+    + " CONE-R in both trainings, kappa 1.08, lambda 3 to 5 at 100, lambda 1 : lambda 2 varied.",
+    parameters=PARAMETERS,
+    sizes={"toy": TOY},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+    code=(learn, metrics, neuron),
+)

@@ -1,0 +1,268 @@
+"""What a study is: a protocol, its parameters, the published values as data, a picture, and what holds."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import platform
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from taxel import _arguments as arguments
+from taxel._core import FormatError, ProblemError
+from taxel._files import write_whole
+from taxel.studies.runner import HERE, Results, Task, Workers, code_digest, run
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Parameters", "Row", "Said", "Section", "Statement", "Study"]
+
+#: Experiment parameters by name: what JSON can hold.
+Parameters = Mapping[str, Any]
+#: What a study found, as JSON holds it: enough to judge its statements and to draw its picture.
+Said = dict[str, Any]
+#: One study's part of the page, as ``summary.json`` holds it.
+Section = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Statement:
+    """Hold a published statement beside what was found.
+
+    Attributes
+    ----------
+    says : str
+        The statement, in the source's words or close to them.
+    published : str
+        Its value.
+    ours : str
+    holds : bool, optional
+        None: nothing to hold it against (the picture is lost, or too little was run).
+    why : str
+        Why it does not hold; or the reading under which it does.
+    """
+
+    says: str
+    published: str
+    ours: str
+    holds: bool | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Hold one realisation and its result."""
+
+    params: dict[str, Any]
+    seed: int
+    result: Any
+
+
+@dataclass(frozen=True)
+class Study:
+    """Describe a study: everything that the runner, the page and the command line need.
+
+    Attributes
+    ----------
+    name, title, where : str
+        As in ``taxel study NAME``; one line; its place in the source.
+    protocol : str
+        What is done, in plain words, with the readings that were used.
+    parameters : mapping
+        The experiment at full size.
+    sizes : mapping of mappings
+        What other sizes change of it; "toy" shows that it runs, in seconds.
+    tasks : function of parameters
+        The realisations. Of studies on recordings also of the folder that holds them.
+    realise : function of (params, seed)
+        Pure. Of studies on recordings also of ``data``.
+    summarise : function of (parameters, rows)
+        Plain values for JSON: numbers and curves.
+    statements : function of (parameters, said)
+    draw : function of (parameters, said)
+        The picture, as the source draws it.
+    code : tuple of modules
+        What a realisation uses beside its own file: when they change, results are reckoned anew.
+    data : tuple of str
+        Folders of recordings that it needs.
+    """
+
+    name: str
+    title: str
+    where: str
+    protocol: str
+    parameters: Parameters
+    sizes: Mapping[str, Parameters]
+    tasks: Callable[..., Sequence[Task]]
+    realise: Callable[..., Any]
+    summarise: Callable[[Parameters, Sequence[Row]], Said]
+    statements: Callable[[Parameters, Said], Sequence[Statement]]
+    draw: Callable[[Parameters, Said], Figure]
+    code: tuple[ModuleType, ...] = ()
+    data: tuple[str, ...] = field(default=())
+
+    def set(self, size: str = "full", **changes: Any) -> dict[str, Any]:
+        """Return the parameters of a size, with changes.
+
+        Raises
+        ------
+        ProblemError : a size or a parameter that is none, or a value of another kind
+        """
+        arguments.text("size", size, ("full", *self.sizes))
+        values = {**self.parameters, **self.sizes.get(size, {})}
+        for name, value in changes.items():
+            if name not in values:
+                raise ProblemError(f"{self.name} has no parameter {name!r}: there are {', '.join(values)}")
+            if not _alike(value, values[name]):
+                raise ProblemError(
+                    f"{name} is {arguments.shown(value)}: must be of the kind of {arguments.shown(values[name])}"
+                )
+            values[name] = value
+        if "realisations" in values:
+            arguments.whole("realisations", values["realisations"], 1)
+        return values
+
+    def run(
+        self,
+        report: Path,
+        *,
+        size: str = "full",
+        changes: Mapping[str, Any] | None = None,
+        data: Path | None = None,
+        workers: Workers = HERE,
+        quiet: bool = False,
+    ) -> Section:
+        """Run what is not in `report` yet, draw, judge; leave ``summary.json`` and the picture there.
+
+        Parameters
+        ----------
+        report : Path
+            Of all studies; this one's folder in it has its name.
+        size : str
+            "full", "toy" ...
+        changes : mapping, optional
+            Parameters that differ from the size's.
+        data : Path, optional
+            Where the recordings lie, for the studies that need some.
+        workers : Workers
+        quiet : bool
+            No progress line.
+
+        Returns
+        -------
+        dict
+
+        Raises
+        ------
+        ProblemError : a size or parameter that is none
+        FormatError : recordings that it needs are not there
+        """
+        parameters = self.set(size, **(changes or {}))
+        tasks, realise = self.tasks, self.realise
+        if self.data:
+            folder = self._recordings(data)
+            tasks, realise = partial(tasks, data=folder), partial(realise, data=folder)
+        folder = report / self.name
+        folder.mkdir(parents=True, exist_ok=True)
+        results = Results(folder / "results.jsonl", code_digest((sys.modules[self.realise.__module__], *self.code)))
+        wanted = list(tasks(parameters))
+        begun = time.time()
+        run(realise, wanted, results, workers=workers, title=self.name, quiet=quiet)
+        said = self.summarise(parameters, [Row(t.params, t.seed, results[t]) for t in wanted])
+        section = {
+            "name": self.name,
+            "title": self.title,
+            "where": self.where,
+            "protocol": self.protocol,
+            "size": size,
+            "parameters": parameters,
+            "realisations": len(wanted),
+            "statements": [asdict(s) for s in self.statements(parameters, said)],
+            "said": said,
+            "cpu_seconds": round(results.seconds(wanted), 1),
+            "wall_seconds": round(time.time() - begun, 1),
+            "code": results.code,
+            **machine(),
+        }
+        write_section(folder, section, [self.draw(parameters, said)])
+        return section
+
+    def _recordings(self, data: Path | None) -> Path:
+        missing = [name for name in self.data if data is None or not (data / name).is_dir()]
+        if data is None or len(missing) == len(self.data):
+            raise FormatError(
+                f"{data or self.name}: holds no recordings; name a folder with any of {', '.join(self.data)} by --data"
+            )
+        return data
+
+
+def _alike(value: Any, other: Any) -> bool:
+    if isinstance(other, bool) or isinstance(value, bool):
+        return isinstance(value, bool) and isinstance(other, bool)
+    if isinstance(other, int | float):
+        return isinstance(value, int | float) and (isinstance(value, int) or isinstance(other, float))
+    if isinstance(other, list | tuple):
+        return isinstance(value, list | tuple) and all(_alike(v, other[0]) for v in value if other)
+    return isinstance(value, type(other))
+
+
+def machine() -> dict[str, Any]:
+    """Return what a reader needs to place the times: processor, versions, date."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    cpu = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.processor())
+    from taxel import __version__  # noqa: PLC0415  the package imports its rooms
+
+    return {
+        "machine": f"{platform.machine()}, {cpu}",
+        "versions": {
+            "taxel": __version__,
+            "python": platform.python_version(),
+            **{name: metadata.version(name) for name in ("numpy", "scipy", "matplotlib")},
+        },
+        "date": time.strftime("%Y-%m-%d", time.gmtime()),
+    }
+
+
+def write_section(folder: Path, section: Section, pictures: Sequence[Figure]) -> None:
+    """Write a study's summary and its pictures, each whole; the summary names the pictures."""
+    names = []
+    for number, figure in enumerate(pictures, 1):
+        name = "figure.png" if len(pictures) == 1 else f"figure-{number}.png"
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="png", dpi=150, bbox_inches="tight", facecolor="white")
+        write_whole(folder / name, partial(_put, buffer.getvalue()), overwrite=True)
+        names.append(name)
+    text = json.dumps(section | {"pictures": names}, indent=1) + "\n"
+    write_whole(folder / "summary.json", partial(_put, text.encode()), overwrite=True)
+
+
+def _put(data: bytes, file: BinaryIO) -> None:
+    file.write(data)
+
+
+def read_section(folder: Path) -> Section | None:
+    """Return what `write_section` left, pictures as data addresses; None where nothing was run."""
+    path = folder / "summary.json"
+    if not path.exists():
+        return None
+    try:
+        section: Section = json.loads(path.read_text(encoding="utf-8"))
+        names = section["pictures"]
+    except (ValueError, KeyError, TypeError):
+        raise FormatError(f"{path}: is no summary of a study; name another folder by --report") from None
+    section["images"] = [
+        f"data:image/png;base64,{base64.b64encode((folder / name).read_bytes()).decode()}" for name in names
+    ]
+    return section
