@@ -238,4 +238,5 @@ def _number(value: float | None) -> str:
 
 
 for _name, _title in STUDIES.items():
-    _add(_name, _title)
+    if _name != "gait":
+        _add(_name, _title)

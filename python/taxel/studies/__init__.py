@@ -1,6 +1,7 @@
 """Studies: a protocol, its parameters, the published values as data, and a runner that gives all of them the rest.
 
-A study is a file of this folder whose `STUDY` is a `taxel.studies.study.Study`, and a line in `STUDIES`.
+A study is a file of this folder whose `STUDY` is a `taxel.studies.study.Study` (or runs like one), and a line in
+`STUDIES`.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from taxel.studies.study import Study
+    from taxel.studies.study import Runs
 
 __all__ = ["STUDIES", "load"]
 
@@ -17,10 +18,11 @@ __all__ = ["STUDIES", "load"]
 STUDIES = {
     "fig6.10": "dense against sparse weights under jitter, background and shunting",
     "fig6.11": "how the weights are distributed, trained without noise and with it",
+    "gait": "gait events by one neuron an event, on published walking recordings (6.12 to 6.14)",
 }
 
 
-def load(name: str) -> Study:
+def load(name: str) -> Runs:
     """Return a study by its name in `STUDIES`."""
-    study: Study = import_module(f"taxel.studies.{name.replace('.', '_')}").STUDY
+    study: Runs = import_module(f"taxel.studies.{name.replace('.', '_')}").STUDY
     return study

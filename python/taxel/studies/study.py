@@ -14,7 +14,7 @@ from functools import partial
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 from taxel import _arguments as arguments
 from taxel._core import FormatError, ProblemError
@@ -24,7 +24,18 @@ from taxel.studies.runner import HERE, Results, Task, Workers, code_digest, run
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Parameters", "Row", "Said", "Section", "Statement", "Study"]
+__all__ = [
+    "Parameters",
+    "Row",
+    "Runs",
+    "Said",
+    "Section",
+    "Statement",
+    "Study",
+    "machine",
+    "read_section",
+    "write_section",
+]
 
 #: Experiment parameters by name: what JSON can hold.
 Parameters = Mapping[str, Any]
@@ -32,6 +43,42 @@ Parameters = Mapping[str, Any]
 Said = dict[str, Any]
 #: One study's part of the page, as ``summary.json`` holds it.
 Section = dict[str, Any]
+
+
+class Runs(Protocol):
+    """Say what the page and the command line ask of a study; `Study` is one."""
+
+    @property
+    def name(self) -> str:
+        """As in ``taxel study NAME``."""
+
+    @property
+    def title(self) -> str:
+        """One line."""
+
+    @property
+    def parameters(self) -> Parameters:
+        """Of full size."""
+
+    @property
+    def sizes(self) -> Mapping[str, Parameters]:
+        """What other sizes change."""
+
+    @property
+    def data(self) -> tuple[str, ...]:
+        """Folders of recordings, any of which it needs."""
+
+    def run(
+        self,
+        report: Path,
+        *,
+        size: str = "full",
+        changes: Parameters | None = None,
+        data: Path | None = None,
+        workers: Workers = HERE,
+        quiet: bool = False,
+    ) -> Section:
+        """Run, judge, draw; leave a summary in ``report``."""
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,12 @@
 
 The files in the order of the way: `sources` (recordings, their truth, their spikes), `insole` (a plate's footfall as an
 insole feels it), `pieces`, `folds`, `recipes` (all parameters, as data), `realise` (one fit and its test), `rules` (the
-plain rules beside it), `protocols` (what is run), `report`.
+plain rules beside it), `protocols` (what is run), `report`, `section` (its part of the page of all studies).
 """
 
 from taxel.studies.gait.protocols import study
+from taxel.studies.gait.section import GaitStudy
 
-__all__ = ["study"]
+__all__ = ["STUDY", "study"]
+
+STUDY = GaitStudy()

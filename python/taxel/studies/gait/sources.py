@@ -21,7 +21,7 @@ from taxel.frames import Frames
 from taxel.studies.gait import insole
 from taxel.studies.gait.pieces import Piece
 
-__all__ = ["SOURCES", "Source", "encoder_of", "fingerprint", "present", "trials_of"]
+__all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "encoder_of", "fingerprint", "present", "trials_of"]
 
 #: Silence before each footfall of the plate, ms: random, so that no cut marks time.
 SILENCE_MS = (300, 900)
@@ -217,14 +217,14 @@ def _walks(folder: Path, name: str, encoder: Any, _placed: str) -> list[Piece]:
 
 
 def _footfalls(folder: Path, name: str, encoder: Any, placed: str) -> list[Piece]:
-    cuts = _cuts(folder, name, placed)
+    all_cuts = cuts(folder, name, placed)
     found = []
-    for person in dict.fromkeys(c.person for c in cuts):
-        found += _row([c for c in cuts if c.person == person], encoder)
+    for person in dict.fromkeys(c.person for c in all_cuts):
+        found += _row([c for c in all_cuts if c.person == person], encoder)
     return found
 
 
-def _row(cuts: list[_Cut], encoder: Any) -> list[Piece]:
+def _row(cuts: list[Cut], encoder: Any) -> list[Piece]:
     """Encode a person's footfalls as one row with random silences, and take it apart again into pieces."""
     rng = np.random.default_rng([int.from_bytes(hashlib.sha256(cuts[0].person.encode()).digest()[:4])])
     order = rng.permutation(len(cuts))
@@ -263,7 +263,7 @@ def _row(cuts: list[_Cut], encoder: Any) -> list[Piece]:
 
 
 @dataclass(frozen=True)
-class _Cut:
+class Cut:
     """One footfall as the insole feels it; truth in ms from its first frame."""
 
     name: str
@@ -273,7 +273,7 @@ class _Cut:
 
 
 @lru_cache(maxsize=4)
-def _cuts(folder: Path, name: str, placed: str) -> tuple[_Cut, ...]:
+def cuts(folder: Path, name: str, placed: str) -> tuple[Cut, ...]:
     """Cut every footfall, once all footprints are known."""
     feet = [_boxed(t) for t in formats.FORMATS[name].trials(folder)]
     prints = [insole.footprint(t) for t in feet]
@@ -284,7 +284,7 @@ def _cuts(folder: Path, name: str, placed: str) -> tuple[_Cut, ...]:
         ]
         frames = insole.cut(trial, prints[k].origin_mm, insole.placement(others))
         truth = {e: times / 1000 for e, times in trial.truth.items()}
-        found.append(_Cut(trial.name, trial.person, frames.values[:, 0, :], truth))
+        found.append(Cut(trial.name, trial.person, frames.values[:, 0, :], truth))
     return tuple(found)
 
 
