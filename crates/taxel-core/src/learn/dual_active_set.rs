@@ -31,7 +31,9 @@ const BLOCK: usize = 64;
 /// Candidates for single steps between two looks at all rows.
 const QUEUE: usize = 16;
 /// Block exchanges in one call of `solve`, after which single steps go on.
-const EXCHANGES: usize = 40;
+const EXCHANGES: usize = 60;
+/// How many of them in a row may leave the dual below its best before they look where they step.
+const BOLD: usize = 3;
 
 /// Names an inequality, in the order in which they were added; never given twice.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -279,7 +281,8 @@ impl DualActiveSet {
     /// None so far; a stop is a verdict.
     pub fn solve(&mut self, stop: Stop<'_>) -> Result<Verdict> {
         self.extend_gram();
-        let mut exchanges = EXCHANGES;
+        let (mut exchanges, mut bold) = (EXCHANGES, BOLD);
+        let mut best: Option<(f64, Vec<usize>, Vec<f64>)> = None;
         let mut undecided: Vec<usize> = Vec::new();
         loop {
             if stop.asked() {
@@ -301,10 +304,30 @@ impl DualActiveSet {
             }
             if exchanges > 0 && candidates.len() > 1 {
                 exchanges -= 1;
-                let before = self.active.len();
-                self.take(&candidates.iter().map(|c| c.0).collect::<Vec<_>>());
-                if self.active.len() > before {
-                    self.settle();
+                let slots: Vec<usize> = candidates.iter().map(|c| c.0).collect();
+                let (held, here) = (self.active.len(), self.dual(&self.weights));
+                if bold > 0 {
+                    if best.as_ref().is_none_or(|b| here < b.0) {
+                        best = Some((here, self.active.clone(), self.multipliers.clone()));
+                        bold = BOLD;
+                    } else {
+                        bold -= 1;
+                    }
+                    if bold == 0
+                        && let Some((_, active, multipliers)) = best.take()
+                    {
+                        self.release();
+                        self.hold(&active, &multipliers);
+                        continue;
+                    }
+                }
+                self.take(&slots);
+                if self.active.len() > held {
+                    if bold > 0 {
+                        self.project();
+                    } else {
+                        self.settle();
+                    }
                     continue;
                 }
             }
@@ -329,7 +352,10 @@ impl DualActiveSet {
                     }
                     if self.dependent + 1 < DEPENDENT.len() {
                         self.dependent += 1;
-                        self.refactor();
+                        let (active, multipliers) = (self.active.clone(), self.multipliers.clone());
+                        self.release();
+                        self.hold(&active, &multipliers);
+                        self.settle();
                     } else {
                         undecided.push(slot);
                     }
@@ -471,21 +497,16 @@ impl DualActiveSet {
 
     /// Computes weights and every row's excess; refines the active rows where they need it, or to the end.
     fn measure(&mut self, last: bool) {
-        self.weights = self.combined();
+        let enough = if last { REFINED } else { 0.1 * TOLERANCE };
         let mut worst = f64::INFINITY;
-        for _ in 0..4 {
-            let mut residuals = self.residuals(&self.weights);
-            let now = residuals.iter().fold(0.0, |worst: f64, r| worst.max(r.abs()));
-            if now <= if last { REFINED } else { 0.1 * TOLERANCE } || now > 0.5 * worst {
+        for round in 0..4 {
+            self.weights = self.combined();
+            let now = self.residuals(&self.weights).iter().fold(0.0, |worst: f64, r| worst.max(r.abs()));
+            if now <= enough || now > 0.5 * worst || round == 3 {
                 break;
             }
             worst = now;
-            self.factor.forward(&mut residuals);
-            self.factor.backward(&mut residuals);
-            for (change, &slot) in residuals.iter().zip(&self.active) {
-                self.multipliers[slot] += change;
-            }
-            self.weights = self.combined();
+            self.settle();
         }
         let mut values = vec![0.0; self.live.len()];
         rows_times(&self.coefficients, self.stride, &self.live, &self.weights, &mut values);
@@ -567,27 +588,24 @@ impl DualActiveSet {
         }
     }
 
-    /// Factors the active rows anew, by single rows with exact pivots.
-    fn refactor(&mut self) {
-        let slots = std::mem::take(&mut self.active);
-        let held: Vec<f64> = slots.iter().map(|&slot| self.multipliers[slot]).collect();
-        for &slot in &slots {
-            self.place[slot] = None;
-            self.multipliers[slot] = 0.0;
-        }
-        self.factor.clear();
-        for (&slot, &u) in slots.iter().zip(&held) {
-            let mut d = self.products(slot);
-            self.factor.forward(&mut d);
-            let (pivot, _) = self.pivot(slot, &d);
-            if pivot > DEPENDENT[self.dependent] {
-                self.factor.push(&d, pivot.sqrt());
-                self.place[slot] = Some(self.active.len());
-                self.active.push(slot);
-                self.multipliers[slot] = u;
+    /// Holds these rows with their multipliers: in blocks, then one by one, with exact pivots, those that nearly depend.
+    fn hold(&mut self, slots: &[usize], multipliers: &[f64]) {
+        self.take(slots);
+        for &slot in slots {
+            if self.place[slot].is_none() {
+                let mut d = self.products(slot);
+                self.factor.forward(&mut d);
+                let (pivot, _) = self.pivot(slot, &d);
+                if pivot > DEPENDENT[self.dependent] && self.active.len() < self.lower.len() {
+                    self.factor.push(&d, pivot.sqrt());
+                    self.place[slot] = Some(self.active.len());
+                    self.active.push(slot);
+                }
             }
         }
-        self.settle();
+        for &slot in &self.active {
+            self.multipliers[slot] = multipliers[slot];
+        }
     }
 
     /// The squared pivot of a row whose `L^-1 g` is `d`, and its coordinates r in the active rows.
@@ -663,49 +681,71 @@ impl DualActiveSet {
         }
     }
 
-    /// Moves the multipliers to the optimum of the active rows; lets go of those that would turn negative.
-    ///
-    /// Each projection must lower the dual, `|A'u|^2 / 2 + limit.u`, so what was reached is never lost.
-    fn settle(&mut self) {
+    /// The step from the multipliers to the optimum of the active rows, and the weights where it begins.
+    fn newton(&self) -> (Vec<f64>, Vec<f64>) {
+        let weights = self.combined();
+        let mut change = self.residuals(&weights);
+        self.factor.forward(&mut change);
+        self.factor.backward(&mut change);
+        (change, weights)
+    }
+
+    /// Moves the active multipliers along `change`, those of inequalities not below 0.
+    fn advance(&mut self, from: &[f64], change: &[f64], length: f64) {
+        for ((&slot, u), change) in self.active.iter().zip(from).zip(change) {
+            let to = u + length * change;
+            let equality = matches!(self.rows[slot].kind, Kind::Equality(_));
+            self.multipliers[slot] = if equality { to } else { to.max(0.0) };
+        }
+    }
+
+    /// Places of inequalities whose multiplier is 0 and would fall.
+    fn falling(&self, change: &[f64]) -> Vec<usize> {
+        let falls = |&k: &usize| {
+            let slot = self.active[k];
+            !self.is_equality(slot) && self.multipliers[slot] <= 0.0 && change[k] < 0.0
+        };
+        (0..self.active.len()).filter(falls).collect()
+    }
+
+    /// Finds an optimum of some of the active rows: lets go of all whose multiplier would turn negative, again and again.
+    fn project(&mut self) {
         loop {
-            let weights = self.combined();
-            let mut change = self.residuals(&weights);
-            let here = self.dual(&weights);
-            self.factor.forward(&mut change);
-            self.factor.backward(&mut change);
+            let (change, _) = self.newton();
             let from: Vec<f64> = self.active.iter().map(|&slot| self.multipliers[slot]).collect();
-            let mut first: f64 = 1.0;
-            let mut negative = false;
-            for ((&slot, &u), &change) in self.active.iter().zip(&from).zip(&change) {
-                if !self.is_equality(slot) && u + change < 0.0 {
-                    negative = true;
-                    if u > 0.0 {
-                        first = first.min(-u / change);
-                    }
-                }
-            }
-            if !negative {
-                for (&slot, change) in self.active.iter().zip(&change) {
-                    self.multipliers[slot] += change;
-                }
+            self.advance(&from, &change, 1.0);
+            let falling = self.falling(&change);
+            if falling.is_empty() {
                 return;
             }
-            for length in [1.0, 0.5, 0.25, first.min(0.2)] {
-                for ((&slot, &u), &change) in self.active.iter().zip(&from).zip(&change) {
-                    let to = u + length * change;
-                    self.multipliers[slot] = if self.is_equality(slot) { to } else { to.max(0.0) };
-                }
+            self.leave(&falling, None);
+        }
+    }
+
+    /// As `project`, but each move lowers `|A'u|^2 / 2 + limit.u` (the dual, its sign turned).
+    fn settle(&mut self) {
+        loop {
+            let (change, weights) = self.newton();
+            let falling = self.falling(&change);
+            if !falling.is_empty() {
+                self.leave(&falling, None);
+                continue;
+            }
+            let here = self.dual(&weights);
+            let from: Vec<f64> = self.active.iter().map(|&slot| self.multipliers[slot]).collect();
+            let until = |k: usize| if self.is_equality(self.active[k]) { f64::INFINITY } else { -from[k] / change[k] };
+            let first = (0..from.len()).filter(|&k| change[k] < 0.0).map(until).fold(1.0, f64::min);
+            for length in [1.0, 0.5, 0.25, first] {
+                self.advance(&from, &change, length.max(first));
                 if length <= first || self.dual(&self.combined()) < here {
                     break;
                 }
             }
-            let places: Vec<usize> = (0..self.active.len())
-                .filter(|&k| {
-                    let slot = self.active[k];
-                    !self.is_equality(slot) && self.multipliers[slot] <= 0.0 && change[k] < 0.0
-                })
-                .collect();
-            self.leave(&places, None);
+            let falling = self.falling(&change);
+            if falling.is_empty() {
+                return;
+            }
+            self.leave(&falling, None);
         }
     }
 
@@ -734,7 +774,8 @@ impl DualActiveSet {
     fn proof(&self, by_slot: Vec<f64>) -> Option<Ray> {
         let bounds = |slot: usize| matches!(self.rows[slot].kind, Kind::Lower(_) | Kind::Upper(_));
         let slots: Vec<usize> = self.live.iter().copied().filter(|&s| by_slot[s] != 0.0 && !bounds(s)).collect();
-        let by: Vec<f64> = slots.iter().map(|&slot| by_slot[slot]).collect();
+        let by: Vec<f64> =
+            slots.iter().map(|&s| if self.is_equality(s) { by_slot[s] } else { by_slot[s].max(0.0) }).collect();
         let mut g = vec![0.0; self.stride];
         add_rows(&self.coefficients, self.stride, &slots, &by, &mut g);
         let (mut least, mut size, mut widest) = (0.0, 0.0, 0.0_f64);
