@@ -1,15 +1,37 @@
 //! Weights from examples: patterns of input spikes, and the times at which the neuron shall fire.
 
+mod chronotron;
 mod cone_program;
 mod cone_r;
 mod dual_active_set;
+mod epochs;
+mod filt;
+mod fp;
+mod htp;
+mod inst;
 #[allow(dead_code)]
 mod mixed;
+mod psd;
+mod resume;
+mod rival;
 mod rounds;
 mod rows;
+mod span;
+mod stepped;
 
+pub use chronotron::{ELearning, ILearning};
 pub use cone_r::{ConeR, Divisor, Fit, Norm, Parts, Problem, Round, Status};
 pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
+pub use epochs::{Ended, Trained, Training, Updates};
+pub use filt::Filt;
+pub use fp::Fp;
+pub use htp::Htp;
+pub use inst::Inst;
+pub use psd::Psd;
+pub use resume::Resume;
+pub use rival::{Law, Rival};
+pub use span::Span;
+pub use stepped::{Current, Reset, SteppedNeuron};
 
 use crate::neuron::Neuron;
 use crate::{Result, SpikeTrains, problem};

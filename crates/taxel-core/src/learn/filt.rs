@@ -1,0 +1,63 @@
+//! FILT: filtered differences of spikes (Gardner and Grüning 2016, PLoS ONE 11(8) e0161335).
+
+use serde::{Deserialize, Serialize};
+
+use super::epochs::{Correction, Presented, Rule, targets_less_fired};
+use super::inst::{published_eta, published_initial};
+use super::rival::check_above_0;
+use super::stepped::{Current, SteppedNeuron, peak_factor};
+use crate::{Result, problem};
+
+/// INST with both spike trains filtered by `e^{-s/tau_q}`: an input counts by
+/// `eps_0 (C_m e^{-s/tau} - C_s e^{-s/tau_s})`, with `C = tau / (tau + tau_q)`, before a spike, and by
+/// `eps_0 (C_m - C_s) e^{s/tau_q}` after it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Filt {
+    /// Time constant of the filter, ms.
+    pub tau_q: f64,
+}
+
+pub(super) struct FiltRule {
+    eps_0: f64,
+    tau: f64,
+    tau_s: f64,
+    tau_q: f64,
+    c_m: f64,
+    c_s: f64,
+}
+
+impl Filt {
+    pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<FiltRule> {
+        check_above_0("tau_q", self.tau_q, " ms")?;
+        let (tau, tau_q) = (neuron.tau, self.tau_q);
+        let Current::Exponential { tau_s } = neuron.current else {
+            return Err(problem!("current is a double exponential: FILT is stated for an exponential one"));
+        };
+        let eps_0 = peak_factor(tau, tau_s);
+        Ok(FiltRule { eps_0, tau, tau_s, tau_q, c_m: tau / (tau + tau_q), c_s: tau_s / (tau_s + tau_q) })
+    }
+}
+
+impl Rule for FiltRule {
+    fn factor(&self, since: f64) -> f64 {
+        self.eps_0
+            * if since > 0.0 {
+                self.c_m * (-since / self.tau).exp() - self.c_s * (-since / self.tau_s).exp()
+            } else {
+                (self.c_m - self.c_s) * (since / self.tau_q).exp()
+            }
+    }
+
+    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
+        targets_less_fired(of.targets, fired, out);
+    }
+
+    fn eta(&self, trains: usize, targets: usize) -> Option<f64> {
+        Some(published_eta(trains, targets))
+    }
+
+    fn initial(&self, trains: usize) -> Option<[f64; 2]> {
+        Some(published_initial(trains))
+    }
+}

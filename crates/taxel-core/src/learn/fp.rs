@@ -1,0 +1,59 @@
+//! FP-learning: finite precision (Memmesheimer, Rubin, Ölveczky and Sompolinsky 2014, Neuron 82:925).
+
+use serde::{Deserialize, Serialize};
+
+use super::epochs::{Correction, Presented, Rule};
+use super::rival::{check_above_0, check_linear};
+use super::stepped::{Reset, Shape, SteppedNeuron};
+use crate::Result;
+
+/// Only the *first* error of a trial changes weights, by the potential that each input makes there; the trial then ends.
+///
+/// An output spike farther than `window_ms` from its target, or a second one at it, lowers at its time; a target whose
+/// window ends without a spike raises at the window's end.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Fp {
+    /// How far from its target a spike may lie, ms.
+    pub window_ms: f64,
+}
+
+pub(super) struct FpRule {
+    shape: Shape,
+    window: f64,
+    forgets: bool,
+}
+
+impl Fp {
+    pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<FpRule> {
+        check_above_0("window_ms", self.window_ms, " ms")?;
+        check_linear("FP", neuron)?;
+        Ok(FpRule { shape: neuron.shape(), window: self.window_ms, forgets: neuron.after_spike == Reset::Reset })
+    }
+}
+
+impl Rule for FpRule {
+    fn factor(&self, since: f64) -> f64 {
+        self.shape.value(since)
+    }
+
+    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
+        let Some((t, amount)) = first_error(of.targets, fired, self.window) else { return };
+        let before = fired.iter().copied().take_while(|&f| f < t).last();
+        let after = before.filter(|_| self.forgets).unwrap_or(f64::NEG_INFINITY);
+        out.push(Correction { after, ..Correction::new(t, amount) });
+    }
+}
+
+/// When the first error of a trial is made, and whether it asks for more (1) or less (-1).
+fn first_error(targets: &[f64], fired: &[f64], window: f64) -> Option<(f64, f64)> {
+    let mut k = 0;
+    for &f in fired {
+        match targets.get(k) {
+            Some(&t) if f > t + window => return Some((t + window, 1.0)),
+            Some(&t) if f >= t - window => k += 1,
+            _ => return Some((f, -1.0)),
+        }
+    }
+    targets.get(k).map(|&t| (t + window, 1.0))
+}

@@ -1,0 +1,47 @@
+//! PSD, precise-spike-driven plasticity (Yu, Tang, Tan and Li 2013, PLoS ONE 8(11) e78318).
+
+use serde::{Deserialize, Serialize};
+
+use super::epochs::{Correction, Presented, Rule, targets_less_fired};
+use super::rival::check_above_0;
+use super::stepped::{SteppedNeuron, peak_factor};
+use crate::{Result, problem};
+
+/// `eta [sum over targets of PSC - sum over output spikes of PSC]`, PSC being the *current*
+/// `V0 (e^{-s/tau_1} - e^{-s/tau_2})`, peak 1, which the membrane filters once more.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Psd {
+    /// Slow time constant of the current, ms.
+    pub tau_1: f64,
+    /// Its fast one, ms.
+    pub tau_2: f64,
+}
+
+pub(super) struct PsdRule {
+    peak: f64,
+    tau_1: f64,
+    tau_2: f64,
+}
+
+impl Psd {
+    pub(super) fn rule(&self, _: &SteppedNeuron) -> Result<PsdRule> {
+        let (tau_1, tau_2) = (self.tau_1, self.tau_2);
+        check_above_0("tau_1", tau_1, " ms")?;
+        check_above_0("tau_2", tau_2, " ms")?;
+        if tau_2 >= tau_1 {
+            return Err(problem!("tau_2 is {tau_2} ms: must lie below tau_1, {tau_1} ms"));
+        }
+        Ok(PsdRule { peak: peak_factor(tau_1, tau_2), tau_1, tau_2 })
+    }
+}
+
+impl Rule for PsdRule {
+    fn factor(&self, since: f64) -> f64 {
+        if since > 0.0 { self.peak * ((-since / self.tau_1).exp() - (-since / self.tau_2).exp()) } else { 0.0 }
+    }
+
+    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
+        targets_less_fired(of.targets, fired, out);
+    }
+}

@@ -1,0 +1,39 @@
+//! SPAN, the spike pattern association neuron (Mohemmed et al. 2012, Int J Neural Syst 22:1250012).
+
+use serde::{Deserialize, Serialize};
+
+use super::epochs::{Correction, Presented, Rule, targets_less_fired};
+use super::rival::check_above_0;
+use super::stepped::SteppedNeuron;
+use crate::Result;
+
+/// Widrow-Hoff on inputs, targets and outputs that are all filtered by `(e / tau_a) s e^{-s/tau_a}`:
+/// `eta` times the integral of `x_i (y_d - y_o)`, in closed form
+/// `(e/2)^2 [sum over targets of (|s| + tau_a) e^{-|s|/tau_a} - the same over output spikes]`. Inputs after a spike count.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Span {
+    /// Time constant of the filter, ms.
+    pub tau_a: f64,
+}
+
+pub(super) struct SpanRule(f64);
+
+impl Span {
+    pub(super) fn rule(&self, _: &SteppedNeuron) -> Result<SpanRule> {
+        check_above_0("tau_a", self.tau_a, " ms")?;
+        Ok(SpanRule(self.tau_a))
+    }
+}
+
+impl Rule for SpanRule {
+    fn factor(&self, since: f64) -> f64 {
+        let apart = since.abs();
+        let half_e = std::f64::consts::E / 2.0;
+        half_e * half_e * (apart + self.0) * (-apart / self.0).exp()
+    }
+
+    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
+        targets_less_fired(of.targets, fired, out);
+    }
+}
