@@ -66,6 +66,22 @@ SCENE = taxel.simulate.Scene.draw(1)
 REGISTERS = taxel.wire.Registers()
 BYTES = taxel.wire.encode(EVENTS)
 
+TEMPOTRON = taxel.learn.Tempotron(eta=0.1, epochs=5).fit([PLAIN], [True])
+EPOCHS = {"eta": 0.1, "initial": (0.0, 1.0), "epochs": 5, "updates": "batch", "step_ms": 0.1, "within_ms": 1.0}
+EPOCHS |= {"until_right": True, "seed": 1, "max_seconds": 1.0, "theta_0": 1.0, "after_spike": "reset", "tau": 9.0}
+EPOCHS |= {"tau_s": 3.0}
+#: The rules that learn by epochs, each with every argument; what they share is tried again in tests/learn.
+RIVALS: list[tuple[Any, dict[str, Any]]] = [
+    (taxel.learn.INST, EPOCHS),
+    (taxel.learn.FILT, {**EPOCHS, "tau_q": 5.0}),
+    (taxel.learn.Chronotron, {**EPOCHS, "rule": "E", "tau_q": 5.0, "gamma_r": 5.0}),
+    (taxel.learn.ReSuMe, {**EPOCHS, "a": 0.1, "amplitude": 2.0, "tau_w": 5.0}),
+    (taxel.learn.SPAN, {**EPOCHS, "tau_a": 5.0}),
+    (taxel.learn.PSD, {**EPOCHS, "tau_1": 8.0, "tau_2": 2.0, "refractory": 0.0}),
+    (taxel.learn.FP, {**EPOCHS, "window_ms": 1.0}),
+    (taxel.learn.HTP, {**EPOCHS, "window_ms": 1.0}),
+]
+
 Sound = Callable[[], tuple[Callable[..., Any], dict[str, Any]]]
 
 
@@ -229,6 +245,25 @@ SOUND: dict[str, Sound] = {
     "taxel.encode.ThresholdIzhikevich": plain(
         taxel.encode.ThresholdIzhikevich, levels=[1.0], published="6.5.1", begin="settled", period_ms=0.1
     ),
+    **{f"taxel.learn.{rule.__name__}": plain(rule, **arguments) for rule, arguments in RIVALS},
+    "taxel.learn.Tempotron": plain(
+        taxel.learn.Tempotron,
+        tau=15.0,
+        tau_s=4.0,
+        theta_0=1.0,
+        eta=0.1,
+        momentum=0.5,
+        initial_sd=0.1,
+        epochs=5,
+        seed=1,
+        max_seconds=1.0,
+    ),
+    "taxel.learn.Tempotron.fit": method(
+        TEMPOTRON, "fit", patterns=[PLAIN], labels=[True], start=[0.1] * 4, progress=lambda *_: None
+    ),
+    "taxel.learn.Tempotron.predict": method(TEMPOTRON, "predict", patterns=[PLAIN]),
+    "taxel.learn.Tempotron.peak": method(TEMPOTRON, "peak", weights=[0.1] * 4, pattern=PLAIN),
+    "taxel.learn.Tempotron.change": method(TEMPOTRON, "change", weights=[0.1] * 4, pattern=PLAIN, label=True),
     "taxel.learn.ConeR": plain(
         taxel.learn.ConeR,
         tau=5.0,

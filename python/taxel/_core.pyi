@@ -280,3 +280,36 @@ class ConeRProblem:
     @property
     def silent_rows(self) -> int: ...
     def fit(self, parameters: str, start: NDArray[np.float64] | None, progress: Any) -> _Fit: ...
+
+# rivals: parameters as JSON; training as (weights, right, best epoch, how it ended, a pending KeyboardInterrupt)
+
+_Trained = tuple[NDArray[np.float64], NDArray[np.float64], int, str, BaseException | None]
+
+def check_rival(parameters: str) -> None: ...
+def fit_rival(
+    parameters: str,
+    patterns: list[tuple[Any, ...]],
+    targets: list[NDArray[np.float64]],
+    start: NDArray[np.float64] | None,
+    max_seconds: float | None,
+    progress: Any,
+) -> _Trained: ...
+def change_rival(
+    parameters: str, weights: NDArray[np.float64], pattern: tuple[Any, ...], targets: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def run_stepped(parameters: str, weights: NDArray[np.float64], pattern: tuple[Any, ...]) -> NDArray[np.float64]: ...
+def check_tempotron(parameters: str) -> str: ...
+def fit_tempotron(
+    parameters: str,
+    patterns: list[tuple[Any, ...]],
+    labels: list[bool],
+    start: NDArray[np.float64] | None,
+    max_seconds: float | None,
+    progress: Any,
+) -> _Trained: ...
+def peak_tempotron(
+    parameters: str, weights: NDArray[np.float64], pattern: tuple[Any, ...]
+) -> tuple[float, float, float]: ...
+def change_tempotron(
+    parameters: str, weights: NDArray[np.float64], pattern: tuple[Any, ...], label: bool
+) -> NDArray[np.float64]: ...

@@ -18,6 +18,7 @@ mod rounds;
 mod rows;
 mod span;
 mod stepped;
+mod tempotron;
 
 pub use chronotron::{ELearning, ILearning};
 pub use cone_r::{ConeR, Divisor, Fit, Norm, Parts, Problem, Round, Status};
@@ -32,6 +33,7 @@ pub use resume::Resume;
 pub use rival::{Law, Rival};
 pub use span::Span;
 pub use stepped::{Current, Reset, SteppedNeuron};
+pub use tempotron::{Peak, Tempotron};
 
 use crate::neuron::Neuron;
 use crate::{Result, SpikeTrains, problem};

@@ -12,6 +12,7 @@ mod live;
 mod neuron;
 mod nouns;
 mod recording;
+mod rivals;
 mod simulate;
 mod wire;
 
@@ -29,6 +30,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     learn::register(module)?;
     neuron::register(module)?;
     recording::register(module)?;
+    rivals::register(module)?;
     simulate::register(module)?;
     wire::register(module)?;
     Ok(())

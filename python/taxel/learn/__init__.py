@@ -1,5 +1,14 @@
 """Weights from examples, in scikit-learn's manners: parameters in the constructor, `fit`, results end in `_`."""
 
+from taxel.learn.chronotron import Chronotron
 from taxel.learn.cone_r import ConeR, ConeRProblem
+from taxel.learn.filt import FILT
+from taxel.learn.fp import FP
+from taxel.learn.htp import HTP
+from taxel.learn.inst import INST
+from taxel.learn.psd import PSD
+from taxel.learn.resume import ReSuMe
+from taxel.learn.span import SPAN
+from taxel.learn.tempotron import Tempotron
 
-__all__ = ["ConeR", "ConeRProblem"]
+__all__ = ["FILT", "FP", "HTP", "INST", "PSD", "SPAN", "Chronotron", "ConeR", "ConeRProblem", "ReSuMe", "Tempotron"]

@@ -1,0 +1,185 @@
+//! The rules that learn by epochs.
+
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use serde::de::DeserializeOwned;
+use taxel_core::learn::{Ended, Rival, SteppedNeuron, Tempotron, Trained};
+use taxel_core::{Result as CoreResult, SpikeTrains, Stop, problem};
+
+use crate::convert::{SpikesIn, array, slice, to_spikes};
+use crate::enter::{enter, enter_keeping};
+use crate::errors::core;
+
+fn parse<T: DeserializeOwned>(json: &str) -> PyResult<T> {
+    serde_json::from_str(json).map_err(|e| core(problem!("{e}")))
+}
+
+/// Training as Python gets it: weights, right, best epoch, how it ended, a pending KeyboardInterrupt.
+type TrainedOut<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, usize, &'static str, Option<Py<PyAny>>);
+
+/// Trains, telling `progress` of each epoch; what it raises ends the training and is raised again.
+fn train<'py>(
+    py: Python<'py>,
+    max_seconds: Option<f64>,
+    progress: Option<Py<PyAny>>,
+    work: impl FnOnce(&mut dyn FnMut(usize, f64), Stop<'_>) -> CoreResult<Trained> + Send,
+) -> PyResult<TrainedOut<'py>> {
+    let raised: Mutex<Option<PyErr>> = Mutex::new(None);
+    let over = AtomicBool::new(false);
+    let (trained, interrupt) = enter_keeping(py, max_seconds, |stop| {
+        let mut report = |epoch: usize, right: f64| {
+            let Some(progress) = &progress else { return };
+            if over.load(Ordering::Relaxed) {
+                return;
+            }
+            if let Err(error) = Python::attach(|py| progress.call1(py, (epoch, right)).map(drop)) {
+                over.store(true, Ordering::Relaxed);
+                if let Ok(mut slot) = raised.lock() {
+                    *slot = Some(error);
+                }
+            }
+        };
+        let ask = || over.load(Ordering::Relaxed) || stop.asked();
+        work(&mut report, Stop::when(&ask))
+    })?;
+    if let Some(error) = raised.into_inner().unwrap_or(None) {
+        return Err(error);
+    }
+    let ended = match trained.ended {
+        Ended::Right => "right",
+        Ended::Epochs => "epochs",
+        Ended::Stopped => "stopped",
+    };
+    Ok((array(py, trained.weights), array(py, trained.right), trained.best_epoch, ended, interrupt))
+}
+
+fn to_patterns(patterns: Vec<SpikesIn<'_>>) -> PyResult<Vec<SpikeTrains>> {
+    patterns.into_iter().map(to_spikes).collect()
+}
+
+/// Checks a rule with its neuron and its training.
+#[pyfunction]
+fn check_rival(parameters: &str) -> PyResult<()> {
+    parse::<Rival>(parameters)?.check().map_err(core)
+}
+
+/// Trains a rule's neuron.
+#[pyfunction]
+#[pyo3(signature = (parameters, patterns, targets, start, max_seconds, progress))]
+fn fit_rival<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    patterns: Vec<SpikesIn<'py>>,
+    targets: Vec<PyReadonlyArray1<'py, f64>>,
+    start: Option<PyReadonlyArray1<'py, f64>>,
+    max_seconds: Option<f64>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<TrainedOut<'py>> {
+    let rival: Rival = parse(parameters)?;
+    let patterns = to_patterns(patterns)?;
+    let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
+    let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
+    train(py, max_seconds, progress, |report, stop| rival.fit(&patterns, &targets, start, report, stop))
+}
+
+/// What one presentation changes, over the learning rate; output spikes.
+#[pyfunction]
+fn change_rival<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    pattern: SpikesIn<'py>,
+    targets: PyReadonlyArray1<'py, f64>,
+) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+    let rival: Rival = parse(parameters)?;
+    let pattern = to_spikes(pattern)?;
+    let (weights, targets) = (slice("weights", &weights)?, slice("targets", &targets)?);
+    let (change, fired) = enter(py, |_| rival.change(weights, &pattern, targets))?;
+    Ok((array(py, change), array(py, fired)))
+}
+
+/// Output spikes of a stepped neuron.
+#[pyfunction]
+fn run_stepped<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    pattern: SpikesIn<'py>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let neuron: SteppedNeuron = parse(parameters)?;
+    let pattern = to_spikes(pattern)?;
+    let weights = slice("weights", &weights)?;
+    let fired = enter(py, |_| neuron.run(weights, &pattern))?;
+    Ok(array(py, fired))
+}
+
+/// Checks parameters; gives them back with every default filled in.
+#[pyfunction]
+fn check_tempotron(parameters: &str) -> PyResult<String> {
+    let tempotron: Tempotron = parse(parameters)?;
+    tempotron.check().map_err(core)?;
+    serde_json::to_string(&tempotron).map_err(|e| core(problem!("{e}")))
+}
+
+/// Trains a Tempotron.
+#[pyfunction]
+#[pyo3(signature = (parameters, patterns, labels, start, max_seconds, progress))]
+fn fit_tempotron<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    patterns: Vec<SpikesIn<'py>>,
+    labels: Vec<bool>,
+    start: Option<PyReadonlyArray1<'py, f64>>,
+    max_seconds: Option<f64>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<TrainedOut<'py>> {
+    let tempotron: Tempotron = parse(parameters)?;
+    let patterns = to_patterns(patterns)?;
+    let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
+    train(py, max_seconds, progress, |report, stop| tempotron.fit(&patterns, &labels, start, report, stop))
+}
+
+/// Highest potential, its time, time of the spike (infinite where there is none).
+#[pyfunction]
+fn peak_tempotron(
+    py: Python<'_>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'_, f64>,
+    pattern: SpikesIn<'_>,
+) -> PyResult<(f64, f64, f64)> {
+    let tempotron: Tempotron = parse(parameters)?;
+    let pattern = to_spikes(pattern)?;
+    let weights = slice("weights", &weights)?;
+    let peak = enter(py, |_| tempotron.peak(weights, &pattern))?;
+    Ok((peak.v_max, peak.t_max, peak.t_spike.unwrap_or(f64::INFINITY)))
+}
+
+/// What one presentation changes, over the learning rate.
+#[pyfunction]
+fn change_tempotron<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    pattern: SpikesIn<'py>,
+    label: bool,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let tempotron: Tempotron = parse(parameters)?;
+    let pattern = to_spikes(pattern)?;
+    let weights = slice("weights", &weights)?;
+    let change = enter(py, |_| tempotron.change(weights, &pattern, label))?;
+    Ok(array(py, change))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(check_rival, module)?)?;
+    module.add_function(wrap_pyfunction!(fit_rival, module)?)?;
+    module.add_function(wrap_pyfunction!(change_rival, module)?)?;
+    module.add_function(wrap_pyfunction!(run_stepped, module)?)?;
+    module.add_function(wrap_pyfunction!(check_tempotron, module)?)?;
+    module.add_function(wrap_pyfunction!(fit_tempotron, module)?)?;
+    module.add_function(wrap_pyfunction!(peak_tempotron, module)?)?;
+    module.add_function(wrap_pyfunction!(change_tempotron, module)?)
+}
