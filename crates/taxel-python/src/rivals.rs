@@ -93,12 +93,12 @@ fn change_rival<'py>(
     weights: PyReadonlyArray1<'py, f64>,
     pattern: SpikesIn<'py>,
     targets: PyReadonlyArray1<'py, f64>,
-) -> PyResult<(Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>)> {
+) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
     let rival: Rival = parse(parameters)?;
     let pattern = to_spikes(pattern)?;
     let (weights, targets) = (slice("weights", &weights)?, slice("targets", &targets)?);
     let (change, fired) = enter(py, |_| rival.change(weights, &pattern, targets))?;
-    Ok((array(py, change), array(py, fired)))
+    Ok([array(py, change), array(py, fired)])
 }
 
 /// Output spikes of a stepped neuron.

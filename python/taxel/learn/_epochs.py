@@ -122,7 +122,10 @@ class EpochLearner:
         ProblemError : weights, a pattern or targets that make no sense
         """
         trains = instance("pattern", pattern, SpikeTrains)._parts()
-        return _core.change_rival(self._json(), floats("weights", weights), trains, floats("targets", targets))
+        change, spikes = _core.change_rival(
+            self._json(), floats("weights", weights), trains, floats("targets", targets)
+        )
+        return change, spikes
 
     def _fitted_neuron(self) -> Neuron | None:
         stepped = self._neuron()
