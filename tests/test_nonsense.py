@@ -294,6 +294,46 @@ SOUND: dict[str, Sound] = {
         CONE.prepare([PLAIN], [[5.0]]), "fit", cone=CONE, start=[0.1] * 4, progress=lambda *_: None
     ),
     "taxel.metrics.victor_purpura": plain(taxel.metrics.victor_purpura, a=[1.0, 2.0], b=[1.5], q=0.1),
+    "taxel.metrics.victor_purpura_multi_unit": plain(
+        taxel.metrics.victor_purpura_multi_unit, a=UNSIGNED, b=UNSIGNED, q=0.1, k=0.5
+    ),
+    "taxel.metrics.van_rossum": plain(taxel.metrics.van_rossum, a=[1.0, 2.0], b=[1.5], tau=5.0, normalisation="spike"),
+    "taxel.metrics.van_rossum_absolute": plain(
+        taxel.metrics.van_rossum_absolute, a=[1.0, 2.0], b=[1.5], tau=5.0, window=(0.0, 50.0), step_ms=1.0
+    ),
+    "taxel.metrics.van_rossum_spatial": plain(
+        taxel.metrics.van_rossum_spatial,
+        a=UNSIGNED,
+        b=UNSIGNED,
+        array=taxel.Array(1, 2),
+        tau=5.0,
+        sigma=2.0,
+        own_train="twice",
+        normalisation="spike",
+    ),
+    "taxel.metrics.van_rossum_spatial_absolute": plain(
+        taxel.metrics.van_rossum_spatial_absolute,
+        a=UNSIGNED,
+        b=UNSIGNED,
+        array=taxel.Array(1, 2),
+        tau=5.0,
+        sigma=2.0,
+        own_train="twice",
+        window=(0.0, 50.0),
+        step_ms=1.0,
+    ),
+    "taxel.metrics.isi_distance": plain(taxel.metrics.isi_distance, a=[1.0, 2.0], b=[1.5], window=(0.0, 50.0)),
+    "taxel.metrics.spike_distance": plain(taxel.metrics.spike_distance, a=[1.0, 2.0], b=[1.5], window=(0.0, 50.0)),
+    "taxel.metrics.pairwise": plain(
+        taxel.metrics.pairwise,
+        metric="van_rossum",
+        a=[[1.0], [2.0]],
+        b=[[3.0]],
+        threads=1,
+        progress=lambda *_: None,
+        tau=5.0,
+        normalisation="spike",
+    ),
     "taxel.open": plain(taxel.open, path="here_events.npz", array=ARRAY, pairing="direct", differences=False),
     "taxel.Recording.between": lambda: (taxel.open("here_events.npz").between, {"start": 0, "stop": 300}),
     "taxel.Recording.frames": lambda: (taxel.open("here_events.npz").frames, {"rate_hz": 1000.0}),

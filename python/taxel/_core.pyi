@@ -65,7 +65,7 @@ class ReadoutStream:
     @property
     def potentials(self) -> list[tuple[str, float]]: ...
 
-# neuron and metrics: parameters as JSON, trains as parts
+# neuron: parameters as JSON, trains as parts
 
 def check_neuron(parameters: str) -> str: ...
 def neuron_run(
@@ -78,7 +78,19 @@ def neuron_potential(
     times: NDArray[np.float64],
     spikes: NDArray[np.float64],
 ) -> NDArray[np.float64]: ...
-def victor_purpura(a: NDArray[np.float64], b: NDArray[np.float64], q: float) -> float: ...
+
+# metrics: a metric as JSON; patterns as (name, count, trains, times, offsets, window, listed)
+
+_Patterns = tuple[str, int, int, NDArray[np.float64], NDArray[np.int64], tuple[float, float] | None, bool]
+
+def distance(metric: str, a: _Patterns, b: _Patterns) -> float: ...
+def pairwise(
+    metric: str,
+    a: _Patterns,
+    b: _Patterns | None,
+    threads: int | None,
+    progress: Callable[[int, int], object] | None,
+) -> NDArray[np.float64]: ...
 
 # recording: header, remarks and counts as JSON
 

@@ -9,6 +9,7 @@ mod detect;
 mod encode;
 mod learn;
 mod live;
+mod metrics;
 mod neuron;
 mod nouns;
 mod recording;
@@ -27,6 +28,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     detect::register(module)?;
     encode::register(module)?;
     live::register(module)?;
+    metrics::register(module)?;
     learn::register(module)?;
     neuron::register(module)?;
     recording::register(module)?;

@@ -1,9 +1,9 @@
-//! The neuron and the distances between its spike trains.
+//! The neuron.
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::neuron::Neuron;
-use taxel_core::{metrics, problem};
+use taxel_core::problem;
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
 use crate::enter::enter;
@@ -57,21 +57,8 @@ fn neuron_potential<'py>(
     Ok(array(py, potential))
 }
 
-/// Victor-Purpura distance.
-#[pyfunction]
-fn victor_purpura<'py>(
-    py: Python<'py>,
-    a: PyReadonlyArray1<'py, f64>,
-    b: PyReadonlyArray1<'py, f64>,
-    q: f64,
-) -> PyResult<f64> {
-    let (a, b) = (slice("a", &a)?, slice("b", &b)?);
-    enter(py, |stop| metrics::victor_purpura(a, b, q, stop))
-}
-
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(check_neuron, module)?)?;
     module.add_function(wrap_pyfunction!(neuron_run, module)?)?;
-    module.add_function(wrap_pyfunction!(neuron_potential, module)?)?;
-    module.add_function(wrap_pyfunction!(victor_purpura, module)?)
+    module.add_function(wrap_pyfunction!(neuron_potential, module)?)
 }

@@ -1,40 +1,23 @@
-"""Distances between spike trains."""
+"""Distances between spike trains, and between patterns of many trains."""
 
-from __future__ import annotations
+from taxel.metrics.isi_distance import isi_distance
+from taxel.metrics.pairwise import pairwise
+from taxel.metrics.spike_distance import spike_distance
+from taxel.metrics.van_rossum import van_rossum
+from taxel.metrics.van_rossum_absolute import van_rossum_absolute
+from taxel.metrics.van_rossum_spatial import van_rossum_spatial
+from taxel.metrics.van_rossum_spatial_absolute import van_rossum_spatial_absolute
+from taxel.metrics.victor_purpura import victor_purpura
+from taxel.metrics.victor_purpura_multi_unit import victor_purpura_multi_unit
 
-from numpy.typing import ArrayLike
-
-from taxel import _core
-from taxel._arguments import floats, number
-
-__all__ = ["victor_purpura"]
-
-
-def victor_purpura(a: ArrayLike, b: ArrayLike, *, q: float) -> float:
-    """Return the cheapest way to turn spike train `a` into spike train `b`.
-
-    Removing or adding a spike costs 1, moving it by dt costs ``q * |dt|``: spikes over ``2 / q`` apart never match.
-
-    Parameters
-    ----------
-    a, b : float64, shapes (n,) and (m,), ms, ascending; either may be empty
-    q : float, 1/ms, 0 or more; infinite: only spikes at the very same time match
-
-    Returns
-    -------
-    float, 0 or more; 1 is one spike removed
-
-    Raises
-    ------
-    ProblemError : times not ascending or not finite (names train and index), or `q` below 0
-
-    Notes
-    -----
-    Victor and Purpura (1996), J. Neurophysiol. 76:1310; thesis 6.3.5. Time O(n m), memory O(m).
-
-    Examples
-    --------
-    >>> round(victor_purpura([10.0, 20.0, 30.0], [12.0, 24.0, 30.0], q=0.1), 6)
-    0.6
-    """
-    return _core.victor_purpura(floats("a", a), floats("b", b), number("q", q))
+__all__ = [
+    "isi_distance",
+    "pairwise",
+    "spike_distance",
+    "van_rossum",
+    "van_rossum_absolute",
+    "van_rossum_spatial",
+    "van_rossum_spatial_absolute",
+    "victor_purpura",
+    "victor_purpura_multi_unit",
+]

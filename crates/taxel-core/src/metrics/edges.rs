@@ -1,0 +1,68 @@
+//! The window of ISI and SPIKE distances, and what lies outside the first and the last spike.
+
+use super::Patterns;
+use crate::{Result, problem};
+
+/// From when to when, ms.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Window {
+    pub(super) start: f64,
+    pub(super) stop: f64,
+}
+
+/// The window that was asked for, or the widest of the patterns' own; every spike must lie in it.
+pub(super) fn window(asked: Option<(f64, f64)>, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Window> {
+    let sides = || std::iter::once(a).chain(b);
+    let widest = || {
+        sides().map(|p| p.window).try_fold((f64::INFINITY, f64::NEG_INFINITY), |wide, own| {
+            own.map(|own| (wide.0.min(own.0), wide.1.max(own.1)))
+        })
+    };
+    let Some((start, stop)) = asked.or_else(widest) else {
+        return Err(problem!("window: must be given, (start, stop) in ms, as lists of times do not say it"));
+    };
+    for side in sides() {
+        for (p, n) in (0..side.count).flat_map(|p| (0..side.trains).map(move |n| (p, n))) {
+            let train = side.train(p, n);
+            if let Some(k) = train.iter().position(|&t| t < start || t > stop) {
+                let place = side.place(p, n);
+                return Err(problem!(
+                    "{place}, spike {k}: {} ms lies outside the window {start} to {stop} ms",
+                    train[k]
+                ));
+            }
+        }
+    }
+    Ok(Window { start, stop })
+}
+
+/// A train as these distances see it: no two spikes at the same time, and a spike at either end where there is none.
+pub(super) fn distinct(train: &[f64], window: Window) -> Vec<f64> {
+    if train.is_empty() {
+        return vec![window.start, window.stop];
+    }
+    let mut spikes = train.to_vec();
+    spikes.dedup();
+    spikes
+}
+
+/// The interval around the times after spike `k - 1` and before spike `k`, of a train with at least one spike.
+///
+/// Outside the first and the last spike it is as far as the window's edge, or as the neighbouring interval if that is
+/// longer.
+pub(super) fn interval(spikes: &[f64], k: usize, window: Window) -> f64 {
+    let n = spikes.len();
+    let beside = |j: usize| if n > 1 { spikes[j + 1] - spikes[j] } else { 0.0 };
+    if k == 0 {
+        (spikes[0] - window.start).max(beside(0))
+    } else if k == n {
+        (window.stop - spikes[n - 1]).max(if n > 1 { beside(n - 2) } else { 0.0 })
+    } else {
+        beside(k - 1)
+    }
+}
+
+/// How many spikes lie at the window's start already.
+pub(super) fn begun(spikes: &[f64], window: Window) -> usize {
+    usize::from(spikes[0] <= window.start)
+}

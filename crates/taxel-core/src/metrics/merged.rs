@@ -1,0 +1,28 @@
+//! Two trains as one sequence of steps.
+
+/// The times at which two ascending trains differ, with how many spikes `a` has there more than `b`.
+///
+/// What both have at the very same time cancels before anything is added up: equal trains give no step at all.
+pub(super) fn merged<'t>(a: &'t [f64], b: &'t [f64]) -> impl Iterator<Item = (f64, f64)> + 't {
+    let (mut i, mut j) = (0, 0);
+    std::iter::from_fn(move || {
+        loop {
+            let t = match (a.get(i), b.get(j)) {
+                (Some(&x), Some(&y)) => x.min(y),
+                (Some(&x), None) => x,
+                (None, Some(&y)) => y,
+                (None, None) => return None,
+            };
+            let mut more = 0.0;
+            while i < a.len() && a[i] == t {
+                (i, more) = (i + 1, more + 1.0);
+            }
+            while j < b.len() && b[j] == t {
+                (j, more) = (j + 1, more - 1.0);
+            }
+            if more != 0.0 {
+                return Some((t, more));
+            }
+        }
+    })
+}

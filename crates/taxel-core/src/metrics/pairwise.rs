@@ -1,0 +1,154 @@
+//! Many pairs: threads, progress, stopping, and the matrix that they fill.
+
+use std::num::NonZero;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
+use std::thread;
+use std::time::Duration;
+
+use crate::{Error, Result, Stop};
+
+/// How often the caller's thread asks whether to stop while only others still work.
+const ASK_EVERY: Duration = Duration::from_millis(20);
+
+/// How a matrix is worked on.
+pub struct Work<'a> {
+    /// Threads; the caller's is one of them, and the only one that asks `stop` and calls `progress`.
+    pub threads: usize,
+    /// Ends the work early.
+    pub stop: Stop<'a>,
+    /// Called with the pairs done and all of them, now and then.
+    pub progress: &'a mut dyn FnMut(usize, usize),
+}
+
+impl<'a> Work<'a> {
+    /// Work on all cores, or on so many threads.
+    #[must_use]
+    pub fn new(threads: Option<NonZero<usize>>, stop: Stop<'a>, progress: &'a mut dyn FnMut(usize, usize)) -> Self {
+        let threads = threads.or_else(|| thread::available_parallelism().ok()).map_or(1, NonZero::get);
+        Self { threads, stop, progress }
+    }
+
+    /// Does `tasks` tasks, each whole on one thread, in their order where there is one thread.
+    ///
+    /// The stop that a task gets is for its thread. `told` turns how many tasks are done into pairs done and all of them.
+    pub(super) fn each(
+        &mut self,
+        tasks: usize,
+        told: &dyn Fn(usize) -> (usize, usize),
+        task: impl Fn(usize, Stop<'_>) -> Result<()> + Sync,
+    ) -> Result<()> {
+        let (next, done, halt) = (AtomicUsize::new(0), AtomicUsize::new(0), AtomicBool::new(false));
+        let run = |stop: Stop<'_>, tell: &mut dyn FnMut(usize)| -> Result<()> {
+            loop {
+                let k = next.fetch_add(1, Relaxed);
+                if k >= tasks {
+                    return Ok(());
+                }
+                let outcome = stop.check().and_then(|()| task(k, stop));
+                if outcome.is_err() {
+                    halt.store(true, Relaxed);
+                    return outcome;
+                }
+                tell(done.fetch_add(1, Relaxed) + 1);
+            }
+        };
+        let (stop, progress) = (self.stop, &mut self.progress);
+        let mut tell = |done| {
+            let (now, all) = told(done);
+            progress(now, all);
+        };
+        let asked = || stop.asked() || halt.load(Relaxed);
+        let halted = || halt.load(Relaxed);
+        let helpers = self.threads.min(tasks).saturating_sub(1);
+        thread::scope(|scope| {
+            let help = || run(Stop::when(&halted), &mut |_| ());
+            let handles: Vec<_> = (0..helpers).map(|_| scope.spawn(help)).collect();
+            let mut outcome = run(Stop::when(&asked), &mut tell);
+            // Whoever presses Ctrl-C while only others still work is heard, too.
+            while handles.iter().any(|h| !h.is_finished()) {
+                if stop.asked() {
+                    halt.store(true, Relaxed);
+                    outcome = Err(Error::Interrupted);
+                }
+                thread::park_timeout(ASK_EVERY);
+            }
+            for handle in handles {
+                match handle.join() {
+                    Ok(Ok(())) => {}
+                    // Others are interrupted where one found an error: that one is told.
+                    Ok(Err(error)) if outcome == Ok(()) || outcome == Err(Error::Interrupted) => outcome = Err(error),
+                    Ok(Err(_)) => {}
+                    Err(panic) => std::panic::resume_unwind(panic),
+                }
+            }
+            outcome
+        })
+    }
+}
+
+/// Distances of all pairs, while they come in.
+///
+/// Cells are atomic so that threads may write where their pairs lie; no two write the same one at a time.
+pub(super) struct Matrix {
+    rows: usize,
+    columns: usize,
+    /// Whether rows and columns are the same patterns: then only cells above the diagonal are filled, and mirrored.
+    symmetric: bool,
+    cells: Vec<AtomicU64>,
+}
+
+impl Matrix {
+    /// Zeros: `rows` patterns against `columns` others, or against each other.
+    pub(super) fn new(rows: usize, columns: Option<usize>) -> Self {
+        let width = columns.unwrap_or(rows);
+        let cells = (0..rows * width).map(|_| AtomicU64::new(0)).collect();
+        Self { rows, columns: width, symmetric: columns.is_none(), cells }
+    }
+
+    /// How many pairs there are, leaving out mirrored ones and the diagonal.
+    pub(super) fn pairs(&self) -> usize {
+        if self.symmetric { self.rows * self.rows.saturating_sub(1) / 2 } else { self.rows * self.columns }
+    }
+
+    /// The first column of row `i` that is to be filled.
+    pub(super) fn first(&self, i: usize) -> usize {
+        if self.symmetric { i + 1 } else { 0 }
+    }
+
+    /// Adds to the distance of patterns `i` and `j`, in either order where they are of the same set.
+    #[inline]
+    pub(super) fn add(&self, i: usize, j: usize, value: f64) {
+        let (i, j) = if self.symmetric && j < i { (j, i) } else { (i, j) };
+        let cell = &self.cells[i * self.columns + j];
+        cell.store((f64::from_bits(cell.load(Relaxed)) + value).to_bits(), Relaxed);
+    }
+
+    /// Fills every cell by `between`, row after row.
+    pub(super) fn each_pair(
+        &self,
+        work: &mut Work<'_>,
+        between: impl Fn(usize, usize, Stop<'_>) -> Result<f64> + Sync,
+    ) -> Result<()> {
+        let share = |rows: usize| (self.pairs() * rows / self.rows.max(1), self.pairs());
+        work.each(self.rows, &share, |i, stop| {
+            for j in self.first(i)..self.columns {
+                stop.check()?;
+                self.add(i, j, between(i, j, stop)?);
+            }
+            Ok(())
+        })
+    }
+
+    /// The distances, row after row.
+    pub(super) fn finish(self) -> Vec<f64> {
+        let mut out: Vec<f64> = self.cells.into_iter().map(|c| f64::from_bits(c.into_inner())).collect();
+        if self.symmetric {
+            for i in 0..self.rows {
+                for j in 0..i {
+                    out[i * self.columns + j] = out[j * self.columns + i];
+                }
+            }
+        }
+        out
+    }
+}

@@ -1,0 +1,80 @@
+//! What is compared: patterns of one or more spike trains, as columns.
+
+use crate::{Result, problem};
+
+/// Several patterns with the same number of trains each; ms.
+#[derive(Debug, Clone)]
+pub struct Patterns<'a> {
+    /// What the caller calls them, for errors.
+    pub name: &'a str,
+    /// How many patterns.
+    pub count: usize,
+    /// Trains in each.
+    pub trains: usize,
+    /// All times, pattern after pattern, train after train.
+    pub times: &'a [f64],
+    /// Where each train begins in `times`, and at last where all end: `count * trains + 1` entries.
+    pub offsets: &'a [usize],
+    /// The widest window that was listened to, where the patterns have one.
+    pub window: Option<(f64, f64)>,
+    /// Whether the caller gave a list, so that errors say which entry.
+    pub listed: bool,
+}
+
+impl Patterns<'_> {
+    /// The times of train `n` of pattern `p`; ms.
+    #[must_use]
+    pub fn train(&self, p: usize, n: usize) -> &[f64] {
+        let k = p * self.trains + n;
+        &self.times[self.offsets[k]..self.offsets[k + 1]]
+    }
+
+    /// All times of pattern `p`, train after train; ms.
+    #[must_use]
+    pub fn all(&self, p: usize) -> &[f64] {
+        &self.times[self.offsets[p * self.trains]..self.offsets[(p + 1) * self.trains]]
+    }
+
+    /// What errors call train `n` of pattern `p`.
+    #[must_use]
+    pub fn place(&self, p: usize, n: usize) -> String {
+        let entry = if self.listed { format!("{}[{p}]", self.name) } else { self.name.to_owned() };
+        if self.trains == 1 { format!("train {entry}") } else { format!("{entry}, train {n}") }
+    }
+
+    /// Checks offsets, finiteness and order.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming pattern, train and spike.
+    pub fn check(&self) -> Result<()> {
+        let sound = self.offsets.len() == self.count * self.trains + 1
+            && self.offsets.first() == Some(&0)
+            && self.offsets.last() == Some(&self.times.len())
+            && self.offsets.is_sorted();
+        if !sound {
+            return Err(problem!("{}: offsets must ascend from 0 to the number of spikes", self.name));
+        }
+        for p in 0..self.count {
+            for n in 0..self.trains {
+                let train = self.train(p, n);
+                // One pass without a branch a spike; what is not finite fails it too.
+                let sound = train.iter().all(|t| t.is_finite()) && train.is_sorted();
+                if !sound {
+                    return Err(self.fault(p, n));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The first fault of a train that has one.
+    fn fault(&self, p: usize, n: usize) -> crate::Error {
+        let (train, place) = (self.train(p, n), self.place(p, n));
+        if let Some(k) = train.iter().position(|t| !t.is_finite()) {
+            return problem!("{place}, spike {k}: time is {}, must be finite", train[k]);
+        }
+        let k = train.windows(2).position(|w| w[1] < w[0]).unwrap_or(0);
+        problem!("{place}, spike {}: {} ms comes after {} ms, times must ascend", k + 1, train[k + 1], train[k])
+    }
+}

@@ -1,0 +1,233 @@
+//! The thesis' distance between patterns of an array: trains smoothed by an exponential, taxels by their distance.
+
+use serde::{Deserialize, Serialize};
+
+use super::van_rossum::Normalisation;
+use super::{One, Patterns, above_0};
+use crate::{Array, Result, Stop, problem};
+
+/// Smoothing in time and over the array (5.8, 5.11).
+///
+/// `g_m = f_m + sum over n of f_n exp(-d_mn / sigma)`, where `f_n` is train n smoothed as in 5.8 and `d_mn` the distance
+/// of taxels m and n. Train n is taxel n of the array; of more trains (ON and OFF), each array's worth is smoothed alone.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Smoothing {
+    /// Time constant, ms; 0.4 in the thesis.
+    #[serde(default = "thesis_tau")]
+    pub tau: f64,
+    /// Spatial constant, mm; 2 in the thesis.
+    #[serde(default = "thesis_sigma")]
+    pub sigma: f64,
+    /// Where the taxels are.
+    pub array: Array,
+    /// How often a train counts at its own taxel.
+    #[serde(default)]
+    pub own_train: OwnTrain,
+}
+
+fn thesis_tau() -> f64 {
+    0.4
+}
+
+fn thesis_sigma() -> f64 {
+    2.0
+}
+
+/// How often a train counts at its own taxel.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OwnTrain {
+    /// By itself and in the sum, whose distance is 0 there: 5.11 as printed.
+    #[default]
+    Twice,
+    /// In the sum alone.
+    Once,
+}
+
+impl Smoothing {
+    pub(super) fn check(&self) -> Result<()> {
+        above_0("tau", self.tau, "ms")?;
+        above_0("sigma", self.sigma, "mm")?;
+        Array::new(self.array.rows, self.array.columns, self.array.pitch_mm, &self.array.name)?;
+        match &self.array.exists {
+            Some(exists) if exists.len() != self.array.len() => {
+                Err(problem!("exists has {} entries: must be one a taxel, {}", exists.len(), self.array.len()))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// The kernel for these patterns, each of whose trains must have a taxel of the array.
+    pub(super) fn laid_out(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Kernel> {
+        let taxels = self.array.len();
+        for side in std::iter::once(a).chain(b) {
+            if side.trains % taxels != 0 {
+                return Err(problem!(
+                    "{} has {} trains, the array {taxels} taxels: must be one train a taxel (or several for each)",
+                    side.name,
+                    side.trains
+                ));
+            }
+            let Some(exists) = &self.array.exists else { continue };
+            for (p, n) in (0..side.count).flat_map(|p| (0..side.trains).map(move |n| (p, n))) {
+                if !exists[n % taxels] && !side.train(p, n).is_empty() {
+                    return Err(problem!("{}: spikes, but the array has no taxel there", side.place(p, n)));
+                }
+            }
+        }
+        Ok(Kernel::new(self))
+    }
+}
+
+/// The Euclidean distance of two patterns smoothed in time and over the array: 5.12, as 5.10 calls itself a norm.
+///
+/// The root of the sum over taxels of the integral over all time of `(g_m(a) - g_m(b))^2`, in closed form: between spikes
+/// all differences are one exponential. Time O(spikes x taxels).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VanRossumSpatial {
+    /// Smoothing in time and over the array.
+    #[serde(flatten)]
+    pub smoothing: Smoothing,
+    /// What the integral is divided by.
+    #[serde(default)]
+    pub normalisation: Normalisation,
+}
+
+impl VanRossumSpatial {
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter.
+    pub fn check(&self) -> Result<()> {
+        self.smoothing.check()
+    }
+
+    /// The distance of two patterns.
+    pub(super) fn between(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        let tau = self.smoothing.tau;
+        let mut square = 0.0;
+        kernel.walk(tau, a, b, Gauge::Squares, stop, |sum, from, to| {
+            square -= sum * (-2.0 * (to - from) / tau).exp_m1();
+        })?;
+        Ok((square * self.normalisation.factor(tau)).sqrt())
+    }
+}
+
+/// How much each taxel's spikes add to each other's smoothed train.
+pub(super) struct Kernel {
+    rows: usize,
+    columns: usize,
+    exists: Option<Vec<bool>>,
+    /// By distance in rows and columns, from -(rows - 1), -(columns - 1) on: what taxel n adds to all of one row is a
+    /// stretch of one row of this.
+    by_offset: Vec<f64>,
+}
+
+/// What is added up over taxels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Gauge {
+    Squares,
+    Absolutes,
+}
+
+/// Heights are kept in units that time raises; past this power they are brought down.
+const HIGHEST: f64 = 200.0;
+
+impl Kernel {
+    fn new(smoothing: &Smoothing) -> Self {
+        let array = &smoothing.array;
+        let (rows, columns) = (usize::from(array.rows), usize::from(array.columns));
+        let mut by_offset = Vec::with_capacity((2 * rows - 1) * (2 * columns - 1));
+        for row in 0..2 * rows - 1 {
+            for column in 0..2 * columns - 1 {
+                let (dy, dx) = (row.abs_diff(rows - 1) as f64, column.abs_diff(columns - 1) as f64);
+                let own = row + 1 == rows && column + 1 == columns && smoothing.own_train == OwnTrain::Twice;
+                by_offset.push((-dx.hypot(dy) * array.pitch_mm / smoothing.sigma).exp() + f64::from(u8::from(own)));
+            }
+        }
+        Self { rows, columns, exists: array.exists.clone(), by_offset }
+    }
+
+    fn taxels(&self) -> usize {
+        self.rows * self.columns
+    }
+
+    /// What a spike of taxel `n` adds to the taxels of row `row`.
+    fn reach(&self, n: usize, row: usize) -> &[f64] {
+        let (y, x) = (n / self.columns, n % self.columns);
+        let start = (row + self.rows - 1 - y) * (2 * self.columns - 1) + self.columns - 1 - x;
+        &self.by_offset[start..start + self.columns]
+    }
+
+    /// Walks through the steps of both patterns; says for each stretch of time, from step to step and on for ever, what
+    /// the squares or absolutes of the taxels' differences add up to at its beginning.
+    pub(super) fn walk(
+        &self,
+        tau: f64,
+        (a, p): One<'_>,
+        (b, q): One<'_>,
+        gauge: Gauge,
+        stop: Stop<'_>,
+        mut stretch: impl FnMut(f64, f64, f64),
+    ) -> Result<()> {
+        let mut steps: Vec<(f64, usize, f64)> = Vec::new();
+        for n in 0..a.trains {
+            steps.extend(super::merged::merged(a.train(p, n), b.train(q, n)).map(|(t, more)| (t, n, more)));
+        }
+        steps.sort_by(|x, y| x.0.total_cmp(&y.0).then(x.1.cmp(&y.1)));
+        let Some(&(first, ..)) = steps.first() else { return Ok(()) };
+        // The difference at taxel m is `heights[m] exp(-(t - since) / tau)`.
+        let mut heights = vec![0.0; a.trains];
+        let (mut since, mut sum, mut last) = (first, 0.0, first);
+        for group in steps.chunk_by(|x, y| x.0 == y.0) {
+            stop.check()?;
+            let t = group[0].0;
+            if sum > 0.0 {
+                stretch(sum, last, t);
+            }
+            if (t - since) / tau > HIGHEST {
+                let fallen = (-(t - since) / tau).exp();
+                heights.iter_mut().for_each(|h| *h *= fallen);
+                since = t;
+            }
+            let risen = ((t - since) / tau).exp();
+            for &(_, n, more) in group {
+                self.add(&mut heights, n, more * risen);
+            }
+            sum = self.total(&heights, gauge) / if gauge == Gauge::Squares { risen * risen } else { risen };
+            last = t;
+        }
+        if sum > 0.0 {
+            stretch(sum, last, f64::INFINITY);
+        }
+        Ok(())
+    }
+
+    fn add(&self, heights: &mut [f64], n: usize, value: f64) {
+        let layer = n / self.taxels();
+        let n = n % self.taxels();
+        let heights = &mut heights[layer * self.taxels()..(layer + 1) * self.taxels()];
+        for (row, heights) in heights.chunks_exact_mut(self.columns).enumerate() {
+            for (height, reach) in heights.iter_mut().zip(self.reach(n, row)) {
+                *height += value * reach;
+            }
+        }
+    }
+
+    fn total(&self, heights: &[f64], gauge: Gauge) -> f64 {
+        let of = |h: f64| if gauge == Gauge::Squares { h * h } else { h.abs() };
+        if let Some(exists) = &self.exists {
+            return heights.iter().zip(exists.iter().cycle()).filter(|(_, there)| **there).map(|(&h, _)| of(h)).sum();
+        }
+        // Eight sums side by side: one alone waits for each addition.
+        let (eights, rest) = heights.as_chunks::<8>();
+        let mut sums = [0.0; 8];
+        for eight in eights {
+            for (sum, &h) in sums.iter_mut().zip(eight) {
+                *sum += of(h);
+            }
+        }
+        sums.iter().sum::<f64>() + rest.iter().map(|&h| of(h)).sum::<f64>()
+    }
+}

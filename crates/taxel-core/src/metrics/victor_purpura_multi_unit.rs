@@ -1,0 +1,224 @@
+//! Victor-Purpura distance between patterns of many units, where a spike may also change its unit.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{One, cost, number_or_name};
+use crate::{Result, Stop};
+
+/// The least cost of turning one pattern into the other: 1 for each spike removed or added, `q |dt|` for each one moved,
+/// `k` for each one that goes to another train.
+///
+/// Aronov (2003), J. Neurosci. Methods 124:175. Dynamic programming is exponential in the number of trains; but what is
+/// asked for is a matching of least cost between the spikes of both patterns, at `q |dt|` (`+ k`) a pair and 1 for each
+/// spike left over. It is found exactly by shortest augmenting paths (Jonker and Volgenant 1987), spike by spike, each
+/// path looking only at pairs that cost less than the 2 of removing and adding. Time O(n (p + n log n)) at worst, where p
+/// is the number of such pairs of n spikes, and O(p) where few of them compete; memory O(n).
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VictorPurpuraMultiUnit {
+    /// Cost of moving a spike by a ms; infinite: only spikes at the very same time match.
+    #[serde(deserialize_with = "number_or_name")]
+    pub q: f64,
+    /// Cost of changing a spike's train: 0 pools all trains, 2 or more keeps them apart.
+    #[serde(deserialize_with = "number_or_name")]
+    pub k: f64,
+}
+
+/// A spike and its train.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Labelled {
+    t: f64,
+    unit: usize,
+}
+
+impl VictorPurpuraMultiUnit {
+    /// Checks `q` and `k`.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where one is below 0.
+    pub fn check(&self) -> Result<()> {
+        cost("q", self.q, "/ms")?;
+        cost("k", self.k, "")
+    }
+
+    /// The distance of two patterns.
+    pub(super) fn between(&self, (a, p): One<'_>, (b, q): One<'_>, stop: Stop<'_>) -> Result<f64> {
+        let (mut rows, mut columns) = (Vec::new(), Vec::new());
+        for unit in 0..a.trains {
+            // Spikes that both have match for nothing, and some cheapest matching has them so: pairs cost a distance,
+            // so whatever two such spikes are matched with may as well be matched with each other.
+            for (t, more) in super::merged::merged(a.train(p, unit), b.train(q, unit)) {
+                let side = if more > 0.0 { &mut rows } else { &mut columns };
+                side.extend(std::iter::repeat_n(Labelled { t, unit }, more.abs() as usize));
+            }
+        }
+        let by_time = |x: &Labelled, y: &Labelled| x.t.total_cmp(&y.t).then(x.unit.cmp(&y.unit));
+        rows.sort_by(by_time);
+        columns.sort_by(by_time);
+        Matching::new(self, rows, columns).solve(stop)
+    }
+
+    /// What it costs to turn one spike into another.
+    fn pair(&self, x: Labelled, y: Labelled) -> f64 {
+        let moved = if x.t == y.t || self.q == 0.0 { 0.0 } else { self.q * (x.t - y.t).abs() };
+        if x.unit == y.unit { moved } else { moved + self.k }
+    }
+}
+
+/// Cost of leaving out a spike and, with it, the one it might have matched.
+const APART: f64 = 2.0;
+
+/// A matching of least cost that grows by one row at a time.
+///
+/// Every row is matched with a column, or with nothing at [`APART`]; `height` and `depth` are the prices of rows and
+/// columns that prove it cheapest: no pair costs less than its row's height plus its column's depth.
+struct Matching<'m> {
+    costs: &'m VictorPurpuraMultiUnit,
+    rows: Vec<Labelled>,
+    columns: Vec<Labelled>,
+    of_row: Vec<Option<usize>>,
+    of_column: Vec<Option<usize>>,
+    height: Vec<f64>,
+    depth: Vec<f64>,
+}
+
+/// A column by its distance from the row to be matched.
+#[derive(PartialEq)]
+struct At(f64, usize);
+
+impl Eq for At {}
+
+impl Ord for At {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0).then(self.1.cmp(&other.1))
+    }
+}
+
+impl PartialOrd for At {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<'m> Matching<'m> {
+    fn new(costs: &'m VictorPurpuraMultiUnit, rows: Vec<Labelled>, columns: Vec<Labelled>) -> Self {
+        let (n, m) = (rows.len(), columns.len());
+        let (of_row, of_column) = (vec![None; n], vec![None; m]);
+        Self { costs, rows, columns, of_row, of_column, height: vec![0.0; n], depth: vec![0.0; m] }
+    }
+
+    fn solve(mut self, stop: Stop<'_>) -> Result<f64> {
+        let m = self.columns.len();
+        // Per search: how far each column is, from which row, and which are done.
+        let mut far = vec![f64::INFINITY; m];
+        let mut from = vec![0; m];
+        let mut done = vec![false; m];
+        let (mut seen, mut behind) = (Vec::new(), Vec::new());
+        let mut next = BinaryHeap::new();
+        for start in 0..self.rows.len() {
+            stop.check()?;
+            // Rows reached, and how far they are.
+            let mut reached = vec![(start, 0.0)];
+            let mut at = 0;
+            // The cheapest end found: a free column, or a row that gives its own up.
+            let (mut least, mut end) = (f64::INFINITY, End::Row(start));
+            loop {
+                while let Some(&(row, here)) = reached.get(at) {
+                    at += 1;
+                    let base = here - self.height[row];
+                    if base + APART < least {
+                        (least, end) = (base + APART, End::Row(row));
+                    }
+                    for column in self.near(row) {
+                        let pair = self.costs.pair(self.rows[row], self.columns[column]);
+                        if pair >= APART || done[column] {
+                            continue;
+                        }
+                        let there = base + pair - self.depth[column];
+                        if there < far[column] && there < least {
+                            if far[column] == f64::INFINITY {
+                                seen.push(column);
+                            }
+                            (far[column], from[column]) = (there, row);
+                            if self.of_column[column].is_none() {
+                                (least, end) = (there, End::Column(column));
+                            } else {
+                                next.push(Reverse(At(there, column)));
+                            }
+                        }
+                    }
+                }
+                let Some(Reverse(At(there, column))) = next.pop() else { break };
+                if there >= least {
+                    break;
+                }
+                if done[column] || there > far[column] {
+                    continue;
+                }
+                done[column] = true;
+                behind.push(column);
+                if let Some(row) = self.of_column[column] {
+                    reached.push((row, there));
+                }
+            }
+            for &(row, here) in &reached {
+                self.height[row] += least - here;
+            }
+            for &column in &behind {
+                self.depth[column] -= least - far[column];
+            }
+            self.turn(start, end, &from);
+            for column in seen.drain(..) {
+                (far[column], done[column]) = (f64::INFINITY, false);
+            }
+            behind.clear();
+            next.clear();
+        }
+        let matched = self.of_row.iter().enumerate().filter_map(|(row, column)| column.map(|c| (row, c)));
+        let (mut pairs, mut sum) = (0, 0.0);
+        for (row, column) in matched {
+            (pairs, sum) = (pairs + 1, sum + self.costs.pair(self.rows[row], self.columns[column]));
+        }
+        Ok(sum + (self.rows.len() + m - 2 * pairs) as f64)
+    }
+
+    /// Columns that may cost less than [`APART`] with this row, by time alone.
+    fn near(&self, row: usize) -> std::ops::Range<usize> {
+        let reach = APART / self.costs.q * (1.0 + 4.0 * f64::EPSILON);
+        let t = self.rows[row].t;
+        let first = self.columns.partition_point(|c| c.t < t - reach);
+        first..first + self.columns[first..].partition_point(|c| c.t <= t + reach)
+    }
+
+    /// Changes partners along the path from `start` to its end.
+    fn turn(&mut self, start: usize, end: End, from: &[usize]) {
+        let (mut row, mut column) = match end {
+            End::Row(row) => (row, self.of_row[row].take()),
+            End::Column(column) => {
+                let row = from[column];
+                let before = self.of_row[row].replace(column);
+                self.of_column[column] = Some(row);
+                (row, before)
+            }
+        };
+        while row != start {
+            let Some(left) = column else { return };
+            row = from[left];
+            column = self.of_row[row].replace(left);
+            self.of_column[left] = Some(row);
+        }
+    }
+}
+
+/// Where a path ends.
+#[derive(Debug, Clone, Copy)]
+enum End {
+    /// At a row that is matched with nothing from now on.
+    Row(usize),
+    /// At a column that nothing was matched with.
+    Column(usize),
+}

@@ -1,0 +1,90 @@
+//! Distances between spike trains and patterns.
+
+use std::num::NonZero;
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use taxel_core::metrics::{Metric, Patterns, Work};
+use taxel_core::problem;
+
+use crate::convert::{array, slice};
+use crate::enter::enter;
+use crate::errors::core;
+
+/// Patterns as Python hands them over: name, count, trains, times, offsets, window, listed.
+type PatternsIn<'py> =
+    (String, usize, usize, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, Option<(f64, f64)>, bool);
+
+/// Patterns with their offsets as the core wants them.
+struct Held<'py> {
+    given: PatternsIn<'py>,
+    offsets: Vec<usize>,
+}
+
+impl<'py> Held<'py> {
+    fn new(given: PatternsIn<'py>) -> PyResult<Self> {
+        let offsets = slice("offsets", &given.4)?.iter().map(|&o| usize::try_from(o).unwrap_or(usize::MAX)).collect();
+        Ok(Self { given, offsets })
+    }
+
+    fn patterns(&self) -> PyResult<Patterns<'_>> {
+        let (name, count, trains, times, _, window, listed) = &self.given;
+        Ok(Patterns {
+            name,
+            count: *count,
+            trains: *trains,
+            times: slice("times", times)?,
+            offsets: &self.offsets,
+            window: *window,
+            listed: *listed,
+        })
+    }
+}
+
+fn to_metric(json: &str) -> PyResult<Metric> {
+    serde_json::from_str(json).map_err(|e| core(problem!("metric: {e}")))
+}
+
+/// The distance of two patterns.
+#[pyfunction]
+fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: PatternsIn<'py>) -> PyResult<f64> {
+    let (metric, a, b) = (to_metric(metric)?, Held::new(a)?, Held::new(b)?);
+    let (a, b) = (a.patterns()?, b.patterns()?);
+    enter(py, |stop| metric.distance(&a, &b, stop))
+}
+
+/// The distances of all patterns from all others, row by row.
+#[pyfunction]
+fn pairwise<'py>(
+    py: Python<'py>,
+    metric: &str,
+    a: PatternsIn<'py>,
+    b: Option<PatternsIn<'py>>,
+    threads: Option<NonZero<usize>>,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (metric, a, b) = (to_metric(metric)?, Held::new(a)?, b.map(Held::new).transpose()?);
+    let (a, b) = (a.patterns()?, b.as_ref().map(Held::patterns).transpose()?);
+    let raised = std::sync::Mutex::new(None);
+    let outcome = enter(py, |stop| {
+        let mut report = |done: usize, all: usize| {
+            let Some(progress) = &progress else { return };
+            if let Err(error) = Python::attach(|py| progress.call1(py, (done, all)).map(drop))
+                && let Ok(mut slot) = raised.lock()
+            {
+                *slot = Some(error);
+            }
+        };
+        let asked = || stop.asked() || raised.lock().is_ok_and(|r| r.is_some());
+        metric.pairwise(&a, b.as_ref(), &mut Work::new(threads, taxel_core::Stop::when(&asked), &mut report))
+    });
+    if let Ok(Some(error)) = raised.into_inner() {
+        return Err(error);
+    }
+    Ok(array(py, outcome?))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(distance, module)?)?;
+    module.add_function(wrap_pyfunction!(pairwise, module)?)
+}

@@ -1,0 +1,66 @@
+"""Matrices of distances."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._arguments import callback, whole
+from taxel.metrics._metric import Pattern, listed, stated
+from taxel.spikes import SpikeTrains
+
+__all__ = ["pairwise"]
+
+
+def pairwise(
+    metric: str,
+    a: SpikeTrains | Sequence[Pattern],
+    b: SpikeTrains | Sequence[Pattern] | None = None,
+    *,
+    threads: int | None = None,
+    progress: Callable[[int, int], object] | None = None,
+    **parameters: Any,
+) -> NDArray[np.float64]:
+    """Return the distances of all patterns of `a` from all of `b`, or from each other.
+
+    Parameters
+    ----------
+    metric : str
+        The name of one of this room's functions, as ``"victor_purpura"``.
+    a, b : sequence of SpikeTrains, sequence of float sequences (ms), or one SpikeTrains
+        The patterns, equally many trains in each; or single trains, those of one SpikeTrains. Without `b` those of `a`
+        are compared with each other.
+    threads : int, 1 or more, optional
+        All cores where it is left out. The distances are the same.
+    progress : function of (done, all), optional
+        Called now and then with the pairs done and all of them.
+    **parameters
+        Those of the metric.
+
+    Returns
+    -------
+    float64, shape (patterns of `a`, patterns of `b`)
+        Entry i, j is what the metric's function gives for ``a[i]`` and ``b[j]``, within rounding. Without `b` it is
+        symmetric, and 0 on the diagonal.
+
+    Raises
+    ------
+    ProblemError : no such metric, parameters or patterns that make no sense (names pattern, train and spike)
+    KeyboardInterrupt : Ctrl-C, within a fraction of a second
+
+    Examples
+    --------
+    >>> pairwise("victor_purpura", [[10.0], [12.0], []], q=0.1).round(6).tolist()
+    [[0.0, 0.2, 1.0], [0.2, 0.0, 1.0], [1.0, 1.0, 0.0]]
+    """
+    stating = stated(metric, parameters)
+    rows, columns = listed("a", a), None if b is None else listed("b", b)
+    count = None if threads is None else whole("threads", threads, 1, 4096)
+    if progress is not None:
+        callback("progress", progress)
+    found = _core.pairwise(stating, rows, columns, count, progress)
+    return found.reshape(rows[1], (rows if columns is None else columns)[1])

@@ -1,0 +1,51 @@
+"""The distance that thesis 5.10 prints."""
+
+from __future__ import annotations
+
+from taxel.metrics._metric import Pattern, distance
+
+__all__ = ["van_rossum_absolute"]
+
+
+def van_rossum_absolute(
+    a: Pattern, b: Pattern, *, tau: float, window: tuple[float, float] | None = None, step_ms: float | None = None
+) -> float:
+    """Return the absolute difference of two smoothed spike trains, summed over time.
+
+    Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on, as for `van_rossum`; but what is added up over time
+    is the absolute difference, as 5.10 prints it, not its square.
+
+    Parameters
+    ----------
+    a, b : float64, shapes (n,) and (m,), ms, ascending; or SpikeTrains with equally many trains
+        Either may be empty. Of patterns the sum over trains; signed ones are split into ON and OFF.
+    tau : float, ms, above 0
+    window : (start, stop), ms, optional
+        The time that counts, 0 to T in 5.10; all time where it is left out.
+    step_ms : float, above 0, optional
+        A sum over points so far apart, from the window's start (whole multiples where there is none), both ends
+        included; the integral over time where it is left out.
+
+    Returns
+    -------
+    float, 0 or more; ms, or a plain number with `step_ms`
+
+    Raises
+    ------
+    ProblemError : times not ascending or not finite (names train and spike), a parameter out of range, another number
+        of
+        trains
+
+    Notes
+    -----
+    *Reading*: 5.10 calls itself a Euclidean norm and prints ``sum over t of sqrt((f_a - f_b)^2)``; `van_rossum` with
+    ``normalisation="none"`` is the norm. Integral and sum are exact: between spikes the difference is one exponential.
+
+    Examples
+    --------
+    >>> van_rossum_absolute([10.0], [], tau=5.0)
+    5.0
+    >>> round(van_rossum_absolute([10.0], [12.0], tau=5.0, window=(0.0, 50.0), step_ms=1.0), 6)
+    3.636716
+    """
+    return distance("van_rossum_absolute", a, b, {"tau": tau, "window": window, "step_ms": step_ms})

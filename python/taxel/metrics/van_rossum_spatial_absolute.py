@@ -1,0 +1,65 @@
+"""Thesis 5.12, read as 5.10 is printed."""
+
+from __future__ import annotations
+
+from taxel._arguments import instance
+from taxel.array import Array
+from taxel.metrics._metric import distance
+from taxel.spikes import SpikeTrains
+
+__all__ = ["van_rossum_spatial_absolute"]
+
+
+def van_rossum_spatial_absolute(
+    a: SpikeTrains,
+    b: SpikeTrains,
+    *,
+    array: Array,
+    tau: float = 0.4,
+    sigma: float = 2.0,
+    own_train: str = "twice",
+    window: tuple[float, float] | None = None,
+    step_ms: float | None = None,
+) -> float:
+    """Return the absolute differences of two patterns smoothed in time and over the array, over taxels and time.
+
+    Smoothing is that of `van_rossum_spatial`; what is added up is ``|g_m(a) - g_m(b)|``.
+
+    Parameters
+    ----------
+    a, b : SpikeTrains with one train a taxel, or several for each
+        As for `van_rossum_spatial`.
+    array : Array
+    tau : float, ms, above 0
+    sigma : float, mm, above 0
+    own_train : {"twice", "once"}
+        As for `van_rossum_spatial`.
+    window : (start, stop), ms, optional
+    step_ms : float, above 0, optional
+        As for `van_rossum_absolute`.
+
+    Returns
+    -------
+    float, 0 or more; ms, or a plain number with `step_ms`
+
+    Raises
+    ------
+    ProblemError : another number of trains, spikes where the array has no taxel, a parameter out of range
+
+    Notes
+    -----
+    Thesis 5.8 to 5.12. *Reading*: 5.12 prints ``sum over n of sqrt(g_n(a) - g_n(b))``; the square under the root and
+    the sum over time are those of 5.10. Time O(spikes x taxels).
+
+    Examples
+    --------
+    >>> from taxel import Array, SpikeTrains
+    >>> array = Array(1, 2, pitch_mm=2.0)
+    >>> a = SpikeTrains.from_lists([[10.0], []], stop=50.0)
+    >>> b = SpikeTrains.from_lists([[], []], stop=50.0)
+    >>> round(van_rossum_spatial_absolute(a, b, array=array), 6)
+    0.947152
+    """
+    patterns = instance("a", a, SpikeTrains), instance("b", b, SpikeTrains)
+    smoothing = {"array": array, "tau": tau, "sigma": sigma, "own_train": own_train}
+    return distance("van_rossum_spatial_absolute", *patterns, {**smoothing, "window": window, "step_ms": step_ms})

@@ -1,0 +1,132 @@
+"""Van Rossum distances: closed forms against quadrature and elephant, a metric's axioms, both readings of 5.10."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from drawing import STOP, times
+from hypothesis import given
+from hypothesis import strategies as st
+
+from taxel import ProblemError
+from taxel.metrics import van_rossum, van_rossum_absolute
+
+taus = st.floats(0.01, 1000)
+
+
+def smoothed(train, t, tau):
+    """5.8 at these times."""
+    past = t[:, None] - np.asarray(train, float)[None, :]
+    return np.where(past >= 0, np.exp(-np.maximum(past, 0) / tau), 0.0).sum(1)
+
+
+def pieces(a, b, tau):
+    """Fine points between all steps, and on until nothing is left, and their weights (Gauss and Legendre)."""
+    x, w = np.polynomial.legendre.leggauss(12)
+    steps = np.unique(np.concatenate([a, b]))
+    last = steps[-1] if len(steps) else 0.0
+    edges = np.concatenate([np.linspace(p, q, 40) for p, q in itertools.pairwise(steps)] + [[last]])
+    edges = np.unique(np.concatenate([edges, last + tau * np.linspace(0, 60, 200)]))
+    half = np.diff(edges) / 2
+    return (edges[:-1] + half)[:, None] + half[:, None] * x, half[:, None] * w
+
+
+@pytest.mark.parametrize("tau", [0.5, 7.0, 300.0])
+def test_both_are_the_integrals_that_quadrature_gives(tau):
+    random = np.random.default_rng(3)
+    for n, m in ((0, 1), (5, 0), (6, 9), (20, 20)):
+        a, b = np.sort(random.uniform(0, 100, n)), np.sort(random.uniform(0, 100, m))
+        t, w = pieces(a, b, tau)
+        difference = smoothed(a, t.ravel(), tau) - smoothed(b, t.ravel(), tau)
+        square = (difference**2 * w.ravel()).sum()
+        assert van_rossum(a, b, tau=tau, normalisation="none") == pytest.approx(math.sqrt(square), rel=1e-9)
+        assert van_rossum(a, b, tau=tau, normalisation="tau") == pytest.approx(math.sqrt(square / tau), rel=1e-9)
+        assert van_rossum(a, b, tau=tau) == pytest.approx(math.sqrt(2 * square / tau), rel=1e-9)
+        assert van_rossum_absolute(a, b, tau=tau) == pytest.approx((np.abs(difference) * w.ravel()).sum(), rel=1e-9)
+
+
+@given(a=times, b=times, tau=taus)
+def test_elephant_has_the_same_value_but_for_its_cancellation(a, b, tau):
+    neo, elephant = pytest.importorskip("neo"), pytest.importorskip("elephant.spike_train_dissimilarity")
+    import quantities as pq
+
+    trains = [neo.SpikeTrain(t, units="ms", t_start=0, t_stop=STOP) for t in (a, b)]
+    with np.errstate(all="ignore"), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(elephant.warnings, "warn", lambda *_, **__: None)
+        theirs = elephant.van_rossum_distance(trains, tau * pq.ms)[0, 1]
+    # Theirs is the root of a difference of sums: as far off as the root of a rounding.
+    assert van_rossum(a, b, tau=tau) == pytest.approx(float(theirs), abs=1e-5)
+
+
+@given(a=times, b=times, c=times, tau=taus)
+def test_both_are_metrics(a, b, c, tau):
+    for metric in (van_rossum, van_rossum_absolute):
+        ab, bc, ac = (metric(x, y, tau=tau) for x, y in ((a, b), (b, c), (a, c)))
+        assert metric(a, a, tau=tau) == 0
+        assert metric(b, a, tau=tau) == ab
+        assert ac <= (ab + bc) * (1 + 1e-9) + 1e-9
+        assert (ab == 0) == (a == b)
+
+
+@given(shift=st.floats(0, 400), tau=taus, n=st.integers(0, 40))
+def test_equal_trains_are_0_apart_however_they_round(shift, tau, n):
+    a = np.sort(np.random.default_rng(n).uniform(0, 1e-3, n)) + shift * 1e6
+    assert van_rossum(a, a.copy(), tau=tau) == 0
+    assert van_rossum([], [], tau=tau) == 0
+
+
+def test_near_trains_lose_no_digits():
+    # A move by dt is nearly sqrt(2 dt / tau), far below the root of a rounding of the sums.
+    a = np.arange(1.0, 200.0)
+    b = a.copy()
+    b[100] += 1e-12
+    moved = b[100] - a[100]
+    assert van_rossum(a, b, tau=10.0) == pytest.approx(math.sqrt(2 * moved / 10.0), rel=1e-6)
+
+
+def test_one_spike_more_is_what_the_normalisation_says():
+    for normalisation, expected in (("spike", 1.0), ("tau", math.sqrt(0.5)), ("none", math.sqrt(4.0))):
+        assert van_rossum([1.0, 50.0], [50.0], tau=8.0, normalisation=normalisation) == pytest.approx(
+            expected, abs=1e-2
+        )
+        assert van_rossum([3.0], [], tau=8.0, normalisation=normalisation) == pytest.approx(expected, rel=1e-15)
+
+
+@given(a=times, b=times, tau=st.floats(0.05, 50), step=st.floats(0.1, 20), start=st.floats(-50, 300))
+def test_the_sum_over_a_grid_is_the_plain_sum(a, b, tau, step, start):
+    window = (start, start + 120.0)
+    t = start + step * np.arange(np.floor(120.0 / step) + 1)
+    t = t[t <= window[1]]
+    near = np.abs(t[:, None] - np.asarray([*a, *b])[None, :])
+    if near.size and near[near > 0].size and near[near > 0].min() < 1e-9:
+        return  # a point a rounding before or behind a spike
+    plain = np.abs(smoothed(a, t, tau) - smoothed(b, t, tau)).sum()
+    assert van_rossum_absolute(a, b, tau=tau, window=window, step_ms=step) == pytest.approx(plain, rel=1e-7, abs=1e-9)
+
+
+@given(a=times, b=times, tau=taus)
+def test_windows_side_by_side_add_up_to_all_time(a, b, tau):
+    parts = [van_rossum_absolute(a, b, tau=tau, window=w) for w in ((-10, 123.25), (123.25, 700), (700, 1e9))]
+    whole = van_rossum_absolute(a, b, tau=tau)
+    assert sum(parts) == pytest.approx(whole, rel=1e-9, abs=1e-9)
+    fine = van_rossum_absolute(a, b, tau=tau, step_ms=tau / 2000) * tau / 2000
+    assert fine == pytest.approx(whole, rel=1e-2, abs=1e-2 * tau)
+
+
+def test_parameters_that_make_no_sense_are_one_clear_error_each():
+    for metric, parameters, said in (
+        (van_rossum, {"tau": 0.0}, "tau is 0 ms: must be above 0 and finite"),
+        (van_rossum, {"tau": -1.0}, "tau is -1 ms"),
+        (van_rossum, {"tau": math.nan}, "tau is nan: must be finite"),
+        (van_rossum, {"tau": 1.0, "normalisation": "max"}, "normalisation is 'max': must be one of 'spike', 'tau'"),
+        (van_rossum_absolute, {"tau": 1.0, "step_ms": 0.0}, "step_ms is 0 ms: must be above 0"),
+        (van_rossum_absolute, {"tau": 1.0, "window": (5.0, 1.0)}, "window is 5 to 1 ms: must be finite, and its start"),
+        (van_rossum_absolute, {"tau": 1.0, "window": (5.0,)}, "window has 1 entries: must be start and stop"),
+    ):
+        with pytest.raises(ProblemError, match=said):
+            metric([1.0], [2.0], **parameters)
+    with pytest.raises(ProblemError, match="train b, spike 1: 1 ms comes after 2 ms, times must ascend"):
+        van_rossum([], [2.0, 1.0], tau=1.0)
