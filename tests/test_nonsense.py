@@ -284,6 +284,8 @@ SOUND: dict[str, Sound] = {
         margin=0.01,
         horizon=30.0,
         tolerance=1e-6,
+        engine="native",
+        max_seconds=60.0,
     ),
     "taxel.learn.ConeR.fit": method(
         CONE, "fit", patterns=[PLAIN], targets=[[5.0]], start=[0.1] * 4, progress=lambda *_: None

@@ -275,12 +275,11 @@ _Fit = tuple[
     float,
     list[float],
     float,
-    int,
-    int,
-    bool,
-    list[tuple[int, int]],
-    int,
+    tuple[int, int, bool, bool],
+    tuple[list[tuple[int, int]], int],
+    tuple[NDArray[np.int64], NDArray[np.float64]],
 ]
+_Start = tuple[NDArray[np.float64], tuple[NDArray[np.int64], NDArray[np.float64]] | None]
 
 def check_cone_r(parameters: str) -> str: ...
 
@@ -325,3 +324,6 @@ def peak_tempotron(
 def change_tempotron(
     parameters: str, weights: NDArray[np.float64], pattern: tuple[Any, ...], label: bool
 ) -> NDArray[np.float64]: ...
+    @property
+    def rows(self) -> int: ...
+    def fit(self, parameters: str, start: _Start | None, progress: Any) -> tuple[_Fit, BaseException | None]: ...

@@ -32,6 +32,17 @@ def examples(seed, trains=14, patterns=2, targets=2, duration=120.0, whole_ms=Fa
     return spikes, wanted
 
 
+def kernel(cone, age):
+    """What an input of this age, above 0, adds to the potential."""
+    if cone.kernel == "alpha":
+        return age / cone.tau * np.exp(-age / cone.tau)
+    if cone.kernel == "exponential":
+        return np.exp(-age / cone.tau)
+    fast = cone.tau / 4 if cone.tau_s is None else cone.tau_s
+    peak = np.log(cone.tau / fast) * cone.tau * fast / (cone.tau - fast)
+    return (np.exp(-age / cone.tau) - np.exp(-age / fast)) / (np.exp(-peak / cone.tau) - np.exp(-peak / fast))
+
+
 def statement(cone, patterns, targets):
     """Every coefficient of 6.12 to 6.14, one sum of kernels at a time."""
 
@@ -49,7 +60,7 @@ def statement(cone, patterns, targets):
                     continue
                 if cone.after_spike == "ignore" and any(e < s <= e + cone.refractory for e in earlier):
                     continue
-                row[n] += (t - s) / cone.tau * np.exp(-(t - s) / cone.tau)
+                row[n] += kernel(cone, t - s)
         return row
 
     delta = 0.1 * cone.tau if cone.delta_t_ms is None else cone.delta_t_ms
@@ -85,9 +96,8 @@ def terms(cone, rows, w):
 
 def shares(cone, rows):
     """What each term is multiplied with: its lambda over their sum, over its largest value (6.3.2, 6.3.3)."""
-    most = max(abs(cone.lb), abs(cone.ub))
-    n = rows[0].shape[1]
-    low, high = terms(cone, rows, np.full(n, -most)), terms(cone, rows, np.full(n, most))
+    most = np.maximum(np.abs(cone.lb), np.abs(cone.ub)) * np.ones(rows[0].shape[1])
+    low, high = terms(cone, rows, -most), terms(cone, rows, most)
     largest = np.array([high[0], high[1], low[2], low[3], high[4]])
     if cone.divide_b_by == "targets":
         largest[2] = len(rows[0])
@@ -123,8 +133,8 @@ def least(cone, rows):
         (block(k, w=behind, y=-eye(k)), cone.kappa * theta),
         (block(n, w=eye(n), a=-eye(n)), np.zeros(n)),
         (block(n, w=-eye(n), a=-eye(n)), np.zeros(n)),
-        (block(n, w=eye(n)), np.full(n, cone.ub)),
-        (block(n, w=-eye(n)), np.full(n, -cone.lb)),
+        (block(n, w=eye(n)), cone.ub * np.ones(n)),
+        (block(n, w=-eye(n)), np.multiply(cone.lb, -np.ones(n))),
         (block(k, w=at, e=-eye(k)), theta),
         (block(k, w=-at, e=-eye(k)), -theta),
         (block(m, w=silent, h=-eye(m)), limit),
@@ -158,6 +168,13 @@ OPTIONS = [
     {"lb": 0.0, "ub": 1.0, "first_threshold": "printed"},
     {"lb": -1.0, "ub": 0.2, "delta_t_ms": 4.0, "horizon": 150.0},
     {"lambdas": (0, 1, 0, 1, 100), "lb": -3.0, "ub": 3.0, "margin": 0.01, "kappa": 2.0},
+    {"lb": [-0.1] * 7 + [-0.6] * 7, "ub": [0.3, 0.05] * 7},
+    {"lb": [0.01] * 14, "ub": 0.5, "lambdas": (4, 0, 10, 100, 80)},
+    {"kernel": "double_exponential", "tau_s": 3.0, "after_spike": "reset"},
+    {"kernel": "double_exponential", "step_ms": 0.4, "norm": "square"},
+    {"kernel": "exponential", "after_spike": "ignore", "lambdas": (2, 2, 10, 100, 800)},
+    {"engine": "cone solver"},
+    {"engine": "cone solver", "lb": [-0.1] * 7 + [-0.6] * 7, "ub": 0.2, "norm": "square"},
 ]
 
 
@@ -173,9 +190,10 @@ def test_the_objective_is_that_of_every_row_handed_whole_to_a_solver(options, se
     assert list(cone.parts_.values()) == pytest.approx(list(value), rel=1e-9, abs=1e-12)
     assert cone.objective_ == pytest.approx(value.sum(), rel=1e-12)
     assert cone.status_ == "solved"
+    assert cone.engine_ == cone.engine
     assert cone.objective_ == pytest.approx(least(cone, rows), rel=1e-6)
-    assert cone.weights_.min() >= cone.lb
-    assert cone.weights_.max() <= cone.ub
+    assert np.all(cone.weights_ >= cone.lb)
+    assert np.all(cone.weights_ <= cone.ub)
 
 
 def fitted(cone, *args, **kwargs):
@@ -202,6 +220,34 @@ def test_a_start_changes_the_way_but_not_the_result():
         warm = fitted(ConeR(tau=12.0, after_spike="reset"), patterns, targets, start=start)
         assert warm.status_ == "solved"
         assert warm.objective_ == pytest.approx(cold.objective_, rel=1e-6)
+
+
+def test_a_fit_to_the_same_rows_hands_on_its_multipliers():
+    patterns, targets = examples(6, trains=40, patterns=4, targets=3, duration=300.0)
+    rows = ConeR(tau=12.0).prepare(patterns, targets)
+    cold, warm = ConeR(tau=12.0, kappa=1.25), ConeR(tau=12.0, kappa=1.25)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        rows.fit(cold)
+        rows.fit(warm, start=rows.fit(ConeR(tau=12.0)))
+    assert warm.objective_ == pytest.approx(cold.objective_, rel=1e-6)
+    again = rows.fit(ConeR(tau=12.0, kappa=1.25), start=cold)
+    assert again.rounds_ < cold.rounds_
+    elsewhere = fitted(ConeR(tau=12.0, kappa=1.25), patterns[:3], targets[:3], start=cold)  # other rows: weights alone
+    assert elsewhere.status_ == "solved"
+    with pytest.raises(ProblemError, match="start: this ConeR is not fitted yet"):
+        rows.fit(warm, start=ConeR())
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_where_the_native_engine_cannot_prove_its_result_the_cone_solver_goes_on_and_the_report_says_so():
+    """Bounds ten thousand times what is needed hide the scale that Newton steps need."""
+    patterns, targets = examples(1, trains=40, patterns=1, duration=250.0)
+    options = {"tau": 40.0, "lambdas": (0.01, 0, 100, 100, 80), "lb": -1000.0, "ub": 1000.0}
+    cone, whole = (ConeR(**options, engine=engine).fit(patterns, targets) for engine in ("native", "cone solver"))
+    assert cone.engine_ == whole.engine_ == "cone solver"
+    assert cone.status_ == "solved"
+    assert cone.objective_ == pytest.approx(whole.objective_, rel=1e-6)
 
 
 def test_one_layout_serves_many_parameters_and_refuses_those_that_need_other_rows():
@@ -295,20 +341,44 @@ def test_progress_is_told_round_by_round_and_may_stop_the_fit_by_raising():
         fitted(ConeR(tau=12.0), patterns, targets, progress=lambda *_: 1 / 0)
 
 
+LONG = {"tau": 40.0, "tolerance": 1e-9, "lambdas": (4, 0, 100, 100, 80)}
+
+
+@pytest.fixture(scope="module")
+def long_rows():
+    """Rows on which a fit takes seconds."""
+    return ConeR(**LONG).prepare(*examples(13, trains=600, patterns=120, targets=5, duration=2000.0))
+
+
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_control_c_stops_a_fit_promptly():
-    patterns, targets = examples(13, trains=600, patterns=120, targets=5, duration=2000.0)
-    rows = ConeR(tau=40.0, tolerance=1e-9).prepare(patterns, targets)
+def test_control_c_stops_a_fit_promptly_and_keeps_the_best_so_far(long_rows):
+    cone = None
 
     def fit_for_ever():
+        nonlocal cone
         for k in range(10_000):
-            rows.fit(ConeR(tau=40.0, tolerance=1e-9, kappa=1.2 + k / 1000))
+            cone = ConeR(**LONG, kappa=1.2 + k / 1000)
+            long_rows.fit(cone)
 
     threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
     begun = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         fit_for_ever()
     assert time.monotonic() - begun < 60
+    assert cone.status_ == "stopped"
+    assert cone.gap_ > cone.tolerance
+    assert cone.objective_ == pytest.approx(sum(cone.parts_.values()))
+
+
+def test_max_seconds_ends_a_fit_with_the_best_so_far_and_a_warning(long_rows):
+    cone = ConeR(**LONG, max_seconds=0.2)
+    with pytest.warns(UserWarning, match="only proven to lie within"):
+        long_rows.fit(cone)
+    assert cone.status_ == "stopped"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        ever = long_rows.fit(ConeR(**LONG | {"tolerance": 1e-3}))
+    assert cone.objective_ * (1 - cone.gap_) <= ever.objective_
 
 
 @pytest.mark.parametrize(
@@ -337,6 +407,13 @@ def test_control_c_stops_a_fit_promptly():
         ({"margin": -0.1}, "margin is -0.1"),
         ({"horizon": float("nan")}, "horizon is nan"),
         ({"tolerance": 0}, "tolerance is 0: must lie between"),
+        ({"lb": [-1.0, 0.5], "ub": 0.5}, "bounds of synapse 1: 0.5 to 0.5 mV: lb must lie below ub"),
+        ({"lb": [-1.0], "ub": [1.0, 1.0]}, "lb holds 1 bounds, ub 2"),
+        ({"lb": []}, "bounds: there is none"),
+        ({"ub": [1.0, float("inf")]}, r"ub\[1\] is inf: must be finite"),
+        ({"ub": "high"}, "a bound must be a number, or one a synapse"),
+        ({"engine": "steam"}, "unknown variant `steam`, expected `native` or `cone solver`"),
+        ({"max_seconds": 0}, "max_seconds is 0: must be above 0"),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
@@ -381,6 +458,11 @@ def test_a_start_that_does_not_fit_is_one_clear_error():
     for start, said in (([1.0, 2.0], "weights: 2 for 1 trains"), ([float("nan")], r"weights\[0\] is NaN")):
         with pytest.raises(ProblemError, match=said):
             ConeR().fit([lists([1.0])], [[5.0]], start=start)
+
+
+def test_bounds_for_another_number_of_trains_are_one_clear_error():
+    with pytest.raises(ProblemError, match="ub: 2 bounds for 1 trains"):
+        ConeR(ub=[1.0, 1.0]).fit([lists([1.0])], [[5.0]])
 
 
 def test_a_last_target_behind_the_horizon_is_one_clear_error():

@@ -1,5 +1,7 @@
 //! Weights from examples: patterns of input spikes, and the times at which the neuron shall fire.
 
+mod augmented;
+mod bounds;
 mod chronotron;
 mod cone_program;
 mod cone_r;
@@ -9,8 +11,10 @@ mod filt;
 mod fp;
 mod htp;
 mod inst;
+mod minimise;
 #[allow(dead_code)]
 mod mixed;
+mod point;
 mod psd;
 mod resume;
 mod rival;
@@ -20,8 +24,9 @@ mod span;
 mod stepped;
 mod tempotron;
 
+pub use bounds::Bound;
 pub use chronotron::{ELearning, ILearning};
-pub use cone_r::{ConeR, Divisor, Fit, Norm, Parts, Problem, Round, Status};
+pub use cone_r::{ConeR, Divisor, Engine, Fit, Norm, Parts, Problem, Round, Shares, Status};
 pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
 pub use epochs::{Ended, Trained, Training, Updates};
 pub use filt::Filt;

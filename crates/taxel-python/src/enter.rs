@@ -29,7 +29,6 @@ where
 /// As [`enter`], for work that keeps the best so far when it is stopped: by Ctrl-C, or after `max_seconds`.
 ///
 /// Gives its result together with the signal's exception, which the caller raises once the result is kept.
-#[allow(dead_code)]
 pub(crate) fn enter_keeping<T, E>(
     py: Python<'_>,
     max_seconds: Option<f64>,

@@ -1,12 +1,15 @@
 //! Learners.
 
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::learn::{ConeR, Fit, Problem, Round, Status};
-use taxel_core::problem;
+use taxel_core::learn::{ConeR, Engine, Fit, Problem, Round, Shares, Status};
+use taxel_core::{Stop, problem};
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
-use crate::enter::enter;
+use crate::enter::{enter, enter_keeping};
 use crate::errors::core;
 
 fn to_cone_r(json: &str) -> PyResult<ConeR> {
@@ -21,8 +24,20 @@ fn check_cone_r(parameters: &str) -> PyResult<String> {
     serde_json::to_string(&to_cone_r(parameters)?).map_err(|e| core(problem!("ConeR: {e}")))
 }
 
-/// A fit as Python gets it: weights, objective, parts, gap, rounds, rows, solved, unreachable, refires.
-type FitOut<'py> = (Bound<'py, PyArray1<f64>>, f64, [f64; 5], f64, usize, usize, bool, Vec<(usize, usize)>, usize);
+/// Multipliers as Python holds them: rows, and a share each.
+type MultipliersOut<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
+type MultipliersIn<'py> = (PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f64>);
+
+/// A fit as Python gets it: weights, objective, parts, gap; rounds, rows, solved, native; unreachable, refires; multipliers.
+type FitOut<'py> = (
+    Bound<'py, PyArray1<f64>>,
+    f64,
+    [f64; 5],
+    f64,
+    (usize, usize, bool, bool),
+    (Vec<(usize, usize)>, usize),
+    MultipliersOut<'py>,
+);
 
 /// The rows of one set of examples.
 #[pyclass(frozen)]
@@ -49,32 +64,66 @@ impl ConeRProblem {
         self.0.silent_rows()
     }
 
+    /// All rows, grid points at which nothing is asked included.
+    #[getter]
+    fn rows(&self) -> usize {
+        self.0.rows()
+    }
+
+    /// A fit, and the exception of a signal that ended it early.
     #[pyo3(signature = (parameters, start, progress))]
     fn fit<'py>(
         &self,
         py: Python<'py>,
         parameters: &str,
-        start: Option<PyReadonlyArray1<'py, f64>>,
+        start: Option<StartIn<'py>>,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<FitOut<'py>> {
+    ) -> PyResult<(FitOut<'py>, Option<Py<PyAny>>)> {
         let parameters = to_cone_r(parameters)?;
-        let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
-        let mut raised = None;
+        let start = start.as_ref().map(to_start).transpose()?;
+        let start = start.as_ref().map(|(weights, multipliers)| (*weights, multipliers.as_ref()));
+        let raised = Mutex::new(None);
+        let failed = AtomicBool::new(false);
         let mut report = |r: Round| {
-            if let (Some(progress), None) = (&progress, &raised) {
+            if let (Some(progress), false) = (&progress, failed.load(Ordering::Relaxed)) {
                 let called = Python::attach(|py| progress.call1(py, (r.round, r.rows, r.objective, r.gap)).map(drop));
-                raised = called.err();
+                if let (Err(error), Ok(mut slot)) = (called, raised.lock()) {
+                    *slot = Some(error);
+                    failed.store(true, Ordering::Relaxed);
+                }
             }
         };
-        let fit = enter(py, |stop| self.0.fit(&parameters, start, &mut report, stop))?;
-        if let Some(error) = raised {
+        let (fit, signal) = enter_keeping(py, parameters.max_seconds, |stop| {
+            let either = || stop.asked() || failed.load(Ordering::Relaxed);
+            self.0.fit(&parameters, start, &mut report, Stop::when(&either))
+        })?;
+        if let Some(error) = raised.into_inner().unwrap_or(None) {
             return Err(error);
         }
-        let Fit { weights, objective, parts, gap, rounds, rows, status, unreachable, refires } = fit;
-        let parts = [parts.l1, parts.l2, parts.B, parts.C, parts.D];
-        let solved = status == Status::Solved;
-        Ok((array(py, weights), objective, parts, gap, rounds, rows, solved, unreachable, refires))
+        Ok((fit_out(py, fit), signal))
     }
+}
+
+/// Weights of an earlier fit, and its multipliers where it was of the same rows.
+type StartIn<'py> = (PyReadonlyArray1<'py, f64>, Option<MultipliersIn<'py>>);
+
+fn to_start<'a>((weights, multipliers): &'a StartIn<'_>) -> PyResult<(&'a [f64], Option<Shares>)> {
+    let multipliers = match multipliers {
+        Some((rows, shares)) => Some(Shares {
+            rows: slice("start", rows)?.iter().map(|&row| usize::try_from(row).unwrap_or(usize::MAX)).collect(),
+            values: slice("start", shares)?.to_vec(),
+        }),
+        None => None,
+    };
+    Ok((slice("start", weights)?, multipliers))
+}
+
+fn fit_out(py: Python<'_>, fit: Fit) -> FitOut<'_> {
+    let parts = [fit.parts.l1, fit.parts.l2, fit.parts.B, fit.parts.C, fit.parts.D];
+    let how = (fit.rounds, fit.rows, fit.status == Status::Solved, fit.engine == Engine::Native);
+    let rows = fit.multipliers.rows.iter().map(|&row| row as i64).collect();
+    let multipliers = (array(py, rows), array(py, fit.multipliers.values));
+    (array(py, fit.weights), fit.objective, parts, fit.gap, how, (fit.unreachable, fit.refires), multipliers)
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

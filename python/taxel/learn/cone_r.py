@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Literal, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._arguments import callback, floats, instance, parameters, several
+from taxel._core import ProblemError
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
@@ -46,8 +47,9 @@ class ConeR:
         How far behind; ``0.1 * tau`` where left out.
     lambdas : five floats, 0 or more
         Shares of l1, l2, B, C, D in the objective; only their ratios matter.
-    lb, ub : float, mV
-        Least and largest weight. All normalisers are taken at ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``.
+    lb, ub : float, or float sequence of shape (trains,), mV
+        Least and largest weight, for all synapses or one a synapse. All normalisers are taken at ``-max(|lb|, |ub|)``
+        and ``+max(|lb|, |ub|)``, synapse by synapse.
     divide_b_by : {"B_max", "targets"}
         B over its largest value, as printed, or over the number of targets.
     norm : {"norm", "square"}
@@ -58,6 +60,11 @@ class ConeR:
         Where silent rows end; the later of the pattern's stop and its last target + `tau` where left out.
     tolerance : float
         The proven relative gap at which a fit counts as solved.
+    engine : {"native", "cone solver"}
+        "native": Newton steps on the few rows near threshold; where their result cannot be proven, the cone solver goes
+        on from it. "cone solver": row generation around Clarabel from the start, slower by far.
+    max_seconds : float, s, optional
+        After so long a fit ends with the best so far, and what is proven of it.
 
     Attributes
     ----------
@@ -69,9 +76,11 @@ class ConeR:
     gap_ : float
         How far, relative to it, the objective can lie above the least one: a proven bound.
     status_ : {"solved", "stopped"}
-        "stopped": the gap is above `tolerance`.
+        "stopped": the gap is above `tolerance`, as `max_seconds` or Ctrl-C ended the fit, or nothing closed it.
+    engine_ : {"native", "cone solver"}
+        Who found these weights: "cone solver" also where the native engine's result could not be proven.
     rounds_, rows_ : int
-        Rounds of row generation, rows in the last one.
+        Rounds of multipliers or of row generation; rows on their kink, or handed to the cone solver, in the last one.
     silent_rows_ : int
         Rows of 6.13.
     unreachable_ : list of (pattern, target)
@@ -87,8 +96,9 @@ class ConeR:
 
     Notes
     -----
-    Thesis 6.3.3, equations 6.12 to 6.14. Solved by row generation around the cone solver Clarabel; the gap is computed
-    apart from it, over all rows. Choices that the thesis leaves open stand on the page *Readings*.
+    Thesis 6.3.3, equations 6.12 to 6.14. Solved by a proximal augmented Lagrangian with semismooth Newton steps, in
+    which only rows near threshold are ever written out, or by row generation around the cone solver Clarabel. The gap
+    is computed apart from either, over all rows. Choices that the thesis leaves open stand on the page *Readings*.
 
     Examples
     --------
@@ -105,12 +115,14 @@ class ConeR:
     parts_: dict[str, float]
     gap_: float
     status_: Literal["solved", "stopped"]
+    engine_: Literal["native", "cone solver"]
     rounds_: int
     rows_: int
     silent_rows_: int
     unreachable_: list[tuple[int, int]]
     refires_: int
     neuron_: Neuron
+    _multipliers: tuple[int, tuple[NDArray[np.int64], NDArray[np.float64]]]
 
     def __init__(
         self,
@@ -128,13 +140,15 @@ class ConeR:
         kappa: float = 1.2,
         delta_t_ms: float | None = None,
         lambdas: Sequence[float] = (2.8, 1.2, 100.0, 100.0, 80.0),
-        lb: float = -0.3,
-        ub: float = 0.3,
+        lb: float | Sequence[float] = -0.3,
+        ub: float | Sequence[float] = 0.3,
         divide_b_by: Literal["B_max", "targets"] = "B_max",
         norm: Literal["norm", "square"] = "norm",
         margin: float = 0.0,
         horizon: float | None = None,
         tolerance: float = 1e-6,
+        engine: Literal["native", "cone solver"] = "native",
+        max_seconds: float | None = None,
     ) -> None:
         self.tau = tau
         self.theta_0 = theta_0
@@ -156,6 +170,8 @@ class ConeR:
         self.margin = margin
         self.horizon = horizon
         self.tolerance = tolerance
+        self.engine: Literal["native", "cone solver"] = engine
+        self.max_seconds = max_seconds
         _core.check_cone_r(self._json())
 
     def fit(
@@ -163,7 +179,7 @@ class ConeR:
         patterns: Sequence[SpikeTrains],
         targets: Sequence[ArrayLike],
         *,
-        start: ArrayLike | None = None,
+        start: ConeR | ArrayLike | None = None,
         progress: Callable[[int, int, float, float], object] | None = None,
     ) -> Self:
         """Learn the weights that fire the neuron at the targets and nowhere else.
@@ -174,8 +190,9 @@ class ConeR:
             The same trains in each; signed ones split into ON and OFF.
         targets : sequence of float sequences, ms
             When the neuron shall fire, one list a pattern; an empty one teaches silence.
-        start : float64, shape (trains,), mV, optional
-            Weights of a similar fit (other `lambdas`, other `kappa`): the closer, the quicker. The result is the same.
+        start : ConeR, or float64 of shape (trains,), mV, optional
+            A similar fit (other `lambdas`, other `kappa`), or its weights: the closer, the quicker. The result is the
+            same. Of a fit to the same rows the multipliers help as well.
         progress : function of (round, rows, objective, gap), optional
             Called after each round.
 
@@ -187,7 +204,7 @@ class ConeR:
         Raises
         ------
         ProblemError : patterns or targets that make no sense (names pattern and target)
-        KeyboardInterrupt : Ctrl-C, within a fraction of a second
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the best so far is kept
 
         Warns
         -----
@@ -215,7 +232,7 @@ class ConeR:
         return ConeRProblem(self, patterns, targets)
 
     def _json(self) -> str:
-        values = {name: value for name, value in vars(self).items() if not name.endswith("_")}
+        values = {name: value for name, value in vars(self).items() if not (name.endswith("_") or name.startswith("_"))}
         neuron = {name: values.pop(name) for name in _NEURON}
         return parameters({"neuron": {**neuron, "time": "grid"}, **values})
 
@@ -246,7 +263,7 @@ class ConeRProblem:
         self,
         cone: ConeR,
         *,
-        start: ArrayLike | None = None,
+        start: ConeR | ArrayLike | None = None,
         progress: Callable[[int, int, float, float], object] | None = None,
     ) -> ConeR:
         """Fit a learner on these rows.
@@ -254,8 +271,8 @@ class ConeRProblem:
         Parameters
         ----------
         cone : ConeR
-            May differ from the one that laid out the rows in `lambdas`, `kappa`, `lb`, `ub`, `divide_b_by`, `norm` and
-            `tolerance`.
+            May differ from the one that laid out the rows in `lambdas`, `kappa`, `lb`, `ub`, `divide_b_by`, `norm`,
+            `tolerance`, `engine` and `max_seconds`.
         start, progress
             As in `ConeR.fit`.
 
@@ -268,31 +285,52 @@ class ConeRProblem:
         ------
         ProblemError : a learner that needs other rows
         """
-        first = None if start is None else floats("start", start)
+        first = None if start is None else self._start(start)
         if progress is not None:
             callback("progress", progress)
-        instance("cone", cone, ConeR)
-        found = self._problem.fit(cone._json(), first, progress)
-        weights, objective, parts, gap, rounds, rows, solved, unreachable, refires = found
-        cone.weights_ = weights
-        cone.objective_ = objective
-        cone.parts_ = dict(zip(("l1", "l2", "B", "C", "D"), parts, strict=True))
-        cone.gap_ = gap
-        cone.status_ = "solved" if solved else "stopped"
-        cone.rounds_, cone.rows_, cone.silent_rows_ = rounds, rows, self.silent_rows
-        cone.unreachable_ = unreachable
-        cone.refires_ = refires
-        cone.neuron_ = Neuron(**{name: getattr(cone, name) for name in _NEURON}, time="grid")
+        found, signal = self._problem.fit(instance("cone", cone, ConeR)._json(), first, progress)
+        _keep(cone, found, self)
+        if signal is not None:
+            raise signal
         _warn(cone)
         return cone
+
+    def _start(self, start: ConeR | ArrayLike) -> tuple[NDArray[np.float64], Any]:
+        if not isinstance(start, ConeR):
+            return floats("start", start), None
+        if not hasattr(start, "weights_"):
+            raise ProblemError("start: this ConeR is not fitted yet")
+        rows, multipliers = start._multipliers
+        return start.weights_, multipliers if rows == self._problem.rows else None
+
+
+def _keep(cone: ConeR, found: Any, problem: Any) -> None:
+    """Put what was found on the learner."""
+    weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable, refires), multipliers = found
+    cone.weights_ = weights
+    cone.objective_ = objective
+    cone.parts_ = dict(zip(("l1", "l2", "B", "C", "D"), parts, strict=True))
+    cone.gap_ = gap
+    cone.status_ = "solved" if solved else "stopped"
+    cone.engine_ = "native" if native else "cone solver"
+    cone.rounds_, cone.rows_, cone.silent_rows_ = rounds, rows, problem.silent_rows
+    cone.unreachable_ = unreachable
+    cone.refires_ = refires
+    cone.neuron_ = Neuron(**{name: getattr(cone, name) for name in _NEURON}, time="grid")
+    cone._multipliers = (problem._problem.rows, multipliers)
+
+
+def _shown(bound: float | Sequence[float]) -> str:
+    return f"{bound}" if np.ndim(bound) == 0 else "their own bounds"
 
 
 def _warn(cone: ConeR) -> None:
     if cone.unreachable_:
         named = ", ".join(f"pattern {p} target {k}" for p, k in cone.unreachable_[:5])
         more = f" and {len(cone.unreachable_) - 5} more" if len(cone.unreachable_) > 5 else ""
+        within = f"within {_shown(cone.lb)} to {_shown(cone.ub)} mV"
         warnings.warn(
-            f"no weights within {cone.lb} to {cone.ub} mV bring {named}{more} to the threshold; the rest was fitted",
+            f"no weights {within} bring {named}{more} to the threshold; the rest was fitted",
             stacklevel=4,
         )
     if cone.refires_:

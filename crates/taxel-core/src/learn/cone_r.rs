@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::augmented::Start;
+use super::bounds::{Bound, bounds_of, check_bounds};
 use super::check_examples;
+use super::point::dot;
 use super::rounds::START_NEAR_MS;
 use super::rows::{SilentRows, TargetRow, target_rows};
 use crate::neuron::{Neuron, Time};
@@ -34,6 +37,18 @@ pub enum Norm {
     Square,
 }
 
+/// Who finds the least objective.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Engine {
+    /// Newton steps on the few rows near threshold; where their result cannot be proven, the cone solver goes on from it.
+    #[default]
+    #[serde(rename = "native")]
+    Native,
+    /// Row generation around the cone solver Clarabel.
+    #[serde(rename = "cone solver")]
+    ConeSolver,
+}
+
 /// Parameters of CONE-R; defaults from Tables 6.1 and 6.2.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -47,9 +62,9 @@ pub struct ConeR {
     /// `lambda_1` to `lambda_5`: l1, l2, B, C, D.
     pub lambdas: [f64; 5],
     /// Least weight, mV.
-    pub lb: f64,
+    pub lb: Bound,
     /// Largest weight, mV.
-    pub ub: f64,
+    pub ub: Bound,
     /// What B is divided by.
     pub divide_b_by: Divisor,
     /// The l2 term as norm or as square.
@@ -60,6 +75,10 @@ pub struct ConeR {
     pub horizon: Option<f64>,
     /// The relative gap between objective and proven bound at which a fit counts as solved.
     pub tolerance: f64,
+    /// Who solves.
+    pub engine: Engine,
+    /// After how long the caller asks for the best so far, s; this crate looks at no clock.
+    pub max_seconds: Option<f64>,
 }
 
 impl Default for ConeR {
@@ -69,13 +88,15 @@ impl Default for ConeR {
             kappa: 1.2,
             delta_t_ms: None,
             lambdas: [2.8, 1.2, 100.0, 100.0, 80.0],
-            lb: -0.3,
-            ub: 0.3,
+            lb: Bound::All(-0.3),
+            ub: Bound::All(0.3),
             divide_b_by: Divisor::Largest,
             norm: Norm::Norm,
             margin: 0.0,
             horizon: None,
             tolerance: 1e-6,
+            engine: Engine::Native,
+            max_seconds: None,
         }
     }
 }
@@ -105,9 +126,7 @@ impl ConeR {
         if self.lambdas.iter().sum::<f64>() == 0.0 {
             return Err(problem!("lambdas are all 0: at least one must be above 0"));
         }
-        if !(self.lb.is_finite() && self.ub.is_finite() && self.lb < self.ub) {
-            return Err(problem!("bounds {} to {} mV: lb must lie below ub, both finite", self.lb, self.ub));
-        }
+        check_bounds(&self.lb, &self.ub)?;
         if let Some(horizon) = self.horizon
             && !horizon.is_finite()
         {
@@ -115,6 +134,9 @@ impl ConeR {
         }
         if !(1e-10..=0.1).contains(&self.tolerance) {
             return Err(problem!("tolerance is {}: must lie between 1e-10 and 0.1", self.tolerance));
+        }
+        if let Some(most) = self.max_seconds.filter(|most| !(most.is_finite() && *most > 0.0)) {
+            return Err(problem!("max_seconds is {most}: must be above 0 and finite"));
         }
         Ok(())
     }
@@ -177,6 +199,17 @@ pub struct Round {
     pub gap: f64,
 }
 
+/// The multipliers that prove a fit: those that are not 0, by row (the silent ones, then the targets).
+///
+/// As shares of the row's weight in 6.14, of C's twice: from 0 to 1 on a silent row, from -1/2 to 1/2 at a target.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Shares {
+    /// Ascending.
+    pub rows: Vec<usize>,
+    /// One a row.
+    pub values: Vec<f64>,
+}
+
 /// A fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
@@ -194,6 +227,10 @@ pub struct Fit {
     pub rows: usize,
     /// How it ended.
     pub status: Status,
+    /// Who found it.
+    pub engine: Engine,
+    /// What a fit nearby may start from, beside the weights.
+    pub multipliers: Shares,
     /// Targets, as (pattern, target), that no weights within the bounds bring to the threshold.
     pub unreachable: Vec<(usize, usize)>,
     /// Output spikes on the training patterns that follow another one, with no target between, within `tau`.
@@ -211,12 +248,10 @@ pub struct Problem {
     /// Rows behind the targets, one after the other, and their `B'B` by columns.
     pub(super) behind: Vec<f64>,
     pub(super) gram: Vec<f64>,
-    /// The potential on all silent rows at weights of 1 mV.
-    at_one: Vec<f64>,
 }
 
 /// Everything that turns potentials into 6.14: the parameters with their normalisers.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Objective {
     pub(super) l1: f64,
     pub(super) l2: f64,
@@ -225,8 +260,17 @@ pub(super) struct Objective {
     pub(super) d: f64,
     pub(super) kappa: f64,
     pub(super) norm: Norm,
-    pub(super) lower: f64,
-    pub(super) upper: f64,
+    /// Least and largest weights, one a synapse, mV.
+    pub(super) lower: Vec<f64>,
+    pub(super) upper: Vec<f64>,
+}
+
+impl Objective {
+    /// The same, every term times `scale`.
+    pub(super) fn scaled(&self, scale: f64) -> Self {
+        let (l1, l2, b, c, d) = (self.l1 * scale, self.l2 * scale, self.b * scale, self.c * scale, self.d * scale);
+        Self { l1, l2, b, c, d, ..self.clone() }
+    }
 }
 
 impl Problem {
@@ -261,10 +305,14 @@ impl Problem {
                 }
             }
         }
-        let mut at_one = Vec::new();
-        silent.potential(&vec![1.0; trains], &mut at_one);
         let patterns = patterns.to_vec();
-        Ok(Self { base: parameters.clone(), patterns, trains, targets: rows, silent, behind, gram, at_one })
+        Ok(Self { base: parameters.clone(), patterns, trains, targets: rows, silent, behind, gram })
+    }
+
+    /// How many rows there are: silent ones, grid points at which nothing is asked, targets.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.silent.len() + self.targets.len()
     }
 
     /// How many silent rows there are.
@@ -274,23 +322,30 @@ impl Problem {
     }
 
     /// The five normalised weights of 6.14.
-    fn objective(&self, parameters: &ConeR) -> Objective {
+    ///
+    /// Reading: 6.3.2 takes each term's largest value over the bounds, which lie at -ub and ub; where they do not, over
+    /// -max(|lb|, |ub|) to max(|lb|, |ub|), synapse by synapse.
+    fn objective(&self, parameters: &ConeR) -> Result<Objective> {
         let [l1, l2, b, c, d] = parameters.shares();
-        let largest = parameters.lb.abs().max(parameters.ub.abs());
-        let n = self.trains as f64;
+        let (lower, upper) = bounds_of(&parameters.lb, &parameters.ub, self.trains)?;
+        let largest: Vec<f64> = lower.iter().zip(&upper).map(|(l, u)| l.abs().max(u.abs())).collect();
         let over = |share: f64, most: f64| if most > 0.0 { share / most } else { 0.0 };
         let rows_at = |r: &TargetRow| {
-            let at: f64 = r.at.iter().sum();
-            let behind: f64 = r.behind.iter().sum();
-            ((largest * behind + parameters.kappa * r.threshold).powi(2), largest * at + r.threshold)
+            let (at, behind) = (dot(&r.at, &largest), dot(&r.behind, &largest));
+            ((behind + parameters.kappa * r.threshold).powi(2), at + r.threshold)
         };
         let (b_max, c_max) = self.targets.iter().map(rows_at).fold((0.0, 0.0), |s, v| (s.0 + v.0, s.1 + v.1));
-        let d_max: f64 = self.at_one.iter().zip(&self.silent.limit).map(|(u, l)| (largest * u - l).max(0.0)).sum();
-        Objective {
-            l1: l1 / (n * largest),
+        let mut potential = Vec::new();
+        if d > 0.0 {
+            self.silent.potential(&largest, &mut potential);
+        }
+        let d_max: f64 = potential.iter().zip(&self.silent.limit).map(|(u, l)| (u - l).max(0.0)).sum();
+        let square = dot(&largest, &largest);
+        Ok(Objective {
+            l1: l1 / largest.iter().sum::<f64>(),
             l2: match parameters.norm {
-                Norm::Norm => l2 / (n.sqrt() * largest),
-                Norm::Square => l2 / (n * largest * largest),
+                Norm::Norm => l2 / square.sqrt(),
+                Norm::Square => l2 / square,
             },
             b: match parameters.divide_b_by {
                 Divisor::Largest => over(b, b_max),
@@ -300,44 +355,72 @@ impl Problem {
             d: over(d, d_max),
             kappa: parameters.kappa,
             norm: parameters.norm,
-            lower: parameters.lb,
-            upper: parameters.ub,
-        }
+            lower,
+            upper,
+        })
     }
 
     /// Fits the weights.
     ///
     /// `parameters` may differ from those that the problem was made with in `lambdas`, `kappa`, bounds, `divide_b_by`,
-    /// `norm` and `tolerance`; the rest is in the rows. `start` are weights of a similar fit: the closer, the quicker.
+    /// `norm`, `tolerance` and `engine`; the rest is in the rows. `start` are weights of a similar fit, and its multipliers
+    /// where it was of these very rows: the closer, the quicker. Where `stop` asks for an end, the best so far comes back.
     ///
     /// # Errors
     ///
-    /// `Problem` for parameters that make no sense or that need other rows; `Interrupted`.
+    /// `Problem` for parameters that make no sense or that need other rows.
     pub fn fit(
         &self,
         parameters: &ConeR,
-        start: Option<&[f64]>,
+        start: Option<(&[f64], Option<&Shares>)>,
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
     ) -> Result<Fit> {
         self.check_same_rows(parameters)?;
-        if let Some(weights) = start {
-            parameters.neuron.check_weights(weights, self.trains)?;
-        }
-        let start = start.map(|weights| weights.iter().map(|w| w.clamp(parameters.lb, parameters.ub)).collect());
-        let objective = self.objective(parameters);
-        let found = self.minimise(&objective, parameters.tolerance, start, progress, stop)?;
+        let objective = self.objective(parameters)?;
+        let start = self.start_from(&objective, start)?;
+        let found = self.minimise(&objective, parameters.tolerance, parameters.engine, start, progress, stop)?;
+        let kept = || found.shares.iter().enumerate().filter(|s| *s.1 != 0.0);
         Ok(Fit {
-            objective: found.parts.sum(),
+            objective: found.objective,
             parts: found.parts,
             gap: found.gap,
             rounds: found.rounds,
             rows: found.rows,
             status: if found.gap <= parameters.tolerance { Status::Solved } else { Status::Stopped },
+            engine: found.engine,
+            multipliers: Shares { rows: kept().map(|s| s.0).collect(), values: kept().map(|s| *s.1).collect() },
             unreachable: self.unreachable(&objective),
-            refires: self.refires(&found.weights, stop)?,
+            refires: self.refires(&found.weights)?,
             weights: found.weights,
         })
+    }
+
+    fn start_from(&self, objective: &Objective, start: Option<(&[f64], Option<&Shares>)>) -> Result<Start> {
+        let Some((weights, multipliers)) = start else { return Ok(Start::default()) };
+        self.base.neuron.check_weights(weights, self.trains)?;
+        let within = weights.iter().zip(objective.lower.iter().zip(&objective.upper));
+        let weights = Some(within.map(|(w, (&low, &high))| w.clamp(low, high)).collect());
+        let Some(multipliers) = multipliers else { return Ok(Start { weights, shares: None }) };
+        let silent = self.silent.len();
+        let mut shares = vec![0.0; silent + self.targets.len()];
+        for (&row, &share) in multipliers.rows.iter().zip(&multipliers.values) {
+            let Some(place) = shares.get_mut(row) else {
+                return Err(problem!(
+                    "start: a multiplier of row {row}, there are {} rows",
+                    silent + self.targets.len()
+                ));
+            };
+            let low = if row < silent { 0.0 } else { -0.5 };
+            if !(low <= share && share <= low + 1.0) {
+                return Err(problem!(
+                    "start: the multiplier of row {row} is {share}, must lie from {low} to {}",
+                    low + 1.0
+                ));
+            }
+            *place = share;
+        }
+        Ok(Start { weights, shares: Some(shares) })
     }
 
     fn check_same_rows(&self, parameters: &ConeR) -> Result<()> {
@@ -355,15 +438,15 @@ impl Problem {
     }
 
     fn unreachable(&self, objective: &Objective) -> Vec<(usize, usize)> {
-        let most = |row: &TargetRow| row.at.iter().map(|v| v * objective.upper.max(0.0)).sum::<f64>();
+        let most = |row: &TargetRow| row.at.iter().zip(&objective.upper).map(|(v, u)| v * u.max(0.0)).sum::<f64>();
         let out_of_reach = |row: &&TargetRow| most(row) < row.threshold;
         self.targets.iter().filter(out_of_reach).map(|r| (r.pattern, r.target)).collect()
     }
 
-    fn refires(&self, weights: &[f64], stop: Stop<'_>) -> Result<usize> {
+    fn refires(&self, weights: &[f64]) -> Result<usize> {
         let mut refires = 0;
         for (p, pattern) in self.patterns.iter().enumerate() {
-            let spikes = self.base.neuron.run(weights, pattern, 1.0, stop)?;
+            let spikes = self.base.neuron.run(weights, pattern, 1.0, Stop::never())?;
             let targets: Vec<f64> = self.targets.iter().filter(|r| r.pattern == p).map(|r| r.t).collect();
             let again = |a: f64, b: f64| b - a <= self.base.neuron.tau && !targets.iter().any(|&t| a < t && t <= b);
             refires += spikes.windows(2).filter(|w| again(w[0].t, w[1].t)).count();

@@ -6,9 +6,11 @@
 //! minimises lies below 6.14 and touches it at those weights: its minimum is a lower bound, and the way there goes down. An
 //! exact line search on 6.14 keeps the next round from overshooting where hinges change state on the way.
 
+use super::augmented::relative;
 use super::cone_program::{ConeProgram, HardRows, Hinges};
-use super::cone_r::{Norm, Objective, Parts, Problem, Round};
-use crate::{Result, Stop};
+use super::cone_r::{Norm, Objective, Problem};
+use super::point::{Point, Tangents, add};
+use crate::{Error, Result, Stop};
 
 /// Rows of the first program: targets and every 4th ms of the 60 ms before them, of so many targets that it stays small.
 pub(super) const START_NEAR_MS: f64 = 60.0;
@@ -18,21 +20,21 @@ const START_ROWS: usize = 500;
 const MOST_ROWS: usize = 2000;
 /// A hinge is kept within this share of `theta_0` from its kink.
 const NEAR: f64 = 0.006;
-/// An objective below this share of that of no weights at all is 0: everything is met.
-const NOTHING: f64 = 1e-10;
 /// What the cone solver can do at best.
 const FINEST: f64 = 1e-12;
 /// Rounds end without a proof where the objective falls by less than this, relatively, and nothing else helps; and at last.
 const STALLED: f64 = 1e-10;
 const MOST_ROUNDS: usize = 500;
 
-/// What the rounds came to.
-pub(super) struct Found {
-    pub(super) weights: Vec<f64>,
-    pub(super) parts: Parts,
-    pub(super) gap: f64,
+/// What the rounds came to, whether proven or not.
+pub(super) struct Rounds {
+    pub(super) best: Point,
+    pub(super) bound: f64,
     pub(super) rounds: usize,
     pub(super) rows: usize,
+    /// A multiplier a row, as shares: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
+    pub(super) shares: Vec<f64>,
+    pub(super) stopped: bool,
 }
 
 /// The state of a hinge.
@@ -41,17 +43,6 @@ enum State {
     Off,
     On,
     Kept,
-}
-
-/// Weights, and where they bring the potential.
-#[derive(Debug, Clone)]
-struct Point {
-    weights: Vec<f64>,
-    /// Potential less limit on the silent rows, then potential less threshold at the targets, mV.
-    excess: Vec<f64>,
-    /// Potential less `kappa` thresholds behind the targets, mV.
-    behind: Vec<f64>,
-    parts: Parts,
 }
 
 /// The hinges that go to the cone program.
@@ -64,72 +55,71 @@ struct Kept {
 }
 
 impl Problem {
-    /// Finds the least objective, from `start` or from a small program of its own.
-    pub(super) fn minimise(
+    /// Minimises 6.14 (scaled so that it is about 1) from a point of which `bound` is known, or from a small program of its own.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the cone solver finds no answer.
+    pub(super) fn by_rounds(
         &self,
         objective: &Objective,
         tolerance: f64,
-        start: Option<Vec<f64>>,
-        progress: &mut dyn FnMut(Round),
+        start: (Point, f64, bool),
+        progress: &mut dyn FnMut(usize, usize, f64, f64),
         stop: Stop<'_>,
-    ) -> Result<Found> {
-        let zero = self.point(objective, vec![0.0_f64.clamp(objective.lower, objective.upper); self.trains]);
-        let scale = if zero.parts.sum() > 0.0 { 1.0 / zero.parts.sum() } else { 1.0 };
+    ) -> Result<Rounds> {
         let mut accuracy = (0.001 * tolerance).min(1e-7);
-        let mut best = match start {
-            Some(weights) => self.point(objective, weights),
-            None => {
-                let answer = self.program(objective, &self.start(objective)).solve(scale, 1e-6, stop)?;
-                self.better(objective, zero, answer.weights)
-            }
+        let (mut best, mut bound, near_best) = start;
+        let (mut rounds, mut rows, near) = (0, 0, NEAR * self.base.neuron.theta_0);
+        let mut shares = vec![0.0; best.excess.len()];
+        let solve = |kept: &Kept, accuracy| match self.program(objective, kept).solve(1.0, accuracy, stop) {
+            Err(Error::Interrupted) => Ok(None),
+            answer => answer.map(Some),
         };
-        // No term of 6.14 is below 0.
-        let (mut bound, mut rounds, near) = (0.0_f64, 0, NEAR * self.base.neuron.theta_0);
+        if !near_best && let Some(answer) = solve(&self.start(objective), 1e-6)? {
+            best = self.better(objective, best, answer.weights);
+        }
         loop {
-            rounds += 1;
             let states = self.states(&best, near);
             let kept = self.kept(objective, &states);
-            let answer = self.program(objective, &kept).solve(scale, accuracy, stop)?;
+            let Some(answer) = solve(&kept, accuracy)? else {
+                return Ok(Rounds { best, bound, rounds, rows, shares, stopped: true });
+            };
+            (rounds, rows) = (rounds + 1, kept.rows.len());
             let trial = self.point(objective, answer.weights.clone());
-            let mut factors = self.slopes(objective, &states);
+            let mut multipliers = self.slopes(objective, &states);
             for (&row, multiplier) in kept.rows.iter().zip(answer.multipliers) {
-                factors[row] = multiplier;
+                multipliers[row] = multiplier;
             }
-            bound = bound.max(trial.parts.sum() - self.gap(objective, &trial, &factors, &answer.pull));
+            // |x| of 6.12 went to the program as 2 max(x, 0) - x.
+            multipliers[self.silent.len()..].iter_mut().for_each(|m| *m -= objective.c);
+            let at = Tangents {
+                weights: &trial.weights,
+                excess: &trial.excess,
+                behind: &trial.behind,
+                multipliers: &multipliers,
+                pull: &answer.pull,
+            };
+            let proven = self.bound(objective, &at);
+            if proven > bound {
+                bound = proven;
+                shares = multipliers;
+                for (row, share) in shares.iter_mut().enumerate() {
+                    *share /= self.hinge_weight(objective, row).max(f64::MIN_POSITIVE);
+                }
+            }
             let before = best.parts.sum();
             best = self.better(objective, best, answer.weights);
-            let least = best.parts.sum();
-            let gap = if least * scale <= NOTHING { 0.0 } else { (least - bound).max(0.0) / least };
-            progress(Round { round: rounds, rows: kept.rows.len(), objective: least, gap });
+            let (least, gap) = (best.parts.sum(), relative(&best, bound));
+            progress(rounds, rows, least, gap);
             let stalled = before - least <= STALLED * least;
             if gap <= tolerance || (stalled && accuracy < FINEST) || rounds == MOST_ROUNDS {
-                let Point { weights, parts, .. } = best;
-                return Ok(Found { weights, parts, gap, rounds, rows: kept.rows.len() });
+                return Ok(Rounds { best, bound, rounds, rows, shares, stopped: false });
             }
             if stalled {
                 accuracy *= 0.01;
             }
         }
-    }
-
-    /// 6.14 at these weights.
-    fn point(&self, objective: &Objective, weights: Vec<f64>) -> Point {
-        let mut excess = Vec::with_capacity(self.silent.len() + self.targets.len());
-        self.silent.potential(&weights, &mut excess);
-        excess.iter_mut().zip(&self.silent.limit).for_each(|(u, limit)| *u -= limit);
-        excess.extend(self.targets.iter().map(|row| dot(&row.at, &weights) - row.threshold));
-        let behind: Vec<f64> =
-            self.targets.iter().map(|r| dot(&r.behind, &weights) - objective.kappa * r.threshold).collect();
-        let (silent, targets) = excess.split_at(self.silent.len());
-        let square: f64 = weights.iter().map(|w| w * w).sum();
-        let parts = Parts {
-            l1: objective.l1 * weights.iter().map(|w| w.abs()).sum::<f64>(),
-            l2: objective.l2 * if objective.norm == Norm::Norm { square.sqrt() } else { square },
-            B: objective.b * behind.iter().map(|x| x * x).sum::<f64>(),
-            C: objective.c * targets.iter().map(|x| x.abs()).sum::<f64>(),
-            D: objective.d * silent.iter().map(|x| x.max(0.0)).sum::<f64>(),
-        };
-        Point { weights, excess, behind, parts }
     }
 
     /// The best point on the way from `from` to `to`.
@@ -260,7 +250,7 @@ impl Problem {
         Kept { hinges: self.hinges(&rows, weight), rows, linear }
     }
 
-    fn program<'a>(&'a self, objective: &Objective, kept: &'a Kept) -> ConeProgram<'a> {
+    fn program<'a>(&'a self, objective: &'a Objective, kept: &'a Kept) -> ConeProgram<'a> {
         ConeProgram {
             linear: &kept.linear,
             l1: objective.l1,
@@ -269,55 +259,9 @@ impl Problem {
             quadratic: objective.b,
             behind: &self.behind,
             gram: &self.gram,
-            bounds: vec![[objective.lower, objective.upper]; self.trains],
+            bounds: objective.lower.iter().zip(&objective.upper).map(|(l, u)| [*l, *u]).collect(),
             hinges: &kept.hinges,
             hard: HardRows::default(),
         }
-    }
-
-    /// A bound on how far 6.14 at this point lies above its least value, whatever the solver did.
-    ///
-    /// Every term is replaced by a tangent below it: hinges by multipliers between 0 and their weight, the norm by a
-    /// `pull` no longer than its factor, a square by its slope. What is left is linear and l1 over the box, and has its least value synapse by synapse.
-    fn gap(&self, objective: &Objective, point: &Point, factors: &[f64], pull: &[f64]) -> f64 {
-        let silent = self.silent.len();
-        let mut gradient = vec![0.0; self.trains];
-        self.silent.add_sum(&factors[..silent], &mut gradient);
-        for ((target, factor), behind) in self.targets.iter().zip(&factors[silent..]).zip(&point.behind) {
-            add(&mut gradient, factor - objective.c, &target.at);
-            add(&mut gradient, 2.0 * objective.b * behind, &target.behind);
-        }
-        let mut gap = 0.0;
-        match objective.norm {
-            Norm::Square => add(&mut gradient, 2.0 * objective.l2, &point.weights),
-            // |w|_2 lies above u.w for every u no longer than 1. The solver's own u fits its multipliers, w/|w| would not:
-            // weights come out to the root of the gap only.
-            Norm::Norm => {
-                add(&mut gradient, 1.0, pull);
-                gap += point.parts.l2 - dot(pull, &point.weights);
-            }
-        }
-        for (row, (&x, &factor)) in point.excess.iter().zip(factors).enumerate() {
-            if x.is_finite() {
-                gap += self.hinge_weight(objective, row) * x.max(0.0) - factor * x;
-            }
-        }
-        for (&g, &w) in gradient.iter().zip(&point.weights) {
-            let cost = |v: f64| g * v + objective.l1 * v.abs();
-            let ends = cost(objective.lower).min(cost(objective.upper));
-            let inside = objective.lower < 0.0 && objective.upper > 0.0;
-            gap += cost(w) - if inside { ends.min(0.0) } else { ends };
-        }
-        gap
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn add(sum: &mut [f64], factor: f64, row: &[f64]) {
-    if factor != 0.0 {
-        sum.iter_mut().zip(row).for_each(|(s, r)| *s += factor * r);
     }
 }

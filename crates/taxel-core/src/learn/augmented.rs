@@ -1,0 +1,543 @@
+//! The minimum of 6.14 by a proximal augmented Lagrangian with semismooth Newton steps.
+//!
+//! Each row has a multiplier between the two slopes of its kink. With the multipliers held, and every kink rounded over
+//! `delta` mV, 6.14 is smooth, and its curvature comes from those few rows alone that lie on their rounded kink: only they are
+//! ever written out. All others enter by one sweep over the grid (the potential) and one back (a sum of rows). Then each
+//! multiplier moves to the slope found, `delta` shrinks, and so on, until a bound from below proves the objective.
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{LltRegularization, cholesky_in_place, cholesky_in_place_scratch};
+use faer::linalg::cholesky::llt::solve::solve_in_place;
+use faer::linalg::matmul::triangular::{BlockStructure, matmul};
+use faer::{Accum, MatMut, MatRef, Par};
+
+use super::cone_r::{Norm, Objective, Problem};
+use super::point::{Point, Tangents, add, dot};
+use super::rounds::Rounds;
+use crate::Stop;
+
+/// At first a target's kink is rounded over so many thresholds (all of them, seen from no weights), one of silence over so many.
+const TARGETS_FROM: f64 = 2.0;
+const SILENCE_FROM: f64 = 0.1;
+/// From a fit nearby: over so many.
+const WARM_FROM: f64 = 0.02;
+/// A round shrinks them by so much, down to so many thresholds.
+const SHRINK: f64 = 0.25;
+const SHARPEST: f64 = 1e-8;
+/// Newton steps of a round, and rounds, at most.
+const STEPS: usize = 12;
+const ROUNDS: usize = 60;
+/// A step is taken whole where the slope along it has fallen to this share at its end; a search stops at that of `EXACT`.
+const WHOLE: f64 = 0.05;
+const EXACT: f64 = 1e-3;
+
+/// Where to begin: weights of a similar fit, and its multipliers as shares of their range.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Start {
+    pub(super) weights: Option<Vec<f64>>,
+    pub(super) shares: Option<Vec<f64>>,
+}
+
+struct Engine<'a> {
+    /// Whether weights were given to start from.
+    started: bool,
+    problem: &'a Problem,
+    objective: &'a Objective,
+    weights: Vec<f64>,
+    excess: Vec<f64>,
+    behind: Vec<f64>,
+    /// Multipliers as shares: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
+    shares: Vec<f64>,
+    /// Multipliers of l1 and bounds, a synapse each.
+    held: Vec<f64>,
+    /// Where the weights were when the round began.
+    centre: Vec<f64>,
+    /// Over how many mV kinks are rounded: silence, targets.
+    delta: [f64; 2],
+    /// Curvature of what holds a weight at 0 or a bound, and of the proximal term.
+    sigma: f64,
+    rho: f64,
+    /// The slope in the weights.
+    gradient: Vec<f64>,
+    /// Rows on their rounded kinks.
+    inside: Vec<usize>,
+    factors: Vec<f64>,
+    hessian: Vec<f64>,
+    memory: MemBuffer,
+}
+
+/// A kink that the line search passes: share at the start, its change, and its part of the slope.
+struct Passing {
+    share: f64,
+    change: f64,
+    lean: f64,
+    low: f64,
+}
+
+impl Problem {
+    /// Minimises 6.14 (scaled so that it is about 1) until its relative gap is `tolerance`, or no further progress is made.
+    pub(super) fn augmented(
+        &self,
+        objective: &Objective,
+        tolerance: f64,
+        start: Start,
+        progress: &mut dyn FnMut(usize, usize, f64, f64),
+        stop: Stop<'_>,
+    ) -> Rounds {
+        let zero: Vec<f64> =
+            objective.lower.iter().zip(&objective.upper).map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
+        let mut best = self.point(objective, zero);
+        let mut engine = Engine::new(self, objective, start, &best);
+        let mut bound = engine.bound_at_zero(&best).max(0.0);
+        if engine.started {
+            let candidate = self.point(objective, engine.weights.clone());
+            bound = bound.max(engine.bound());
+            if candidate.parts.sum() < best.parts.sum() {
+                best = candidate;
+            }
+        }
+        let (mut rounds, mut rows, mut stalled) = (0, 0, 0);
+        let mut gap = relative(&best, bound);
+        let mut stopped = false;
+        while gap > tolerance && rounds < ROUNDS && stalled < 12 {
+            rounds += 1;
+            let accuracy = 0.03 * (best.parts.sum() - bound);
+            let mut reached = false;
+            for _ in 0..STEPS {
+                if stop.asked() {
+                    stopped = true;
+                    break;
+                }
+                if engine.slope() <= accuracy {
+                    reached = true;
+                    break;
+                }
+                engine.step();
+            }
+            rows = engine.inside.len();
+            let candidate = self.point(objective, engine.candidate());
+            bound = bound.max(engine.bound());
+            if candidate.parts.sum() < best.parts.sum() {
+                best = candidate;
+            }
+            let before = gap;
+            gap = relative(&best, bound);
+            stalled = if gap > 0.9 * before { stalled + 1 } else { 0 };
+            progress(rounds, rows, best.parts.sum(), gap);
+            engine.sharpen(reached);
+            if stopped {
+                break;
+            }
+        }
+        Rounds { best, bound, rounds, rows, shares: engine.shares, stopped }
+    }
+}
+
+/// The share of the objective that is not proven; none where everything is met.
+pub(super) fn relative(best: &Point, bound: f64) -> f64 {
+    let least = best.parts.sum();
+    if least <= NOTHING { 0.0 } else { (least - bound).max(0.0) / least }
+}
+
+/// An objective below this share of that of no weights at all is 0: everything is met.
+pub(super) const NOTHING: f64 = 1e-10;
+
+impl<'a> Engine<'a> {
+    fn new(problem: &'a Problem, objective: &'a Objective, start: Start, zero: &Point) -> Self {
+        let n = problem.trains;
+        let silent = problem.silent.len();
+        let total = silent + problem.targets.len();
+        let theta = problem.base.neuron.theta_0;
+        let started = start.weights.is_some();
+        let (weights, excess, behind) = match start.weights {
+            None => (zero.weights.clone(), zero.excess.clone(), zero.behind.clone()),
+            Some(weights) => {
+                let at = problem.point(objective, weights);
+                (at.weights, at.excess, at.behind)
+            }
+        };
+        let delta =
+            if start.shares.is_some() { [WARM_FROM * theta; 2] } else { [SILENCE_FROM * theta, TARGETS_FROM * theta] };
+        let warm = start.shares.is_some();
+        let mut shares = start.shares.unwrap_or_default();
+        shares.resize(total, 0.0);
+        let widest = objective.upper.iter().zip(&objective.lower).fold(0.0_f64, |m, (u, l)| m.max(u.max(-l)));
+        let scratch = cholesky_in_place_scratch::<f64>(n, Par::Seq, faer::Spec::default());
+        let mut engine = Self {
+            started,
+            problem,
+            objective,
+            centre: weights.clone(),
+            weights,
+            excess,
+            behind,
+            shares,
+            held: vec![0.0; n],
+            delta,
+            sigma: 1.0,
+            rho: 1.0,
+            gradient: vec![0.0; n],
+            inside: vec![],
+            factors: vec![0.0; total],
+            hessian: vec![0.0; n * n],
+            memory: MemBuffer::new(scratch),
+        };
+        // How hard the rows pull at a synapse, with no weights: the scale of what holds it and of the proximal term.
+        engine.multipliers();
+        let mut pull = vec![0.0; n];
+        for (k, target) in problem.targets.iter().enumerate() {
+            add(&mut pull, engine.factors[silent + k].abs().max(objective.c), &target.at);
+            add(&mut pull, 2.0 * objective.b * objective.kappa * target.threshold, &target.behind);
+        }
+        let most = (dot(&pull, &pull) / n as f64).sqrt();
+        let size = (objective.l1 + objective.l2 / (n as f64).sqrt()).max(1e-3 * most).max(1e-12);
+        engine.sigma = if warm { 50.0 } else { 1.0 } * size / widest;
+        engine.rho = if warm { 1e-3 } else { 0.1 } * size / widest;
+        if warm {
+            engine.hold_still();
+        }
+        engine
+    }
+
+    /// The slope of each row, times its weight in 6.14.
+    fn multipliers(&mut self) {
+        let silent = self.problem.silent.len();
+        let (d, c) = (self.objective.d, 2.0 * self.objective.c);
+        let [one, other] = self.delta.map(|delta| 1.0 / delta);
+        let rows = self.factors.iter_mut().zip(&self.excess).zip(&self.shares);
+        for (k, ((factor, &x), &share)) in rows.enumerate() {
+            *factor = if k < silent {
+                d * (share + x * one).clamp(0.0, 1.0)
+            } else {
+                c * (share + x * other).clamp(-0.5, 0.5)
+            };
+        }
+    }
+
+    /// Computes the slope in the weights; gives how much 6.14 could fall along it within the bounds.
+    fn slope(&mut self) -> f64 {
+        let (problem, o) = (self.problem, self.objective);
+        let silent = problem.silent.len();
+        self.multipliers();
+        self.inside.clear();
+        let (d, c) = (o.d, o.c);
+        for (k, &factor) in self.factors.iter().enumerate() {
+            let on_kink = if k < silent { 0.0 < factor && factor < d } else { factor.abs() < c };
+            if on_kink {
+                self.inside.push(k);
+            }
+        }
+        self.gradient.fill(0.0);
+        if o.d > 0.0 {
+            problem.silent.add_sum(&self.factors[..silent], &mut self.gradient);
+        }
+        for ((target, &factor), &behind) in problem.targets.iter().zip(&self.factors[silent..]).zip(&self.behind) {
+            add(&mut self.gradient, factor, &target.at);
+            add(&mut self.gradient, 2.0 * o.b * behind, &target.behind);
+        }
+        match o.norm {
+            Norm::Square => add(&mut self.gradient, 2.0 * o.l2, &self.weights),
+            Norm::Norm => {
+                let pull = self.pull();
+                add(&mut self.gradient, 1.0, &pull);
+            }
+        }
+        let mut could = 0.0;
+        for n in 0..self.weights.len() {
+            let w = self.weights[n];
+            self.gradient[n] += self.rho * (w - self.centre[n]) + self.hold(n, w).0;
+            could += self.gradient[n].abs() * (o.upper[n] - o.lower[n]);
+        }
+        could
+    }
+
+    /// The slope of the norm; none where all weights are 0.
+    fn pull(&self) -> Vec<f64> {
+        let length = dot(&self.weights, &self.weights).sqrt();
+        let factor = if length > 0.0 { self.objective.l2 / length } else { 0.0 };
+        self.weights.iter().map(|w| factor * w).collect()
+    }
+
+    /// What holds weight `n` at 0 and within its bounds: the slope, whether it is held, and where.
+    fn hold(&self, n: usize, w: f64) -> (f64, bool, f64) {
+        let o = self.objective;
+        let z = w + self.held[n] / self.sigma;
+        let shift = o.l1 / self.sigma;
+        let soft = if z > shift {
+            z - shift
+        } else if z < -shift {
+            z + shift
+        } else {
+            0.0
+        };
+        let at = soft.clamp(o.lower[n], o.upper[n]);
+        let held = at != soft || (soft == 0.0 && shift > 0.0);
+        (self.sigma * (z - at), held, at)
+    }
+
+    /// Has l1 and the bounds hold against all else where the weights are at 0 or at a bound.
+    fn hold_still(&mut self) {
+        self.slope();
+        for n in 0..self.weights.len() {
+            let (w, o) = (self.weights[n], self.objective);
+            let against = self.hold(n, w).0 - self.gradient[n];
+            self.held[n] = if w <= o.lower[n] || w >= o.upper[n] {
+                against
+            } else if w == 0.0 {
+                against.clamp(-o.l1, o.l1)
+            } else {
+                o.l1 * w.signum()
+            };
+        }
+    }
+
+    /// The weights where l1 and the bounds hold them: some exactly at 0, none outside.
+    fn candidate(&self) -> Vec<f64> {
+        (0..self.weights.len()).map(|n| self.hold(n, self.weights[n]).2).collect()
+    }
+
+    /// One Newton step, as long as an exact search along it finds best.
+    fn step(&mut self) {
+        let (problem, o) = (self.problem, self.objective);
+        let n = self.weights.len();
+        let silent = problem.silent.len();
+        let kept = self.inside.partition_point(|&k| k < silent);
+        let mut rows = problem.silent.coefficients(&self.inside[..kept]);
+        let root = (o.d / self.delta[0]).sqrt();
+        rows.iter_mut().for_each(|v| *v *= root);
+        let root = (2.0 * o.c / self.delta[1]).sqrt();
+        for &k in &self.inside[kept..] {
+            rows.extend(problem.targets[k - silent].at.iter().map(|v| root * v));
+        }
+        let count = self.inside.len();
+        let length = dot(&self.weights, &self.weights).sqrt();
+        loop {
+            self.hessian.iter_mut().zip(&problem.gram).for_each(|(h, g)| *h = 2.0 * o.b * g);
+            let ridge = match o.norm {
+                Norm::Square => 2.0 * o.l2,
+                Norm::Norm if length > 0.0 => {
+                    let f = o.l2 / (length * length * length);
+                    for (column, &w) in self.hessian.chunks_exact_mut(n).zip(&self.weights) {
+                        add(column, -f * w, &self.weights);
+                    }
+                    o.l2 / length
+                }
+                Norm::Norm => 0.0,
+            };
+            for i in 0..n {
+                let holding = if self.hold(i, self.weights[i]).1 { self.sigma } else { 0.0 };
+                self.hessian[i * n + i] += ridge + self.rho + holding;
+            }
+            let mut h = MatMut::from_column_major_slice_mut(&mut self.hessian, n, n);
+            if count > 0 {
+                let r = MatRef::from_column_major_slice(&rows, n, count);
+                let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
+                matmul(h.as_mut(), lower, Accum::Add, r, full, r.transpose(), full, 1.0, Par::Seq);
+            }
+            let stack = MemStack::new(&mut self.memory);
+            if cholesky_in_place(h.as_mut(), LltRegularization::default(), Par::Seq, stack, faer::Spec::default())
+                .is_ok()
+            {
+                break;
+            }
+            self.rho = (self.rho * 100.0).max(1e-12);
+        }
+        let mut direction: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
+        let h = MatRef::from_column_major_slice(&self.hessian, n, n);
+        let stack = MemStack::new(&mut self.memory);
+        solve_in_place(h, MatMut::from_column_major_slice_mut(&mut direction, n, 1), Par::Seq, stack);
+        self.move_along(&direction);
+    }
+
+    fn move_along(&mut self, direction: &[f64]) {
+        let (problem, o) = (self.problem, self.objective);
+        let silent = problem.silent.len();
+        let mut rise = Vec::with_capacity(self.excess.len());
+        if o.d > 0.0 {
+            problem.silent.potential(direction, &mut rise);
+        } else {
+            rise.resize(silent, 0.0);
+        }
+        rise.extend(problem.targets.iter().map(|row| dot(&row.at, direction)));
+        let lift: Vec<f64> = problem.targets.iter().map(|row| dot(&row.behind, direction)).collect();
+        let smooth = {
+            let against: f64 =
+                self.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
+            let square = dot(direction, direction);
+            let (mut from, mut bend) = (self.rho * against, self.rho * square);
+            from += 2.0 * o.b * dot(&self.behind, &lift);
+            bend += 2.0 * o.b * dot(&lift, &lift);
+            if o.norm == Norm::Square {
+                from += 2.0 * o.l2 * dot(&self.weights, direction);
+                bend += 2.0 * o.l2 * square;
+            }
+            (from, bend)
+        };
+        let start = dot(&self.gradient, direction);
+        let mut end = 1.0;
+        let mut t = loop {
+            let (passing, steady) = self.passing(&rise, end);
+            let slope = |t: f64| self.slope_along(t, direction, smooth, steady, &passing);
+            let (mut low, mut at_low, mut high, mut at_high) = (0.0, start, end, slope(end));
+            if at_high <= WHOLE * start.abs() {
+                if end < 64.0 && at_high < -0.5 * start.abs() {
+                    end *= 4.0;
+                    continue;
+                }
+                break end;
+            }
+            let mut t = high;
+            // Illinois: a secant that never keeps the same end twice at full value.
+            for _ in 0..60 {
+                t = low + (high - low) * (at_low / (at_low - at_high)).clamp(1e-3, 0.999);
+                let here = slope(t);
+                if here.abs() <= EXACT * start.abs() || high - low <= 1e-12 * high {
+                    break;
+                }
+                if here > 0.0 {
+                    (high, at_high) = (t, here);
+                    at_low *= 0.5;
+                } else {
+                    (low, at_low) = (t, here);
+                    at_high *= 0.5;
+                }
+            }
+            break t;
+        };
+        if !t.is_finite() {
+            t = 0.0;
+        }
+        add(&mut self.weights, t, direction);
+        self.excess.iter_mut().zip(&rise).for_each(|(x, r)| *x += t * r);
+        add(&mut self.behind, t, &lift);
+    }
+
+    /// The kinks that a step as long as `end` passes, and the slope of all that lie beyond theirs throughout.
+    fn passing(&self, rise: &[f64], end: f64) -> (Vec<Passing>, f64) {
+        let silent = self.problem.silent.len();
+        let (d, c) = (self.objective.d, 2.0 * self.objective.c);
+        let [one, other] = self.delta.map(|delta| 1.0 / delta);
+        let mut passing = Vec::new();
+        let mut steady = 0.0;
+        let rows = self.excess.iter().zip(rise).zip(&self.shares);
+        for (k, ((&x, &r), &share)) in rows.enumerate() {
+            let (weight, steep, low) = if k < silent { (d, one, 0.0) } else { (c, other, -0.5) };
+            let (from, change) = (share + x * steep, r * steep);
+            let to = from + end * change;
+            if from.max(to) <= low {
+                steady += low * weight * r;
+            } else if from.min(to) >= low + 1.0 {
+                steady += (low + 1.0) * weight * r;
+            } else {
+                passing.push(Passing { share: from, change, lean: weight * r, low });
+            }
+        }
+        (passing, steady)
+    }
+
+    fn slope_along(&self, t: f64, direction: &[f64], smooth: (f64, f64), steady: f64, passing: &[Passing]) -> f64 {
+        let mut sum = smooth.0 + t * smooth.1 + steady;
+        for p in passing {
+            sum += p.lean * (p.share + t * p.change).clamp(p.low, p.low + 1.0);
+        }
+        let (mut along, mut square) = (0.0, 0.0);
+        for (n, (&w, &d)) in self.weights.iter().zip(direction).enumerate() {
+            let here = w + t * d;
+            sum += self.hold(n, here).0 * d;
+            along += here * d;
+            square += here * here;
+        }
+        if self.objective.norm == Norm::Norm && square > 0.0 {
+            sum += self.objective.l2 * along / square.sqrt();
+        }
+        sum
+    }
+
+    /// What the multipliers found prove.
+    fn bound(&mut self) -> f64 {
+        self.multipliers();
+        let pull = self.pull();
+        self.proves(&pull)
+    }
+
+    fn proves(&self, pull: &[f64]) -> f64 {
+        let at = Tangents {
+            weights: &self.weights,
+            excess: &self.excess,
+            behind: &self.behind,
+            multipliers: &self.factors,
+            pull,
+        };
+        self.problem.bound(self.objective, &at)
+    }
+
+    /// What no weights at all prove: the subgradient of the norm that lies nearest to all other slopes there.
+    fn bound_at_zero(&self, zero: &Point) -> f64 {
+        let (problem, o) = (self.problem, self.objective);
+        let silent = problem.silent.len();
+        let slope = |(k, &x): (usize, &f64)| match k < silent {
+            true => {
+                if x > 0.0 {
+                    o.d
+                } else {
+                    0.0
+                }
+            }
+            false => o.c * x.signum(),
+        };
+        let multipliers: Vec<f64> = zero.excess.iter().enumerate().map(slope).collect();
+        let mut pull = vec![0.0; self.weights.len()];
+        if o.norm == Norm::Norm && o.l2 > 0.0 && zero.weights.iter().all(|&w| w == 0.0) {
+            problem.silent.add_sum(&multipliers[..silent], &mut pull);
+            for ((target, &multiplier), &behind) in problem.targets.iter().zip(&multipliers[silent..]).zip(&zero.behind)
+            {
+                add(&mut pull, multiplier, &target.at);
+                add(&mut pull, 2.0 * o.b * behind, &target.behind);
+            }
+            for (n, p) in pull.iter_mut().enumerate() {
+                let soft = if *p > o.l1 {
+                    *p - o.l1
+                } else if *p < -o.l1 {
+                    *p + o.l1
+                } else {
+                    0.0
+                };
+                let free = if soft > 0.0 { o.lower[n] < 0.0 } else { o.upper[n] > 0.0 };
+                *p = if free { -soft } else { 0.0 };
+            }
+            let length = dot(&pull, &pull).sqrt();
+            if length > o.l2 {
+                pull.iter_mut().for_each(|p| *p *= o.l2 / length);
+            }
+        }
+        let at = Tangents {
+            weights: &zero.weights,
+            excess: &zero.excess,
+            behind: &zero.behind,
+            multipliers: &multipliers,
+            pull: &pull,
+        };
+        problem.bound(o, &at)
+    }
+
+    /// The multipliers move to the slopes found, kinks get sharper, the proximal term lets go.
+    fn sharpen(&mut self, reached: bool) {
+        let silent = self.problem.silent.len();
+        self.multipliers();
+        let (d, c) = (self.objective.d, 2.0 * self.objective.c);
+        for (k, (share, factor)) in self.shares.iter_mut().zip(&self.factors).enumerate() {
+            let weight = if k < silent { d } else { c };
+            *share = if weight > 0.0 { factor / weight } else { 0.0 };
+        }
+        for n in 0..self.weights.len() {
+            self.held[n] = self.hold(n, self.weights[n]).0;
+        }
+        self.centre.copy_from_slice(&self.weights);
+        let theta = self.problem.base.neuron.theta_0;
+        if reached {
+            self.delta = self.delta.map(|delta| (delta * SHRINK).max(SHARPEST * theta));
+            self.sigma /= SHRINK;
+            self.rho *= SHRINK;
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Bounds on the weights: the same for all synapses, or one a synapse.
+
+use serde::{Deserialize, Serialize};
+
+use crate::{Result, problem};
+
+/// A least or a largest weight, mV.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a bound must be a number, or one a synapse, mV")]
+pub enum Bound {
+    /// The same for all synapses.
+    All(f64),
+    /// One a synapse.
+    Each(Vec<f64>),
+}
+
+impl Bound {
+    /// The bound of synapse `n`, mV.
+    #[must_use]
+    pub fn at(&self, n: usize) -> f64 {
+        match self {
+            Self::All(value) => *value,
+            Self::Each(values) => values[n],
+        }
+    }
+
+    fn len(&self) -> Option<usize> {
+        match self {
+            Self::All(_) => None,
+            Self::Each(values) => Some(values.len()),
+        }
+    }
+}
+
+/// Checks that `lb` lies below `ub`, both finite, at every synapse.
+///
+/// # Errors
+///
+/// `Problem`, naming the synapse.
+pub fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
+    if let (Some(a), Some(b)) = (lb.len(), ub.len())
+        && a != b
+    {
+        return Err(problem!("lb holds {a} bounds, ub {b}: must be one a synapse, or one for all"));
+    }
+    let each = lb.len().or(ub.len());
+    if each == Some(0) {
+        return Err(problem!("bounds: there is none, must be one a synapse, or one for all"));
+    }
+    for n in 0..each.unwrap_or(1) {
+        let (low, high) = (lb.at(n), ub.at(n));
+        if !(low.is_finite() && high.is_finite() && low < high) {
+            let place = if each.is_some() { format!("bounds of synapse {n}:") } else { "bounds".to_owned() };
+            return Err(problem!("{place} {low} to {high} mV: lb must lie below ub, both finite"));
+        }
+    }
+    Ok(())
+}
+
+/// The bounds of `trains` synapses, mV.
+///
+/// # Errors
+///
+/// `Problem` where their number is another.
+pub fn bounds_of(lb: &Bound, ub: &Bound, trains: usize) -> Result<(Vec<f64>, Vec<f64>)> {
+    check_bounds(lb, ub)?;
+    for (name, bound) in [("lb", lb), ("ub", ub)] {
+        if let Some(count) = bound.len().filter(|&count| count != trains) {
+            return Err(problem!("{name}: {count} bounds for {trains} trains, must be one a train, or one for all"));
+        }
+    }
+    Ok(((0..trains).map(|n| lb.at(n)).collect(), (0..trains).map(|n| ub.at(n)).collect()))
+}
