@@ -61,7 +61,9 @@ READOUT = taxel.Readout(LEVELS, {"a": (taxel.Neuron(tau=2.0), [0.5] * 32)}, arra
 RECIPE = taxel.detect.Recipe(LEVELS, {"tau": 5.0}, {"a": {"ub": 1.0}})
 EXAMPLE = taxel.detect.Example(taxel.Frames(np.eye(4)[:, :, None] * np.ones(4), [0, 9000, 18000, 27000]), {"a": [9000]})
 CONE = taxel.learn.ConeR(tau=5.0, ub=1.0)
+CONE_X = taxel.learn.ConeX(tau=5.0, ub=1.0)
 PLAIN = TRAINS.split_by_sign()
+REFUTED = taxel.learn.ConeX().fit([UNSIGNED], [[0.5]])
 SCENE = taxel.simulate.Scene.draw(1)
 REGISTERS = taxel.wire.Registers()
 BYTES = taxel.wire.encode(EVENTS)
@@ -295,6 +297,44 @@ SOUND: dict[str, Sound] = {
     "taxel.learn.ConeRProblem.fit": method(
         CONE.prepare([PLAIN], [[5.0]]), "fit", cone=CONE, start=[0.1] * 4, progress=lambda *_: None
     ),
+    "taxel.learn.ConeX": plain(
+        taxel.learn.ConeX,
+        kernel="alpha",
+        tau=5.0,
+        tau_s=1.0,
+        theta_0=0.3,
+        theta_plus=0.2,
+        tau_rec=10.0,
+        refractory=3.0,
+        after_spike="reset",
+        first_threshold="theta_0",
+        time="continuous",
+        step_ms=1.0,
+        kappa=1.2,
+        delta_t_ms=1.0,
+        lambdas=[1.0, 1.0, 1.0],
+        lb=-1.0,
+        ub=[1.0] * 4,
+        divide_b_by="targets",
+        norm="square",
+        margin=0.01,
+        slope=0.01,
+        horizon=30.0,
+        tolerance=1e-6,
+        max_seconds=10.0,
+    ),
+    "taxel.learn.ConeX.fit": method(
+        CONE_X, "fit", patterns=[PLAIN], targets=[[5.0]], start=REFUTED, progress=lambda *_: None
+    ),
+    "taxel.learn.ConeXProblem": plain(taxel.learn.ConeXProblem, cone=CONE_X, patterns=[PLAIN], targets=[[5.0]]),
+    "taxel.learn.ConeXProblem.row": method(REFUTED.problem_, "row", row=("silence", 0, 5.0), margin=True),
+    "taxel.learn.ConeXProblem.target": method(REFUTED.problem_, "target", pattern=0, target=0),
+    "taxel.learn.ConeXProblem.silence": method(REFUTED.problem_, "silence", pattern=0, t=5.0, margin=True),
+    "taxel.learn.ConeXProblem.slope": method(REFUTED.problem_, "slope", pattern=0, target=0, margin=True),
+    "taxel.learn.ConeXProblem.behind": method(REFUTED.problem_, "behind", pattern=0, target=0),
+    "taxel.learn.check_certificate": plain(
+        taxel.learn.check_certificate, problem=REFUTED.problem_, certificate=REFUTED.certificate_, margin=True
+    ),
     "taxel.metrics.victor_purpura": plain(taxel.metrics.victor_purpura, a=[1.0, 2.0], b=[1.5], q=0.1),
     "taxel.metrics.victor_purpura_multi_unit": plain(
         taxel.metrics.victor_purpura_multi_unit, a=UNSIGNED, b=UNSIGNED, q=0.1, k=0.5
@@ -443,6 +483,9 @@ LEFT_OUT = {
     "taxel.detect.Learner": "a protocol",
     "taxel.formats.Format": "a result",
     "taxel.formats.Trial": "a result",
+    "taxel.learn.Certificate": "a result",
+    "taxel.learn.Margin": "a result",
+    "taxel.learn.Row": "a name, checked by ConeXProblem.row",
     "taxel.live.Said": "a result",
     "taxel.live.Summary": "a result",
     "taxel.live.heard": "takes what Live said",

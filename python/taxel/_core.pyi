@@ -327,3 +327,29 @@ def change_tempotron(
     @property
     def rows(self) -> int: ...
     def fit(self, parameters: str, start: _Start | None, progress: Any) -> tuple[_Fit, BaseException | None]: ...
+# cone_x: parameters as JSON; rows by name (kind, pattern, target or time), stated as (coefficients, limit)
+
+_Row = tuple[str, int, float]
+_Weighed = tuple[list[_Row], NDArray[np.float64]]
+
+def check_cone_x(parameters: str) -> str: ...
+
+@final
+class ConeXProblem:
+    def __new__(
+        cls, parameters: str, patterns: list[tuple[Any, ...]], targets: list[NDArray[np.float64]]
+    ) -> ConeXProblem: ...
+    def bounds(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def row(self, name: _Row, margin: bool) -> tuple[NDArray[np.float64], float]: ...
+    def behind(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]: ...
+    def fit(
+        self,
+        start: list[Any],
+        multipliers: NDArray[np.float64],
+        progress: Any,
+        max_seconds: float | None,
+    ) -> tuple[
+        tuple[Any, NDArray[np.float64], float, list[float], float, float],
+        tuple[tuple[float, float], Any, int, _Weighed, tuple[_Weighed, float, bool, str] | None],
+        Any,
+    ]: ...

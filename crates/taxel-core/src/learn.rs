@@ -2,9 +2,11 @@
 
 mod augmented;
 mod bounds;
+pub mod certificate;
 mod chronotron;
 mod cone_program;
 mod cone_r;
+pub mod cone_x;
 mod dual_active_set;
 mod epochs;
 mod filt;
@@ -20,13 +22,16 @@ mod resume;
 mod rival;
 mod rounds;
 mod rows;
+mod silence;
 mod span;
+pub mod statement;
 mod stepped;
 mod tempotron;
 
 pub use bounds::Bound;
 pub use chronotron::{ELearning, ILearning};
 pub use cone_r::{ConeR, Divisor, Engine, Fit, Norm, Parts, Problem, Round, Shares, Status};
+pub use cone_x::ConeX;
 pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
 pub use epochs::{Ended, Trained, Training, Updates};
 pub use filt::Filt;
@@ -40,8 +45,38 @@ pub use span::Span;
 pub use stepped::{Current, Reset, SteppedNeuron};
 pub use tempotron::{Peak, Tempotron};
 
+use serde::{Deserialize, Serialize};
+
 use crate::neuron::Neuron;
 use crate::{Result, SpikeTrains, problem};
+
+/// One value for all, or one each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum OneOrEach {
+    /// For all.
+    One(f64),
+    /// One each.
+    Each(Vec<f64>),
+}
+
+impl OneOrEach {
+    fn values(&self) -> &[f64] {
+        match self {
+            Self::One(value) => std::slice::from_ref(value),
+            Self::Each(values) => values,
+        }
+    }
+
+    /// The values as `count` of them.
+    fn each(&self, name: &str, count: usize, of: &str) -> Result<Vec<f64>> {
+        match self {
+            Self::One(value) => Ok(vec![*value; count]),
+            Self::Each(values) if values.len() == count => Ok(values.clone()),
+            Self::Each(values) => Err(problem!("{name}: {} values, must be one, or one a {of}, {count}", values.len())),
+        }
+    }
+}
 
 /// Checks what every learner is given: one list of targets (ms, ascending) a pattern, the same trains in each pattern.
 ///

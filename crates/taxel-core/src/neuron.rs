@@ -9,7 +9,7 @@ mod srm0;
 mod streaming;
 
 pub use kernel::{Kernel, Shape, State, Step};
-
+pub(crate) use srm0::peak;
 pub use streaming::{NeuronStream, OutputSpike};
 
 use serde::{Deserialize, Serialize};
@@ -85,6 +85,10 @@ pub struct Neuron {
     /// Step of the grid, ms.
     pub step_ms: f64,
 }
+
+/// An input so near an end of a refractory time counts as at it, ms: trained neurons fire within 1e-6 ms of their targets, and
+/// inputs at whole ms often lie just there.
+const AT_EDGE: f64 = 1e-6;
 
 impl Default for Neuron {
     fn default() -> Self {
@@ -260,8 +264,8 @@ impl Neuron {
         let Some(spike) = last_spike else { return false };
         match self.after_spike {
             AfterSpike::Keep => false,
-            AfterSpike::Ignore => spike < t && t <= spike + self.refractory,
-            AfterSpike::Reset => t <= spike + self.refractory,
+            AfterSpike::Ignore => spike + AT_EDGE < t && t <= spike + self.refractory + AT_EDGE,
+            AfterSpike::Reset => t <= spike + self.refractory + AT_EDGE,
         }
     }
 }

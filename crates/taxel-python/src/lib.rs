@@ -5,6 +5,7 @@ mod enter;
 mod errors;
 mod knock;
 
+mod cone_x;
 mod detect;
 mod encode;
 mod learn;
@@ -25,6 +26,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     knock::register(module)?;
     nouns::register(module)?;
+    cone_x::register(module)?;
     detect::register(module)?;
     encode::register(module)?;
     live::register(module)?;

@@ -115,6 +115,16 @@ impl Shape {
         if age <= 0.0 { 0.0 } else { self.after(self.input(), age).b }
     }
 
+    /// When the kernel is largest, ms after the input.
+    #[must_use]
+    pub fn peak(&self) -> f64 {
+        match self.kernel {
+            Kernel::Alpha => self.tau,
+            Kernel::DoubleExponential => (self.tau / self.tau_s).ln() / self.rate,
+            Kernel::Exponential => 0.0,
+        }
+    }
+
     /// How steeply the potential rises now, mV/ms.
     #[must_use]
     #[inline]

@@ -1,8 +1,8 @@
 //! The neuron at work: input spikes in, output spikes out, the same wherever the stream is cut.
 
 use super::grid::GridStream;
-use super::srm0::next_crossing;
-use super::{AfterSpike, FirstThreshold, Neuron, Shape, State, Time};
+use super::srm0::{TOUCH, next_crossing};
+use super::{AT_EDGE, AfterSpike, FirstThreshold, Neuron, Shape, State, Time};
 use crate::{Result, problem};
 
 /// A spike of the neuron.
@@ -175,11 +175,21 @@ impl ContinuousStream {
 
     fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
         self.settle(t, out);
+        // A crossing that rounding puts a hair behind an input is at it: the input could turn the potential down there.
+        if matches!(self.next, Next::At(crossing) if crossing - t <= AT_EDGE) && self.edge.is_none() && self.touches(t)
+        {
+            self.fire(t, out);
+        }
         if self.neuron.loses(t, self.threshold.fired) {
             return;
         }
         self.move_to(t);
         self.shape.add(&mut self.state, weight, 0.0);
+    }
+
+    /// Whether the potential has come up to the threshold at `t`, but for rounding.
+    fn touches(&self, t: f64) -> bool {
+        self.shape.after(self.state, t - self.at).b >= self.threshold.base + self.threshold.rise(t) - TOUCH
     }
 
     fn move_to(&mut self, t: f64) {

@@ -1,0 +1,171 @@
+//! Proof that no weights within the bounds meet a stated problem (Farkas), checked in plain arithmetic over restated rows.
+//!
+//! With multipliers y of target rows (any sign) and z of all others (0 or more), every solution w has
+//! `g.w <= y.threshold + z.limit`, where g is the sum of the rows, each times its multiplier. If even the least that `g.w`
+//! can be within the bounds is larger, there is no solution; the bounds pay for rounding, so they must be finite.
+
+use std::collections::BTreeMap;
+
+use super::statement::{Margin, Row, Statement};
+use crate::Result;
+
+/// Multipliers that prove a problem infeasible, and what they say in words.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Certificate {
+    /// Rows with their multipliers.
+    pub rows: Vec<(Row, f64)>,
+    /// By how much the bounds fail what the rows demand, mV; above its rounding.
+    pub gap: f64,
+    /// Whether it also holds with margin and slope 0 in its rows: then the problem is impossible, not only with this margin.
+    pub at_all: bool,
+    /// Which patterns, targets and silences conflict.
+    pub text: String,
+}
+
+/// The weights that are allowed, mV.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bounds {
+    /// One a train.
+    pub lower: Vec<f64>,
+    /// One a train.
+    pub upper: Vec<f64>,
+}
+
+impl Bounds {
+    /// The least and the largest that a row can come to.
+    fn range(&self, row: &[f64]) -> (f64, f64) {
+        let ends = row.iter().zip(&self.lower).zip(&self.upper).map(|((a, l), u)| (a * l, a * u));
+        ends.fold((0.0, 0.0), |sum, (l, u)| (sum.0 + l.min(u), sum.1 + l.max(u)))
+    }
+}
+
+/// Rows named in a reading, those of most weight first.
+const NAMED: usize = 12;
+
+impl Certificate {
+    /// Checks multipliers of rows (those of other rows than targets must be 0 or more); gives nothing if they prove nothing.
+    pub(super) fn check(statement: &Statement, bounds: &Bounds, rows: Vec<(Row, f64)>) -> Result<Option<Self>> {
+        let Some(proven) = gap(statement, bounds, &rows, false)? else { return Ok(None) };
+        let at_all = gap(statement, bounds, &rows, true)?.is_some();
+        let text = read(statement, bounds, &rows, at_all)?;
+        Ok(Some(Self { rows, gap: proven, at_all, text }))
+    }
+
+    /// Looks for a target that no weights reach, or that all exceed: a proof of one row.
+    pub(super) fn of_one_target(statement: &Statement, bounds: &Bounds) -> Result<Option<Self>> {
+        for (pattern, target) in statement.targets() {
+            let row = Row::Target { pattern, target };
+            for multiplier in [-1.0, 1.0] {
+                if let Some(proof) = Self::check(statement, bounds, vec![(row, multiplier)])? {
+                    return Ok(Some(proof));
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// By how much the least of `g.w` within the bounds exceeds what the rows (`bare`: without margin and slope) allow; nothing if
+/// rounding could explain it.
+fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) -> Result<Option<f64>> {
+    let trains = statement.trains;
+    let (mut sum, mut size, mut row) = (vec![0.0; trains], vec![0.0; trains], vec![0.0; trains]);
+    let (mut allowed, mut most) = (0.0, 0.0);
+    for &(name, multiplier) in rows {
+        if multiplier < 0.0 && !matches!(name, Row::Target { .. }) {
+            return Ok(None);
+        }
+        let limit = statement.state_into(name, &mut row)? + if bare { statement.margin_of(name) } else { 0.0 };
+        for ((g, s), a) in sum.iter_mut().zip(&mut size).zip(&row) {
+            *g += multiplier * a;
+            *s += (multiplier * a).abs();
+        }
+        allowed += multiplier * limit;
+        most += (multiplier * limit).abs();
+    }
+    for ((s, l), u) in size.iter().zip(&bounds.lower).zip(&bounds.upper) {
+        most += s * l.abs().max(u.abs());
+    }
+    let gap = bounds.range(&sum).0 - allowed;
+    // Each term is rounded once when made and once for each sum that it enters.
+    let rounding = (rows.len() + trains) as f64 * f64::EPSILON * most;
+    Ok((gap > rounding).then_some(gap))
+}
+
+fn read(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: bool) -> Result<String> {
+    let mut text = match rows {
+        [(row @ Row::Target { pattern, target }, _)] => {
+            let stated = statement.state(*row)?;
+            let (least, most) = bounds.range(&stated.coefficients);
+            let t = statement.time(*row);
+            let why = if stated.coefficients.iter().all(|&a| a == 0.0) {
+                "no input counts before it".to_owned()
+            } else if most < stated.limit {
+                format!("full weights come to {} mV there, the threshold is {} mV", short(most), short(stated.limit))
+            } else {
+                format!(
+                    "the least weights come to {} mV there, the threshold is {} mV",
+                    short(least),
+                    short(stated.limit)
+                )
+            };
+            format!("no weights within the bounds fire at pattern {pattern} target {target} ({} ms): {why}", short(t))
+        }
+        _ => format!("no weights within the bounds meet these together: {}", list(statement, rows)?),
+    };
+    let Margin { height, slope } = statement.margin;
+    if at_all {
+        text += ". Impossible at all: it needs no margin";
+    } else if slope > 0.0 {
+        text += &format!(
+            ". This holds for silence {height} mV below the threshold, coming up to targets by {slope} mV/ms or more"
+        );
+    } else {
+        text += &format!(". This holds for silence {height} mV below the threshold");
+    }
+    Ok(text)
+}
+
+/// The rows that weigh most, by pattern.
+fn list(statement: &Statement, rows: &[(Row, f64)]) -> Result<String> {
+    let mut weighed = Vec::with_capacity(rows.len());
+    for &(row, multiplier) in rows {
+        let stated = statement.state(row)?;
+        let length = stated.coefficients.iter().map(|a| a * a).sum::<f64>().sqrt();
+        weighed.push((multiplier.abs() * length.max(stated.limit.abs()), row));
+    }
+    weighed.sort_by(|a, b| b.0.total_cmp(&a.0));
+    // By pattern: targets that must be hit or neared, and times of silence.
+    let mut told: BTreeMap<usize, (Vec<String>, Vec<f64>)> = BTreeMap::new();
+    for &(_, row) in weighed.iter().take(NAMED) {
+        let t = statement.time(row);
+        match row {
+            Row::Target { pattern, target } => {
+                told.entry(pattern).or_default().0.push(format!("fire at target {target} ({} ms)", short(t)));
+            }
+            Row::Slope { pattern, target } => {
+                told.entry(pattern)
+                    .or_default()
+                    .0
+                    .push(format!("come up to target {target} ({} ms) from below", short(t)));
+            }
+            Row::Silence { pattern, t } => told.entry(pattern).or_default().1.push(t),
+        }
+    }
+    let mut parts = Vec::new();
+    for (pattern, (mut asked, mut silent)) in told {
+        silent.sort_by(f64::total_cmp);
+        if !silent.is_empty() {
+            let times: Vec<String> = silent.iter().map(|&t| short(t)).collect();
+            asked.push(format!("be silent at {} ms", times.join(", ")));
+        }
+        parts.push(format!("pattern {pattern} shall {}", asked.join(", ")));
+    }
+    let more = rows.len().saturating_sub(NAMED);
+    Ok(if more > 0 { format!("{}; and {more} rows that weigh less", parts.join("; ")) } else { parts.join("; ") })
+}
+
+fn short(x: f64) -> String {
+    let text = format!("{x:.3}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}

@@ -1,0 +1,161 @@
+//! CONE-X.
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use taxel_core::learn::ConeX;
+use taxel_core::learn::cone_x::{Engine, Fit, Problem, Round, Status};
+use taxel_core::learn::statement::{Row, Stated};
+use taxel_core::problem;
+
+use crate::convert::{SpikesIn, array, slice, to_spikes};
+use crate::enter::{enter, enter_keeping};
+use crate::errors::core;
+
+fn to_cone_x(json: &str) -> PyResult<ConeX> {
+    let parameters: ConeX = serde_json::from_str(json).map_err(|e| core(problem!("ConeX: {e}")))?;
+    parameters.check().map_err(core)?;
+    Ok(parameters)
+}
+
+/// Checks parameters; gives them back with every default filled in.
+#[pyfunction]
+fn check_cone_x(parameters: &str) -> PyResult<String> {
+    serde_json::to_string(&to_cone_x(parameters)?).map_err(|e| core(problem!("ConeX: {e}")))
+}
+
+/// A row by name: kind, pattern, and target or time (ms).
+type Name = (String, usize, f64);
+
+fn to_row((kind, pattern, at): &Name) -> PyResult<Row> {
+    let (pattern, t) = (*pattern, *at);
+    match kind.as_str() {
+        "silence" => Ok(Row::Silence { pattern, t }),
+        "target" => Ok(Row::Target { pattern, target: whole(t)? }),
+        "slope" => Ok(Row::Slope { pattern, target: whole(t)? }),
+        _ => Err(core(problem!("row of kind {kind:?}: must be \"target\", \"silence\" or \"slope\""))),
+    }
+}
+
+fn whole(target: f64) -> PyResult<usize> {
+    if target >= 0.0 && target.fract() == 0.0 && target < 2f64.powi(53) {
+        Ok(target as usize)
+    } else {
+        Err(core(problem!("target {target}: must be a whole number from 0 on")))
+    }
+}
+
+fn from_row(row: Row) -> Name {
+    match row {
+        Row::Silence { pattern, t } => ("silence".into(), pattern, t),
+        Row::Target { pattern, target } => ("target".into(), pattern, target as f64),
+        Row::Slope { pattern, target } => ("slope".into(), pattern, target as f64),
+    }
+}
+
+/// Rows and their multipliers.
+type Weighed<'py> = (Vec<Name>, Bound<'py, PyArray1<f64>>);
+
+fn weighed<'py>(py: Python<'py>, rows: &[(Row, f64)]) -> Weighed<'py> {
+    (rows.iter().map(|r| from_row(r.0)).collect(), array(py, rows.iter().map(|r| r.1).collect()))
+}
+
+/// A certificate as Python gets it: rows and multipliers, gap, whether it needs no margin, what it says.
+type CertificateOut<'py> = (Weighed<'py>, f64, bool, String);
+
+/// A fit as Python gets it: status, weights, objective, parts, gap, violation, margin, engine, rounds, held rows, certificate;
+/// and the exception of a signal that came meanwhile.
+type FitOut<'py> = (
+    (&'static str, Bound<'py, PyArray1<f64>>, f64, [f64; 3], f64, f64),
+    ((f64, f64), &'static str, usize, Weighed<'py>, Option<CertificateOut<'py>>),
+    Option<Py<PyAny>>,
+);
+
+/// Coefficients and limit of a row.
+type RowOut<'py> = (Bound<'py, PyArray1<f64>>, f64);
+
+/// A stated problem.
+#[pyclass(frozen)]
+struct ConeXProblem(Problem);
+
+#[pymethods]
+impl ConeXProblem {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        parameters: &str,
+        patterns: Vec<SpikesIn<'_>>,
+        targets: Vec<PyReadonlyArray1<'_, f64>>,
+    ) -> PyResult<Self> {
+        let parameters = to_cone_x(parameters)?;
+        let patterns = patterns.into_iter().map(to_spikes).collect::<PyResult<Vec<_>>>()?;
+        let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
+        enter(py, |stop| Problem::new(&parameters, &patterns, &targets, stop)).map(Self)
+    }
+
+    /// Least and largest weights.
+    fn bounds<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+        let bounds = self.0.bounds();
+        (array(py, bounds.lower.clone()), array(py, bounds.upper.clone()))
+    }
+
+    /// A row, with or without its margin.
+    fn row<'py>(&self, py: Python<'py>, name: Name, margin: bool) -> PyResult<RowOut<'py>> {
+        let (row, statement) = (to_row(&name)?, self.0.statement());
+        let Stated { coefficients, limit } = statement.state(row).map_err(core)?;
+        Ok((array(py, coefficients), if margin { limit } else { limit + statement.margin_of(row) }))
+    }
+
+    /// What B looks at behind a target, and what it shall reach.
+    fn behind<'py>(&self, py: Python<'py>, pattern: usize, target: usize) -> PyResult<RowOut<'py>> {
+        let Stated { coefficients, limit } = self.0.behind(pattern, target).map_err(core)?;
+        Ok((array(py, coefficients), limit))
+    }
+
+    #[pyo3(signature = (start, multipliers, progress, max_seconds))]
+    fn fit<'py>(
+        &self,
+        py: Python<'py>,
+        start: Vec<Name>,
+        multipliers: PyReadonlyArray1<'py, f64>,
+        progress: Option<Py<PyAny>>,
+        max_seconds: Option<f64>,
+    ) -> PyResult<FitOut<'py>> {
+        let multipliers = slice("multipliers", &multipliers)?;
+        let rows = start.iter().map(to_row).collect::<PyResult<Vec<_>>>()?;
+        let start: Vec<(Row, f64)> = rows.into_iter().zip(multipliers.iter().copied()).collect();
+        let mut raised = None;
+        let mut report = |r: Round| {
+            if let (Some(progress), None) = (&progress, &raised) {
+                let called =
+                    Python::attach(|py| progress.call1(py, (r.round, r.rows, r.broken, r.objective)).map(drop));
+                raised = called.err();
+            }
+        };
+        let (fit, signal) = enter_keeping(py, max_seconds, |stop| self.0.fit(&start, &mut report, stop))?;
+        if let Some(error) = raised {
+            return Err(error);
+        }
+        let Fit { status, weights, objective, parts, gap, violation, margin, engine, rounds, held, certificate } = fit;
+        let status = match status {
+            Status::Solved => "solved",
+            Status::Infeasible => "infeasible",
+            Status::Stopped => "stopped",
+        };
+        let engine = match engine {
+            Engine::Native => "native",
+            Engine::ConeSolver => "cone solver",
+        };
+        let certificate = certificate.map(|c| (weighed(py, &c.rows), c.gap, c.at_all, c.text));
+        let held = weighed(py, &held);
+        Ok((
+            (status, array(py, weights), objective, parts, gap, violation),
+            ((margin.height, margin.slope), engine, rounds, held, certificate),
+            signal,
+        ))
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(check_cone_x, module)?)?;
+    module.add_class::<ConeXProblem>()
+}

@@ -1,0 +1,60 @@
+"""The check of a proof that a problem of `taxel.learn.ConeX` has no solution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taxel._arguments import flag, instance
+from taxel.learn.cone_x import Certificate, ConeXProblem
+
+__all__ = ["check_certificate"]
+
+
+def check_certificate(problem: ConeXProblem, certificate: Certificate, *, margin: bool = True) -> bool:
+    """Check a proof of infeasibility against the stated rows, in plain NumPy.
+
+    Every solution w has ``row @ w == limit`` at a target and ``<= limit`` else. So ``g @ w <= multipliers @ limits``,
+    where g is the sum of the rows, each times its multiplier. If even the least that ``g @ w`` can be within the bounds
+    is larger, beyond all rounding, there is no solution.
+
+    Parameters
+    ----------
+    problem : ConeXProblem
+        What was to be solved (`ConeX.problem_`).
+    certificate : Certificate
+        The proof (`ConeX.certificate_`).
+    margin : bool
+        False: with margin and slope 0 in the rows, so that the proof holds for every margin.
+
+    Returns
+    -------
+    bool
+        Whether it is one.
+
+    Raises
+    ------
+    ProblemError : a row that the problem does not have
+
+    Examples
+    --------
+    >>> import taxel
+    >>> trains = taxel.SpikeTrains.from_lists([[50.0], [60.0]], stop=100.0)
+    >>> cone = taxel.learn.ConeX().fit([trains], [[40.0]])
+    >>> cone.status_, taxel.learn.check_certificate(cone.problem_, cone.certificate_)
+    ('infeasible', True)
+    """
+    instance("problem", problem, ConeXProblem)
+    instance("certificate", certificate, Certificate)
+    flag("margin", margin)
+    g, size, demanded = np.zeros(len(problem.lb)), 0.0, 0.0
+    most = np.maximum(np.abs(problem.lb), np.abs(problem.ub))
+    for row, multiplier in zip(certificate.rows, certificate.multipliers, strict=True):
+        if multiplier < 0 and row.kind != "target":
+            return False
+        coefficients, limit = problem.row(row, margin=margin)
+        g = g + multiplier * coefficients
+        demanded += multiplier * limit
+        size += abs(multiplier) * (np.abs(coefficients) @ most + abs(limit))
+    least = np.minimum(problem.lb * g, problem.ub * g).sum()
+    rounding = (len(certificate.rows) + len(most)) * np.finfo(float).eps * size
+    return bool(least - demanded > rounding)

@@ -1,0 +1,471 @@
+"""CONE-X: weights that fire a neuron at its targets and nowhere else, exactly, or the proof that there are none."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._arguments import callback, flag, floats, instance, number, parameters, several, shown, whole
+from taxel._core import ProblemError
+from taxel.neuron import Neuron
+from taxel.spikes import SpikeTrains
+
+__all__ = ["Certificate", "ConeX", "ConeXProblem", "Margin", "Row"]
+
+_NEURON = (
+    "kernel",
+    "tau",
+    "tau_s",
+    "theta_0",
+    "theta_plus",
+    "tau_rec",
+    "refractory",
+    "after_spike",
+    "first_threshold",
+    "time",
+    "step_ms",
+)
+
+
+class Row(NamedTuple):
+    """Name a row of a problem by pattern and time.
+
+    Attributes
+    ----------
+    kind : {"target", "silence", "slope"}
+        The potential at a target equals the threshold (6.9a); it stays below at a time (6.9b); it comes up to a target
+        from below.
+    pattern : int
+    at : int or float
+        Which target of the pattern; in silence when, ms.
+    """
+
+    kind: Literal["target", "silence", "slope"]
+    pattern: int
+    at: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate:
+    """Prove that no weights within the bounds meet the named rows together (Farkas).
+
+    Attributes
+    ----------
+    rows : list of Row
+    multipliers : float64, shape (rows,)
+        Of targets any sign, of all other rows 0 or more.
+    gap : float, mV
+        By how much the bounds fail what the rows demand.
+    at_all : bool
+        Whether it also holds with margin and slope 0 in its rows: then the problem is impossible at all, not only with
+        this margin.
+    text : str
+        Which patterns, which targets, which silences conflict.
+    """
+
+    rows: list[Row]
+    multipliers: NDArray[np.float64]
+    gap: float
+    at_all: bool
+    text: str
+
+    def __str__(self) -> str:
+        return self.text
+
+    def __repr__(self) -> str:
+        return f"<Certificate of {len(self.rows)} rows: {self.text}>"
+
+
+class Margin(NamedTuple):
+    """Say how far below the threshold silence stays.
+
+    Attributes
+    ----------
+    mv : float, mV
+        Away from targets.
+    slope : float, mV/ms
+        How steeply that falls to 0 at a target; 0 on the grid, where nothing tapers.
+    """
+
+    mv: float
+    slope: float
+
+
+class ConeX:
+    """Learn weights by CONE-X: every target met and every silence kept, with the least norms and missed lift.
+
+    In continuous time (the default) silence holds at every instant. On the grid it is the thesis' problem 6.11, which
+    asks for silence at 1 ms points only: most such weights fire early or once more between them.
+
+    Parameters
+    ----------
+    kernel, tau, tau_s, theta_0, theta_plus, tau_rec, refractory, after_spike, first_threshold, time, step_ms
+        The neuron, as in `taxel.Neuron`; with ``time="grid"`` `step_ms` is also the step of the silent rows.
+    kappa : float, above 0
+        What the potential shall reach behind a target, in thresholds.
+    delta_t_ms : float, ms, optional
+        How far behind; ``0.1 * tau`` where left out.
+    lambdas : three floats, 0 or more
+        Shares of l1, l2, B in the objective; only their ratios matter. All 0: any weights will do.
+    lb, ub : float or float64 of shape (trains,), mV
+        Least and largest weight, finite. All normalisers are taken at ``-max(|lb|, |ub|)`` and ``+max(|lb|, |ub|)``.
+    divide_b_by : {"B_max", "targets"}
+        B over its largest value, as printed, or over the number of targets.
+    norm : {"norm", "square"}
+        The l2 term as printed, or squared.
+    margin : float, mV, optional
+        How far below the threshold silence shall stay; where left out 1e-3 in continuous time, 0 on the grid.
+    slope : float, mV/ms, optional
+        How steeply that margin falls to 0 at a target, and how much steeper than the threshold the potential comes up
+        there; 1e-3 where left out. Continuous time only.
+    horizon : float or float64 of shape (patterns,), ms, optional
+        Where silence ends; the later of a pattern's stop and its last target + `tau` where left out.
+    tolerance : float
+        The proven relative gap at which a fit counts as solved.
+    max_seconds : float, optional
+        After so long a fit ends with the best so far.
+
+    Attributes
+    ----------
+    status_ : {"solved", "infeasible", "stopped"}
+        "solved": every target is met to 1e-12 mV, silence keeps at least half its margin, and no weights have an
+        objective smaller by more than `tolerance`. "infeasible": `certificate_` proves it. "stopped": neither is known.
+    weights_ : float64, shape (trains,), mV
+        The best so far where stopped; NaN where infeasible.
+    objective_ : float
+        6.11 at these weights; infinite where infeasible.
+    parts_ : dict
+        Its terms: l1, l2, B.
+    gap_ : float
+        Proven relative distance of the objective to the least one, whatever the engine said.
+    margin_ : Margin
+        The margin that holds, at least half of what was asked for; on the grid, as `mv`, the least threshold -
+        potential over the silent points.
+    violation_ : float, mV
+        How far the worst row is broken: targets missed, silence with half its margin.
+    engine_ : {"native", "cone solver"}
+        What closed the gap: taxel's own engine, or row generation around Clarabel where the own one did not.
+    certificate_ : Certificate or None
+        The proof, where infeasible.
+    problem_ : ConeXProblem
+        The problem, which states its rows when asked.
+    rounds_ : int
+        Rounds of row generation.
+    held_ : list of (Row, float)
+        The rows that bind, with their multipliers.
+    neuron_ : Neuron
+        The neuron that the weights are for.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    Thesis 6.3.2, equations 6.9 to 6.11. Silence is priced over all patterns by recursion; what binds goes to a dual
+    active set (Goldfarb and Idnani 1983), which also gives the proof. Cost: about 2.5 `trains` steps of O(rows^2).
+    Choices that the thesis leaves open stand on the page *Readings*.
+
+    Examples
+    --------
+    >>> trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
+    >>> cone = ConeX(tau=10.0, lb=-1.0, ub=1.0).fit([trains], [[20.0]])
+    >>> cone.status_
+    'solved'
+    >>> cone.neuron_.run(cone.weights_, trains).round(6)
+    array([20.])
+    """
+
+    status_: Literal["solved", "infeasible", "stopped"]
+    weights_: NDArray[np.float64]
+    objective_: float
+    parts_: dict[str, float]
+    gap_: float
+    margin_: Margin
+    violation_: float
+    engine_: Literal["native", "cone solver"]
+    certificate_: Certificate | None
+    problem_: ConeXProblem
+    rounds_: int
+    held_: list[tuple[Row, float]]
+    neuron_: Neuron
+
+    def __init__(
+        self,
+        *,
+        kernel: Literal["alpha", "double_exponential", "exponential"] = "alpha",
+        tau: float = 15.0,
+        tau_s: float | None = None,
+        theta_0: float = 0.3,
+        theta_plus: float = 0.2,
+        tau_rec: float | None = None,
+        refractory: float = 3.0,
+        after_spike: Literal["keep", "ignore", "reset"] = "keep",
+        first_threshold: Literal["theta_0", "printed"] = "theta_0",
+        time: Literal["continuous", "grid"] = "continuous",
+        step_ms: float = 1.0,
+        kappa: float = 1.2,
+        delta_t_ms: float | None = None,
+        lambdas: Sequence[float] = (0.0, 1.0, 0.0),
+        lb: float | ArrayLike = -0.3,
+        ub: float | ArrayLike = 0.3,
+        divide_b_by: Literal["B_max", "targets"] = "B_max",
+        norm: Literal["norm", "square"] = "norm",
+        margin: float | None = None,
+        slope: float | None = None,
+        horizon: float | ArrayLike | None = None,
+        tolerance: float = 1e-8,
+        max_seconds: float | None = None,
+    ) -> None:
+        self.kernel: Literal["alpha", "double_exponential", "exponential"] = kernel
+        self.tau = tau
+        self.tau_s = tau_s
+        self.theta_0 = theta_0
+        self.theta_plus = theta_plus
+        self.tau_rec = tau_rec
+        self.refractory = refractory
+        self.after_spike: Literal["keep", "ignore", "reset"] = after_spike
+        self.first_threshold: Literal["theta_0", "printed"] = first_threshold
+        self.time: Literal["continuous", "grid"] = time
+        self.step_ms = step_ms
+        self.kappa = kappa
+        self.delta_t_ms = delta_t_ms
+        self.lambdas = lambdas
+        self.lb = lb
+        self.ub = ub
+        self.divide_b_by = divide_b_by
+        self.norm = norm
+        self.margin = margin
+        self.slope = slope
+        self.horizon = horizon
+        self.tolerance = tolerance
+        self.max_seconds = max_seconds
+        _core.check_cone_x(self._json())
+
+    def fit(
+        self,
+        patterns: Sequence[SpikeTrains],
+        targets: Sequence[ArrayLike],
+        *,
+        start: ConeX | None = None,
+        progress: Callable[[int, int, int, float], object] | None = None,
+    ) -> Self:
+        """Find the weights, or the proof that there are none.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains in each; signed ones split into ON and OFF.
+        targets : sequence of float sequences, ms
+            When the neuron shall fire, one list a pattern; an empty one teaches silence.
+        start : ConeX, optional
+            An earlier fit of a similar problem: its rows and multipliers are where this one begins. The result is the
+            same.
+        progress : function of (round, rows, broken, objective), optional
+            Called after each round; `broken` counts the stretches of time in which silence is broken.
+
+        Returns
+        -------
+        ConeX
+            Itself.
+
+        Raises
+        ------
+        ProblemError : patterns or targets that make no sense (names pattern and target)
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the best so far is kept, `status_` is "stopped"
+        """
+        if progress is not None:
+            callback("progress", progress)
+        held = [] if start is None else _held(instance("start", start, ConeX))
+        problem = ConeXProblem(self, patterns, targets)
+        multipliers = np.array([multiplier for _, multiplier in held], dtype=np.float64)
+        seconds = None if self.max_seconds is None else float(self.max_seconds)
+        found = problem._problem.fit([tuple(row) for row, _ in held], multipliers, progress, seconds)
+        (status, weights, objective, parts, gap, violation), rest, signal = found
+        margin, engine, rounds, (rows, multipliers), certificate = rest
+        self.status_ = status
+        self.weights_ = weights
+        self.objective_ = objective
+        self.parts_ = dict(zip(("l1", "l2", "B"), parts, strict=True))
+        self.gap_ = gap
+        self.violation_ = violation
+        self.margin_ = Margin(*margin)
+        self.engine_ = engine
+        self.rounds_ = rounds
+        self.held_ = list(zip(map(_row, rows), multipliers.tolist(), strict=True))
+        self.certificate_ = None
+        if certificate is not None:
+            (rows, multipliers), proven, at_all, text = certificate
+            self.certificate_ = Certificate([_row(row) for row in rows], multipliers, proven, at_all, text)
+        self.problem_ = problem
+        self.neuron_ = Neuron(**{name: getattr(self, name) for name in _NEURON})
+        if signal is not None:
+            raise signal
+        return self
+
+    def _json(self) -> str:
+        values = {name: value for name, value in vars(self).items() if not name.endswith("_")}
+        neuron = {name: values.pop(name) for name in _NEURON}
+        seconds = values.pop("max_seconds")
+        if seconds is not None and not number("max_seconds", seconds) > 0.0:
+            raise ProblemError(f"max_seconds is {seconds}: must be above 0")
+        for name in ("lb", "ub", "horizon"):
+            if not (values[name] is None and name == "horizon"):
+                values[name] = _one_or_each(name, values[name])
+        return parameters({"neuron": neuron, **values})
+
+    def __repr__(self) -> str:
+        default = ConeX.__init__.__kwdefaults__ or {}
+        values = ((name, getattr(self, name)) for name in default)
+        changed = (f"{name}={value!r}" for name, value in values if not np.array_equal(value, default[name]))
+        return f"ConeX({', '.join(changed)})"
+
+
+class ConeXProblem:
+    """State the rows of a problem when asked, by pattern and time; never all of them at once.
+
+    Attributes
+    ----------
+    lb, ub : float64, shape (trains,), mV
+    targets : list of float64, ms
+        One array a pattern.
+    """
+
+    def __init__(self, cone: ConeX, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
+        trains = [
+            instance(f"pattern {p}", pattern, SpikeTrains) for p, pattern in enumerate(several("patterns", patterns))
+        ]
+        self.targets = [floats(f"targets of pattern {p}", t) for p, t in enumerate(several("targets", targets))]
+        parts = [pattern._parts() for pattern in trains]
+        self._problem = _core.ConeXProblem(instance("cone", cone, ConeX)._json(), parts, self.targets)
+        self.lb, self.ub = self._problem.bounds()
+
+    def row(self, row: Row | tuple[str, int, float], *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
+        """State a row by its name: ``coefficients @ w == limit`` at a target, ``<= limit`` else.
+
+        Parameters
+        ----------
+        row : Row, or (kind, pattern, at)
+        margin : bool
+            False: with margin and slope 0.
+
+        Returns
+        -------
+        coefficients : float64, shape (trains,)
+            Of the potential; in a slope row (kind "slope") of its slope, 1/ms, negated.
+        limit : float, mV (in a slope row mV/ms)
+
+        Raises
+        ------
+        ProblemError : no such row
+        """
+        try:
+            kind, pattern, at = row
+        except (TypeError, ValueError):
+            raise ProblemError(f"row is {shown(row)}: must be kind, pattern and target or time") from None
+        if not isinstance(kind, str):
+            raise ProblemError(f"row is {shown(row)}: its kind must be a text")
+        name = (kind, whole("pattern", pattern, 0), number("target or time", at))
+        return self._problem.row(name, flag("margin", margin))
+
+    def target(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
+        """State what a target asks (6.9a): the coefficients of the potential there, which equals the threshold.
+
+        Parameters
+        ----------
+        pattern, target : int
+
+        Returns
+        -------
+        coefficients : float64, shape (trains,)
+        threshold : float, mV
+
+        Raises
+        ------
+        ProblemError : no such target
+        """
+        return self.row(("target", pattern, whole("target", target, 0)))
+
+    def silence(self, pattern: int, t: float, *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
+        """State what silence asks at a time (6.9b): coefficients of the potential, and what it must not exceed.
+
+        Parameters
+        ----------
+        pattern : int
+        t : float, ms
+        margin : bool
+            False: with margin 0.
+
+        Returns
+        -------
+        coefficients : float64, shape (trains,)
+        limit : float, mV
+            The threshold less the margin.
+
+        Raises
+        ------
+        ProblemError : a time at which nothing is asked
+        """
+        return self.row(("silence", pattern, t), margin=margin)
+
+    def slope(self, pattern: int, target: int, *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
+        """State how the potential comes up to a target from below (continuous time only).
+
+        Parameters
+        ----------
+        pattern, target : int
+        margin : bool
+            False: with slope 0.
+
+        Returns
+        -------
+        coefficients : float64, shape (trains,), 1/ms
+            Of the potential's slope just before the target, negated.
+        limit : float, mV/ms
+            The threshold's slope and the margin's, negated.
+
+        Raises
+        ------
+        ProblemError : no such target, or a grid
+        """
+        return self.row(("slope", pattern, whole("target", target, 0)), margin=margin)
+
+    def behind(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:
+        """State what B looks at behind a target (6.10): the coefficients of the potential, and what it shall reach.
+
+        Parameters
+        ----------
+        pattern, target : int
+
+        Returns
+        -------
+        coefficients : float64, shape (trains,)
+        wanted : float, mV
+            `kappa` thresholds.
+
+        Raises
+        ------
+        ProblemError : no such target
+        """
+        return self._problem.behind(whole("pattern", pattern, 0), whole("target", target, 0))
+
+
+def _row(name: tuple[str, int, float]) -> Row:
+    kind, pattern, at = name
+    return Row(kind, pattern, at if kind == "silence" else int(at))  # type: ignore[arg-type]
+
+
+def _held(start: ConeX) -> list[tuple[Row, float]]:
+    held: Any = getattr(start, "held_", None)
+    if held is None:
+        raise ProblemError("start: has not been fitted")
+    return list(held)
+
+
+def _one_or_each(name: str, value: Any) -> Any:
+    return number(name, value) if np.isscalar(value) else floats(name, value).tolist()
