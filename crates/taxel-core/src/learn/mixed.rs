@@ -67,6 +67,8 @@ pub(super) struct Found {
     pub(super) objective: f64,
     /// The least objective over these rows is no lower, hence over these and more.
     pub(super) bound: f64,
+    /// Whether rows and bounds are met to rounding.
+    pub(super) met: bool,
     pub(super) engine: Engine,
     pub(super) stopped: bool,
     pub(super) start: Start,
@@ -196,6 +198,7 @@ impl<'a> Best<'a> {
             inequality: unscaled(&self.point.inequality, &program.of_below),
             objective: self.objective * program.cost,
             bound: self.bound * program.cost,
+            met: self.met,
             engine,
             stopped,
             start: Start(state),

@@ -19,9 +19,14 @@ const NEARLY: f64 = 0.995;
 /// Primal residual that counts as met, in units of rows of length 1.
 const MET: f64 = 1e-12;
 /// Steps without gain after which rounding must be in the way.
-const MOST_IDLE: usize = 6;
+const MOST_IDLE: usize = 15;
 /// An objective below this counts as this in the gap.
 const NOTHING: f64 = 1e-10;
+/// Corrections of a step towards equal products, as long as they lengthen it.
+const MOST_CORRECTIONS: usize = 2;
+/// A linear system is solved to this, relatively, in so many refinements at most.
+const REFINED: f64 = 1e-10;
+const MOST_REFINEMENTS: usize = 3;
 /// Curvature of a weight that cannot move.
 const FIXED: f64 = 1e30;
 
@@ -258,7 +263,7 @@ impl<'a> Interior<'a> {
         let known = state.slack.len();
         let above = || below.iter().zip(&program.limit).skip(known).map(|(u, limit)| u - limit);
         let most = above().fold(1e-4, f64::max);
-        mu = mu.max(most * most);
+        mu = mu.max(10.0 * most * most);
         let lift = |a: &mut f64, b: &mut f64| {
             if *a * *b < mu {
                 if a > b { *b = mu / *a } else { *a = mu / *b }
@@ -403,9 +408,23 @@ impl<'a> Interior<'a> {
             let Some(newton) = self.newton(state, &r.w) else { break };
             let affine = newton.direction(&r, &self.complement(state, &newton, 0.0, None));
             let reach = self.reach(state, &r.w, &affine).min(1.0);
-            let aim = self.complement(state, &newton, (1.0 - reach).powi(3) * mu, Some(&affine));
-            let step = newton.direction(&r, &aim);
-            let reach = (NEARLY * self.reach(state, &r.w, &step)).min(1.0);
+            let aimed = (1.0 - reach).powi(3) * mu;
+            let mut aim = self.complement(state, &newton, aimed, Some(&affine));
+            let mut step = newton.direction(&r, &aim);
+            let mut reach = (NEARLY * self.reach(state, &r.w, &step)).min(1.0);
+            for _ in 0..if reach > 0.9 { 0 } else { MOST_CORRECTIONS } {
+                let further = (1.5 * reach + 0.3).min(1.0);
+                let better = self.correct(state, &step, further, aimed, &aim);
+                let trial = newton.direction(&r, &better);
+                let longer = (NEARLY * self.reach(state, &r.w, &trial)).min(1.0);
+                if longer < reach + 0.1 * (further - reach) {
+                    break;
+                }
+                (step, reach, aim) = (trial, longer, better);
+                if reach > 0.9 {
+                    break;
+                }
+            }
             state.go(reach, &step);
         }
         *state = best;
@@ -458,6 +477,30 @@ impl<'a> Interior<'a> {
             let x0 = (p0 * r0 - dot(p1, &r1)) / det;
             let x1 = r1.iter().zip(p1).map(|(r, p)| (r - x0 * p) / p0).collect();
             out.cone = Some((x0, x1));
+        }
+        out
+    }
+
+    /// Gondzio's corrector: products that a longer step would bring far from `mu` are pulled back.
+    fn correct(&self, state: &State, step: &Step, reach: f64, mu: f64, aim: &Complement) -> Complement {
+        let pull = |product: f64| {
+            if product < 0.1 * mu {
+                0.1 * mu - product
+            } else if product > 10.0 * mu {
+                (10.0 * mu - product).max(-10.0 * mu)
+            } else {
+                0.0
+            }
+        };
+        let pair = |a: f64, da: f64, b: f64, db: f64| pull((a + reach * da) * (b + reach * db));
+        let mut out =
+            Complement { low: aim.low.clone(), high: aim.high.clone(), rows: aim.rows.clone(), cone: aim.cone.clone() };
+        for (j, p) in self.parts.iter().enumerate() {
+            out.low[j] += pair(state.x[j], step.x[j], state.low[j], step.low[j]);
+            out.high[j] += pair(p.range - state.x[j], -step.x[j], state.high[j], step.high[j]);
+        }
+        for i in 0..state.slack.len() {
+            out.rows[i] += pair(state.slack[i], step.slack[i], state.inequality[i], step.inequality[i]);
         }
         out
     }
@@ -581,11 +624,16 @@ impl Newton<'_> {
         }
         let equality: Vec<f64> = r.equality.iter().map(|e| -e).collect();
         let (mut w, mut du) = self.once(&right, &equality);
-        for _ in 0..2 {
+        let size = right.iter().chain(&equality).fold(0.0_f64, |m, x| m.max(x.abs()));
+        for _ in 0..MOST_REFINEMENTS {
             let mut left = self.times(&w);
             add_sum(&program.equal, &du, &mut left);
             let rw: Vec<f64> = right.iter().zip(&left).map(|(a, b)| a - b).collect();
             let re: Vec<f64> = equality.iter().zip(times(&program.equal, &w)).map(|(a, b)| a - b).collect();
+            let off = rw.iter().chain(&re).fold(0.0_f64, |m, x| m.max(x.abs()));
+            if off <= REFINED * size {
+                break;
+            }
             let (cw, cu) = self.once(&rw, &re);
             w.iter_mut().zip(&cw).for_each(|(a, b)| *a += b);
             du.iter_mut().zip(&cu).for_each(|(a, b)| *a += b);

@@ -1,116 +1,331 @@
 use super::*;
-use crate::Stop;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
-/// Patterns of 6.4.4: one spike a train at a whole ms up to 200, one target by class.
-struct Capacity {
-    n: usize,
-    spikes: Vec<Vec<f64>>,
-    targets: Vec<f64>,
+/// A problem of its own rows; `dense` keeps what [`Terms`] and [`HardRows`] borrow.
+#[derive(Clone, Default)]
+struct Problem {
+    l1: f64,
+    l2: f64,
+    norm: Norm,
+    lift: f64,
+    behind: Vec<f64>,
+    wanted: Vec<f64>,
+    equal: Vec<f64>,
+    equal_to: Vec<f64>,
+    below: Vec<f64>,
+    limit: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
 }
 
-fn row(spikes: &[f64], t: f64) -> Vec<f64> {
-    let alpha = |s: f64| if s < t { (t - s) / 15.0 * (1.0 - (t - s) / 15.0).exp() } else { 0.0 };
-    spikes.iter().map(|&s| alpha(s)).collect()
+impl Problem {
+    /// Alpha rows of random patterns: targets to meet, silence before them.
+    fn drawn(n: usize, targets: usize, silent: usize, random: &mut StdRng) -> Self {
+        let mut out = Self { lower: vec![-0.3; n], upper: vec![0.3; n], ..Self::default() };
+        let patterns: Vec<Vec<f64>> =
+            (0..targets).map(|_| (0..n).map(|_| random.random_range(0.0..200.0)).collect()).collect();
+        for spikes in &patterns {
+            let t = random.random_range(50.0..150.0);
+            out.equal.extend(alpha(spikes, t));
+            out.equal_to.push(0.3);
+            out.behind.extend(alpha(spikes, t + 1.5));
+            out.wanted.push(0.36);
+            for _ in 0..silent {
+                out.below.extend(alpha(spikes, t - random.random_range(1.0..60.0)));
+                out.limit.push(0.3);
+            }
+        }
+        let largest = out.behind.chunks(n).map(|r| (0.3 * r.iter().sum::<f64>() + 0.36).powi(2)).sum::<f64>();
+        out.l1 = 0.01 / (0.3 * n as f64);
+        out.l2 = 0.01 / (0.3 * (n as f64).sqrt());
+        out.lift = 0.98 / largest;
+        out
+    }
+
+    fn with(mut self, l1: f64, l2: f64, lift: f64) -> Self {
+        self.l1 *= l1;
+        self.l2 *= l2;
+        self.lift *= lift;
+        self
+    }
+
+    fn terms(&self) -> Terms<'_> {
+        let Self { l1, l2, norm, lift, behind, wanted, .. } = self;
+        Terms { l1: *l1, l2: *l2, norm: *norm, lift: *lift, behind, wanted }
+    }
+
+    fn rows(&self) -> HardRows<'_> {
+        HardRows { equal: &self.equal, equal_to: &self.equal_to, below: &self.below, limit: &self.limit }
+    }
+
+    fn solve(&self) -> Found {
+        self.go_on(None, 1e-8)
+    }
+
+    fn go_on(&self, start: Option<&Start>, tolerance: f64) -> Found {
+        minimise(&self.terms(), &self.rows(), &self.lower, &self.upper, start, tolerance, Stop::never()).unwrap()
+    }
+
+    fn objective(&self, w: &[f64]) -> f64 {
+        let square = dot(w, w);
+        let behind = self.behind.chunks(w.len()).zip(&self.wanted);
+        self.l1 * w.iter().map(|w| w.abs()).sum::<f64>()
+            + self.l2 * if self.norm == Norm::Square { square } else { square.sqrt() }
+            + self.lift * behind.map(|(row, m)| (dot(row, w) - m).powi(2)).sum::<f64>()
+    }
+
+    /// Clarabel on the same rows, unscaled by us.
+    fn oracle(&self) -> f64 {
+        let program = Program::new(&self.terms(), &self.rows(), &self.lower, &self.upper);
+        let point = program.clarabel(Stop::never()).unwrap();
+        program.objective(&point.weights) * program.cost
+    }
+
+    fn assert_exact(&self, found: &Found) {
+        for (row, value) in self.equal.chunks(self.lower.len()).zip(&self.equal_to) {
+            assert!((dot(row, &found.weights) - value).abs() <= 1e-12, "a target is missed");
+        }
+        for (row, limit) in self.below.chunks(self.lower.len()).zip(&self.limit) {
+            assert!(dot(row, &found.weights) - limit <= 1e-13, "silence is broken");
+        }
+        let bounds = self.lower.iter().zip(&self.upper);
+        assert!(found.weights.iter().zip(bounds).all(|(w, (l, u))| (*l..=*u).contains(w)), "a bound is crossed");
+        assert!(found.inequality.iter().all(|z| *z >= 0.0), "a multiplier is below 0");
+        let objective = self.objective(&found.weights);
+        assert!((objective - found.objective).abs() <= 1e-12 * objective, "the objective is not that of the weights");
+        assert!(found.bound <= found.objective, "the bound lies above");
+    }
+
+    fn assert_best(&self, found: &Found) {
+        self.assert_exact(found);
+        assert!(found.gap() <= 1e-8, "gap {:e}", found.gap());
+        let oracle = self.oracle();
+        assert!((found.objective - oracle).abs() <= 1e-7 * oracle, "{} is not {oracle}", found.objective);
+    }
 }
 
-impl Capacity {
-    fn new(n: usize, p: usize, seed: u64) -> Self {
-        let mut random = StdRng::seed_from_u64(seed);
-        let spikes = (0..p).map(|_| (0..n).map(|_| f64::from(random.random_range(1..=200_u32))).collect()).collect();
-        Self { n, spikes, targets: (0..p).map(|k| 50.0 * ((k % 3) + 1) as f64).collect() }
+fn alpha(spikes: &[f64], t: f64) -> Vec<f64> {
+    let value = |s: f64| if s < t { (t - s) / 15.0 * (1.0 - (t - s) / 15.0).exp() } else { 0.0 };
+    spikes.iter().map(|&s| value(s)).collect()
+}
+
+const MIXES: [(f64, f64, f64); 7] = [
+    (1.0, 1.0, 1.0),
+    (1.0, 0.0, 0.0),
+    (0.0, 1.0, 0.0),
+    (1.0, 4.0, 0.0),
+    (4.0, 1.0, 0.0),
+    (0.0, 1.0, 1.0),
+    (1.0, 0.0, 100.0),
+];
+
+#[test]
+fn every_mix_of_terms_comes_out_as_from_clarabel() {
+    let mut random = StdRng::seed_from_u64(1);
+    for (k, (l1, l2, lift)) in MIXES.into_iter().enumerate() {
+        for norm in [Norm::Norm, Norm::Square] {
+            let mut problem = Problem::drawn(40 + 20 * (k % 3), 6, 8, &mut random).with(l1, l2, lift);
+            problem.norm = norm;
+            let found = problem.solve();
+            assert_eq!(found.engine, Engine::Native, "{l1} {l2} {lift} {norm:?}");
+            problem.assert_best(&found);
+        }
     }
 }
 
 #[test]
-#[ignore]
-fn capacity() {
-    let arg = |name: &str, or: &str| std::env::var(name).unwrap_or(or.into()).parse::<f64>().unwrap();
-    let (n, p) = (arg("N", "100") as usize, arg("P", "18") as usize);
-    let (l1, l2, l3) = (arg("L1", "2"), arg("L2", "2"), arg("L3", "200"));
-    let sum = l1 + l2 + l3;
-    let c = Capacity::new(n, p, 0);
-    let (mut equal, mut behind) = (vec![], vec![]);
-    for (s, &t) in c.spikes.iter().zip(&c.targets) {
-        equal.extend(row(s, t));
-        behind.extend(row(s, t + 1.5));
-    }
-    let equal_to = vec![0.3; p];
-    let wanted = vec![0.3 * 1.2; p];
-    let b_max: f64 = behind.chunks(n).map(|r| (0.3 * r.iter().sum::<f64>() + 0.36).powi(2)).sum();
-    let terms = Terms {
-        l1: l1 / sum / (n as f64 * 0.3),
-        l2: l2 / sum / ((n as f64).sqrt() * 0.3),
-        norm: Norm::Norm,
-        lift: l3 / sum / b_max,
-        behind: &behind,
-        wanted: &wanted,
-    };
-    let (mut below, mut limit) = (vec![], vec![]);
-    let (lower, upper) = (vec![-0.3; n], vec![0.3; n]);
-    let mut w = times(&equal, &vec![0.0; n]);
-    w.resize(n, 0.0);
-    // start rows: each 4th ms in the 30 before the target
-    let mut have = std::collections::HashSet::new();
-    for k in 0..p {
-        for d in (1..30).step_by(4) {
-            let t = c.targets[k] - f64::from(d);
-            have.insert((k, t as u64));
-            below.extend(row(&c.spikes[k], t));
-            limit.push(0.3);
-        }
-    }
-    let begun = std::time::Instant::now();
-    let mut start = None;
-    for round in 0..20 {
-        let rows = HardRows { equal: &equal, equal_to: &equal_to, below: &below, limit: &limit };
-        let tolerance = [1e-1, 1e-2, 1e-3, 1e-4].get(round).copied().unwrap_or(1e-8);
-        let at = std::time::Instant::now();
-        let found = minimise(
-            &terms,
-            &rows,
-            &lower,
-            &upper,
-            start.as_ref().filter(|_| arg("WARM", "1") > 0.0),
-            tolerance,
-            Stop::never(),
-        )
-        .unwrap();
-        let w = found.weights.clone();
-        let mut added = 0;
-        let mut worst = 0.0_f64;
-        for k in 0..p {
-            let u: Vec<f64> = (0..=200).map(|t| dot(&row(&c.spikes[k], f64::from(t)), &w)).collect();
-            let silent = |t: usize| !((t as f64) >= c.targets[k] && (t as f64) <= c.targets[k] + 3.0);
-            let theta = |t: usize| {
-                if t as f64 > c.targets[k] { 0.3 + 0.2 * (-(t as f64 - c.targets[k] - 3.0) / 30.0).exp() } else { 0.3 }
+fn bounds_may_differ_by_weight_lie_on_one_side_or_leave_no_room() {
+    let mut random = StdRng::seed_from_u64(2);
+    for (l1, l2, lift) in MIXES {
+        let mut problem = Problem::drawn(60, 5, 6, &mut random).with(l1, l2, lift);
+        for k in 0..60 {
+            let (lower, upper) = match k % 5 {
+                0 => (0.0, 0.1),
+                1 => (-0.1, 0.3),
+                2 => (0.01, 0.2),
+                3 => (-0.05, -0.001),
+                _ => (0.02, 0.02),
             };
-            for t in 0..=200 {
-                let x = u[t] - theta(t);
-                if silent(t) && x > 1e-10 {
-                    worst = worst.max(x);
-                    let peak = (t == 0 || u[t - 1] - theta(t - 1) <= x)
-                        && (t == 200 || u[t + 1] - theta(t + 1) <= x || !silent(t + 1));
-                    if peak && have.insert((k, t as u64)) {
-                        below.extend(row(&c.spikes[k], t as f64));
-                        limit.push(theta(t));
-                        added += 1;
-                    }
-                }
-            }
+            (problem.lower[k], problem.upper[k]) = (lower, upper);
         }
-        eprintln!(
-            "round {round}: {} rows, gap {:.1e}, {:.3} s, worst {worst:.1e}, added {added}, F {:.12e} {:?}",
-            limit.len() - added,
-            found.gap(),
-            at.elapsed().as_secs_f64(),
-            found.objective,
-            found.engine,
-        );
-        start = Some(found.start);
-        if added == 0 && tolerance < 1e-5 {
-            break;
+        problem.assert_best(&problem.solve());
+    }
+}
+
+#[test]
+fn tight_bounds_bind() {
+    let mut random = StdRng::seed_from_u64(3);
+    for (l1, l2, lift) in MIXES {
+        let mut problem = Problem::drawn(80, 4, 6, &mut random).with(l1, l2, lift);
+        problem.lower.fill(-0.03);
+        problem.upper.fill(0.035);
+        let found = problem.solve();
+        problem.assert_best(&found);
+        if lift == 0.0 && l2 == 0.0 {
+            assert!(found.weights.iter().any(|w| *w == 0.035), "no bound binds");
         }
     }
-    eprintln!("total {:.3}", begun.elapsed().as_secs_f64());
+}
+
+#[test]
+fn zeros_of_l1_are_exact() {
+    let mut random = StdRng::seed_from_u64(4);
+    let found = Problem::drawn(100, 3, 10, &mut random).with(1.0, 0.0, 0.0).solve();
+    assert!(found.weights.iter().filter(|w| **w == 0.0).count() > 80);
+}
+
+#[test]
+fn b_alone_has_many_minima_and_one_least_value() {
+    let mut random = StdRng::seed_from_u64(5);
+    for _ in 0..3 {
+        let mut problem = Problem::drawn(50, 5, 12, &mut random).with(0.0, 0.0, 1.0);
+        problem.wanted.fill(0.9);
+        problem.lower.fill(-0.15);
+        problem.upper.fill(0.15);
+        let found = problem.solve();
+        problem.assert_exact(&found);
+        assert!(found.objective <= problem.oracle() * (1.0 + 1e-7) + 1e-12);
+        assert!(found.gap() <= 1e-8 || found.objective < 1e-10 * problem.objective(&[0.0; 50]), "{:e}", found.gap());
+    }
+}
+
+#[test]
+fn rows_said_twice_or_almost_twice_do_no_harm() {
+    let mut random = StdRng::seed_from_u64(6);
+    for (l1, l2, lift) in MIXES {
+        let plain = Problem::drawn(60, 5, 6, &mut random).with(l1, l2, lift);
+        let mut doubled = plain.clone();
+        doubled.equal.extend_from_slice(&plain.equal[..120]);
+        doubled.equal_to.extend_from_slice(&plain.equal_to[..2]);
+        doubled.below.extend_from_slice(&plain.below);
+        doubled.limit.extend_from_slice(&plain.limit);
+        for (row, limit) in plain.below.chunks(60).zip(&plain.limit) {
+            doubled.below.extend(row.iter().map(|v| v * (1.0 + 1e-8 * random.random::<f64>())));
+            doubled.limit.push(limit + 1e-9);
+        }
+        let (a, b) = (plain.solve(), doubled.solve());
+        doubled.assert_exact(&b);
+        assert!(b.gap() <= 1e-8, "gap {:e}", b.gap());
+        assert!((a.objective - b.objective).abs() <= 1e-6 * a.objective, "{} {}", a.objective, b.objective);
+    }
+}
+
+#[test]
+fn without_targets_the_best_weights_are_none() {
+    let mut random = StdRng::seed_from_u64(7);
+    for (l1, l2, _) in MIXES {
+        let mut problem = Problem::drawn(30, 2, 10, &mut random).with(l1, l2, 0.0);
+        problem.equal.clear();
+        problem.equal_to.clear();
+        let found = problem.solve();
+        problem.assert_exact(&found);
+        assert!(found.objective < 1e-12, "{}", found.objective);
+        assert!(found.bound >= 0.0);
+    }
+}
+
+#[test]
+fn the_bound_holds_for_any_multipliers() {
+    let mut random = StdRng::seed_from_u64(8);
+    for (l1, l2, lift) in MIXES {
+        for norm in [Norm::Norm, Norm::Square] {
+            let mut problem = Problem::drawn(30, 3, 6, &mut random).with(l1, l2, lift);
+            problem.norm = norm;
+            let found = problem.solve();
+            let program = Program::new(&problem.terms(), &problem.rows(), &problem.lower, &problem.upper);
+            let mut best = f64::NEG_INFINITY;
+            for size in [0.0, 0.01, 0.1, 1.0] {
+                let mut near = |x: &f64, scale: f64| x / scale + size * (random.random::<f64>() - 0.5);
+                let equality = found.equality.iter().zip(&program.of_equal);
+                let inequality = found.inequality.iter().zip(&program.of_below);
+                let point = Point {
+                    weights: found.weights.iter().map(|w| near(w, program.weight)).collect(),
+                    equality: equality.map(|(u, s)| near(u, program.cost / s)).collect(),
+                    inequality: inequality.map(|(z, s)| near(z, program.cost / s)).collect(),
+                    pull: found.weights.iter().map(|w| near(w, program.weight)).collect(),
+                };
+                let bound = program.bound(&point) * program.cost;
+                assert!(bound <= found.objective, "{bound} lies above {}", found.objective);
+                best = best.max(bound);
+            }
+            assert!(best.is_finite());
+        }
+    }
+}
+
+#[test]
+fn rows_may_come_and_go_between_calls() {
+    let mut random = StdRng::seed_from_u64(9);
+    for (l1, l2, lift) in MIXES {
+        let whole = Problem::drawn(60, 6, 10, &mut random).with(l1, l2, lift);
+        let mut part = whole.clone();
+        part.below.truncate(60 * 20);
+        part.limit.truncate(20);
+        let mut start = part.go_on(None, 1e-2).start;
+        let keep: Vec<bool> = (0..20).map(|i| i % 2 == 0).collect();
+        start.retain(&keep);
+        let mut next = part.clone();
+        next.below = part.below.chunks(60).zip(&keep).filter(|(_, k)| **k).flat_map(|(row, _)| row.to_vec()).collect();
+        next.limit.truncate(10);
+        let dropped = part.below.chunks(60).zip(&keep).filter(|(_, k)| !**k).flat_map(|(row, _)| row.to_vec());
+        next.below.extend(dropped);
+        next.below.extend_from_slice(&whole.below[60 * 20..]);
+        next.limit.clone_from(&whole.limit);
+        let warm = next.go_on(Some(&start), 1e-8);
+        next.assert_best(&warm);
+    }
+}
+
+#[test]
+fn rows_that_cannot_be_met_are_never_said_to_be() {
+    let mut random = StdRng::seed_from_u64(10);
+    for off in [1e-9, 1e-3] {
+        let mut problem = Problem::drawn(40, 3, 4, &mut random);
+        problem.below.extend_from_slice(&problem.equal[..40].to_vec());
+        problem.limit.push(problem.equal_to[0] - off);
+        let found = problem.solve();
+        assert!(!found.met);
+        assert!(found.objective.is_finite() && found.weights.iter().all(|w| w.is_finite()));
+    }
+}
+
+#[test]
+fn a_request_to_stop_ends_with_what_there_is() {
+    let problem = Problem::drawn(40, 3, 4, &mut StdRng::seed_from_u64(11));
+    let asked = || true;
+    let stop = Stop::when(&asked);
+    let found = minimise(&problem.terms(), &problem.rows(), &problem.lower, &problem.upper, None, 1e-8, stop).unwrap();
+    assert!(found.stopped);
+    assert!(found.weights.iter().all(|w| w.abs() <= 0.3) && found.bound <= found.objective || !found.met);
+}
+
+/// 6.4.5, where an augmented Lagrangian failed: one target at 40 ms, rows behind it, B not divided, inputs kept.
+#[test]
+fn lift_against_silence_behind_the_target_is_solved() {
+    for kappa in [1.0, 1.04, 1.08, 1.16, 1.3] {
+        let mut random = StdRng::seed_from_u64(12);
+        let spikes: Vec<f64> = (0..200).map(|_| random.random_range(0.0..40.0)).collect();
+        let value = |s: f64, t: f64| if s < t { (t - s) / 10.0 * (1.0 - (t - s) / 10.0).exp() } else { 0.0 };
+        let row = |t: f64| spikes.iter().map(move |&s| value(s, t)).collect::<Vec<f64>>();
+        let mut problem = Problem {
+            l1: 0.0,
+            l2: 2.0 / 102.0 / (200.0_f64.sqrt() * 0.3),
+            lift: 100.0 / 102.0,
+            behind: row(41.5),
+            wanted: vec![0.3 * kappa],
+            equal: row(40.0),
+            equal_to: vec![0.3],
+            lower: vec![-0.3; 200],
+            upper: vec![0.3; 200],
+            ..Problem::default()
+        };
+        for t in (0..=50).filter(|t| !(40..=43).contains(t)) {
+            problem.below.extend(row(f64::from(t)));
+            problem.limit.push(0.3);
+        }
+        let found = problem.solve();
+        problem.assert_best(&found);
+        problem.l1 = problem.l2;
+        problem.assert_best(&problem.solve());
+    }
 }
