@@ -69,6 +69,7 @@ REGISTERS = taxel.wire.Registers()
 BYTES = taxel.wire.encode(EVENTS)
 
 TEMPOTRON = taxel.learn.Tempotron(eta=0.1, epochs=5).fit([PLAIN], [True])
+SKIM = taxel.learn.SKIM(tau=5.0).fit([PLAIN], [[5.0]])
 EPOCHS = {"eta": 0.1, "initial": (0.0, 1.0), "epochs": 5, "updates": "batch", "step_ms": 0.1, "within_ms": 1.0}
 EPOCHS |= {"until_right": True, "seed": 1, "max_seconds": 1.0, "theta_0": 1.0, "after_spike": "reset", "tau": 9.0}
 EPOCHS |= {"tau_s": 3.0}
@@ -248,6 +249,26 @@ SOUND: dict[str, Sound] = {
         taxel.encode.ThresholdIzhikevich, levels=[1.0], published="6.5.1", begin="settled", period_ms=0.1
     ),
     **{f"taxel.learn.{rule.__name__}": plain(rule, **arguments) for rule, arguments in RIVALS},
+    "taxel.learn.SKIM": plain(
+        taxel.learn.SKIM,
+        tau=5.0,
+        kernel="double_exponential",
+        tau_s=2.0,
+        step_ms=1.0,
+        pulse_ms=3.0,
+        ridge=0.1,
+        branches=5,
+        spread=0.5,
+        delay_ms=3.0,
+        nonlinearity="tanh",
+        thresholds=[0.5],
+        within_ms=5.0,
+        seed=1,
+    ),
+    "taxel.learn.SKIM.fit": method(taxel.learn.SKIM(tau=5.0), "fit", patterns=[PLAIN], targets=[[5.0]]),
+    "taxel.learn.SKIM.rows": method(SKIM, "rows", pattern=PLAIN),
+    "taxel.learn.SKIM.output": method(SKIM, "output", pattern=PLAIN),
+    "taxel.learn.SKIM.predict": method(SKIM, "predict", patterns=[PLAIN], threshold=0.5),
     "taxel.learn.Tempotron": plain(
         taxel.learn.Tempotron,
         tau=15.0,

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde::de::DeserializeOwned;
-use taxel_core::learn::{Ended, Rival, SteppedNeuron, Tempotron, Trained};
+use taxel_core::learn::{Ended, Rival, Skim, SteppedNeuron, Tempotron, Trained};
 use taxel_core::{Result as CoreResult, SpikeTrains, Stop, problem};
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
@@ -173,6 +173,54 @@ fn change_tempotron<'py>(
     Ok(array(py, change))
 }
 
+/// Checks parameters.
+#[pyfunction]
+fn check_skim(parameters: &str) -> PyResult<()> {
+    parse::<Skim>(parameters)?.check().map_err(core)
+}
+
+/// A least-squares problem as Python gets it: R row after row, z, the sum of squares out of reach, rows.
+type NormalOut<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64, usize);
+
+/// Brings the least-squares problem of examples to triangular form.
+#[pyfunction]
+fn reduce_skim<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    patterns: Vec<SpikesIn<'py>>,
+    targets: Vec<PyReadonlyArray1<'py, f64>>,
+) -> PyResult<NormalOut<'py>> {
+    let skim: Skim = parse(parameters)?;
+    let patterns = to_patterns(patterns)?;
+    let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
+    let normal = enter(py, |stop| skim.reduce(&patterns, &targets, stop))?;
+    Ok((array(py, normal.r()), array(py, normal.z()), normal.rest(), normal.rows))
+}
+
+/// The rows of one pattern, one after the other.
+#[pyfunction]
+fn rows_skim<'py>(py: Python<'py>, parameters: &str, pattern: SpikesIn<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let skim: Skim = parse(parameters)?;
+    let pattern = to_spikes(pattern)?;
+    let rows = enter(py, |stop| skim.rows(&pattern, stop))?;
+    Ok(array(py, rows))
+}
+
+/// The output at each row's time.
+#[pyfunction]
+fn output_skim<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    pattern: SpikesIn<'py>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let skim: Skim = parse(parameters)?;
+    let pattern = to_spikes(pattern)?;
+    let weights = slice("weights", &weights)?;
+    let output = enter(py, |stop| skim.output(weights, &pattern, stop))?;
+    Ok(array(py, output))
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(check_rival, module)?)?;
     module.add_function(wrap_pyfunction!(fit_rival, module)?)?;
@@ -181,5 +229,9 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(check_tempotron, module)?)?;
     module.add_function(wrap_pyfunction!(fit_tempotron, module)?)?;
     module.add_function(wrap_pyfunction!(peak_tempotron, module)?)?;
-    module.add_function(wrap_pyfunction!(change_tempotron, module)?)
+    module.add_function(wrap_pyfunction!(change_tempotron, module)?)?;
+    module.add_function(wrap_pyfunction!(check_skim, module)?)?;
+    module.add_function(wrap_pyfunction!(reduce_skim, module)?)?;
+    module.add_function(wrap_pyfunction!(rows_skim, module)?)?;
+    module.add_function(wrap_pyfunction!(output_skim, module)?)
 }

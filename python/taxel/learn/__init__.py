@@ -10,6 +10,7 @@ from taxel.learn.htp import HTP
 from taxel.learn.inst import INST
 from taxel.learn.psd import PSD
 from taxel.learn.resume import ReSuMe
+from taxel.learn.skim import SKIM
 from taxel.learn.span import SPAN
 from taxel.learn.tempotron import Tempotron
 
@@ -19,6 +20,7 @@ __all__ = [
     "HTP",
     "INST",
     "PSD",
+    "SKIM",
     "SPAN",
     "Certificate",
     "Chronotron",
