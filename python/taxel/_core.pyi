@@ -268,7 +268,8 @@ def send(
     segment: bool,
 ) -> str: ...
 
-# learn: parameters as JSON; a fit as (weights, objective, parts, gap, rounds, rows, solved, unreachable, refires)
+# learn: parameters as JSON; a fit as (weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable,
+# refires), multipliers), and a pending KeyboardInterrupt
 
 _Fit = tuple[
     NDArray[np.float64],
@@ -290,7 +291,9 @@ class ConeRProblem:
     ) -> ConeRProblem: ...
     @property
     def silent_rows(self) -> int: ...
-    def fit(self, parameters: str, start: NDArray[np.float64] | None, progress: Any) -> _Fit: ...
+    @property
+    def rows(self) -> int: ...
+    def fit(self, parameters: str, start: _Start | None, progress: Any) -> tuple[_Fit, BaseException | None]: ...
 
 # rivals: parameters as JSON; training as (weights, right, best epoch, how it ended, a pending KeyboardInterrupt)
 

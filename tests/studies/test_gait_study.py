@@ -18,7 +18,7 @@ from tests.formats.test_loaders import interpolated
 from taxel import FormatError, ProblemError
 from taxel.studies.gait import report, study
 from taxel.studies.gait.protocols import PROTOCOLS
-from taxel.studies.gait.recipes import ENCODERS, SEARCH
+from taxel.studies.gait.recipes import ENCODERS, SEARCH, SETTINGS
 
 
 def walker(folder: Path, name: str, seed: int) -> None:
@@ -130,6 +130,32 @@ def test_a_second_run_reckons_nothing_again(data, ran):
     assert (folder / "results.jsonl").stat().st_size == before
 
 
+def test_the_full_search_chooses_inside_each_fold_and_only_on_the_plate(data, ran, tmp_path):
+    said = study(data, size="toy", search="full", report=tmp_path, quiet=True)
+    found = rows(said, "plate", "contact")
+    assert {"528: as printed", "528: recipe"} <= set(found)
+    assert not any(row.startswith("528") for row in rows(said, "gaitpdb", "contact"))
+    assert sorted(one["left_out"] for one in said["full_search"]) == sorted(["subj900", "subj901", "subj902"] * 2)
+    for one in said["full_search"]:
+        assert one["tau"] in (10.0, 40.0)
+        assert one["lambda_1"] + one["lambda_2"] == 4
+    results = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
+    searches = [r for r in results if r["params"]["kind"] == "search"]
+    assert len(searches) == 2 * 3 * 4  # as printed and recipe; folds; tau and kappa
+    for one in searches:
+        assert set(one["params"]["judged"]) < set(one["params"]["left_out"])
+        assert [t["lambdas"][0] for t in one["result"]["tried"]] == [4.0, 3.6]
+        assert all(t["status"] == "solved" for t in one["result"]["tried"])
+    assert "The 528 settings of 6.5.2" in (tmp_path / "gait.html").read_text()
+    _, listed = ran
+    assert listed["full_search"] == []
+
+
+def test_the_settings_of_the_full_search_are_528():
+    assert np.prod([len(values) for values in SETTINGS.values()]) == 528
+    assert (SETTINGS["tau"][-1], SETTINGS["kappa"][-1], SETTINGS["lambda_1"][0]) == (220.0, 1.3, 4.0)
+
+
 def test_other_people_are_judged_by_all_of_these(data, tmp_path):
     other = tmp_path / "other"
     (other / "insole_gaitpdb").mkdir(parents=True)
@@ -186,6 +212,7 @@ def test_a_goal_is_met_only_where_every_part_of_it_is():
     ("arguments", "error", "said"),
     [
         ({"size": "huge"}, ProblemError, "size is 'huge'"),
+        ({"search": "all"}, ProblemError, "search is 'all'"),
         ({"only": ["emed"]}, ProblemError, "only is 'emed'"),
         ({"only": 3}, ProblemError, "only is 3"),
         (

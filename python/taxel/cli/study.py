@@ -168,6 +168,9 @@ def gait(
         Path | None, typer.Option(help="Such a folder of other people: train on DATA, judge on TEST.")
     ] = None,
     size: Annotated[str, typer.Option(help="full, or toy (shows that it runs).")] = "full",
+    search: Annotated[
+        str, typer.Option(help="listed points, or full: on plate also the 528 settings of 6.5.2 (hours).")
+    ] = "listed",
     jobs: Jobs = 1,
     backend: Backend = "loky",
     scheduler: Scheduler = None,
@@ -186,7 +189,8 @@ def gait(
     from taxel.studies.gait import study  # noqa: PLC0415  the learner and its libraries load slowly
 
     workers = _workers(jobs, backend, scheduler)
-    said = study(data, test, size=size, workers=workers, report=report, only=only or (), quiet=as_json)
+    options = {"size": size, "search": search, "workers": workers, "report": report, "only": only or ()}
+    said = study(data, test, **options, quiet=as_json)
     if as_json:
         typer.echo(json.dumps(said))
         return

@@ -20,7 +20,18 @@ from taxel.studies.gait import realise as realisation
 from taxel.studies.gait.folds import Scope
 from taxel.studies.gait.pieces import Piece
 from taxel.studies.gait.realise import TEST, Setting, realise
-from taxel.studies.gait.recipes import ENCODERS, NOTES, PRINTED, RULE_ENCODERS, SEARCH, TONIC, Point
+from taxel.studies.gait.recipes import (
+    ENCODERS,
+    FULL,
+    NOTES,
+    PRINTED,
+    RULE_ENCODERS,
+    SEARCH,
+    SETTINGS,
+    TONIC,
+    Point,
+    changed,
+)
 from taxel.studies.gait.rules import RULES
 from taxel.studies.gait.sources import SOURCES, encoded, fingerprint, present
 from taxel.studies.runner import HERE, Results, Task, Workers, code_digest, run
@@ -32,6 +43,8 @@ ROWS = {
     "notes": "the notes' recipe (tuned on the shared people)",
     "chosen": "parameters chosen inside the training folds",
     "printed": "Table 6.2 as printed",
+    "528: as printed": "528 settings of 6.5.2 searched, all else as printed",
+    "528: recipe": "528 settings of 6.5.2 searched, all else as in the notes' recipe",
     "tonic": "the notes' recipe with tonic inputs (extension)",
     "others": "the notes' recipe, insole placed by other people's mean",
     **{f"rule: {name}": f"plain rule: {text}" for name, text in RULES.items()},
@@ -212,6 +225,7 @@ class _Plan:
     common: dict[str, Any]
     testing: bool
     events: tuple[str, ...]
+    full: bool = False
 
     @property
     def can_choose(self) -> bool:
@@ -236,6 +250,29 @@ class _Plan:
         params = {"kind": "neuron", "left_out": left_out, "event": event, "point": point, "train": dict(train)}
         return Task(self.common | params | {"scope": scope.name, "placed": "own"}, seed=1)
 
+    def searches(self, scope: Scope, left_out: list[int], event: str, row: str, size: str) -> list[Task]:
+        """Name the search of all settings inside a fold: a third of the other groups judge what the rest trained."""
+        after = max(left_out, default=-1) + 1
+        groups = len(scope.groups)
+        others = [g for g in ((after + k) % groups for k in range(groups)) if g not in left_out]
+        judged = sorted(others[: max(1, len(others) // 3 + (len(others) % 3 > 1))])
+        few = slice(2) if size == "toy" else slice(None)
+        params = {
+            "kind": "search",
+            "left_out": sorted([*left_out, *judged]),
+            "judged": judged,
+            "event": event,
+            "lambda_1": list(SETTINGS["lambda_1"][few]),
+            "train": {"count": 20},
+            "scope": scope.name,
+            "placed": "own",
+        }
+        return [
+            Task(self.common | params | {"point": changed(FULL[row][event], tau=tau, kappa=kappa)}, seed=1)
+            for tau in SETTINGS["tau"][few]
+            for kappa in SETTINGS["kappa"][few]
+        ]
+
     def rule(self, scope: Scope, left_out: list[int], event: str, rule: str) -> Task:
         """Name a plain rule's choice."""
         encoder = RULE_ENCODERS[self.source][event]
@@ -249,6 +286,7 @@ def study(
     test: Path | None = None,
     *,
     size: str = "full",
+    search: str = "listed",
     workers: Workers = HERE,
     report: Path,
     only: Sequence[str] = (),
@@ -264,6 +302,9 @@ def study(
         Other people: everything is trained on `data` and judged there, instead of by folds.
     size : {"full", "toy"}
         Toy: people left out only, the first event only, two points to choose from.
+    search : {"listed", "full"}
+        Full: on the plate, people left out, also all 528 settings of 6.5.2 for contact and foot-off, all else once as
+        printed and once as in the notes' recipe; chosen by one split of the training people.
     workers : Workers
     report : Path
         Folder for results (JSON lines), folds, and the report.
@@ -282,22 +323,23 @@ def study(
     FormatError : `data` or `test` holds no source
     ProblemError : a size or source that is none
     """
-    from taxel.studies.gait.report import summary, write_report  # noqa: PLC0415  jinja2 and matplotlib load slowly
+    from taxel.studies.gait.report import figures, summary, write_report  # noqa: PLC0415  jinja2 and matplotlib load slowly
 
     data, report = Path(arguments.path("data", data)), Path(arguments.path("report", report))
     test = None if test is None else Path(arguments.path("test", test))
     arguments.text("size", size, ("full", "toy"))
+    arguments.text("search", search, ("listed", "full"))
     only = [arguments.text("only", name, SOURCES) for name in arguments.several("only", only)]
     folders = _sources(data, only)
     tests = {} if test is None else _sources(test, only)
     wanted = [name for name in SOURCES if name in folders and (test is None or name in tests)]
     report.mkdir(parents=True, exist_ok=True)
-    plans = [plan for name in wanted for plan in _plans(name, folders[name], tests.get(name), size)]
+    plans = [plan for name in wanted for plan in _plans(name, folders[name], tests.get(name), size, search)]
     _write_folds(report / "folds.json", plans)
     setting = Setting(folders, tests, {f"{p.source}/{p.protocol.name}": p.scopes for p in plans})
     results = Results(report / "results.jsonl", code_digest(_CODE))
     call = partial(realise, setting=setting)
-    outcomes, seconds = [], 0.0
+    outcomes, full, seconds = [], [], 0.0
     for plan in plans:
         title = f"{plan.source}, {plan.protocol.name}"
         first = _first(plan, size)
@@ -305,6 +347,7 @@ def study(
         second = _second(plan, size, results)
         run(call, second, results, workers=workers, title=f"{title}: chosen", quiet=quiet)
         outcomes += _outcomes(plan, size, results)
+        full += _full_search(plan, size, results, figures)
         seconds += results.seconds([*first, *second])
     skipped = [SOURCES[n].folder for n in SOURCES if n not in wanted and (not only or n in only)]
     skipped += [
@@ -318,6 +361,7 @@ def study(
     said = summary(
         outcomes,
         plans=[(p.source, p.protocol) for p in plans],
+        full_search=full,
         skipped=skipped,
         size=size,
         test=test is not None,
@@ -337,7 +381,7 @@ def _sources(folder: Path, only: Sequence[str]) -> dict[str, Path]:
     return found
 
 
-def _plans(name: str, folder: Path, test: Path | None, size: str) -> Iterator[_Plan]:
+def _plans(name: str, folder: Path, test: Path | None, size: str, search: str) -> Iterator[_Plan]:
     encoder = next(iter(NOTES[name].values()))["encoder"]
     all_pieces = list(encoded(folder, name, encoder).pieces.values())
     data = [fingerprint(folder, name)] + ([fingerprint(test, name)] if test else [])
@@ -357,7 +401,8 @@ def _plans(name: str, folder: Path, test: Path | None, size: str) -> Iterator[_P
         if not scopes:
             continue
         events = SOURCES[name].events[: 1 if size == "toy" else None]
-        yield _Plan(name, protocol, scopes, common, test is not None, events)
+        full = search == "full" and (name, protocol.name) == ("plate", "people left out")
+        yield _Plan(name, protocol, scopes, common, test is not None, events, full)
 
 
 def _write_folds(path: Path, plans: Sequence[_Plan]) -> None:
@@ -389,11 +434,13 @@ def _rows(plan: _Plan, event: str) -> list[str]:
             rows += [f"encoder: {name}" for name in ENCODERS]
         elif row != "tonic" or event in TONIC.get(plan.source, {}):
             rows.append(row)
+    if plan.full and plan.can_choose:
+        rows += [row for row, points in FULL.items() if event in points]
     return rows
 
 
 def _chooses(row: str) -> bool:
-    return row == "chosen" or row.startswith("encoder")
+    return row == "chosen" or row.startswith("encoder") or row in FULL
 
 
 def _fixed(plan: _Plan, scope: Scope, left_out: list[int], event: str, row: str, size: str) -> Task:
@@ -419,6 +466,9 @@ def _first(plan: _Plan, size: str) -> list[Task]:
             if not _chooses(row):
                 tasks.append(_fixed(plan, scope, left_out, event, row, size))
                 continue
+            if row in FULL:
+                tasks += plan.searches(scope, left_out, event, row, size)
+                continue
             for point in _points(plan, event, row, size):
                 tasks += [plan.neuron(scope, out, event, point, inside=True) for _, out in plan.inner(scope, left_out)]
     return sorted({t.key(""): t for t in tasks}.values(), key=_by_encoder)
@@ -426,7 +476,7 @@ def _first(plan: _Plan, size: str) -> list[Task]:
 
 def _by_encoder(task: Task) -> str:
     """Order tasks so that one encoding serves many of them in a row."""
-    encoder = task.params["point"]["encoder"] if task.params["kind"] == "neuron" else task.params["encoder"]
+    encoder = task.params["encoder"] if task.params["kind"] == "rule" else task.params["point"]["encoder"]
     return json.dumps([task.params["placed"], encoder, task.params["event"]])
 
 
@@ -443,6 +493,8 @@ def _second(plan: _Plan, size: str, results: Results) -> list[Task]:
 
 def _chosen(plan: _Plan, scope: Scope, left_out: list[int], event: str, row: str, size: str, results: Results) -> Point:
     """Choose by missed + false inside the training folds first, then by root mean square error."""
+    if row in FULL:
+        return _searched(plan, scope, left_out, event, row, size, results)[0]
     best: tuple[tuple[float, float], Point] | None = None
     for point in _points(plan, event, row, size):
         wrong, errors = 0, []
@@ -457,6 +509,56 @@ def _chosen(plan: _Plan, scope: Scope, left_out: list[int], event: str, row: str
     if best is None:
         raise ProblemError(f"{plan.source}, {event}: no point to choose from")
     return best[1]
+
+
+def _searched(
+    plan: _Plan, scope: Scope, left_out: list[int], event: str, row: str, size: str, results: Results
+) -> tuple[Point, dict[str, Any]]:
+    """Return the best of all settings that a fold searched, and what was found of it inside."""
+    tries = [
+        (task.params["point"], tried)
+        for task in plan.searches(scope, left_out, event, row, size)
+        for tried in results[task]["tried"]
+    ]
+    unknown = float("inf")
+    point, best = min(
+        tries, key=lambda t: (t[1]["missed"] + t[1]["false"], unknown if t[1]["rms_ms"] is None else t[1]["rms_ms"])
+    )
+    return changed(point, lambdas=best["lambdas"]), best
+
+
+def _full_search(plan: _Plan, size: str, results: Results, figures: Any) -> Iterator[dict[str, Any]]:
+    """List what each fold chose of the 528 settings, what it had found of it inside, and what it came to."""
+    for scope, event, row in _each(plan):
+        for left_out in plan.outer(scope) if row in FULL else ():
+            point, inside = _searched(plan, scope, left_out, event, row, size, results)
+            tested = results[plan.neuron(scope, left_out, event, point)]["tested"]
+            units = [_unit(name, unit) for group in tested.values() for name, unit in group.items()]
+            found = figures(units)
+            yield {
+                "event": event,
+                "all_else": row.removeprefix("528: "),
+                "left_out": ", ".join(sorted({u.person for u in units})),
+                "tau": point["neuron"]["tau"],
+                "kappa": point["learn"]["kappa"],
+                "lambda_1": point["learn"]["lambdas"][0],
+                "lambda_2": point["learn"]["lambdas"][1],
+                "inside": inside,
+                **{name: found[name] for name in ("missed", "false", "error_ms")},
+            }
+
+
+def _unit(name: str, unit: Mapping[str, Any]) -> Unit:
+    return Unit(
+        name,
+        unit["person"],
+        unit["group"],
+        unit["events"],
+        unit["false"],
+        unit["minutes"],
+        tuple(unit["errors"]),
+        tuple(unit["delays"]),
+    )
 
 
 def _outcomes(plan: _Plan, size: str, results: Results) -> list[Outcome]:
@@ -474,19 +576,7 @@ def _outcomes(plan: _Plan, size: str, results: Results) -> list[Outcome]:
                     points.append(results[task]["fit"])
             tasks.append(task)
             for group in [TEST] if plan.testing else [str(g) for g in left_out]:
-                for name, unit in results[task]["tested"][group].items():
-                    units.append(
-                        Unit(
-                            name,
-                            unit["person"],
-                            unit["group"],
-                            unit["events"],
-                            unit["false"],
-                            unit["minutes"],
-                            tuple(unit["errors"]),
-                            tuple(unit["delays"]),
-                        )
-                    )
+                units += [_unit(name, unit) for name, unit in results[task]["tested"][group].items()]
         before = found.get((event, row))
         found[event, row] = Outcome(
             plan.source,

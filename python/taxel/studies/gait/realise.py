@@ -59,9 +59,10 @@ def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str,
     Parameters
     ----------
     params : dict
-        ``kind`` ("neuron" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of groups; none: the
-        test folder is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a person), ``placed``;
-        of a neuron its ``point``; of a rule ``rule`` and ``encoder``.
+        ``kind`` ("neuron", "search" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of groups;
+        none: the test folder is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a person), ``placed``;
+        of a neuron its ``point``; of a search a ``point``, the ``lambda_1`` to try one after the other, and which of
+        the groups left out are ``judged``; of a rule ``rule`` and ``encoder``.
     seed : int
         Draws the footfalls and their order in the training row.
     setting : Setting
@@ -72,7 +73,7 @@ def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str,
         ``tested``: by group and unit what was found; ``fit``: what the learner says of itself, or the rule's numbers.
     """
     scope = setting.scope(params)
-    encoder = params["point"]["encoder"] if params["kind"] == "neuron" else params["encoder"]
+    encoder = params["encoder"] if params["kind"] == "rule" else params["point"]["encoder"]
     data = encoded(setting.folders[params["source"]], params["source"], encoder, params["placed"])
     training = _training(scope, params, data, seed)
     tested = {str(g): [part.of(data.pieces) for part in scope.groups[g]] for g in params["left_out"]}
@@ -82,6 +83,9 @@ def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str,
     rows = {g: _rows(pieces, params["source"]) for g, pieces in tested.items()}
     if params["kind"] == "neuron":
         return _neuron(params, data, training, rows, seed)
+    if params["kind"] == "search":
+        judged = [row for g in params["judged"] for row in rows[str(g)]]
+        return _search(params, data, training, judged, seed)
     return _rule(params, data, training, rows)
 
 
@@ -118,13 +122,7 @@ def _neuron(
 ) -> dict[str, Any]:
     point, event = params["point"], params["event"]
     later = data.latency_ms + point["delay_ms"]
-    patterns = training
-    if not SOURCES[params["source"]].by_minute:
-        rng = np.random.default_rng([seed, 2])
-        patterns = [joined([training[k] for k in rng.permutation(len(training))])]
-    patterns = [p for p in patterns if len(p.truth[event]) and len(p.spikes.times)]
-    if not patterns:
-        raise ProblemError(f"{params['source']}, {event}: no event with a spike in what should train")
+    patterns = _patterns(params, training, seed)
     cone = ConeR(**point["neuron"], **point["learn"], step_ms=STEP_MS)
     with warnings.catch_warnings():  # what the learner warns of is kept in the result
         warnings.simplefilter("ignore", UserWarning)
@@ -134,6 +132,49 @@ def _neuron(
         for g, pieces in rows.items()
     }
     return {"tested": tested, "fit": _told(cone, patterns, event)}
+
+
+def _search(
+    params: Mapping[str, Any], data: Encoded, training: list[Piece], judged: list[Piece], seed: int
+) -> dict[str, Any]:
+    """Try lambda_1 : lambda_2 one after the other on the same rows, each from the fit before."""
+    point, event = params["point"], params["event"]
+    later = data.latency_ms + point["delay_ms"]
+    patterns = _patterns(params, training, seed)
+    rows, before, tried = None, None, []
+    for l1 in params["lambda_1"]:
+        learn = point["learn"] | {"lambdas": [l1, round(4 - l1, 1), *point["learn"]["lambdas"][2:]]}
+        cone = ConeR(**point["neuron"], **learn, step_ms=STEP_MS)
+        if rows is None:
+            rows = cone.prepare([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)
+            before = rows.fit(cone, start=before)
+        found = [_scored(cone.neuron_.run(cone.weights_, p.spikes), p, event, later) for p in judged]
+        errors = np.concatenate([np.empty(0), *(f["errors"] for f in found)])
+        tried.append(
+            {
+                "lambdas": learn["lambdas"],
+                "missed": sum(f["events"] - len(f["errors"]) for f in found),
+                "false": sum(f["false"] for f in found),
+                "rms_ms": round(float(np.sqrt(np.mean(errors**2))), 3) if len(errors) else None,
+                "status": cone.status_,
+                "engine": cone.engine_,
+            }
+        )
+    return {"tried": tried}
+
+
+def _patterns(params: Mapping[str, Any], training: list[Piece], seed: int) -> list[Piece]:
+    """Return what is learnt from: footfalls in one row, in random order; recordings as they are."""
+    event, patterns = params["event"], training
+    if not SOURCES[params["source"]].by_minute:
+        rng = np.random.default_rng([seed, 2])
+        patterns = [joined([training[k] for k in rng.permutation(len(training))])]
+    patterns = [p for p in patterns if len(p.truth[event]) and len(p.spikes.times)]
+    if not patterns:
+        raise ProblemError(f"{params['source']}, {event}: no event with a spike in what should train")
+    return patterns
 
 
 def _told(cone: ConeR, patterns: list[Piece], event: str) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from copy import deepcopy
 from typing import Any
 
-__all__ = ["ENCODERS", "NOTES", "PRINTED", "RULE_ENCODERS", "SEARCH", "TONIC", "Point", "changed"]
+__all__ = ["ENCODERS", "FULL", "NOTES", "PRINTED", "RULE_ENCODERS", "SEARCH", "SETTINGS", "TONIC", "Point", "changed"]
 
 Point = dict[str, Any]
 
@@ -221,6 +221,19 @@ SEARCH: dict[str, dict[str, list[Point]]] = {
         ]
         for event, point in NOTES["gaitndd"].items()
     },
+}
+
+#: The 528 settings of 6.5.2: tau (ms), kappa, lambda_1; lambda_2 is what that leaves of 4.
+SETTINGS: dict[str, tuple[float, ...]] = {
+    "tau": tuple(float(tau) for tau in range(10, 221, 30)),
+    "kappa": (1.05, 1.1, 1.15, 1.2, 1.25, 1.3),
+    "lambda_1": tuple(round(4 - 0.4 * k, 1) for k in range(11)),
+}
+
+#: All else, where those settings are searched: as printed, and as in the notes' recipe. 6.5.2 has these two events.
+FULL: dict[str, dict[str, Point]] = {
+    name: {event: points[event] for event in ("contact", "foot_off")}
+    for name, points in {"528: as printed": PRINTED["plate"], "528: recipe": NOTES["plate"]}.items()
 }
 
 _HELD = crossing(1, 60, 200, 500, hold_ms=10.0)

@@ -95,6 +95,7 @@ def summary(
     outcomes: Sequence[Outcome],
     *,
     plans: Sequence[tuple[str, Protocol]],
+    full_search: Sequence[dict[str, Any]],
     skipped: Sequence[str],
     size: str,
     test: bool,
@@ -137,6 +138,7 @@ def summary(
         "machine": platform.machine(),
         "cpu_seconds": round(cpu_seconds, 1),
         "search_points": {s: {e: len(points) for e, points in events.items()} for s, events in SEARCH.items()},
+        "full_search": list(full_search),
         "sources": sources,
     }
 
