@@ -174,6 +174,9 @@ SOUND: dict[str, Sound] = {
         step_ms=0.5,
     ),
     "taxel.Neuron.run": method(taxel.Neuron(), "run", weights=[1.0] * 2, trains=UNSIGNED, threshold=1.0),
+    "taxel.Neuron.run_many": method(
+        taxel.Neuron(), "run_many", weights=[[1.0] * 2, [0.5] * 2], trains=UNSIGNED, threshold=1.0
+    ),
     "taxel.Neuron.potential": method(
         taxel.Neuron(), "potential", weights=[1.0] * 2, trains=UNSIGNED, times=[1.0, 5.0], spikes=[2.0]
     ),

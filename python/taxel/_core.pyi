@@ -71,6 +71,13 @@ def check_neuron(parameters: str) -> str: ...
 def neuron_run(
     parameters: str, weights: NDArray[np.float64], trains: tuple[Any, ...], threshold: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+def neuron_run_many(
+    parameters: str,
+    weights: NDArray[np.float64] | NDArray[np.float32],
+    neurons: int,
+    trains: tuple[Any, ...],
+    threshold: float,
+) -> tuple[Any, ...]: ...
 def neuron_potential(
     parameters: str,
     weights: NDArray[np.float64],

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import floats, number, parameters
+from taxel._arguments import floats, number, numbers, parameters
 from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
 
@@ -117,6 +117,50 @@ class Neuron:
         In continuous time each crossing is the root of the potential less threshold, to rounding. Cost: O(1) a spike.
         """
         return self._run(weights, trains, threshold)[0]
+
+    def run_many(self, weights: ArrayLike, trains: SpikeTrains, *, threshold: float = 1.0) -> SpikeTrains:
+        """Return when many neurons of this kind fire, all on the same inputs.
+
+        Parameters
+        ----------
+        weights : float64 or float32, shape (neurons, trains), mV
+            Single precision is read as it stands, which saves memory; the reckoning is in double.
+        trains : SpikeTrains
+            As in `run`.
+        threshold : float, above 0
+            A factor on the threshold.
+
+        Returns
+        -------
+        SpikeTrains
+            One train a neuron, with the window of `trains`: the spikes that `run` gives with that row of weights.
+
+        Raises
+        ------
+        ProblemError : not one weight a neuron and train, or nothing finite (names neuron and train)
+
+        Notes
+        -----
+        Cost: a few operations an input spike and neuron, exact in continuous time too.
+
+        Examples
+        --------
+        >>> trains = SpikeTrains.from_lists([[0.0], [2.0]], stop=50.0)
+        >>> fired = Neuron(tau=10.0, after_spike="reset").run_many([[1.0, 0.5], [0.1, 0.1], [2.0, 0.0]], trains)
+        >>> [train.round(3).tolist() for train in fired]
+        [[3.366], [], [1.795]]
+        """
+        given = np.asarray(weights) if isinstance(weights, np.ndarray) else weights
+        single = isinstance(given, np.ndarray) and given.dtype == np.float32
+        matrix = numbers("weights", given, np.float32 if single else np.float64)
+        if matrix.ndim != 2:
+            raise ProblemError(f"weights has {matrix.ndim} dimensions: must have two, neurons and trains")
+        if matrix.shape[1] != len(_trains(trains)):
+            raise ProblemError(f"weights: {matrix.shape[1]} a neuron for {len(trains)} trains, must be one a train")
+        factor = number("threshold", threshold)
+        return SpikeTrains._from_parts(
+            _core.neuron_run_many(self._json(), matrix.reshape(-1), len(matrix), trains._parts(), factor)
+        )
 
     def potential(
         self,

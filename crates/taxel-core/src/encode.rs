@@ -10,7 +10,6 @@ mod running_range;
 mod sampled;
 mod tare;
 mod threshold_izhikevich;
-mod wide;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

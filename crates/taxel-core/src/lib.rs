@@ -21,6 +21,8 @@ pub mod detect;
 pub mod learn;
 pub mod metrics;
 
+mod wide;
+
 pub use array::Array;
 pub use error::{Error, Result, Stop};
 pub use events::{Events, Intensities, Marker};

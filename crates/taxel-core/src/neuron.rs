@@ -5,10 +5,12 @@
 
 mod grid;
 mod kernel;
+mod population;
 mod srm0;
 mod streaming;
 
 pub use kernel::{Kernel, Shape, State, Step};
+pub use population::Weight;
 pub(crate) use srm0::peak;
 pub use streaming::{NeuronStream, OutputSpike};
 

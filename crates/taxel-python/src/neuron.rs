@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use taxel_core::neuron::Neuron;
 use taxel_core::problem;
 
-use crate::convert::{SpikesIn, array, slice, to_spikes};
+use crate::convert::{SpikesIn, SpikesOut, array, from_spikes, slice, to_spikes};
 use crate::enter::enter;
 use crate::errors::core;
 
@@ -41,6 +41,37 @@ fn neuron_run<'py>(
     Ok((array(py, times), array(py, slopes)))
 }
 
+/// Weights of many neurons, in the precision that they are held in.
+#[derive(FromPyObject)]
+enum WeightsIn<'py> {
+    Double(PyReadonlyArray1<'py, f64>),
+    Single(PyReadonlyArray1<'py, f32>),
+}
+
+/// The spike trains of many neurons on the same inputs; weights neuron after neuron.
+#[pyfunction]
+fn neuron_run_many<'py>(
+    py: Python<'py>,
+    parameters: &str,
+    weights: WeightsIn<'py>,
+    neurons: usize,
+    trains: SpikesIn<'py>,
+    threshold: f64,
+) -> PyResult<SpikesOut<'py>> {
+    let (neuron, trains) = (to_neuron(parameters)?, to_spikes(trains)?);
+    let fired = match &weights {
+        WeightsIn::Double(weights) => {
+            let weights = slice("weights", weights)?;
+            enter(py, |stop| neuron.run_many(weights, neurons, &trains, threshold, stop))
+        }
+        WeightsIn::Single(weights) => {
+            let weights = slice("weights", weights)?;
+            enter(py, |stop| neuron.run_many(weights, neurons, &trains, threshold, stop))
+        }
+    };
+    Ok(from_spikes(py, fired?))
+}
+
 /// The potential at these times.
 #[pyfunction]
 fn neuron_potential<'py>(
@@ -60,5 +91,6 @@ fn neuron_potential<'py>(
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(check_neuron, module)?)?;
     module.add_function(wrap_pyfunction!(neuron_run, module)?)?;
+    module.add_function(wrap_pyfunction!(neuron_run_many, module)?)?;
     module.add_function(wrap_pyfunction!(neuron_potential, module)?)
 }

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::sampled::{BLOCK, Block, Channels, Source, blocks};
-use super::wide::wide;
 use super::{Stream, Tare, ms};
+use crate::wide::wide;
 use crate::{Array, Events, Result, Spike, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.

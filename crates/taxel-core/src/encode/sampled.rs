@@ -3,8 +3,8 @@
 //! A [`Rule`] knows one encoder's law and nothing of events, pieces or order; [`Sampled`] brings it the samples. What
 //! did not change since the last sample is known by block, so a rule need not look at it.
 
-use super::wide::wide;
 use super::{Stream, micros, ms};
+use crate::wide::wide;
 use crate::{Array, Events, Result, Spike, problem};
 
 /// Channels that are looked at together; the compiler turns loops over a block into vector instructions.

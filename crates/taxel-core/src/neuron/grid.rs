@@ -107,11 +107,8 @@ impl GridStream {
     }
 
     fn compare(&mut self, out: &mut Vec<OutputSpike>) {
-        if std::mem::replace(&mut self.compared, true) || self.state.b < self.threshold.base - TOUCH {
-            return;
-        }
         let t = self.time(self.point);
-        if self.threshold.silent_at(t) || self.state.b < self.threshold.base + self.threshold.rise(t) - TOUCH {
+        if std::mem::replace(&mut self.compared, true) || !self.threshold.reached(t, self.state.b) {
             return;
         }
         out.push(OutputSpike { t, slope: self.shape.slope(self.state) });

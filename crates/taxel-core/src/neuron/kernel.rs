@@ -149,6 +149,12 @@ impl Shape {
         state.b.max(0.0) + state.a.max(0.0) * largest
     }
 
+    /// The largest value of the kernel up to `age` ms after the input.
+    #[must_use]
+    pub fn largest_within(&self, age: f64) -> f64 {
+        self.after(self.input(), age.min(self.peak())).b
+    }
+
     /// Beyond this many ms a kernel is below the rounding of its largest value.
     #[must_use]
     pub fn forgotten(&self) -> f64 {

@@ -21,36 +21,58 @@ pub(crate) struct Peak {
 }
 
 /// Where the potential first reaches the threshold, ms from now, if no input comes; `rise` decays with `tau_rec`.
-pub(super) fn next_crossing(shape: &Shape, state: State, theta: f64, rise: f64, tau_rec: f64) -> Option<f64> {
+///
+/// It is asked for up to `within` ms from now, and may be left out beyond.
+pub(super) fn next_crossing(
+    shape: &Shape,
+    state: State,
+    theta: f64,
+    rise: f64,
+    tau_rec: f64,
+    within: f64,
+) -> Option<f64> {
     if shape.bound(state) < theta - TOUCH {
         return None;
     }
-    let above = |s: f64| shape.after(state, s).b - theta - rise * (-s / tau_rec).exp();
-    if above(0.0) >= 0.0 {
+    let risen = |s: f64| if rise == 0.0 { 0.0 } else { rise * (-s / tau_rec).exp() };
+    // Potential less threshold, and its slope.
+    let above = |s: f64| {
+        let (now, risen) = (shape.after(state, s), risen(s));
+        (now.b - theta - risen, shape.slope(now) + risen / tau_rec)
+    };
+    if state.b - theta - rise >= 0.0 {
         return Some(0.0);
     }
-    let peak = peak(shape, state, rise, tau_rec)?;
-    let top = above(peak.at);
-    if top < -TOUCH {
-        return None;
+    let (mut low, mut high) = (0.0, within);
+    let (at_end, slope) = if within.is_finite() { above(within) } else { (f64::NEG_INFINITY, 0.0) };
+    if at_end < 0.0 {
+        // Below at the end it may have been above before, around a maximum; not if it still comes up to its only one.
+        if slope > 0.0 && rise == 0.0 {
+            return None;
+        }
+        let peak = peak(shape, state, rise, tau_rec).filter(|peak| peak.at <= within)?;
+        let (top, _) = above(peak.at);
+        if top < -TOUCH {
+            return None;
+        }
+        if top <= 0.0 {
+            return Some(peak.at);
+        }
+        (low, high) = (peak.from, peak.at);
     }
-    if top <= 0.0 {
-        return Some(peak.at);
-    }
-    // Up to the peak there is one root. Newton, kept inside the bracket.
-    let (mut low, mut high, mut s) = (peak.from, peak.at, f64::midpoint(peak.from, peak.at));
+    // In there is one root. Newton from the left, where the curve bends down it stays left of the root; kept inside.
+    let mut s = low;
     for _ in 0..100 {
-        let now = shape.after(state, s);
-        let risen = rise * (-s / tau_rec).exp();
-        let value = now.b - theta - risen;
+        let (value, slope) = above(s);
         if value < 0.0 {
             low = s;
         } else {
             high = s;
         }
-        let newton = s - value / (shape.slope(now) + risen / tau_rec);
-        let next = if low < newton && newton < high { newton } else { f64::midpoint(low, high) };
-        if (next - s).abs() <= 2.0 * f64::EPSILON * next {
+        let newton = s - value / slope;
+        let next = if low <= newton && newton <= high { newton } else { f64::midpoint(low, high) };
+        // Nearer than this the potential's own rounding decides.
+        if (next - s).abs() <= 2.0 * f64::EPSILON * next.max(shape.tau) {
             return Some(next);
         }
         s = next;

@@ -73,7 +73,7 @@ impl NeuronStream {
         if t >= self.now {
             self.now = t;
             match &mut self.clock {
-                Clock::Continuous(stream) => stream.settle(t, out),
+                Clock::Continuous(stream) => stream.settle(t, f64::INFINITY, out),
                 Clock::Grid(stream) => stream.settle(t, out),
             }
         }
@@ -126,6 +126,9 @@ impl Threshold {
 
     /// What is left of the rise at `t`, mV.
     pub(super) fn rise(&self, t: f64) -> f64 {
+        if self.plus == 0.0 {
+            return 0.0;
+        }
         self.since.map_or(0.0, |since| {
             let recovering = t - since - self.refractory;
             if recovering < -EDGE { 0.0 } else { self.plus * (-recovering / self.tau_rec).exp() }
@@ -137,15 +140,20 @@ impl Threshold {
         self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + EDGE)
     }
 
+    /// Whether a potential on a grid has reached the threshold at `t`, and the neuron may fire.
+    pub(super) fn reached(&self, t: f64, potential: f64) -> bool {
+        potential >= self.base - TOUCH && !self.silent_at(t) && potential >= self.base + self.rise(t) - TOUCH
+    }
+
     /// When the rise sets in and the refractory time ends.
-    fn edge(&self) -> Option<f64> {
+    pub(super) fn edge(&self) -> Option<f64> {
         self.since.map(|since| since + self.refractory)
     }
 }
 
 /// Continuous time: the next crossing is known exactly from the state after the last input.
 #[derive(Debug, Clone)]
-struct ContinuousStream {
+pub(super) struct ContinuousStream {
     neuron: Neuron,
     shape: Shape,
     threshold: Threshold,
@@ -166,25 +174,58 @@ enum Next {
 }
 
 impl ContinuousStream {
-    fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
+    pub(super) fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
         let threshold = Threshold::new(neuron, factor, start);
         let edge = threshold.edge();
         let (shape, state) = (neuron.shape(), State::default());
         Self { neuron: neuron.clone(), shape, threshold, state, at: start, edge, next: Next::Never }
     }
 
-    fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
-        self.settle(t, out);
-        // A crossing that rounding puts a hair behind an input is at it: the input could turn the potential down there.
-        if matches!(self.next, Next::At(crossing) if crossing - t <= AT_EDGE) && self.edge.is_none() && self.touches(t)
-        {
-            self.fire(t, out);
+    /// Goes from a state that somebody else kept at `at` to `until`, where an input comes or the end; gives the state there.
+    pub(super) fn resume(
+        &mut self,
+        state: State,
+        at: f64,
+        until: f64,
+        input: bool,
+        out: &mut Vec<OutputSpike>,
+    ) -> State {
+        (self.state, self.at, self.next) = (state, at, Next::Unknown);
+        if input {
+            self.settle_at_input(until, until + AT_EDGE, out);
+        } else {
+            self.settle(until, until, out);
         }
+        self.shape.after(self.state, until - self.at)
+    }
+
+    /// The end of the refractory time, or where the printed first rise sets in, while it lies ahead.
+    pub(super) fn edge(&self) -> Option<f64> {
+        self.edge
+    }
+
+    /// What is left of the threshold's rise at `t`, mV.
+    pub(super) fn rise(&self, t: f64) -> f64 {
+        self.threshold.rise(t)
+    }
+
+    fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
+        self.settle_at_input(t, f64::INFINITY, out);
         if self.neuron.loses(t, self.threshold.fired) {
             return;
         }
         self.move_to(t);
         self.shape.add(&mut self.state, weight, 0.0);
+    }
+
+    /// Fires whatever crosses up to an input at `t`, included.
+    fn settle_at_input(&mut self, t: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
+        self.settle(t, horizon, out);
+        // A crossing that rounding puts a hair behind an input is at it: the input could turn the potential down there.
+        if matches!(self.next, Next::At(crossing) if crossing - t <= AT_EDGE) && self.edge.is_none() && self.touches(t)
+        {
+            self.fire(t, out);
+        }
     }
 
     /// Whether the potential has come up to the threshold at `t`, but for rounding.
@@ -200,13 +241,13 @@ impl ContinuousStream {
         self.next = Next::Unknown;
     }
 
-    /// Fires whatever crosses up to `until`, included.
-    fn settle(&mut self, until: f64, out: &mut Vec<OutputSpike>) {
+    /// Fires whatever crosses up to `until`, included; what crosses after `horizon` is not asked for.
+    fn settle(&mut self, until: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
         loop {
             let waiting = self.edge.is_some() && self.threshold.fired.is_some();
             // At the state's own time the potential has been compared already: an input adds 0 there.
             if !waiting && until > self.at && self.next == Next::Unknown {
-                self.next = self.crossing();
+                self.next = self.crossing(horizon);
             }
             match (self.next, self.edge) {
                 (Next::At(t), edge) if !waiting && t <= until && edge.is_none_or(|e| t < e) => self.fire(t, out),
@@ -214,17 +255,18 @@ impl ContinuousStream {
                     self.move_to(edge);
                     self.edge = None;
                     // The neuron is free again: it fires at once where the potential is above the threshold already.
-                    self.next = self.crossing();
+                    self.next = self.crossing(horizon);
                 }
                 _ => return,
             }
         }
     }
 
-    fn crossing(&self) -> Next {
+    fn crossing(&self, horizon: f64) -> Next {
         // Before the printed first rise sets in there is none; it is an edge of its own.
         let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(self.at) };
-        let found = next_crossing(&self.shape, self.state, self.threshold.base, rise, self.threshold.tau_rec);
+        let (base, tau_rec) = (self.threshold.base, self.threshold.tau_rec);
+        let found = next_crossing(&self.shape, self.state, base, rise, tau_rec, horizon - self.at);
         found.map_or(Next::Never, |s| Next::At(self.at + s))
     }
 

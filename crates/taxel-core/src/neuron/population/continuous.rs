@@ -1,0 +1,211 @@
+//! A block in continuous time: from one input time to the next, exact.
+
+use super::{FADED, LANES, Lanes, SLACK, Weight};
+use crate::SpikeTrains;
+use crate::neuron::streaming::{ContinuousStream, OutputSpike};
+use crate::neuron::{AfterSpike, Neuron, State, Step};
+use crate::wide::wide;
+
+/// From this share of tau on the tangent says less than the kernel's largest value.
+const LONG: f64 = 0.3;
+
+/// What all neurons have in common: the inputs by time, and what passes between them.
+pub(super) struct Script {
+    begin: ContinuousStream,
+    intervals: Vec<Interval>,
+    /// The trains of all inputs, by time.
+    inputs: Vec<u32>,
+    all_hear: bool,
+    /// The slope that a state of 1 gives, of `a` and of `b`, 1/ms.
+    slope: State,
+    /// The base of the threshold, mV.
+    base: f64,
+}
+
+/// The time from one input to the next.
+struct Interval {
+    from: f64,
+    until: f64,
+    /// The inputs at its beginning end here.
+    inputs_end: usize,
+    step: Step,
+    /// What is left at its end of a rise at its beginning.
+    fade: f64,
+    length: f64,
+    /// Long intervals are judged by the largest value within them of a kernel that begins with them.
+    reach: Option<f64>,
+}
+
+impl Script {
+    pub(super) fn new(neuron: &Neuron, trains: &SpikeTrains, threshold: f64) -> Self {
+        let (shape, spikes) = (neuron.shape(), trains.by_time());
+        let mut intervals: Vec<Interval> = vec![];
+        let mut from = trains.start;
+        let mut push = |from: f64, until: f64, inputs_end: usize| {
+            let length = until - from;
+            intervals.push(Interval {
+                from,
+                until,
+                inputs_end,
+                step: shape.step(length),
+                fade: (-length / neuron.tau_rec()).exp(),
+                length,
+                reach: (length > LONG * neuron.tau).then(|| shape.largest_within(length)),
+            });
+        };
+        for (k, spike) in spikes.iter().enumerate() {
+            if spike.t > from {
+                push(from, spike.t, k);
+                from = spike.t;
+            }
+        }
+        push(from, trains.stop, spikes.len());
+        Self {
+            begin: ContinuousStream::new(neuron, threshold, trains.start),
+            inputs: spikes.iter().map(|s| s.train).collect(),
+            all_hear: neuron.after_spike == AfterSpike::Keep,
+            slope: State { a: shape.slope(State { a: 1.0, b: 0.0 }), b: shape.slope(State { a: 0.0, b: 1.0 }) },
+            base: neuron.theta_0 * threshold,
+            intervals,
+        }
+    }
+}
+
+/// Runs a block of neurons from start to stop; adds each one's spikes to `fired`.
+pub(super) fn run<W: Weight>(neuron: &Neuron, script: &Script, block: &[[W; LANES]], fired: &mut [Vec<f64>; LANES]) {
+    let mut streams: Vec<ContinuousStream> = vec![script.begin.clone(); LANES];
+    let mut lanes = Lanes::new(script.begin.edge());
+    let mut perhaps = [false; LANES];
+    let mut found: Vec<OutputSpike> = vec![];
+    let mut k = 0;
+    while let Some(at) = quiet(&mut lanes, script, block, k, &mut perhaps) {
+        let interval = &script.intervals[at];
+        let before = (lanes.a, lanes.b);
+        pass(&mut lanes, interval);
+        for lane in (0..LANES).filter(|&l| perhaps[l]) {
+            let stream = &mut streams[lane];
+            found.clear();
+            let state = State { a: before.0[lane], b: before.1[lane] };
+            let after =
+                stream.resume(state, interval.from, interval.until, at + 1 < script.intervals.len(), &mut found);
+            if let Some(last) = found.last() {
+                fired[lane].extend(found.iter().map(|spike| spike.t));
+                lanes.fire(lane, last.t, last.t + neuron.refractory, neuron.after_spike);
+                if neuron.after_spike == AfterSpike::Reset {
+                    (lanes.a[lane], lanes.b[lane]) = (after.a, after.b);
+                }
+            }
+            if stream.edge().is_none() && lanes.edge[lane] <= interval.until {
+                lanes.edge[lane] = f64::INFINITY;
+                lanes.rise[lane] = stream.rise(interval.until);
+            }
+        }
+        k = at + 1;
+    }
+}
+
+/// Whether a neuron may cross its threshold within an interval, or its refractory time may end.
+///
+/// While a potential rises above 0 it bends down, so it stays below its tangent; where it falls it is highest now.
+#[inline(always)]
+fn may_matter(a: f64, b: f64, rise: f64, edge: f64, script: &Script, interval: &Interval) -> bool {
+    let top = match interval.reach {
+        None => {
+            let slope = a * script.slope.a + b * script.slope.b;
+            b + (if slope > 0.0 { slope } else { 0.0 }) * interval.length
+        }
+        Some(reach) => (if b > 0.0 { b } else { 0.0 }) + (if a > 0.0 { a } else { 0.0 }) * reach,
+    };
+    // A rise only falls, so what is left at the end is the least that stands in the way.
+    (top >= script.base - SLACK + rise * (interval.fade * FADED)) | (edge <= interval.until)
+}
+
+/// Goes through the interval before, adds an input, and says whether any neuron may matter.
+#[inline(always)]
+fn one_input<W: Weight>(
+    lanes: &mut Lanes,
+    script: &Script,
+    interval: &Interval,
+    (step, fade): (Step, f64),
+    weights: &[W; LANES],
+    hears: Option<&[f64; LANES]>,
+) -> bool {
+    let mut any = false;
+    for l in 0..LANES {
+        let (a, b, w) = (lanes.a[l], lanes.b[l], weights[l].into());
+        let w: f64 = hears.map_or(w, |hears| w * hears[l]);
+        let (a, b, rise) = (a * step.aa + w, b * step.bb + a * step.ba, lanes.rise[l] * fade);
+        (lanes.a[l], lanes.b[l], lanes.rise[l]) = (a, b, rise);
+        any |= may_matter(a, b, rise, lanes.edge[l], script, interval);
+    }
+    any
+}
+
+wide! {
+    /// Moves a block through an interval without inputs or spikes.
+    fn pass(lanes: &mut Lanes, interval: &Interval) {
+        let Step { aa, ba, bb } = interval.step;
+        for l in 0..LANES {
+            let (a, b) = (lanes.a[l], lanes.b[l]);
+            lanes.a[l] = a * aa;
+            lanes.b[l] = b * bb + a * ba;
+            lanes.rise[l] *= interval.fade;
+        }
+    }
+}
+
+wide! {
+    /// Moves a block on from the beginning of interval `from`, its inputs still to come, up to the next one in which a
+    /// neuron may matter; that one is given, its inputs added, with who may.
+    fn quiet<W: Weight>(
+        lanes: &mut Lanes,
+        script: &Script,
+        block: &[[W; LANES]],
+        from: usize,
+        perhaps: &mut [bool; LANES],
+    ) -> Option<usize> {
+        let mut next = if from == 0 { 0 } else { script.intervals[from - 1].inputs_end };
+        let mut step = Step { aa: 1.0, ba: 0.0, bb: 1.0 };
+        let mut fade = 1.0;
+        for (k, interval) in script.intervals.iter().enumerate().skip(from) {
+            let inputs = &script.inputs[next..interval.inputs_end];
+            next = interval.inputs_end;
+            let mut any = false;
+            if let &[train] = inputs {
+                // Mostly there is one input: all in one go.
+                let weights = &block[train as usize];
+                any = if script.all_hear {
+                    one_input(lanes, script, interval, (step, fade), weights, None)
+                } else {
+                    let hears = lanes.hears(interval.from);
+                    one_input(lanes, script, interval, (step, fade), weights, Some(&hears))
+                };
+            } else {
+                for l in 0..LANES {
+                    let (a, b) = (lanes.a[l], lanes.b[l]);
+                    lanes.a[l] = a * step.aa;
+                    lanes.b[l] = b * step.bb + a * step.ba;
+                    lanes.rise[l] *= fade;
+                }
+                let hears = if script.all_hear { [1.0; LANES] } else { lanes.hears(interval.from) };
+                for &train in inputs {
+                    let weights = &block[train as usize];
+                    for l in 0..LANES {
+                        lanes.a[l] += weights[l].into() * hears[l];
+                    }
+                }
+                for l in 0..LANES {
+                    any |= may_matter(lanes.a[l], lanes.b[l], lanes.rise[l], lanes.edge[l], script, interval);
+                }
+            }
+            if any {
+                for (l, perhaps) in perhaps.iter_mut().enumerate() {
+                    *perhaps = may_matter(lanes.a[l], lanes.b[l], lanes.rise[l], lanes.edge[l], script, interval);
+                }
+                return Some(k);
+            }
+            (step, fade) = (interval.step, interval.fade);
+        }
+        None
+    }
+}

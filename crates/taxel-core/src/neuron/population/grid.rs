@@ -1,0 +1,196 @@
+//! A block on a grid: from point to point.
+
+use super::{FADED, LANES, Lanes, SLACK, Weight};
+use crate::SpikeTrains;
+use crate::neuron::streaming::{EDGE, Threshold};
+use crate::neuron::{AfterSpike, Neuron, State, Step};
+use crate::wide::wide;
+
+/// What all neurons have in common: the grid and its inputs.
+pub(super) struct Script {
+    threshold: Threshold,
+    points: Vec<Point>,
+    inputs: Vec<Input>,
+    step: Step,
+    /// What a step leaves of a rise.
+    fade: f64,
+    all_hear: bool,
+}
+
+struct Point {
+    t: f64,
+    /// Inputs since the point before end here ...
+    aged_end: usize,
+    /// ... and those at the point itself here: they move nothing before it is left.
+    arriving_end: usize,
+}
+
+struct Input {
+    train: u32,
+    t: f64,
+    /// What a weight of 1 has become at the point.
+    one: State,
+}
+
+impl Lanes {
+    /// The rise sets in where it is time.
+    fn recover(&mut self, lane: usize, threshold: &Threshold, t: f64) {
+        if self.edge[lane] <= t + EDGE {
+            self.edge[lane] = f64::INFINITY;
+            self.rise[lane] = threshold.rise(t);
+        }
+    }
+
+    /// Adds inputs one after the other; all of them come at `now`, where it is given.
+    #[inline(always)]
+    fn hear<W: Weight>(&mut self, block: &[[W; LANES]], inputs: &[Input], now: Option<f64>, all_hear: bool) {
+        // The sums stay in registers.
+        let (mut a, mut b) = (self.a, self.b);
+        let hears = now.map(|now| self.hears(now));
+        for input in inputs {
+            let weights = &block[input.train as usize];
+            let one = input.one;
+            match (all_hear, &hears) {
+                (true, _) if one.b == 0.0 => {
+                    for l in 0..LANES {
+                        a[l] += weights[l].into() * one.a;
+                    }
+                }
+                (true, _) => {
+                    for l in 0..LANES {
+                        let w: f64 = weights[l].into();
+                        a[l] += w * one.a;
+                        b[l] += w * one.b;
+                    }
+                }
+                (false, Some(hears)) if one.b == 0.0 => {
+                    for l in 0..LANES {
+                        a[l] += weights[l].into() * one.a * hears[l];
+                    }
+                }
+                (false, hears) => {
+                    let hears = hears.unwrap_or_else(|| self.hears(input.t));
+                    for l in 0..LANES {
+                        let w = weights[l].into() * hears[l];
+                        a[l] += w * one.a;
+                        b[l] += w * one.b;
+                    }
+                }
+            }
+        }
+        (self.a, self.b) = (a, b);
+    }
+}
+
+impl Script {
+    pub(super) fn new(neuron: &Neuron, trains: &SpikeTrains, threshold: f64) -> Self {
+        let (shape, step_ms, start) = (neuron.shape(), neuron.step_ms, trains.start);
+        let time = |point: f64| start + point * step_ms;
+        let spikes = trains.by_time();
+        let point_of = |t: f64| ((t - start) / step_ms).ceil();
+        // The last point that is compared; rounding may put an input's own point a hair beyond the floor.
+        let last = spikes.iter().map(|s| point_of(s.t)).filter(|&p| time(p) <= trains.stop);
+        let last = last.fold(((trains.stop - start) / step_ms).floor(), f64::max);
+        let mut inputs: Vec<Input> = Vec::with_capacity(spikes.len());
+        let (mut points, mut rest) = (vec![], spikes.iter().peekable());
+        let mut point = 0.0;
+        while point <= last {
+            let t = time(point);
+            let mut arriving = vec![];
+            while let Some(spike) = rest.next_if(|s| point_of(s.t) <= point) {
+                let age = t - spike.t;
+                if age > 0.0 {
+                    let one = shape.after(shape.input(), age);
+                    inputs.push(Input { train: spike.train, t: spike.t, one });
+                } else {
+                    arriving.push(Input { train: spike.train, t: spike.t, one: shape.input() });
+                }
+            }
+            let aged_end = inputs.len();
+            inputs.append(&mut arriving);
+            points.push(Point { t, aged_end, arriving_end: inputs.len() });
+            point += 1.0;
+        }
+        Self {
+            threshold: Threshold::new(neuron, threshold, start),
+            step: shape.step(step_ms),
+            fade: (-step_ms / neuron.tau_rec()).exp(),
+            all_hear: neuron.after_spike == AfterSpike::Keep,
+            points,
+            inputs,
+        }
+    }
+}
+
+/// Runs a block of neurons from start to stop; adds each one's spikes to `fired`.
+pub(super) fn run<W: Weight>(neuron: &Neuron, script: &Script, block: &[[W; LANES]], fired: &mut [Vec<f64>; LANES]) {
+    let mut thresholds: Vec<Threshold> = vec![script.threshold.clone(); LANES];
+    let mut lanes = Lanes::new(script.threshold.edge());
+    let mut perhaps = [false; LANES];
+    let mut from = None;
+    while let Some(at) = quiet(&mut lanes, script, block, from, &mut perhaps) {
+        let t = script.points[at].t;
+        for lane in (0..LANES).filter(|&l| perhaps[l]) {
+            let threshold = &mut thresholds[lane];
+            lanes.recover(lane, threshold, t);
+            if threshold.reached(t, lanes.b[lane]) {
+                fired[lane].push(t);
+                threshold.fire(t);
+                lanes.fire(lane, t, t + neuron.refractory, neuron.after_spike);
+                if neuron.after_spike == AfterSpike::Reset {
+                    (lanes.a[lane], lanes.b[lane]) = (0.0, 0.0);
+                }
+                lanes.recover(lane, threshold, t);
+            }
+        }
+        from = Some(at);
+    }
+}
+
+#[inline(always)]
+fn may_matter(lanes: &Lanes, l: usize, t: f64, floor: f64) -> bool {
+    (lanes.b[l] >= floor + lanes.rise[l] * FADED) | (lanes.edge[l] <= t + EDGE)
+}
+
+wide! {
+    /// Moves a block on from point `from`, left with its own inputs, or from before the first one, up to the next point at
+    /// which a neuron may matter; that one is given, with who may.
+    fn quiet<W: Weight>(
+        lanes: &mut Lanes,
+        script: &Script,
+        block: &[[W; LANES]],
+        from: Option<usize>,
+        perhaps: &mut [bool; LANES],
+    ) -> Option<usize> {
+        let floor = script.threshold.base - SLACK;
+        let Step { aa, ba, bb } = script.step;
+        let mut next = 0;
+        if let Some(from) = from {
+            let point = &script.points[from];
+            next = point.arriving_end;
+            lanes.hear(block, &script.inputs[point.aged_end..next], Some(point.t), script.all_hear);
+        }
+        for (k, point) in script.points.iter().enumerate().skip(from.map_or(0, |from| from + 1)) {
+            for l in 0..LANES {
+                let (a, b) = (lanes.a[l], lanes.b[l]);
+                lanes.a[l] = a * aa;
+                lanes.b[l] = b * bb + a * ba;
+                lanes.rise[l] *= script.fade;
+            }
+            lanes.hear(block, &script.inputs[next..point.aged_end], None, script.all_hear);
+            let mut any = false;
+            for l in 0..LANES {
+                any |= may_matter(lanes, l, point.t, floor);
+            }
+            if any {
+                for (l, perhaps) in perhaps.iter_mut().enumerate() {
+                    *perhaps = may_matter(lanes, l, point.t, floor);
+                }
+                return Some(k);
+            }
+            lanes.hear(block, &script.inputs[point.aged_end..point.arriving_end], Some(point.t), script.all_hear);
+            next = point.arriving_end;
+        }
+        None
+    }
+}
