@@ -5,18 +5,19 @@
 //! (l2 alone, or no objective) come from a dual active set, whose every state is a lower bound; they also decide whether
 //! there are any. Other objectives go on from there.
 
-use std::collections::HashSet;
+mod mix;
+mod shortest;
 
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{Bounds, Certificate};
 use super::cone_r::{Divisor, Norm};
-use super::dual_active_set::{DualActiveSet, Multipliers, RowId, Verdict};
 use super::silence::{Peak, Silence};
-use super::statement::{Margin, Row, Statement};
+use super::statement::{Margin, Row, Stated, Statement};
 use super::{OneOrEach, check_examples};
 use crate::neuron::{Neuron, Time};
 use crate::{Result, SpikeTrains, Stop, problem};
+use shortest::{End, Shortest};
 
 /// How far a target may be missed, mV.
 const MET: f64 = 1e-12;
@@ -264,18 +265,14 @@ impl Objective {
     }
 }
 
-/// Where the rounds of the shortest weights ended.
-enum End {
-    Met,
-    Infeasible(Certificate),
-    Stopped,
-}
-
-struct Shortest {
+/// The best weights so far, and what is known of them.
+struct Best {
     weights: Vec<f64>,
+    /// No weights have a smaller objective.
+    least: f64,
     held: Vec<(Row, f64)>,
+    engine: Engine,
     rounds: usize,
-    end: End,
 }
 
 impl Problem {
@@ -333,7 +330,7 @@ impl Problem {
     /// # Errors
     ///
     /// `Problem` where there is no such target.
-    pub fn behind(&self, pattern: usize, target: usize) -> Result<super::statement::Stated> {
+    pub fn behind(&self, pattern: usize, target: usize) -> Result<Stated> {
         let mut stated = self.statement.behind(pattern, target, self.parameters.delta_t())?;
         stated.limit *= self.parameters.kappa;
         Ok(stated)
@@ -350,16 +347,19 @@ impl Problem {
         if let Some(certificate) = Certificate::of_one_target(&self.statement, &self.bounds)? {
             return Ok(self.refuted(certificate, 0));
         }
-        let shortest = self.shortest(start, progress, stop)?;
-        let bound = self.bound_of_square(&shortest.held)?;
-        let least = self.objective.of_square(bound);
-        let Shortest { weights, held, rounds, end } = shortest;
-        let met = match end {
-            End::Infeasible(certificate) => return Ok(self.refuted(certificate, rounds)),
-            End::Met => true,
-            End::Stopped => false,
-        };
-        self.report(weights, held, rounds, least, Engine::Native, met)
+        let Shortest { weights, held, rounds, end } = self.shortest(start, progress, stop)?;
+        // The other terms are never below 0.
+        let least = self.objective.of_square(self.bound_of_square(&held)?);
+        let best = Best { weights, least, held, engine: Engine::Native, rounds };
+        match end {
+            End::Infeasible(certificate) => Ok(self.refuted(certificate, rounds)),
+            End::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
+                let best = self.mix(best, start, progress, stop)?;
+                self.report(best, !stop.asked())
+            }
+            End::Met => self.report(best, true),
+            End::Stopped => self.report(best, false),
+        }
     }
 
     fn refuted(&self, certificate: Certificate, rounds: usize) -> Fit {
@@ -378,26 +378,20 @@ impl Problem {
         }
     }
 
-    /// Measures the weights over all rows, whatever engine they come from; `least` is a bound on the objective.
-    fn report(
-        &self,
-        weights: Vec<f64>,
-        held: Vec<(Row, f64)>,
-        rounds: usize,
-        least: f64,
-        engine: Engine,
-        ended: bool,
-    ) -> Result<Fit> {
+    /// Measures the weights over all rows, whatever engine they come from.
+    fn report(&self, best: Best, ended: bool) -> Result<Fit> {
+        let Best { mut weights, least, held, engine, rounds } = best;
+        // A bound that binds is met to rounding, from either side.
+        for ((w, &l), &u) in weights.iter_mut().zip(&self.bounds.lower).zip(&self.bounds.upper) {
+            *w = w.clamp(l, u);
+        }
         let parts = self.objective.parts(&weights);
         let objective: f64 = parts.iter().sum();
         let gap = if objective > 0.0 { (objective - least).max(0.0) / objective } else { 0.0 };
-        let missed = self.missed(&weights)?;
-        let broken = self.broken(&weights, f64::NEG_INFINITY).iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.excess));
-        let within = weights.iter().zip(&self.bounds.lower).zip(&self.bounds.upper).all(|((w, l), u)| l <= w && w <= u);
-        let solved =
-            ended && within && missed <= MET && broken <= self.rounding(&weights) && gap <= self.parameters.tolerance;
+        let (missed, broken) = (self.missed(&weights)?, self.worst(&weights));
+        let kept = missed <= MET && broken <= self.rounding(&weights);
         Ok(Fit {
-            status: if solved { Status::Solved } else { Status::Stopped },
+            status: if ended && kept && gap <= self.parameters.tolerance { Status::Solved } else { Status::Stopped },
             margin: self.margin(&weights),
             weights,
             objective,
@@ -417,7 +411,8 @@ impl Problem {
         let mut worst: f64 = 0.0;
         for (pattern, target) in self.statement.targets() {
             let limit = self.statement.state_into(Row::Target { pattern, target }, &mut row)?;
-            worst = worst.max((dot(&row, weights) - limit).abs());
+            let off = (dot(&row, weights) - limit).abs();
+            worst = if off > worst || off.is_nan() { off } else { worst };
         }
         Ok(worst)
     }
@@ -426,6 +421,11 @@ impl Problem {
     fn broken(&self, weights: &[f64], tolerance: f64) -> Vec<Peak> {
         let grid = self.parameters.neuron.time == Time::Grid;
         self.silence.broken(weights, if grid { 1.0 } else { ASKED_SHARE }, tolerance)
+    }
+
+    /// By how much silence is broken at worst, mV; below 0 where it is kept.
+    fn worst(&self, weights: &[f64]) -> f64 {
+        self.broken(weights, f64::NEG_INFINITY).iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.excess))
     }
 
     fn rounding(&self, weights: &[f64]) -> f64 {
@@ -459,190 +459,25 @@ impl Problem {
             share = next;
         }
     }
-
-    /// Row generation around the dual active set.
-    fn shortest(&self, start: &[(Row, f64)], progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<Shortest> {
-        let mut working = Working::new(self, start)?;
-        let mut rounds = 0;
-        loop {
-            rounds += 1;
-            let verdict = working.engine.solve(stop)?;
-            let weights = working.engine.weights().to_vec();
-            let end = match verdict {
-                Verdict::Infeasible(ray) => {
-                    let proof = Certificate::check(&self.statement, &self.bounds, working.named(&ray.multipliers))?;
-                    proof.map_or(End::Stopped, End::Infeasible)
-                }
-                Verdict::Stopped => End::Stopped,
-                Verdict::Optimal => {
-                    let broken = self.broken(&weights, self.rounding(&weights));
-                    let rows = working.rows();
-                    let objective = self.objective.parts(&weights).iter().sum();
-                    progress(Round { round: rounds, rows, broken: broken.len(), objective });
-                    let flat = working.flat(&weights, ASKED_SHARE * self.statement.margin.slope);
-                    if rounds < MOST_ROUNDS && !stop.asked() && working.cut(&self.statement, &broken, &flat)? {
-                        continue;
-                    }
-                    if broken.is_empty() && flat.is_empty() { End::Met } else { End::Stopped }
-                }
-            };
-            let held = working.named(&working.engine.multipliers());
-            return Ok(Shortest { weights, held, rounds, end });
-        }
-    }
-
-    /// A bound on `|w|^2` below, from any multipliers: what the Lagrangian comes to at least within the bounds.
-    fn bound_of_square(&self, held: &[(Row, f64)]) -> Result<f64> {
-        let trains = self.statement.trains;
-        let (mut sum, mut row, mut allowed) = (vec![0.0; trains], vec![0.0; trains], 0.0);
-        for &(name, multiplier) in held {
-            let limit = self.statement.state_into(name, &mut row)?;
-            sum.iter_mut().zip(&row).for_each(|(g, a)| *g += multiplier * a);
-            allowed += multiplier * limit;
-        }
-        let least: f64 = (sum.iter().zip(&self.bounds.lower).zip(&self.bounds.upper))
-            .map(|((&g, &l), &u)| {
-                let w = (-g).clamp(l, u);
-                0.5 * w * w + g * w
-            })
-            .sum();
-        Ok((2.0 * (least - allowed)).max(0.0))
-    }
 }
 
-/// The engine with the names of its rows.
-struct Working {
-    engine: DualActiveSet,
-    targets: Vec<Row>,
-    /// By number of the inequality.
-    names: Vec<Row>,
-    /// Silent rows in the working set, by pattern and time.
-    there: HashSet<(usize, u64)>,
-    /// The slope rows, one after the other, and whether they are in the working set.
-    slopes: Vec<Slope>,
-    row: Vec<f64>,
-}
+/// Slope rows, which no sweep prices.
+#[derive(Debug)]
+struct Slopes(Vec<(Row, Stated)>);
 
-struct Slope {
-    name: Row,
-    coefficients: Vec<f64>,
-    limit: f64,
-    id: Option<RowId>,
-}
-
-impl Working {
-    fn new(problem: &Problem, start: &[(Row, f64)]) -> Result<Self> {
-        let Problem { statement, bounds, .. } = problem;
-        let mut working = Self {
-            engine: DualActiveSet::new(&bounds.lower, &bounds.upper)?,
-            targets: statement.targets().map(|(pattern, target)| Row::Target { pattern, target }).collect(),
-            names: vec![],
-            there: HashSet::new(),
-            slopes: vec![],
-            row: vec![0.0; statement.trains],
-        };
-        for &target in &working.targets {
-            let limit = statement.state_into(target, &mut working.row)?;
-            working.engine.equality(&working.row, limit)?;
+impl Slopes {
+    fn new(statement: &Statement) -> Result<Self> {
+        if statement.neuron.time == Time::Grid {
+            return Ok(Self(vec![]));
         }
-        if problem.parameters.neuron.time == Time::Continuous {
-            for (pattern, target) in statement.targets() {
-                let name = Row::Slope { pattern, target };
-                let stated = statement.state(name)?;
-                let id = working.engine.inequality(&stated.coefficients, stated.limit)?;
-                working.names.push(name);
-                working.slopes.push(Slope {
-                    name,
-                    coefficients: stated.coefficients,
-                    limit: stated.limit,
-                    id: Some(id),
-                });
-            }
-        }
-        if !start.is_empty() {
-            working.start(statement, start)?;
-        }
-        Ok(working)
+        let rows = statement.targets().map(|(pattern, target)| Row::Slope { pattern, target });
+        Ok(Self(rows.map(|row| Ok((row, statement.state(row)?))).collect::<Result<_>>()?))
     }
 
-    fn start(&mut self, statement: &Statement, start: &[(Row, f64)]) -> Result<()> {
-        let mut multipliers = Multipliers { equalities: vec![0.0; self.targets.len()], inequalities: vec![] };
-        for &(row, multiplier) in start {
-            if !multiplier.is_finite() {
-                return Err(problem!("start: a multiplier is {multiplier}, must be finite"));
-            }
-            match row {
-                Row::Target { .. } => {
-                    if let Some(k) = self.targets.iter().position(|r| *r == row) {
-                        multipliers.equalities[k] = multiplier;
-                    }
-                }
-                Row::Slope { .. } => {
-                    if let Some(id) = self.slopes.iter().find(|s| s.name == row).and_then(|s| s.id) {
-                        multipliers.inequalities.push((id, multiplier.max(0.0)));
-                    }
-                }
-                // Rows that this problem does not have are no help to it.
-                Row::Silence { pattern, t } => {
-                    if statement.is_asked(pattern, t) && !self.there.contains(&(pattern, t.to_bits())) {
-                        let id = self.add(statement, row)?;
-                        multipliers.inequalities.push((id, multiplier.max(0.0)));
-                    }
-                }
-            }
-        }
-        self.engine.start(&multipliers)
-    }
-
-    /// Adds a row of silence.
-    fn add(&mut self, statement: &Statement, row: Row) -> Result<RowId> {
-        let limit = statement.state_into(row, &mut self.row)?;
-        let id = self.engine.inequality(&self.row, limit)?;
-        self.names.push(row);
-        if let Row::Silence { pattern, t } = row {
-            self.there.insert((pattern, t.to_bits()));
-        }
-        Ok(id)
-    }
-
-    /// The slope rows out of the working set that are broken by more than `share`, mV/ms.
-    fn flat(&self, weights: &[f64], share: f64) -> Vec<usize> {
-        let broken = |s: &Slope| s.id.is_none() && dot(&s.coefficients, weights) > s.limit + share;
-        self.slopes.iter().enumerate().filter(|(_, s)| broken(s)).map(|(k, _)| k).collect()
-    }
-
-    fn rows(&self) -> usize {
-        self.targets.len() + self.there.len()
-    }
-
-    /// Drops what does not bind and adds what is broken; says whether anything is new.
-    fn cut(&mut self, statement: &Statement, broken: &[Peak], flat: &[usize]) -> Result<bool> {
-        let new: Vec<&Peak> = broken.iter().filter(|p| !self.there.contains(&(p.pattern, p.t.to_bits()))).collect();
-        if new.is_empty() && flat.is_empty() {
-            return Ok(false);
-        }
-        for id in self.engine.drop_inactive() {
-            match self.names[id.index()] {
-                Row::Silence { pattern, t } => drop(self.there.remove(&(pattern, t.to_bits()))),
-                name => self.slopes.iter_mut().filter(|s| s.name == name).for_each(|s| s.id = None),
-            }
-        }
-        for peak in new {
-            self.add(statement, peak.row())?;
-        }
-        for &k in flat {
-            let slope = &mut self.slopes[k];
-            slope.id = Some(self.engine.inequality(&slope.coefficients, slope.limit)?);
-            self.names.push(slope.name);
-        }
-        Ok(true)
-    }
-
-    /// Multipliers by name.
-    fn named(&self, multipliers: &Multipliers) -> Vec<(Row, f64)> {
-        let targets = self.targets.iter().copied().zip(multipliers.equalities.iter().copied());
-        let others = multipliers.inequalities.iter().map(|&(id, z)| (self.names[id.index()], z));
-        targets.chain(others).filter(|(_, u)| *u != 0.0).collect()
+    /// Those that are broken with this share of the slope that is asked for.
+    fn broken(&self, weights: &[f64], left_out: f64) -> Vec<usize> {
+        let broken = |row: &Stated| dot(&row.coefficients, weights) > row.limit + left_out;
+        (0..self.0.len()).filter(|&k| broken(&self.0[k].1)).collect()
     }
 }
 

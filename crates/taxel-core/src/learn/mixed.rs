@@ -358,7 +358,7 @@ impl Program {
     }
 
     fn met(&self, w: &[f64]) -> bool {
-        self.missing(w) <= polish::MET * (self.width() as f64).sqrt().max(10.0)
+        w.iter().all(|w| w.is_finite()) && self.missing(w) <= polish::MET * (self.width() as f64).sqrt().max(10.0)
     }
 
     fn at_zero(&self) -> f64 {

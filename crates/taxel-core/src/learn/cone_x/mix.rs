@@ -1,0 +1,216 @@
+//! Objectives of more than the shortest weights: l1, B and sums of terms, by rounds around the solver for few rows.
+
+use std::collections::HashSet;
+
+use super::{ASKED_SHARE, Best, Engine, MET, MOST_ROUNDS, Problem, Round, Slopes};
+use crate::learn::certificate::Bounds;
+use crate::learn::cone_program::HardRows;
+use crate::learn::dual_active_set::{DualActiveSet, Verdict};
+use crate::learn::mixed::{self, Terms};
+use crate::learn::silence::Peak;
+use crate::learn::statement::Row;
+use crate::{Result, Stop};
+
+/// First rounds look for rows only, at this tolerance; silence is broken there from this share of `theta_0` on, and rows with
+/// that much room to the other share go.
+const NEAR: f64 = 1e-3;
+const NEAR_SHARE: f64 = 1e-4;
+const SLACK_SHARE: f64 = 0.05;
+/// Rounds in which rows go: later ones only add, so that they end.
+const DROPPING: usize = 10;
+
+impl Problem {
+    /// Goes on from weights that meet every row.
+    pub(super) fn mix(
+        &self,
+        mut best: Best,
+        start: &[(Row, f64)],
+        progress: &mut dyn FnMut(Round),
+        stop: Stop<'_>,
+    ) -> Result<Best> {
+        let objective = &self.objective;
+        let terms = Terms {
+            l1: objective.l1,
+            l2: objective.l2,
+            norm: objective.norm,
+            lift: objective.b,
+            behind: &objective.behind,
+            wanted: &objective.wanted,
+        };
+        let Bounds { lower, upper } = &self.bounds;
+        let mut rows = Dense::new(self, best.held.iter().chain(start).map(|r| r.0))?;
+        let (mut going, mut near, begun) = (None, true, best.rounds);
+        loop {
+            best.rounds += 1;
+            let tolerance = if near { NEAR } else { self.parameters.tolerance };
+            let found = mixed::minimise(&terms, &rows.hard(), lower, upper, going.as_ref(), tolerance, stop)?;
+            best.least = best.least.max(found.bound);
+            if found.stopped || best.rounds >= MOST_ROUNDS {
+                return Ok(best);
+            }
+            let weights = if near { found.weights } else { self.projected(&rows, found.weights, stop)? };
+            let theta = self.parameters.neuron.theta_0;
+            let broken = self.broken(&weights, if near { NEAR_SHARE * theta } else { self.rounding(&weights) });
+            let value: f64 = objective.parts(&weights).iter().sum();
+            progress(Round { round: best.rounds, rows: rows.names.len(), broken: broken.len(), objective: value });
+            let mut goes_on = found.start;
+            if near && best.rounds < begun + DROPPING {
+                goes_on.retain(&rows.drop_slack(&weights, &found.inequality, SLACK_SHARE * theta));
+            }
+            if rows.add(self, &weights, &broken)? {
+                going = Some(goes_on);
+                continue;
+            }
+            if near {
+                (near, going) = (false, Some(goes_on));
+                continue;
+            }
+            best.engine = match found.engine {
+                mixed::Engine::Native => Engine::Native,
+                mixed::Engine::Clarabel => Engine::ConeSolver,
+            };
+            // Rows that bind here help the next fit, although the shortest weights do not need them.
+            for (&name, &multiplier) in rows.names.iter().zip(&found.inequality) {
+                if multiplier > 0.0 && !best.held.iter().any(|(held, _)| *held == name) {
+                    best.held.push((name, 0.0));
+                }
+            }
+            if self.missed(&weights)? <= MET
+                && self.worst(&weights) <= self.rounding(&weights)
+                && value < objective.parts(&best.weights).iter().sum()
+            {
+                best.weights = weights;
+            }
+            return Ok(best);
+        }
+    }
+
+    /// The nearest weights that meet the rows to rounding, where these do not.
+    fn projected(&self, rows: &Dense, weights: Vec<f64>, stop: Stop<'_>) -> Result<Vec<f64>> {
+        if rows.missed(&weights) <= 0.5 * MET {
+            return Ok(weights);
+        }
+        let less = |bounds: &[f64]| -> Vec<f64> { bounds.iter().zip(&weights).map(|(b, w)| b - w).collect() };
+        let mut engine = DualActiveSet::new(&less(&self.bounds.lower), &less(&self.bounds.upper))?;
+        for (row, limit) in rows.equal.chunks_exact(weights.len()).zip(&rows.equal_to) {
+            engine.equality(row, limit - super::dot(row, &weights))?;
+        }
+        for (row, limit) in rows.below.chunks_exact(weights.len()).zip(&rows.limit) {
+            engine.inequality(row, limit - super::dot(row, &weights))?;
+        }
+        if engine.solve(stop)? != Verdict::Optimal {
+            return Ok(weights);
+        }
+        let moved = weights.iter().zip(engine.weights()).map(|(w, v)| w + v);
+        Ok(moved.zip(&self.bounds.lower).zip(&self.bounds.upper).map(|((w, l), u)| w.clamp(*l, *u)).collect())
+    }
+}
+
+/// The working set, written out.
+struct Dense {
+    equal: Vec<f64>,
+    equal_to: Vec<f64>,
+    below: Vec<f64>,
+    limit: Vec<f64>,
+    /// Of the rows below.
+    names: Vec<Row>,
+    there: HashSet<(usize, u64)>,
+    slopes: Slopes,
+}
+
+impl Dense {
+    /// All targets, and those of these rows that the problem has.
+    fn new(problem: &Problem, rows: impl Iterator<Item = Row>) -> Result<Self> {
+        let statement = &problem.statement;
+        let slopes = Slopes::new(statement)?;
+        let mut dense = Self {
+            equal: vec![],
+            equal_to: vec![],
+            below: vec![],
+            limit: vec![],
+            names: vec![],
+            there: HashSet::new(),
+            slopes,
+        };
+        for (pattern, target) in statement.targets() {
+            let stated = statement.state(Row::Target { pattern, target })?;
+            dense.equal.extend(stated.coefficients);
+            dense.equal_to.push(stated.limit);
+        }
+        for row in rows {
+            match row {
+                Row::Silence { pattern, t } if statement.is_asked(pattern, t) => {
+                    dense.add_silence(problem, pattern, t)?
+                }
+                Row::Slope { .. } => {
+                    if let Some(k) = dense.slopes.0.iter().position(|s| s.0 == row) {
+                        dense.add_slope(k);
+                    }
+                }
+                Row::Silence { .. } | Row::Target { .. } => {}
+            }
+        }
+        Ok(dense)
+    }
+
+    fn hard(&self) -> HardRows<'_> {
+        HardRows { equal: &self.equal, equal_to: &self.equal_to, below: &self.below, limit: &self.limit }
+    }
+
+    fn add_silence(&mut self, problem: &Problem, pattern: usize, t: f64) -> Result<()> {
+        if self.there.insert((pattern, t.to_bits())) {
+            let row = Row::Silence { pattern, t };
+            let stated = problem.statement.state(row)?;
+            self.push(row, &stated.coefficients, stated.limit);
+        }
+        Ok(())
+    }
+
+    fn add_slope(&mut self, k: usize) {
+        let (row, stated) = self.slopes.0[k].clone();
+        if !self.names.contains(&row) {
+            self.push(row, &stated.coefficients, stated.limit);
+        }
+    }
+
+    fn push(&mut self, row: Row, coefficients: &[f64], limit: f64) {
+        self.names.push(row);
+        self.below.extend_from_slice(coefficients);
+        self.limit.push(limit);
+    }
+
+    /// Adds what is broken; says whether anything is new.
+    fn add(&mut self, problem: &Problem, weights: &[f64], broken: &[Peak]) -> Result<bool> {
+        let before = self.names.len();
+        for peak in broken {
+            self.add_silence(problem, peak.pattern, peak.t)?;
+        }
+        for k in self.slopes.broken(weights, (1.0 - ASKED_SHARE) * problem.statement.margin.slope) {
+            self.add_slope(k);
+        }
+        Ok(self.names.len() > before)
+    }
+
+    /// Drops rows without a multiplier that have this much room; says which are kept.
+    fn drop_slack(&mut self, weights: &[f64], multipliers: &[f64], room: f64) -> Vec<bool> {
+        let n = weights.len();
+        let most = multipliers.iter().fold(0.0, |m: f64, z| m.max(*z));
+        let rows = self.below.chunks_exact(n).zip(&self.limit).zip(multipliers);
+        let keep: Vec<bool> =
+            rows.map(|((row, limit), z)| *z > 1e-6 * most || limit - super::dot(row, weights) < room).collect();
+        let kept = |k: &usize| keep[*k];
+        self.below = (0..keep.len()).filter(kept).flat_map(|k| self.below[k * n..(k + 1) * n].to_vec()).collect();
+        self.limit = (0..keep.len()).filter(kept).map(|k| self.limit[k]).collect();
+        self.names = (0..keep.len()).filter(kept).map(|k| self.names[k]).collect();
+        let silent =
+            |row: &Row| if let Row::Silence { pattern, t } = row { Some((*pattern, t.to_bits())) } else { None };
+        self.there = self.names.iter().filter_map(silent).collect();
+        keep
+    }
+
+    /// How far the worst row of targets is missed.
+    fn missed(&self, weights: &[f64]) -> f64 {
+        let rows = self.equal.chunks_exact(weights.len()).zip(&self.equal_to);
+        rows.map(|(row, to)| (super::dot(row, weights) - to).abs()).fold(0.0, f64::max)
+    }
+}

@@ -1,0 +1,202 @@
+//! The shortest weights that meet every row: row generation around the dual active set.
+
+use std::collections::HashSet;
+
+use super::{ASKED_SHARE, Certificate, MOST_ROUNDS, Problem, Round, Slopes};
+use crate::learn::dual_active_set::{DualActiveSet, Multipliers, RowId, Verdict};
+use crate::learn::silence::Peak;
+use crate::learn::statement::{Row, Statement};
+use crate::{Result, Stop, problem};
+
+/// Where the rounds of the shortest weights ended.
+pub(super) enum End {
+    Met,
+    Infeasible(Certificate),
+    Stopped,
+}
+
+/// What the rounds of the shortest weights came to.
+pub(super) struct Shortest {
+    pub(super) weights: Vec<f64>,
+    pub(super) held: Vec<(Row, f64)>,
+    pub(super) rounds: usize,
+    pub(super) end: End,
+}
+
+impl Problem {
+    /// Row generation around the dual active set.
+    pub(super) fn shortest(
+        &self,
+        start: &[(Row, f64)],
+        progress: &mut dyn FnMut(Round),
+        stop: Stop<'_>,
+    ) -> Result<Shortest> {
+        let mut working = Working::new(self, start)?;
+        let mut rounds = 0;
+        loop {
+            rounds += 1;
+            let verdict = working.engine.solve(stop)?;
+            let weights = working.engine.weights().to_vec();
+            let end = match verdict {
+                Verdict::Infeasible(ray) => {
+                    let proof = Certificate::check(&self.statement, &self.bounds, working.named(&ray.multipliers))?;
+                    proof.map_or(End::Stopped, End::Infeasible)
+                }
+                Verdict::Stopped => End::Stopped,
+                Verdict::Optimal => {
+                    let broken = self.broken(&weights, self.rounding(&weights));
+                    let rows = working.rows();
+                    let objective = self.objective.parts(&weights).iter().sum();
+                    progress(Round { round: rounds, rows, broken: broken.len(), objective });
+                    let flat = working.flat(&weights, (1.0 - ASKED_SHARE) * self.statement.margin.slope);
+                    if rounds < MOST_ROUNDS && !stop.asked() && working.cut(&self.statement, &broken, &flat)? {
+                        continue;
+                    }
+                    if broken.is_empty() && flat.is_empty() { End::Met } else { End::Stopped }
+                }
+            };
+            let held = working.named(&working.engine.multipliers());
+            return Ok(Shortest { weights, held, rounds, end });
+        }
+    }
+
+    /// A bound on `|w|^2` below, from any multipliers: what the Lagrangian comes to at least within the bounds.
+    pub(super) fn bound_of_square(&self, held: &[(Row, f64)]) -> Result<f64> {
+        let trains = self.statement.trains;
+        let (mut sum, mut row, mut allowed) = (vec![0.0; trains], vec![0.0; trains], 0.0);
+        for &(name, multiplier) in held {
+            let limit = self.statement.state_into(name, &mut row)?;
+            sum.iter_mut().zip(&row).for_each(|(g, a)| *g += multiplier * a);
+            allowed += multiplier * limit;
+        }
+        let least: f64 = (sum.iter().zip(&self.bounds.lower).zip(&self.bounds.upper))
+            .map(|((&g, &l), &u)| {
+                let w = (-g).clamp(l, u);
+                0.5 * w * w + g * w
+            })
+            .sum();
+        Ok((2.0 * (least - allowed)).max(0.0))
+    }
+}
+
+/// The engine with the names of its rows.
+struct Working {
+    engine: DualActiveSet,
+    targets: Vec<Row>,
+    /// By number of the inequality.
+    names: Vec<Row>,
+    /// Silent rows in the working set, by pattern and time.
+    there: HashSet<(usize, u64)>,
+    slopes: Slopes,
+    /// By slope row, its number in the working set.
+    ids: Vec<Option<RowId>>,
+    row: Vec<f64>,
+}
+
+impl Working {
+    fn new(problem: &Problem, start: &[(Row, f64)]) -> Result<Self> {
+        let Problem { statement, bounds, .. } = problem;
+        let mut working = Self {
+            engine: DualActiveSet::new(&bounds.lower, &bounds.upper)?,
+            targets: statement.targets().map(|(pattern, target)| Row::Target { pattern, target }).collect(),
+            names: vec![],
+            there: HashSet::new(),
+            slopes: Slopes::new(statement)?,
+            ids: vec![],
+            row: vec![0.0; statement.trains],
+        };
+        for &target in &working.targets {
+            let limit = statement.state_into(target, &mut working.row)?;
+            working.engine.equality(&working.row, limit)?;
+        }
+        for (name, stated) in &working.slopes.0 {
+            working.ids.push(Some(working.engine.inequality(&stated.coefficients, stated.limit)?));
+            working.names.push(*name);
+        }
+        if !start.is_empty() {
+            working.start(statement, start)?;
+        }
+        Ok(working)
+    }
+
+    fn start(&mut self, statement: &Statement, start: &[(Row, f64)]) -> Result<()> {
+        let mut multipliers = Multipliers { equalities: vec![0.0; self.targets.len()], inequalities: vec![] };
+        for &(row, multiplier) in start {
+            if !multiplier.is_finite() {
+                return Err(problem!("start: a multiplier is {multiplier}, must be finite"));
+            }
+            match row {
+                Row::Target { .. } => {
+                    if let Some(k) = self.targets.iter().position(|r| *r == row) {
+                        multipliers.equalities[k] = multiplier;
+                    }
+                }
+                Row::Slope { .. } => {
+                    if let Some(id) = self.slopes.0.iter().position(|s| s.0 == row).and_then(|k| self.ids[k]) {
+                        multipliers.inequalities.push((id, multiplier.max(0.0)));
+                    }
+                }
+                // Rows that this problem does not have are no help to it.
+                Row::Silence { pattern, t } => {
+                    if statement.is_asked(pattern, t) && !self.there.contains(&(pattern, t.to_bits())) {
+                        let id = self.add(statement, row)?;
+                        multipliers.inequalities.push((id, multiplier.max(0.0)));
+                    }
+                }
+            }
+        }
+        self.engine.start(&multipliers)
+    }
+
+    /// Adds a row of silence.
+    fn add(&mut self, statement: &Statement, row: Row) -> Result<RowId> {
+        let limit = statement.state_into(row, &mut self.row)?;
+        let id = self.engine.inequality(&self.row, limit)?;
+        self.names.push(row);
+        if let Row::Silence { pattern, t } = row {
+            self.there.insert((pattern, t.to_bits()));
+        }
+        Ok(id)
+    }
+
+    /// The slope rows out of the working set that are broken, even with this much less slope.
+    fn flat(&self, weights: &[f64], left_out: f64) -> Vec<usize> {
+        let mut broken = self.slopes.broken(weights, left_out);
+        broken.retain(|&k| self.ids[k].is_none());
+        broken
+    }
+
+    fn rows(&self) -> usize {
+        self.targets.len() + self.there.len()
+    }
+
+    /// Drops what does not bind and adds what is broken; says whether anything is new.
+    fn cut(&mut self, statement: &Statement, broken: &[Peak], flat: &[usize]) -> Result<bool> {
+        let new: Vec<&Peak> = broken.iter().filter(|p| !self.there.contains(&(p.pattern, p.t.to_bits()))).collect();
+        if new.is_empty() && flat.is_empty() {
+            return Ok(false);
+        }
+        for id in self.engine.drop_inactive() {
+            match self.names[id.index()] {
+                Row::Silence { pattern, t } => drop(self.there.remove(&(pattern, t.to_bits()))),
+                _ => self.ids.iter_mut().filter(|known| **known == Some(id)).for_each(|known| *known = None),
+            }
+        }
+        for peak in new {
+            self.add(statement, peak.row())?;
+        }
+        for &k in flat {
+            let (name, stated) = &self.slopes.0[k];
+            self.ids[k] = Some(self.engine.inequality(&stated.coefficients, stated.limit)?);
+            self.names.push(*name);
+        }
+        Ok(true)
+    }
+
+    /// Multipliers by name.
+    fn named(&self, multipliers: &Multipliers) -> Vec<(Row, f64)> {
+        let targets = self.targets.iter().copied().zip(multipliers.equalities.iter().copied());
+        let others = multipliers.inequalities.iter().map(|&(id, z)| (self.names[id.index()], z));
+        targets.chain(others).filter(|(_, u)| *u != 0.0).collect()
+    }
+}
