@@ -96,6 +96,7 @@ def pairwise(
     a: _Patterns,
     b: _Patterns | None,
     threads: int | None,
+    vectors: str | None,
     progress: Callable[[int, int], object] | None,
 ) -> NDArray[np.float64]: ...
 

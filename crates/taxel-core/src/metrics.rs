@@ -10,6 +10,7 @@ mod merged;
 mod pairwise;
 mod patterns;
 mod spike_distance;
+mod stored;
 mod van_rossum;
 mod van_rossum_absolute;
 mod van_rossum_spatial;
@@ -27,7 +28,7 @@ pub use van_rossum::{Normalisation, VanRossum};
 pub use van_rossum_absolute::VanRossumAbsolute;
 pub use van_rossum_spatial::{OwnTrain, Smoothing, VanRossumSpatial};
 pub use van_rossum_spatial_absolute::VanRossumSpatialAbsolute;
-pub use victor_purpura::VictorPurpura;
+pub use victor_purpura::{Vectors, VictorPurpura};
 pub use victor_purpura_multi_unit::VictorPurpuraMultiUnit;
 
 use crate::{Result, Stop, problem};
@@ -91,7 +92,12 @@ impl Metric {
     pub fn pairwise(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<Vec<f64>> {
         let ready = self.prepare(a, b)?;
         let matrix = Matrix::new(a.count, b.map(|b| b.count));
-        matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?;
+        match &ready {
+            Ready::VictorPurpura(m) if m.has_reach() && work.vectors != Vectors::None => m.fill(&matrix, a, b, work)?,
+            Ready::VanRossum(m) => m.fill(&matrix, a, b, work)?,
+            Ready::VanRossumSpatial(m, kernel) => m.fill(kernel, &matrix, a, b, work)?,
+            _ => matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?,
+        }
         Ok(matrix.finish())
     }
 

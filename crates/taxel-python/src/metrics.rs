@@ -4,7 +4,7 @@ use std::num::NonZero;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::metrics::{Metric, Patterns, Work};
+use taxel_core::metrics::{Metric, Patterns, Vectors, Work};
 use taxel_core::problem;
 
 use crate::convert::{array, slice};
@@ -53,6 +53,18 @@ fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: PatternsI
     enter(py, |stop| metric.distance(&a, &b, stop))
 }
 
+/// Vector instructions by their names; the widest of the machine where none is named.
+fn to_vectors(name: Option<&str>) -> PyResult<Vectors> {
+    let vectors = match name {
+        None => Vectors::best(),
+        Some("none") => Vectors::None,
+        Some("avx2") => Vectors::Avx2,
+        Some("avx512") => Vectors::Avx512,
+        Some(other) => return Err(core(problem!("vectors is {other:?}: must be none, avx2 or avx512"))),
+    };
+    if vectors.present() { Ok(vectors) } else { Err(core(problem!("vectors: this machine has no {vectors:?}"))) }
+}
+
 /// The distances of all patterns from all others, row by row.
 #[pyfunction]
 fn pairwise<'py>(
@@ -61,10 +73,12 @@ fn pairwise<'py>(
     a: PatternsIn<'py>,
     b: Option<PatternsIn<'py>>,
     threads: Option<NonZero<usize>>,
+    vectors: Option<&str>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (metric, a, b) = (to_metric(metric)?, Held::new(a)?, b.map(Held::new).transpose()?);
     let (a, b) = (a.patterns()?, b.as_ref().map(Held::patterns).transpose()?);
+    let vectors = to_vectors(vectors)?;
     let raised = std::sync::Mutex::new(None);
     let outcome = enter(py, |stop| {
         let mut report = |done: usize, all: usize| {
@@ -76,7 +90,9 @@ fn pairwise<'py>(
             }
         };
         let asked = || stop.asked() || raised.lock().is_ok_and(|r| r.is_some());
-        metric.pairwise(&a, b.as_ref(), &mut Work::new(threads, taxel_core::Stop::when(&asked), &mut report))
+        let mut work = Work::new(threads, taxel_core::Stop::when(&asked), &mut report);
+        work.vectors = vectors;
+        metric.pairwise(&a, b.as_ref(), &mut work)
     });
     if let Ok(Some(error)) = raised.into_inner() {
         return Err(error);

@@ -1,5 +1,7 @@
 //! Van Rossum distance: Euclidean, of trains smoothed by an exponential; in closed form.
 
+mod matrix;
+
 use serde::{Deserialize, Serialize};
 
 use super::above_0;
@@ -35,13 +37,14 @@ pub enum Normalisation {
 }
 
 impl Normalisation {
-    /// What the integral over time, in units of tau / 2, is multiplied with before the root.
-    pub(super) fn factor(self, tau: f64) -> f64 {
-        match self {
+    /// The distance of an integral over time in units of tau / 2.
+    pub(super) fn root(self, square: f64, tau: f64) -> f64 {
+        let factor = match self {
             Self::Spike => 1.0,
             Self::Tau => 0.5,
             Self::None => tau / 2.0,
-        }
+        };
+        (square * factor).sqrt()
     }
 }
 
@@ -66,6 +69,10 @@ impl VanRossum {
             last = t;
         }
         square += height * height;
-        (square * self.normalisation.factor(self.tau)).sqrt()
+        self.normalisation.root(square, self.tau)
     }
 }
+
+/// Below this share of both trains' squares, the square of their distance is not taken as a difference of sums any more:
+/// it would have lost too many of its digits.
+pub(super) const NEAR: f64 = 1e-4;

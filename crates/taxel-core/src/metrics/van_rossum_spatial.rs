@@ -1,5 +1,7 @@
 //! The thesis' distance between patterns of an array: trains smoothed by an exponential, taxels by their distance.
 
+mod matrix;
+
 use serde::{Deserialize, Serialize};
 
 use super::van_rossum::Normalisation;
@@ -105,12 +107,17 @@ impl VanRossumSpatial {
 
     /// The distance of two patterns.
     pub(super) fn between(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        Ok(self.normalisation.root(self.square(kernel, a, b, stop)?, self.smoothing.tau))
+    }
+
+    /// The squared distance of two patterns, in units of tau / 2.
+    fn square(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
         let tau = self.smoothing.tau;
         let mut square = 0.0;
         kernel.walk(tau, a, b, Gauge::Squares, stop, |sum, from, to| {
             square -= sum * (-2.0 * (to - from) / tau).exp_m1();
         })?;
-        Ok((square * self.normalisation.factor(tau)).sqrt())
+        Ok(square)
     }
 }
 

@@ -1,9 +1,15 @@
 //! Victor-Purpura distance: the cheapest way to turn one spike train into another.
 
+mod lanes;
+
 use serde::{Deserialize, Serialize};
 
-use super::{cost, number_or_name};
+pub use lanes::Vectors;
+
+use super::pairwise::Matrix;
+use super::{Patterns, Work, cost, number_or_name};
 use crate::{Result, Stop};
+use lanes::Block;
 
 /// The least cost of turning one train into the other: 1 for each spike removed or added, `q |dt|` for each one moved.
 ///
@@ -27,8 +33,13 @@ impl VictorPurpura {
         cost("q", self.q, "/ms")
     }
 
+    /// Whether moving costs something, and not without end: otherwise spikes are only counted.
+    pub(super) fn has_reach(&self) -> bool {
+        self.q > 0.0 && self.q.is_finite()
+    }
+
     /// Spikes farther apart than this never match; rounded so that none is left out.
-    pub(super) fn reach(&self) -> f64 {
+    fn reach(&self) -> f64 {
         2.0 / self.q * (1.0 + 4.0 * f64::EPSILON)
     }
 
@@ -69,6 +80,45 @@ impl VictorPurpura {
             }
         }
         Ok(cost[hi] + count(b.len() - hi))
+    }
+
+    /// Fills a matrix with the sums over trains, many pairs side by side.
+    ///
+    /// Train after train, the columns' trains are sorted by length, so that those side by side are about as long.
+    pub(super) fn fill(
+        &self,
+        matrix: &Matrix,
+        a: &Patterns<'_>,
+        b: Option<&Patterns<'_>>,
+        work: &mut Work<'_>,
+    ) -> Result<()> {
+        let (vectors, lanes) = (work.vectors, work.vectors.lanes());
+        let others = b.unwrap_or(a);
+        let (pairs, reach) = (matrix.pairs(), self.reach());
+        for n in 0..a.trains {
+            let mut order: Vec<usize> = (0..others.count).collect();
+            order.sort_by_key(|&p| others.train(p, n).len());
+            let blocks: Vec<Block> = order
+                .chunks(lanes)
+                .map(|chunk| Block::new(lanes, &chunk.iter().map(|&p| others.train(p, n)).collect::<Vec<_>>()))
+                .collect();
+            // Patterns against each other: those that come later in the order.
+            let row = |at: usize| if b.is_some() { (at, 0) } else { (order[at], at + 1) };
+            let told = |rows: usize| ((pairs * n + pairs * rows / a.count) / a.trains, pairs);
+            work.each(a.count, &told, |at, stop| {
+                let (i, first) = row(at);
+                let mut cost = Vec::new();
+                for (block, from) in blocks.iter().zip((0..).step_by(lanes)).skip(first / lanes) {
+                    stop.check()?;
+                    let distances = block.distances(vectors, a.train(i, n), self.q, reach, &mut cost, stop)?;
+                    for (at, distance) in (from..others.count).zip(distances).skip(first.saturating_sub(from)) {
+                        matrix.add(i, order[at], distance);
+                    }
+                }
+                Ok(())
+            })?;
+        }
+        Ok(())
     }
 }
 

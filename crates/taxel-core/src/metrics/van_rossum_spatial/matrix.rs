@@ -1,0 +1,189 @@
+//! Matrices of distances with a spatial kernel, by stored exponentials.
+//!
+//! The inner product of two smoothed patterns is a sum over their spikes of the inner products of trains, weighted by
+//! what the taxels' smoothings have in common. For each row and taxel n, the row's whole pattern is stored as taxel n sees
+//! it through these weights; then each column's spikes at n are looked up once.
+
+use super::{Kernel, VanRossumSpatial};
+use crate::metrics::pairwise::Matrix;
+use crate::metrics::stored::{Entries, Frame, Query};
+use crate::metrics::van_rossum::NEAR;
+use crate::metrics::{Patterns, Work};
+use crate::{Result, Stop};
+
+/// Spikes of columns that are held ready at a time: half a GB.
+const HELD: usize = 1 << 24;
+
+/// What a look-up costs, in steps of a walk through both patterns.
+const LOOK_UP: usize = 8;
+
+impl VanRossumSpatial {
+    /// Fills a matrix, by stored exponentials where they are worth their making.
+    pub(in crate::metrics) fn fill(
+        &self,
+        kernel: &Kernel,
+        matrix: &Matrix,
+        a: &Patterns<'_>,
+        b: Option<&Patterns<'_>>,
+        work: &mut Work<'_>,
+    ) -> Result<()> {
+        let others = b.unwrap_or(a);
+        let spikes = (a.times.len() / a.count.max(1)).max(others.times.len() / others.count.max(1));
+        let active = kernel.active(a, others);
+        let walking = matrix.pairs().saturating_mul(2 * spikes * kernel.taxels());
+        let storing = active.len().pow(2) * kernel.taxels()
+            + a.count * spikes * active.len() * LOOK_UP
+            + matrix.pairs() * spikes * LOOK_UP;
+        let frame = Frame::around(self.smoothing.tau, &[a, others], None);
+        match frame {
+            Some(frame) if storing < walking => Stored {
+                metric: self,
+                kernel,
+                frame,
+                weights: kernel.common(&active),
+                active,
+                rows: a,
+                columns: others,
+            }
+            .fill(matrix, b.is_none(), work),
+            _ => matrix.each_pair(work, |i, j, stop| self.between(kernel, (a, i), (others, j), stop)),
+        }
+    }
+}
+
+impl Kernel {
+    /// Taxels that spike in any pattern, in any of its layers.
+    fn active(&self, a: &Patterns<'_>, b: &Patterns<'_>) -> Vec<usize> {
+        let mut active = vec![false; self.taxels()];
+        for side in [a, b] {
+            for (k, ends) in side.offsets.windows(2).enumerate() {
+                active[k % side.trains.max(1) % self.taxels()] |= ends[1] > ends[0];
+            }
+        }
+        (0..self.taxels()).filter(|&n| active[n]).collect()
+    }
+
+    /// What the smoothings of two taxels have in common: the sum over existing taxels of what both add there, for each two
+    /// of these.
+    fn common(&self, taxels: &[usize]) -> Vec<f64> {
+        let count = taxels.len();
+        let mut common = vec![0.0; count * count];
+        let mut reach = vec![0.0; count];
+        for m in 0..self.taxels() {
+            if self.exists.as_ref().is_some_and(|exists| !exists[m]) {
+                continue;
+            }
+            let (row, column) = (m / self.columns, m % self.columns);
+            for (reach, &n) in reach.iter_mut().zip(taxels) {
+                *reach = self.reach(n, row)[column];
+            }
+            for (common, &first) in common.chunks_exact_mut(count).zip(&reach) {
+                for (common, second) in common.iter_mut().zip(&reach) {
+                    *common += first * second;
+                }
+            }
+        }
+        common
+    }
+}
+
+/// A matrix in the making.
+struct Stored<'s> {
+    metric: &'s VanRossumSpatial,
+    kernel: &'s Kernel,
+    frame: Frame,
+    /// Taxels that spike, and what each two have in common.
+    active: Vec<usize>,
+    weights: Vec<f64>,
+    rows: &'s Patterns<'s>,
+    columns: &'s Patterns<'s>,
+}
+
+impl Stored<'_> {
+    fn fill(&self, matrix: &Matrix, symmetric: bool, work: &mut Work<'_>) -> Result<()> {
+        let rows = self.squares(self.rows, work)?;
+        let columns = if symmetric { rows.clone() } else { self.squares(self.columns, work)? };
+        let spikes = (self.columns.times.len() / self.columns.count.max(1)).max(1);
+        let tile = (HELD / spikes).max(1);
+        let tiles = self.columns.count.div_ceil(tile);
+        for (number, from) in (0..self.columns.count).step_by(tile).enumerate() {
+            let to = (from + tile).min(self.columns.count);
+            let trains = self.columns.trains;
+            let (first, last) = (self.columns.offsets[from * trains], self.columns.offsets[to * trains]);
+            let held: Vec<Query> = self.columns.times[first..last].iter().map(|&t| self.frame.query(t)).collect();
+            let queries = |j: usize, n: usize| {
+                let ends = &self.columns.offsets[j * trains + n..=j * trains + n + 1];
+                &held[ends[0] - first..ends[1] - first]
+            };
+            let told = |row: usize| {
+                let pairs = matrix.pairs();
+                ((pairs * number + pairs * row / self.rows.count) / tiles, pairs)
+            };
+            work.each(self.rows.count, &told, |i, stop| {
+                let begin = matrix.first(i).max(from);
+                let mut products = vec![0.0; to.saturating_sub(begin)];
+                if products.is_empty() {
+                    return Ok(());
+                }
+                self.products(i, stop, |n, entries, sums| {
+                    for (j, product) in (begin..).zip(&mut products) {
+                        *product += entries.product(sums, queries(j, n));
+                    }
+                })?;
+                for (j, product) in (begin..).zip(products) {
+                    let own = rows[i] + columns[j];
+                    let square = own - 2.0 * product;
+                    let distance = if square > NEAR * own {
+                        self.metric.normalisation.root(square, self.metric.smoothing.tau)
+                    } else {
+                        self.metric.between(self.kernel, (self.rows, i), (self.columns, j), stop)?
+                    };
+                    matrix.add(i, j, distance);
+                }
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Row `i` as each train that spikes anywhere sees it.
+    fn products(&self, i: usize, stop: Stop<'_>, mut seen: impl FnMut(usize, &Entries, &[[f64; 2]])) -> Result<()> {
+        let (taxels, count) = (self.kernel.taxels(), self.active.len());
+        let (mut sums, mut weights) = (Vec::new(), Vec::new());
+        for layer in (0..self.rows.trains).step_by(taxels) {
+            let mut spikes: Vec<(f64, usize)> = Vec::new();
+            for (k, &n) in self.active.iter().enumerate() {
+                spikes.extend(self.rows.train(i, layer + n).iter().map(|&t| (t, k)));
+            }
+            spikes.sort_by(|x, y| x.0.total_cmp(&y.0));
+            let together = || spikes.chunk_by(|x, y| x.0 == y.0);
+            let (entries, of_time) = Entries::new(&self.frame, together().map(|spikes| spikes[0].0));
+            let entry: Vec<(usize, usize)> =
+                together().zip(of_time).flat_map(|(spikes, e)| spikes.iter().map(move |&(_, k)| (e, k))).collect();
+            for (k, &n) in self.active.iter().enumerate() {
+                stop.check()?;
+                let common = &self.weights[k * count..(k + 1) * count];
+                weights.clear();
+                weights.resize(entries.len(), 0.0);
+                for &(e, k) in &entry {
+                    weights[e] += common[k];
+                }
+                entries.sums(|e| weights[e], &mut sums);
+                seen(layer + n, &entries, &sums);
+            }
+        }
+        Ok(())
+    }
+
+    /// The squared distance of each pattern from none at all, in units of tau / 2.
+    fn squares(&self, patterns: &Patterns<'_>, work: &mut Work<'_>) -> Result<Vec<f64>> {
+        let offsets = vec![0; patterns.trains + 1];
+        let none = Patterns { count: 1, times: &[], offsets: &offsets, ..patterns.clone() };
+        let found = Matrix::new(patterns.count, Some(1));
+        work.each(patterns.count, &|_| (0, 1), |i, stop| {
+            found.add(i, 0, self.metric.square(self.kernel, (patterns, i), (&none, 0), stop)?);
+            Ok(())
+        })?;
+        Ok(found.finish())
+    }
+}
