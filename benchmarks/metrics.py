@@ -1,0 +1,142 @@
+"""Distances between spike trains against elephant's matrices and PySpike's: how long a pair takes, and a large matrix.
+
+Trains of 1 s, Victor-Purpura at 50/s, van Rossum at 20 ms. Elephant and PySpike are called for a whole matrix of trains
+(``victor_purpura_distance``, ``van_rossum_distance``, ``isi_distance_matrix``, ``spike_distance_matrix``), as are we
+(``taxel.metrics.pairwise``); elephant's calls on two trains take 2 to 20 times as long a pair as its matrices. Then
+patterns of 256 taxels with about 100 spikes each, as in a matrix of 1800 by 1800: 300 or fewer against each other,
+scaled to all 1 619 100 pairs. One thread; CPU time of it.
+"""
+
+import time
+import warnings
+
+import numpy as np
+import pyspike
+import quantities as pq
+from _rounds import measure, ratio, stamp
+from elephant.spike_train_dissimilarity import van_rossum_distance, victor_purpura_distance
+from neo import SpikeTrain
+
+from taxel import Array, SpikeTrains, _core
+from taxel.metrics import pairwise
+from taxel.metrics._metric import listed, stated
+
+Q, TAU = 0.05, 20.0
+MATRIX, TAXELS, SPIKES = 1800, 256, 100
+
+
+def trains(random, count, spikes, stop=1000.0):
+    return [np.sort(random.uniform(0, stop, spikes)) for _ in range(count)]
+
+
+def pattern(random):
+    times = [np.sort(random.uniform(0, 1000, random.poisson(SPIKES))) for _ in range(TAXELS)]
+    return SpikeTrains.from_lists(times, 0.0, 1000.0)
+
+
+def off(ours, theirs):
+    """Return the largest difference of two matrices."""
+    return float(np.abs(ours - theirs).max())
+
+
+def against_peers(spikes, *, quick):
+    """Measure a pair of so many spikes a train, ours and the peers'."""
+    random = np.random.default_rng(spikes)
+    count = 10 if quick else 60
+    lists = trains(random, count, spikes)
+    ours = SpikeTrains.from_lists(lists, 0.0, 1000.0)
+    neo = [SpikeTrain(t, units="ms", t_start=0, t_stop=1000) for t in lists]
+    spy = [pyspike.SpikeTrain(t, (0.0, 1000.0)) for t in lists]
+    pairs = count * (count - 1) / 2
+    # The fast ones are called often enough to be measured.
+    often = 5 if quick else 100
+    repeated = {
+        "taxel victor_purpura": lambda: pairwise("victor_purpura", ours, q=Q, threads=1),
+        "taxel van_rossum": lambda: pairwise("van_rossum", ours, tau=TAU, threads=1),
+        "taxel isi_distance": lambda: pairwise("isi_distance", ours, threads=1),
+        "taxel spike_distance": lambda: pairwise("spike_distance", ours, threads=1),
+    }
+    peers = {
+        "elephant victor_purpura": lambda: victor_purpura_distance(neo, Q / pq.ms),
+        "elephant van_rossum": lambda: van_rossum_distance(neo, TAU * pq.ms),
+        "PySpike isi_distance": lambda: pyspike.isi_distance_matrix(spy),
+        "PySpike spike_distance": lambda: pyspike.spike_distance_matrix(spy),
+    }
+    mine = {name: (lambda run=run: [run() for _ in range(often)]) for name, run in repeated.items()}
+    results = measure({**mine, **peers}, rounds=1 if quick else 5, work=pairs)
+    for name in mine:
+        for clock in ("cpu_s", "wall_s"):
+            results[name][clock] = {
+                key: np.divide(value, often).tolist() if key != "rounds" else value
+                for key, value in results[name][clock].items()
+            }
+        results[name]["rate"] *= often
+    for result in results.values():
+        result["us_a_pair"] = 1e6 / result["rate"]
+    couples = {name: (f"taxel {name.split()[1]}", name) for name in peers}
+    return {
+        "trains": count,
+        "results": results,
+        "ratios": {f"{name}, {spikes} spikes": ratio(results, *couple) for name, couple in couples.items()},
+        "largest difference": {name: off(repeated[couple[0]](), peers[name]()) for name, couple in couples.items()},
+    }
+
+
+def minutes(metric, patterns, vectors=None, **parameters):
+    """Return the CPU minutes of a matrix of all of these patterns, on one thread."""
+    begun = time.thread_time()
+    _core.pairwise(stated(metric, parameters), listed("a", patterns), None, 1, vectors, None)
+    return (time.thread_time() - begun) / 60
+
+
+def large(*, quick):
+    """Measure matrices over patterns of many taxels, and scale them to `MATRIX` patterns."""
+    random = np.random.default_rng(0)
+    most = 12 if quick else 300
+    patterns = [pattern(random) for _ in range(most)]
+    array = {"array": Array(16, 16, pitch_mm=2.67)}
+    whole = MATRIX * (MATRIX - 1) / 2
+    found = {}
+    for name, metric, count, vectors, parameters in (
+        ("van Rossum summed over taxels", "van_rossum", most, None, {"tau": TAU}),
+        ("van Rossum with the spatial kernel", "van_rossum_spatial", most, None, {**array, "tau": TAU}),
+        ("the same, tau 0.4 ms as in the thesis", "van_rossum_spatial", most, None, array),
+        (
+            "sum of absolute differences with the spatial kernel",
+            "van_rossum_spatial_absolute",
+            max(most // 12, 4),
+            None,
+            array,
+        ),
+        ("Victor-Purpura summed over taxels, AVX-512", "victor_purpura", most, "avx512", {"q": Q}),
+        ("Victor-Purpura summed over taxels, AVX2", "victor_purpura", most, "avx2", {"q": Q}),
+        ("Victor-Purpura summed over taxels, no vectors", "victor_purpura", max(most // 6, 4), "none", {"q": Q}),
+    ):
+        pairs = count * (count - 1) / 2
+        try:
+            took = minutes(metric, patterns[:count], vectors, **parameters)
+        except _core.ProblemError as error:
+            found[name] = {"not measured": str(error)}
+            continue
+        found[name] = {
+            "patterns": count,
+            "pairs": pairs,
+            "share of all pairs": pairs / whole,
+            "cpu_minutes": took,
+            "cpu_minutes for all pairs, scaled": took * whole / pairs,
+        }
+    return {"matrix": MATRIX, "taxels": TAXELS, "spikes a taxel": SPIKES, "results": found}
+
+
+def run(*, quick):
+    """Measure; quick: few trains, one round."""
+    warnings.simplefilter("ignore")
+    small = {f"{spikes} spikes": against_peers(spikes, quick=quick) for spikes in (20, 200)}
+    return {
+        "question": __doc__.splitlines()[0],
+        **stamp("elephant", "pyspike", "neo"),
+        "against peers": small,
+        "large matrices": large(quick=quick),
+        "ratios": {name: value for part in small.values() for name, value in part["ratios"].items()},
+        "stable": all(r["stable"] for part in small.values() for r in part["results"].values()),
+    }
