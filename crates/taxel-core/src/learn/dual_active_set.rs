@@ -11,11 +11,8 @@
 mod factor;
 mod kernels;
 
-use faer::linalg::matmul::matmul;
-use faer::{Accum, MatMut, MatRef, Par};
-
 use self::factor::Factor;
-use self::kernels::{Aligned, LANES, add_rows, dot, rows_times};
+use self::kernels::{Aligned, LANES, add_rows, dot, products, rows_times};
 use crate::{Result, Stop, problem};
 
 /// Rows (scaled to length 1) count as met within this.
@@ -28,6 +25,8 @@ const DOUBTFUL: f64 = 1e-5;
 const DEPENDENT: [f64; 4] = [1e-16, 1e-20, 1e-24, 1e-28];
 /// Rows appended to the factor in one go.
 const BLOCK: usize = 64;
+/// Rows that enter at once when each step must raise the dual.
+const FEW: usize = 32;
 /// Candidates for single steps between two looks at all rows.
 const QUEUE: usize = 16;
 /// Block exchanges in one call of `solve`, after which single steps go on.
@@ -321,7 +320,7 @@ impl DualActiveSet {
                         continue;
                     }
                 }
-                self.take(&slots);
+                self.take(&slots[..if bold > 0 { slots.len() } else { slots.len().min(FEW) }]);
                 if self.active.len() > held {
                     if bold > 0 {
                         self.project();
@@ -429,21 +428,14 @@ impl DualActiveSet {
             for (row, &slot) in rows.chunks_exact_mut(stride).zip(fresh) {
                 row.copy_from_slice(&self.coefficients[slot * stride..][..stride]);
             }
-            let mut products = vec![0.0; fresh.len() * slots];
-            matmul(
-                MatMut::from_row_major_slice_mut(&mut products, fresh.len(), slots),
-                Accum::Replace,
-                MatRef::from_row_major_slice_with_stride(&rows[..], fresh.len(), stride, stride),
-                MatRef::from_row_major_slice_with_stride(&self.coefficients[..], slots, stride, stride).transpose(),
-                1.0,
-                Par::Seq,
-            );
-            for (&slot, products) in fresh.iter().zip(products.chunks_exact(slots)) {
-                self.gram[slot * self.gram_stride..][..slots].copy_from_slice(products);
+            let mut sums = vec![0.0; fresh.len() * slots];
+            products(&rows, &self.coefficients[..slots * stride], stride, &mut sums, slots);
+            for (&slot, sums) in fresh.iter().zip(sums.chunks_exact(slots)) {
+                self.gram[slot * self.gram_stride..][..slots].copy_from_slice(sums);
             }
             for other in 0..slots {
                 for (k, &slot) in fresh.iter().enumerate() {
-                    self.gram[other * self.gram_stride + slot] = products[k * slots + other];
+                    self.gram[other * self.gram_stride + slot] = sums[k * slots + other];
                 }
             }
         }
@@ -499,19 +491,19 @@ impl DualActiveSet {
     fn measure(&mut self, last: bool) {
         let enough = if last { REFINED } else { 0.1 * TOLERANCE };
         let mut worst = f64::INFINITY;
+        let mut values = vec![0.0; self.live.len()];
         for round in 0..4 {
             self.weights = self.combined();
-            let now = self.residuals(&self.weights).iter().fold(0.0, |worst: f64, r| worst.max(r.abs()));
+            rows_times(&self.coefficients, self.stride, &self.live, &self.weights, &mut values);
+            for (value, &slot) in values.iter().zip(&self.live) {
+                self.excess[slot] = value - self.rows[slot].limit;
+            }
+            let now = self.active.iter().fold(0.0, |worst: f64, &slot| worst.max(self.excess[slot].abs()));
             if now <= enough || now > 0.5 * worst || round == 3 {
                 break;
             }
             worst = now;
-            self.settle();
-        }
-        let mut values = vec![0.0; self.live.len()];
-        rows_times(&self.coefficients, self.stride, &self.live, &self.weights, &mut values);
-        for (value, &slot) in values.iter().zip(&self.live) {
-            self.excess[slot] = value - self.rows[slot].limit;
+            self.refine();
         }
     }
 
@@ -549,15 +541,20 @@ impl DualActiveSet {
     fn take(&mut self, slots: &[usize]) {
         for block in slots.chunks(BLOCK) {
             let block: Vec<usize> = block.iter().copied().filter(|&slot| self.place[slot].is_none()).collect();
-            let m = self.active.len();
-            let mut products = vec![0.0; (m + block.len()) * block.len()];
-            for (column, &slot) in products.chunks_exact_mut((m + block.len()).max(1)).zip(&block) {
+            let stride = self.factor.padded();
+            let mut g = vec![0.0; stride * block.len()];
+            let mut own = vec![0.0; block.len() * block.len()];
+            for (k, &slot) in block.iter().enumerate() {
                 let row = &self.gram[slot * self.gram_stride..][..self.gram_stride];
-                for (value, &slot) in column.iter_mut().zip(self.active.iter().chain(&block)) {
+                for (value, &slot) in g[k * stride..].iter_mut().zip(&self.active) {
+                    *value = row[slot];
+                }
+                for (value, &slot) in own[k * block.len()..].iter_mut().zip(&block) {
                     *value = row[slot];
                 }
             }
-            for k in self.factor.append(&mut products, block.len(), DOUBTFUL, self.lower.len()) {
+            let limits: Vec<f64> = block.iter().map(|&slot| self.rows[slot].limit).collect();
+            for k in self.factor.append(&mut g, stride, &mut own, &limits, DOUBTFUL, self.lower.len()) {
                 self.place[block[k]] = Some(self.active.len());
                 self.active.push(block[k]);
             }
@@ -597,7 +594,7 @@ impl DualActiveSet {
                 self.factor.forward(&mut d);
                 let (pivot, _) = self.pivot(slot, &d);
                 if pivot > DEPENDENT[self.dependent] && self.active.len() < self.lower.len() {
-                    self.factor.push(&d, pivot.sqrt());
+                    self.factor.push(&d, pivot.sqrt(), self.rows[slot].limit);
                     self.place[slot] = Some(self.active.len());
                     self.active.push(slot);
                 }
@@ -671,7 +668,7 @@ impl DualActiveSet {
             }
             self.multipliers[slot] += length * sign;
             let Some(place) = against else {
-                self.factor.push(&d, pivot.sqrt());
+                self.factor.push(&d, pivot.sqrt(), self.rows[slot].limit);
                 self.place[slot] = Some(self.active.len());
                 self.active.push(slot);
                 return None;
@@ -681,40 +678,41 @@ impl DualActiveSet {
         }
     }
 
-    /// The step from the multipliers to the optimum of the active rows, and the weights where it begins.
-    fn newton(&self) -> (Vec<f64>, Vec<f64>) {
-        let weights = self.combined();
-        let mut change = self.residuals(&weights);
-        self.factor.forward(&mut change);
-        self.factor.backward(&mut change);
-        (change, weights)
-    }
-
-    /// Moves the active multipliers along `change`, those of inequalities not below 0.
-    fn advance(&mut self, from: &[f64], change: &[f64], length: f64) {
-        for ((&slot, u), change) in self.active.iter().zip(from).zip(change) {
-            let to = u + length * change;
-            let equality = matches!(self.rows[slot].kind, Kind::Equality(_));
-            self.multipliers[slot] = if equality { to } else { to.max(0.0) };
-        }
-    }
-
-    /// Places of inequalities whose multiplier is 0 and would fall.
-    fn falling(&self, change: &[f64]) -> Vec<usize> {
-        let falls = |&k: &usize| {
-            let slot = self.active[k];
-            !self.is_equality(slot) && self.multipliers[slot] <= 0.0 && change[k] < 0.0
-        };
-        (0..self.active.len()).filter(falls).collect()
-    }
-
     /// Finds an optimum of some of the active rows: lets go of all whose multiplier would turn negative, again and again.
     fn project(&mut self) {
         loop {
-            let (change, _) = self.newton();
-            let from: Vec<f64> = self.active.iter().map(|&slot| self.multipliers[slot]).collect();
-            self.advance(&from, &change, 1.0);
-            let falling = self.falling(&change);
+            let optimum = self.factor.optimum();
+            let negative = |&k: &usize| optimum[k] < 0.0 && !self.is_equality(self.active[k]);
+            let negative: Vec<usize> = (0..optimum.len()).filter(negative).collect();
+            if negative.is_empty() {
+                for (&slot, u) in self.active.iter().zip(optimum) {
+                    self.multipliers[slot] = u;
+                }
+                return;
+            }
+            self.leave(&negative, None);
+        }
+    }
+
+    /// As `project`, but no further at a time than to where the first multiplier turns 0, so that the dual only rises.
+    fn settle(&mut self) {
+        loop {
+            let optimum = self.factor.optimum();
+            let mut length: f64 = 1.0;
+            for (&slot, &to) in self.active.iter().zip(&optimum) {
+                let from = self.multipliers[slot];
+                if to < 0.0 && !self.is_equality(slot) {
+                    length = length.min(from / (from - to));
+                }
+            }
+            let mut falling = Vec::new();
+            for (k, (&slot, &to)) in self.active.iter().zip(&optimum).enumerate() {
+                let from = self.multipliers[slot];
+                self.multipliers[slot] = from + length * (to - from);
+                if to < 0.0 && !self.is_equality(slot) && from / (from - to) <= length {
+                    falling.push(k);
+                }
+            }
             if falling.is_empty() {
                 return;
             }
@@ -722,31 +720,17 @@ impl DualActiveSet {
         }
     }
 
-    /// As `project`, but each move lowers `|A'u|^2 / 2 + limit.u` (the dual, its sign turned).
-    fn settle(&mut self) {
-        loop {
-            let (change, weights) = self.newton();
-            let falling = self.falling(&change);
-            if !falling.is_empty() {
-                self.leave(&falling, None);
-                continue;
-            }
-            let here = self.dual(&weights);
-            let from: Vec<f64> = self.active.iter().map(|&slot| self.multipliers[slot]).collect();
-            let until = |k: usize| if self.is_equality(self.active[k]) { f64::INFINITY } else { -from[k] / change[k] };
-            let first = (0..from.len()).filter(|&k| change[k] < 0.0).map(until).fold(1.0, f64::min);
-            for length in [1.0, 0.5, 0.25, first] {
-                self.advance(&from, &change, length.max(first));
-                if length <= first || self.dual(&self.combined()) < here {
-                    break;
-                }
-            }
-            let falling = self.falling(&change);
-            if falling.is_empty() {
-                return;
-            }
-            self.leave(&falling, None);
+    /// Corrects the active multipliers by what the active rows are off, and lets go of those that turn negative.
+    fn refine(&mut self) {
+        let mut change = self.residuals(&self.weights);
+        self.factor.forward(&mut change);
+        self.factor.backward(&mut change);
+        for (&slot, change) in self.active.iter().zip(&change) {
+            self.multipliers[slot] += change;
         }
+        let negative = |&k: &usize| self.multipliers[self.active[k]] < 0.0 && !self.is_equality(self.active[k]);
+        let negative: Vec<usize> = (0..self.active.len()).filter(negative).collect();
+        self.leave(&negative, None);
     }
 
     /// The dual at the multipliers that gave `weights`; less is better.

@@ -1,10 +1,6 @@
 //! Cholesky factor of the Gram matrix of the active rows: rows are appended by the block and removed by rotations.
 
-use faer::linalg::matmul::matmul;
-use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
-use faer::{Accum, MatMut, MatRef, Par};
-
-use super::kernels::{Aligned, LANES, backward, forward, rotate};
+use super::kernels::{Aligned, LANES, backward, dot, forward, forward_many, products, rotate};
 
 /// L with `L L' = G` over the active rows, in the order in which they came.
 #[derive(Debug, Clone, Default)]
@@ -14,6 +10,8 @@ pub(super) struct Factor {
     stride: usize,
     /// One over the diagonal.
     inverse: Vec<f64>,
+    /// `L^-1` times the rows' limits.
+    limits: Vec<f64>,
 }
 
 impl Factor {
@@ -24,6 +22,7 @@ impl Factor {
 
     pub(super) fn clear(&mut self) {
         self.inverse.clear();
+        self.limits.clear();
     }
 
     /// The length that vectors must have for `solve`: the rows, to the end of the line.
@@ -41,8 +40,17 @@ impl Factor {
         backward(&self.l, self.stride, &self.inverse, self.len(), x);
     }
 
-    /// Appends a row whose `L^-1 g` is `d` and whose pivot is `pivot`.
-    pub(super) fn push(&mut self, d: &[f64], pivot: f64) {
+    /// `-(L L')^-1` times the limits: where the rows alone, no sign asked, would have their multipliers.
+    pub(super) fn optimum(&self) -> Vec<f64> {
+        let mut x: Vec<f64> = self.limits.iter().map(|y| -y).collect();
+        x.resize(self.padded(), 0.0);
+        self.backward(&mut x);
+        x.truncate(self.len());
+        x
+    }
+
+    /// Appends a row with this limit, whose `L^-1 g` is `d` and whose pivot is `pivot`.
+    pub(super) fn push(&mut self, d: &[f64], pivot: f64, limit: f64) {
         let m = self.len();
         self.reserve(m + 1);
         for (k, &d) in d[..m].iter().enumerate() {
@@ -50,53 +58,73 @@ impl Factor {
         }
         self.write(m, m, pivot);
         self.inverse.push(1.0 / pivot);
+        self.limits.push((limit - dot(&d[..m], &self.limits)) / pivot);
     }
 
     /// Appends rows, but none whose squared pivot is `least` or below, nor more than `most` in all; says which it took.
     ///
-    /// `products` has a column a new row: its products with the rows here, then with all the new ones.
-    pub(super) fn append(&mut self, products: &mut [f64], rows: usize, least: f64, most: usize) -> Vec<usize> {
-        let m = self.len();
+    /// `g` has a column of `stride` numbers a new row, its products with the rows here, then 0; `own` the products of
+    /// the new rows with each other.
+    pub(super) fn append(
+        &mut self,
+        g: &mut [f64],
+        stride: usize,
+        own: &mut [f64],
+        limits: &[f64],
+        least: f64,
+        most: usize,
+    ) -> Vec<usize> {
+        let (m, rows) = (self.len(), limits.len());
         self.reserve(m + rows);
-        let mut schur = vec![0.0; rows * rows];
-        for (column, products) in schur.chunks_exact_mut(rows).zip(products.chunks_exact(m + rows)) {
-            column.copy_from_slice(&products[m..]);
-        }
+        let mut limits = limits.to_vec();
         if m > 0 {
-            let l = MatRef::from_column_major_slice_with_stride(&self.l[..], m, m, self.stride);
-            let mut d = MatMut::from_column_major_slice_with_stride_mut(products, m, rows, m + rows);
-            solve_lower_triangular_in_place(l, d.as_mut(), Par::Seq);
-            let schur = MatMut::from_column_major_slice_mut(&mut schur, rows, rows);
-            matmul(schur, Accum::Add, d.as_ref().transpose(), d.as_ref(), -1.0, Par::Seq);
+            forward_many(&self.l, self.stride, &self.inverse, m, g, stride);
+            let mut products_of_d = vec![0.0; rows * rows];
+            products(g, g, stride, &mut products_of_d, rows);
+            for (own, d) in own.iter_mut().zip(&products_of_d) {
+                *own -= d;
+            }
+            for (limit, d) in limits.iter_mut().zip(g.chunks_exact(stride)) {
+                *limit -= dot(&d[..m], &self.limits);
+            }
         }
         let mut taken: Vec<usize> = Vec::with_capacity(rows);
         for k in 0..rows {
-            let pivot = schur[k * rows + k];
+            let pivot = own[k * rows + k];
             if pivot <= least || self.len() >= most {
                 continue;
             }
             let pivot = pivot.sqrt();
-            let at = self.len();
-            for (j, &d) in products[k * (m + rows)..][..m].iter().enumerate() {
-                self.write(at, j, d);
-            }
-            for (j, &other) in taken.iter().enumerate() {
-                self.write(at, m + j, schur[other * rows + k]);
-            }
-            self.write(at, at, pivot);
+            own[k * rows + k] = pivot;
+            let limit = limits[k] / pivot;
             self.inverse.push(1.0 / pivot);
+            self.limits.push(limit);
             taken.push(k);
-            let (before, after) = schur.split_at_mut((k + 1) * rows);
+            let (before, after) = own.split_at_mut((k + 1) * rows);
             let column = &mut before[k * rows + k + 1..];
             for d in &mut *column {
                 *d /= pivot;
             }
             for (i, other) in after.chunks_exact_mut(rows).enumerate() {
                 let by = column[i];
+                limits[k + 1 + i] -= by * limit;
                 for (product, d) in other[k + 1 + i..].iter_mut().zip(&column[i..]) {
                     *product -= by * d;
                 }
             }
+        }
+        let width = self.len().next_multiple_of(LANES);
+        for (j, column) in self.l.chunks_exact_mut(self.stride).take(m).enumerate() {
+            for (to, &k) in column[m..width].iter_mut().zip(&taken) {
+                *to = g[k * stride + j];
+            }
+            column[self.inverse.len()..width].fill(0.0);
+        }
+        for (j, (column, &other)) in self.l.chunks_exact_mut(self.stride).skip(m).zip(&taken).enumerate() {
+            for (to, &k) in column[m + j..width].iter_mut().zip(&taken[j..]) {
+                *to = own[other * rows + k];
+            }
+            column[self.inverse.len()..width].fill(0.0);
         }
         taken
     }
@@ -116,21 +144,26 @@ impl Factor {
             let column = &mut self.l[k * stride..][..width];
             if places.get(carries.len()) == Some(&k) {
                 carries.push(column.to_vec());
-                tails.push(d.as_ref().map_or(0.0, |d| d[k]));
+                tails.push((d.as_ref().map_or(0.0, |d| d[k]), self.limits[k]));
                 continue;
             }
             for (carry, tail) in carries.iter_mut().zip(&mut tails) {
                 let r = column[k].hypot(carry[k]);
                 let (c, s) = (column[k] / r, carry[k] / r);
-                rotate(c, s, &mut column[k..], &mut carry[k..]);
+                let line = k - k % LANES;
+                rotate(c, s, &mut column[line..], &mut carry[line..]);
+                let (of_d, of_limit) = tail;
                 if let Some(d) = d.as_deref_mut() {
-                    (d[k], *tail) = (c * d[k] + s * *tail, c * *tail - s * d[k]);
+                    (d[k], *of_d) = (c * d[k] + s * *of_d, c * *of_d - s * d[k]);
                 }
+                let limit = &mut self.limits[k];
+                (*limit, *of_limit) = (c * *limit + s * *of_limit, c * *of_limit - s * *limit);
             }
             let to = k - carries.len();
             if let Some(d) = d.as_deref_mut() {
                 d[to] = d[k];
             }
+            self.limits[to] = self.limits[k];
             let diagonal = column[k];
             close_up(column, m, &places[carries.len()..]);
             // Rows k and later stand `carries.len()` places too low; those above the diagonal do not matter.
@@ -140,6 +173,7 @@ impl Factor {
             self.inverse[to] = 1.0 / diagonal;
         }
         self.inverse.truncate(left);
+        self.limits.truncate(left);
         if let Some(d) = d {
             d.truncate(left);
             d.resize(left.next_multiple_of(LANES), 0.0);

@@ -33,30 +33,114 @@ impl std::ops::DerefMut for Aligned {
     }
 }
 
-/// `a b + c`, in one rounding where the machine has it.
-#[inline(always)]
-fn fused<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FUSED { a.mul_add(b, c) } else { a * b + c }
+/// Eight numbers in the machine's registers.
+trait Vector: Copy {
+    fn splat(value: f64) -> Self;
+    fn load(from: &[f64; LANES]) -> Self;
+    fn store(self, to: &mut [f64; LANES]);
+    /// `a b + self`.
+    fn add_product(self, a: Self, b: Self) -> Self;
+    fn total(self) -> f64;
 }
 
-#[inline(always)]
-fn add_product<const FUSED: bool>(sum: &mut [f64; LANES], a: &[f64; LANES], b: &[f64; LANES]) {
-    for l in 0..LANES {
-        sum[l] = fused::<FUSED>(a[l], b[l], sum[l]);
+impl Vector for [f64; LANES] {
+    #[inline(always)]
+    fn splat(value: f64) -> Self {
+        [value; LANES]
+    }
+    #[inline(always)]
+    fn load(from: &[f64; LANES]) -> Self {
+        *from
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f64; LANES]) {
+        *to = self;
+    }
+    #[inline(always)]
+    fn add_product(self, a: Self, b: Self) -> Self {
+        std::array::from_fn(|l| a[l] * b[l] + self[l])
+    }
+    #[inline(always)]
+    fn total(self) -> f64 {
+        let [a, b, c, d, e, f, g, h] = self;
+        ((a + e) + (c + g)) + ((b + f) + (d + h))
     }
 }
 
-#[inline(always)]
-fn add_scaled<const FUSED: bool>(sum: &mut [f64; LANES], a: f64, b: &[f64; LANES]) {
-    for l in 0..LANES {
-        sum[l] = fused::<FUSED>(a, b[l], sum[l]);
-    }
-}
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use std::arch::x86_64::*;
 
-#[inline(always)]
-fn total(lanes: &[f64; LANES]) -> f64 {
-    let [a, b, c, d, e, f, g, h] = *lanes;
-    ((a + e) + (c + g)) + ((b + f) + (d + h))
+    use super::{LANES, Vector};
+
+    /// A vector of AVX-512; made only in functions compiled for it.
+    #[derive(Clone, Copy)]
+    pub(super) struct Zmm(__m512d);
+
+    impl Vector for Zmm {
+        #[inline(always)]
+        fn splat(value: f64) -> Self {
+            // SAFETY: `kernel!` names this type only where the machine has AVX-512F.
+            Self(unsafe { _mm512_set1_pd(value) })
+        }
+        #[inline(always)]
+        fn load(from: &[f64; LANES]) -> Self {
+            // SAFETY: as above; eight numbers are read.
+            Self(unsafe { _mm512_loadu_pd(from.as_ptr()) })
+        }
+        #[inline(always)]
+        fn store(self, to: &mut [f64; LANES]) {
+            // SAFETY: as above; eight numbers are written.
+            unsafe { _mm512_storeu_pd(to.as_mut_ptr(), self.0) }
+        }
+        #[inline(always)]
+        fn add_product(self, a: Self, b: Self) -> Self {
+            // SAFETY: as above.
+            Self(unsafe { _mm512_fmadd_pd(a.0, b.0, self.0) })
+        }
+        #[inline(always)]
+        fn total(self) -> f64 {
+            // SAFETY: as above.
+            unsafe { _mm512_reduce_add_pd(self.0) }
+        }
+    }
+
+    /// Two vectors of AVX2; made only in functions compiled for it.
+    #[derive(Clone, Copy)]
+    pub(super) struct Ymm(__m256d, __m256d);
+
+    impl Vector for Ymm {
+        #[inline(always)]
+        fn splat(value: f64) -> Self {
+            // SAFETY: `kernel!` names this type only where the machine has AVX2 and FMA.
+            let one = unsafe { _mm256_set1_pd(value) };
+            Self(one, one)
+        }
+        #[inline(always)]
+        fn load(from: &[f64; LANES]) -> Self {
+            // SAFETY: as above; eight numbers are read.
+            unsafe { Self(_mm256_loadu_pd(from.as_ptr()), _mm256_loadu_pd(from[4..].as_ptr())) }
+        }
+        #[inline(always)]
+        fn store(self, to: &mut [f64; LANES]) {
+            // SAFETY: as above; eight numbers are written.
+            unsafe {
+                _mm256_storeu_pd(to.as_mut_ptr(), self.0);
+                _mm256_storeu_pd(to[4..].as_mut_ptr(), self.1);
+            }
+        }
+        #[inline(always)]
+        fn add_product(self, a: Self, b: Self) -> Self {
+            // SAFETY: as above.
+            unsafe { Self(_mm256_fmadd_pd(a.0, b.0, self.0), _mm256_fmadd_pd(a.1, b.1, self.1)) }
+        }
+        #[inline(always)]
+        fn total(self) -> f64 {
+            let mut lanes = [0.0; LANES];
+            self.store(&mut lanes);
+            lanes.total()
+        }
+    }
 }
 
 #[inline(always)]
@@ -69,29 +153,25 @@ fn lines_mut(numbers: &mut [f64]) -> &mut [[f64; LANES]] {
     numbers.as_chunks_mut().0
 }
 
-/// Defines a function compiled for AVX-512 and AVX2 with fused multiply-add, taken where the machine has them.
+/// Defines a function over vectors `V`, compiled for AVX-512, for AVX2 and plainly; the machine's widest is taken.
 macro_rules! kernel {
-    ($(#[$about:meta])* fn $name:ident<$fused:ident>($($argument:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
+    ($(#[$about:meta])* fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
         $(#[$about])*
         pub(super) fn $name($($argument: $kind),*) $(-> $out)? {
             #[inline(always)]
-            fn plain<const $fused: bool>($($argument: $kind),*) $(-> $out)? $body
+            fn plain<$vector: Vector>($($argument: $kind),*) $(-> $out)? $body
 
             #[cfg(target_arch = "x86_64")]
             {
-                #[target_feature(enable = "avx512f,avx512vl,avx512dq,fma")]
+                #[target_feature(enable = "avx512f,fma")]
                 fn avx512($($argument: $kind),*) $(-> $out)? {
-                    plain::<true>($($argument),*)
+                    plain::<x86::Zmm>($($argument),*)
                 }
                 #[target_feature(enable = "avx2,fma")]
                 fn avx2($($argument: $kind),*) $(-> $out)? {
-                    plain::<true>($($argument),*)
+                    plain::<x86::Ymm>($($argument),*)
                 }
-                if std::arch::is_x86_feature_detected!("avx512f")
-                    && std::arch::is_x86_feature_detected!("avx512vl")
-                    && std::arch::is_x86_feature_detected!("avx512dq")
-                    && std::arch::is_x86_feature_detected!("fma")
-                {
+                if std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("fma") {
                     // SAFETY: the machine was just asked and has these.
                     return unsafe { avx512($($argument),*) };
                 }
@@ -100,52 +180,68 @@ macro_rules! kernel {
                     return unsafe { avx2($($argument),*) };
                 }
             }
-            plain::<false>($($argument),*)
+            plain::<[f64; LANES]>($($argument),*)
         }
     };
 }
 
 kernel! {
     /// `a.b`; what does not fill a line counts too.
-    fn dot<FUSED>(a: &[f64], b: &[f64]) -> f64 {
-        let mut sums = [[0.0; LANES]; 4];
+    fn dot<V>(a: &[f64], b: &[f64]) -> f64 {
+        let mut sums = [V::splat(0.0); 4];
         let (a4, b4) = (lines(a).chunks_exact(4), lines(b).chunks_exact(4));
         for (x, y) in a4.clone().zip(b4.clone()) {
             for s in 0..4 {
-                add_product::<FUSED>(&mut sums[s], &x[s], &y[s]);
+                sums[s] = sums[s].add_product(V::load(&x[s]), V::load(&y[s]));
             }
         }
         for (x, y) in a4.remainder().iter().zip(b4.remainder()) {
-            add_product::<FUSED>(&mut sums[0], x, y);
+            sums[0] = sums[0].add_product(V::load(x), V::load(y));
         }
         let tail: f64 = a.as_chunks::<LANES>().1.iter().zip(b.as_chunks::<LANES>().1).map(|(x, y)| x * y).sum();
-        sums.iter().map(total).sum::<f64>() + tail
+        (sums[0].total() + sums[1].total()) + (sums[2].total() + sums[3].total()) + tail
+    }
+}
+
+/// Products of S rows with x, by vectors.
+#[inline(always)]
+fn times<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], x: &[[f64; LANES]]) -> [f64; S] {
+    let rows = rows.map(|row| &row[..x.len()]);
+    let mut sums = [V::splat(0.0); S];
+    for (i, x) in x.iter().enumerate() {
+        let x = V::load(x);
+        for s in 0..S {
+            sums[s] = sums[s].add_product(V::load(&rows[s][i]), x);
+        }
+    }
+    sums.map(V::total)
+}
+
+/// `sum += by[0] rows[0] + ..`, by vectors.
+#[inline(always)]
+fn add<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], by: [f64; S], sum: &mut [[f64; LANES]]) {
+    let rows = rows.map(|row| &row[..sum.len()]);
+    let by = by.map(V::splat);
+    for (i, sum) in sum.iter_mut().enumerate() {
+        let mut here = V::load(sum);
+        for s in 0..S {
+            here = here.add_product(by[s], V::load(&rows[s][i]));
+        }
+        here.store(sum);
     }
 }
 
 kernel! {
     /// `out[k] = rows[which[k]].x`; rows of `stride` numbers, a multiple of eight, the padding 0.
-    fn rows_times<FUSED>(rows: &[f64], stride: usize, which: &[usize], x: &[f64], out: &mut [f64]) {
+    fn rows_times<V>(rows: &[f64], stride: usize, which: &[usize], x: &[f64], out: &mut [f64]) {
         let x = lines(&x[..stride]);
-        for (which, out) in which.chunks(4).zip(out.chunks_mut(4)) {
-            if let ([a, b, c, d], [oa, ob, oc, od]) = (which, &mut *out) {
-                let row = |k: &usize| lines(&rows[k * stride..][..stride]);
-                let (a, b, c, d) = (row(a), row(b), row(c), row(d));
-                let mut sums = [[0.0; LANES]; 4];
-                for i in 0..x.len() {
-                    add_product::<FUSED>(&mut sums[0], &a[i], &x[i]);
-                    add_product::<FUSED>(&mut sums[1], &b[i], &x[i]);
-                    add_product::<FUSED>(&mut sums[2], &c[i], &x[i]);
-                    add_product::<FUSED>(&mut sums[3], &d[i], &x[i]);
-                }
-                [*oa, *ob, *oc, *od] = [total(&sums[0]), total(&sums[1]), total(&sums[2]), total(&sums[3])];
+        let row = |k: usize| lines(&rows[k * stride..][..stride]);
+        for (which, out) in which.chunks(LANES).zip(out.chunks_mut(LANES)) {
+            if let Ok(which) = <[usize; LANES]>::try_from(which) {
+                out.copy_from_slice(&times::<V, LANES>(which.map(row), x));
             } else {
-                for (k, out) in which.iter().zip(out) {
-                    let mut sum = [0.0; LANES];
-                    for (a, x) in lines(&rows[k * stride..][..stride]).iter().zip(x) {
-                        add_product::<FUSED>(&mut sum, a, x);
-                    }
-                    *out = total(&sum);
+                for (&k, out) in which.iter().zip(out) {
+                    [*out] = times::<V, 1>([row(k)], x);
                 }
             }
         }
@@ -154,70 +250,47 @@ kernel! {
 
 kernel! {
     /// `out += sum of by[k] rows[which[k]]`; rows as in `rows_times`.
-    fn add_rows<FUSED>(rows: &[f64], stride: usize, which: &[usize], by: &[f64], out: &mut [f64]) {
+    fn add_rows<V>(rows: &[f64], stride: usize, which: &[usize], by: &[f64], out: &mut [f64]) {
         let out = lines_mut(&mut out[..stride]);
-        for (which, by) in which.chunks(8).zip(by.chunks(8)) {
-            if let ([a, b, c, d, e, f, g, h], Ok(by)) = (which, <&[f64; 8]>::try_from(by)) {
-                let row = |k: &usize| lines(&rows[k * stride..][..stride]);
-                let (a, b, c, d, e, f, g, h) = (row(a), row(b), row(c), row(d), row(e), row(f), row(g), row(h));
-                for i in 0..out.len() {
-                    let mut sum = out[i];
-                    add_scaled::<FUSED>(&mut sum, by[0], &a[i]);
-                    add_scaled::<FUSED>(&mut sum, by[1], &b[i]);
-                    add_scaled::<FUSED>(&mut sum, by[2], &c[i]);
-                    add_scaled::<FUSED>(&mut sum, by[3], &d[i]);
-                    add_scaled::<FUSED>(&mut sum, by[4], &e[i]);
-                    add_scaled::<FUSED>(&mut sum, by[5], &f[i]);
-                    add_scaled::<FUSED>(&mut sum, by[6], &g[i]);
-                    add_scaled::<FUSED>(&mut sum, by[7], &h[i]);
-                    out[i] = sum;
-                }
+        let row = |k: usize| lines(&rows[k * stride..][..stride]);
+        for (which, by) in which.chunks(LANES).zip(by.chunks(LANES)) {
+            if let (Ok(which), Ok(by)) = (<[usize; LANES]>::try_from(which), by.try_into()) {
+                add::<V, LANES>(which.map(row), by, out);
             } else {
-                for (k, &by) in which.iter().zip(by) {
-                    for (sum, row) in out.iter_mut().zip(lines(&rows[k * stride..][..stride])) {
-                        add_scaled::<FUSED>(sum, by, row);
-                    }
+                for (&k, &by) in which.iter().zip(by) {
+                    add::<V, 1>([row(k)], [by], out);
                 }
             }
         }
     }
 }
 
+/// Solves for the unknowns k to k + here of `L x = x`, those before being out of it.
+#[inline(always)]
+fn triangle(l: &[f64], stride: usize, inverse: &[f64], k: usize, here: usize, x: &mut [f64]) {
+    for j in k..k + here {
+        x[j] *= inverse[j];
+        for i in j + 1..k + here {
+            x[i] -= x[j] * l[j * stride + i];
+        }
+    }
+}
+
+/// The eight columns from k on, below the rows that they solve.
+#[inline(always)]
+fn below(l: &[f64], stride: usize, k: usize, padded: usize) -> [&[[f64; LANES]]; LANES] {
+    std::array::from_fn(|j| lines(&l[(k + j) * stride + k + LANES..(k + j) * stride + padded]))
+}
+
 kernel! {
     /// Solves `L x = x` in place; L by columns of `stride`, the first `m`; lines beyond `m` are 0.
-    fn forward<FUSED>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
+    fn forward<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
         let padded = m.next_multiple_of(LANES);
         for k in (0..m).step_by(LANES) {
-            let here = (m - k).min(LANES);
-            for j in k..k + here {
-                x[j] *= inverse[j];
-                let by = -x[j];
-                for i in j + 1..k + here {
-                    x[i] = fused::<FUSED>(by, l[j * stride + i], x[i]);
-                }
-            }
-            if here == LANES && k + LANES < padded {
-                let column = |j: usize| lines(&l[(k + j) * stride + k + LANES..(k + j) * stride + padded]);
-                let by: [f64; LANES] = std::array::from_fn(|j| -x[k + j]);
-                let (a, b, c, d) = (column(0), column(1), column(2), column(3));
-                let (e, f, g, h) = (column(4), column(5), column(6), column(7));
-                let rest = lines_mut(&mut x[k + LANES..padded]);
-                for i in 0..rest.len() {
-                    let mut sum = rest[i];
-                    let mut other = [0.0; LANES];
-                    add_scaled::<FUSED>(&mut sum, by[0], &a[i]);
-                    add_scaled::<FUSED>(&mut other, by[1], &b[i]);
-                    add_scaled::<FUSED>(&mut sum, by[2], &c[i]);
-                    add_scaled::<FUSED>(&mut other, by[3], &d[i]);
-                    add_scaled::<FUSED>(&mut sum, by[4], &e[i]);
-                    add_scaled::<FUSED>(&mut other, by[5], &f[i]);
-                    add_scaled::<FUSED>(&mut sum, by[6], &g[i]);
-                    add_scaled::<FUSED>(&mut other, by[7], &h[i]);
-                    for l in 0..LANES {
-                        sum[l] += other[l];
-                    }
-                    rest[i] = sum;
-                }
+            triangle(l, stride, inverse, k, (m - k).min(LANES), x);
+            if k + LANES < padded {
+                let by = std::array::from_fn(|j| -x[k + j]);
+                add::<V, LANES>(below(l, stride, k, padded), by, lines_mut(&mut x[k + LANES..padded]));
             }
         }
     }
@@ -225,48 +298,122 @@ kernel! {
 
 kernel! {
     /// Solves `L' x = x` in place; L as in `forward`.
-    fn backward<FUSED>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
+    fn backward<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
         let padded = m.next_multiple_of(LANES);
         for k in (0..m).step_by(LANES).rev() {
-            let here = (m - k).min(LANES);
-            if here == LANES && k + LANES < padded {
-                let column = |j: usize| lines(&l[(k + j) * stride + k + LANES..(k + j) * stride + padded]);
-                let (a, b, c, d) = (column(0), column(1), column(2), column(3));
-                let (e, f, g, h) = (column(4), column(5), column(6), column(7));
-                let mut sums = [[0.0; LANES]; LANES];
-                let rest = lines(&x[k + LANES..padded]);
-                for i in 0..rest.len() {
-                    add_product::<FUSED>(&mut sums[0], &a[i], &rest[i]);
-                    add_product::<FUSED>(&mut sums[1], &b[i], &rest[i]);
-                    add_product::<FUSED>(&mut sums[2], &c[i], &rest[i]);
-                    add_product::<FUSED>(&mut sums[3], &d[i], &rest[i]);
-                    add_product::<FUSED>(&mut sums[4], &e[i], &rest[i]);
-                    add_product::<FUSED>(&mut sums[5], &f[i], &rest[i]);
-                    add_product::<FUSED>(&mut sums[6], &g[i], &rest[i]);
-                    add_product::<FUSED>(&mut sums[7], &h[i], &rest[i]);
-                }
+            if k + LANES < padded {
+                let sums = times::<V, LANES>(below(l, stride, k, padded), lines(&x[k + LANES..padded]));
                 for j in 0..LANES {
-                    x[k + j] -= total(&sums[j]);
+                    x[k + j] -= sums[j];
                 }
             }
+            let here = (m - k).min(LANES);
             for j in (k..k + here).rev() {
-                let mut sum = x[j];
                 for i in j + 1..k + here {
-                    sum = fused::<FUSED>(-l[j * stride + i], x[i], sum);
+                    x[j] -= l[j * stride + i] * x[i];
                 }
-                x[j] = sum * inverse[j];
+                x[j] *= inverse[j];
             }
         }
     }
 }
 
 kernel! {
-    /// Turns `(x, y)` by a plane rotation: `x = c x + s y`, `y = c y - s x`.
-    fn rotate<FUSED>(c: f64, s: f64, x: &mut [f64], y: &mut [f64]) {
-        for (x, y) in x.iter_mut().zip(y) {
-            let old = *x;
-            *x = fused::<FUSED>(s, *y, c * old);
-            *y = fused::<FUSED>(-s, old, c * *y);
+    /// `forward` for many right sides, columns of `x_stride` numbers each.
+    fn forward_many<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64], x_stride: usize) {
+        let padded = m.next_multiple_of(LANES);
+        // Few enough right sides that they stay near while L passes by.
+        for x in x.chunks_mut(16 * x_stride) {
+            for k in (0..m).step_by(LANES) {
+                for x in x.chunks_exact_mut(x_stride) {
+                    triangle(l, stride, inverse, k, (m - k).min(LANES), x);
+                }
+                if k + LANES >= padded {
+                    continue;
+                }
+                let columns = below(l, stride, k, padded);
+                for x in x.chunks_mut(2 * x_stride) {
+                    if x.len() == 2 * x_stride {
+                        let (a, b) = x.split_at_mut(x_stride);
+                        let (a, b) = (&mut a[k..padded], &mut b[k..padded]);
+                        let ((of_a, a), (of_b, b)) = (a.split_at_mut(LANES), b.split_at_mut(LANES));
+                        let of_a: [V; LANES] = std::array::from_fn(|j| V::splat(-of_a[j]));
+                        let of_b: [V; LANES] = std::array::from_fn(|j| V::splat(-of_b[j]));
+                        let columns = columns.map(|column| &column[..a.len() / LANES]);
+                        for (i, (a, b)) in lines_mut(a).iter_mut().zip(lines_mut(b)).enumerate() {
+                            let (mut sum_a, mut sum_b) = (V::load(a), V::load(b));
+                            for j in 0..LANES {
+                                let column = V::load(&columns[j][i]);
+                                sum_a = sum_a.add_product(of_a[j], column);
+                                sum_b = sum_b.add_product(of_b[j], column);
+                            }
+                            sum_a.store(a);
+                            sum_b.store(b);
+                        }
+                    } else {
+                        let by = std::array::from_fn(|j| -x[k + j]);
+                        add::<V, LANES>(columns, by, lines_mut(&mut x[k + LANES..padded]));
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Rows of the left and of the right whose products are summed at once, and how many coefficients of each.
+const LEFT: usize = 4;
+const RIGHT: usize = 6;
+const DEEP: usize = 512;
+
+kernel! {
+    /// `out[i][j] += left[i].right[j]`: all products of two sets of rows, of `stride` numbers each; `out` by rows of `width`.
+    fn products<V>(left: &[f64], right: &[f64], stride: usize, out: &mut [f64], width: usize) {
+        for from in (0..stride).step_by(DEEP) {
+            let to = (from + DEEP).min(stride);
+            for (left, out) in left.chunks(128 * stride).zip(out.chunks_mut(128 * width)) {
+                for (r, right) in right.chunks(RIGHT * stride).enumerate() {
+                    for (left, out) in left.chunks(LEFT * stride).zip(out.chunks_mut(LEFT * width)) {
+                        if left.len() == LEFT * stride && right.len() == RIGHT * stride {
+                            let a: [_; LEFT] = std::array::from_fn(|i| lines(&left[i * stride + from..i * stride + to]));
+                            let b: [_; RIGHT] = std::array::from_fn(|j| lines(&right[j * stride + from..j * stride + to]));
+                            let mut sums = [[V::splat(0.0); RIGHT]; LEFT];
+                            for k in 0..(to - from) / LANES {
+                                let b: [V; RIGHT] = std::array::from_fn(|j| V::load(&b[j][k]));
+                                for i in 0..LEFT {
+                                    let a = V::load(&a[i][k]);
+                                    for j in 0..RIGHT {
+                                        sums[i][j] = sums[i][j].add_product(a, b[j]);
+                                    }
+                                }
+                            }
+                            for i in 0..LEFT {
+                                for j in 0..RIGHT {
+                                    out[i * width + r * RIGHT + j] += sums[i][j].total();
+                                }
+                            }
+                        } else {
+                            for (i, left) in left.chunks_exact(stride).enumerate() {
+                                for (j, right) in right.chunks_exact(stride).enumerate() {
+                                    let [sum] = times::<V, 1>([lines(&left[from..to])], lines(&right[from..to]));
+                                    out[i * width + r * RIGHT + j] += sum;
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+kernel! {
+    /// Turns `(x, y)` by a plane rotation: `x = c x + s y`, `y = c y - s x`; both of whole lines.
+    fn rotate<V>(c: f64, s: f64, x: &mut [f64], y: &mut [f64]) {
+        let (c, s, minus, zero) = (V::splat(c), V::splat(s), V::splat(-s), V::splat(0.0));
+        for (x, y) in lines_mut(x).iter_mut().zip(lines_mut(y)) {
+            let (a, b) = (V::load(x), V::load(y));
+            zero.add_product(c, a).add_product(s, b).store(x);
+            zero.add_product(c, b).add_product(minus, a).store(y);
         }
     }
 }
