@@ -313,6 +313,14 @@ SOUND: dict[str, Sound] = {
         engine="native",
         max_seconds=60.0,
     ),
+    "taxel.learn.OnlineConeR": plain(taxel.learn.OnlineConeR, window=3),
+    "taxel.learn.OnlineConeR.partial_fit": lambda: (
+        taxel.learn.OnlineConeR(window=3, tau=5.0, ub=1.0).partial_fit,
+        {"pattern": PLAIN, "targets": [5.0]},
+    ),
+    "taxel.learn.OnlineConeR.fit": method(
+        taxel.learn.OnlineConeR(window=3, tau=5.0, ub=1.0), "fit", patterns=[PLAIN], targets=[[5.0]]
+    ),
     "taxel.learn.ConeR.fit": method(
         CONE, "fit", patterns=[PLAIN], targets=[[5.0]], start=[0.1] * 4, progress=lambda *_: None
     ),

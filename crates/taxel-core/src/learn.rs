@@ -16,6 +16,7 @@ mod inst;
 mod minimise;
 #[allow(dead_code)]
 mod mixed;
+mod online_cone_r;
 mod point;
 mod psd;
 mod resume;
@@ -39,6 +40,7 @@ pub use filt::Filt;
 pub use fp::Fp;
 pub use htp::Htp;
 pub use inst::Inst;
+pub use online_cone_r::OnlineConeR;
 pub use psd::Psd;
 pub use resume::Resume;
 pub use rival::{Law, Rival};
@@ -97,51 +99,64 @@ fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>
         ));
     }
     for (p, (pattern, targets)) in patterns.iter().zip(targets).enumerate() {
-        pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
-        if pattern.is_empty() {
-            return Err(problem!("pattern {p}: has no train"));
-        }
-        if pattern.len() != patterns[0].len() {
-            return Err(problem!("pattern {p}: {} trains, pattern 0 has {}", pattern.len(), patterns[0].len()));
-        }
-        if pattern.times.is_empty() {
-            return Err(problem!("pattern {p}: has no spike, so no weight can matter in it"));
-        }
-        if pattern.values.is_some() {
-            return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
-        }
-        for (k, &t) in targets.iter().enumerate() {
-            if !t.is_finite() {
-                return Err(problem!("pattern {p}, target {k}: time is {t}, must be finite"));
-            }
-            if t < pattern.start || t > pattern.stop {
-                return Err(problem!(
-                    "pattern {p}, target {k}: {t} ms lies outside the pattern's window {} to {} ms",
-                    pattern.start,
-                    pattern.stop
-                ));
-            }
-            if k == 0 {
-                continue;
-            }
-            let since = t - targets[k - 1];
-            if since <= 0.0 {
-                return Err(problem!(
-                    "pattern {p}, target {k}: {t} ms comes after {} ms, targets must ascend",
-                    targets[k - 1]
-                ));
-            }
-            if since <= neuron.refractory {
-                return Err(problem!(
-                    "pattern {p}, target {k} ({t} ms): {since} ms after target {}, inside the refractory {} ms",
-                    k - 1,
-                    neuron.refractory
-                ));
-            }
-        }
+        check_example(neuron, p, pattern, targets)?;
+        check_trains(p, pattern, patterns[0].len())?;
     }
     if targets.iter().all(Vec::is_empty) {
         return Err(problem!("targets: no pattern has one, so nothing is to be learnt"));
     }
     Ok(())
+}
+
+/// Checks one pattern, number `p`, and its targets.
+fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<()> {
+    pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
+    if pattern.is_empty() {
+        return Err(problem!("pattern {p}: has no train"));
+    }
+    if pattern.times.is_empty() {
+        return Err(problem!("pattern {p}: has no spike, so no weight can matter in it"));
+    }
+    if pattern.values.is_some() {
+        return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
+    }
+    for (k, &t) in targets.iter().enumerate() {
+        if !t.is_finite() {
+            return Err(problem!("pattern {p}, target {k}: time is {t}, must be finite"));
+        }
+        if t < pattern.start || t > pattern.stop {
+            return Err(problem!(
+                "pattern {p}, target {k}: {t} ms lies outside the pattern's window {} to {} ms",
+                pattern.start,
+                pattern.stop
+            ));
+        }
+        if k == 0 {
+            continue;
+        }
+        let since = t - targets[k - 1];
+        if since <= 0.0 {
+            return Err(problem!(
+                "pattern {p}, target {k}: {t} ms comes after {} ms, targets must ascend",
+                targets[k - 1]
+            ));
+        }
+        if since <= neuron.refractory {
+            return Err(problem!(
+                "pattern {p}, target {k} ({t} ms): {since} ms after target {}, inside the refractory {} ms",
+                k - 1,
+                neuron.refractory
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Checks that a pattern has the trains that pattern 0 has.
+fn check_trains(p: usize, pattern: &SpikeTrains, trains: usize) -> Result<()> {
+    if pattern.len() == trains {
+        Ok(())
+    } else {
+        Err(problem!("pattern {p}: {} trains, pattern 0 has {trains}", pattern.len()))
+    }
 }

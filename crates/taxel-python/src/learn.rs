@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
+use taxel_core::learn as core_learn;
 use taxel_core::learn::{ConeR, Engine, Fit, Problem, Round, Shares, Status};
 use taxel_core::{Stop, problem};
 
@@ -104,6 +105,43 @@ impl ConeRProblem {
     }
 }
 
+/// A sliding window of patterns and its last fit.
+#[pyclass]
+struct OnlineConeR {
+    window: core_learn::OnlineConeR,
+    max_seconds: Option<f64>,
+}
+
+#[pymethods]
+impl OnlineConeR {
+    #[new]
+    fn new(parameters: &str, window: usize) -> PyResult<Self> {
+        let parameters = to_cone_r(parameters)?;
+        let window = core_learn::OnlineConeR::new(&parameters, window).map_err(core)?;
+        Ok(Self { window, max_seconds: parameters.max_seconds })
+    }
+
+    #[getter]
+    fn patterns(&self) -> usize {
+        self.window.patterns()
+    }
+
+    #[getter]
+    fn silent_rows(&self) -> usize {
+        self.window.silent_rows()
+    }
+
+    fn add(&mut self, pattern: SpikesIn<'_>, targets: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+        self.window.add(&to_spikes(pattern)?, slice("targets", &targets)?).map_err(core)
+    }
+
+    /// A fit, and the exception of a signal that ended it early.
+    fn fit<'py>(&mut self, py: Python<'py>) -> PyResult<(FitOut<'py>, Option<Py<PyAny>>)> {
+        let (fit, signal) = enter_keeping(py, self.max_seconds, |stop| self.window.fit(&mut |_| {}, stop))?;
+        Ok((fit_out(py, fit), signal))
+    }
+}
+
 /// Weights of an earlier fit, and its multipliers where it was of the same rows.
 type StartIn<'py> = (PyReadonlyArray1<'py, f64>, Option<MultipliersIn<'py>>);
 
@@ -128,5 +166,6 @@ fn fit_out(py: Python<'_>, fit: Fit) -> FitOut<'_> {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(check_cone_r, module)?)?;
-    module.add_class::<ConeRProblem>()
+    module.add_class::<ConeRProblem>()?;
+    module.add_class::<OnlineConeR>()
 }

@@ -8,6 +8,7 @@ from taxel.learn.filt import FILT
 from taxel.learn.fp import FP
 from taxel.learn.htp import HTP
 from taxel.learn.inst import INST
+from taxel.learn.online_cone_r import OnlineConeR
 from taxel.learn.psd import PSD
 from taxel.learn.resume import ReSuMe
 from taxel.learn.skim import SKIM
@@ -29,6 +30,7 @@ __all__ = [
     "ConeX",
     "ConeXProblem",
     "Margin",
+    "OnlineConeR",
     "ReSuMe",
     "Row",
     "Tempotron",

@@ -231,8 +231,11 @@ class ConeR:
         """
         return ConeRProblem(self, patterns, targets)
 
+    def _values(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if not (name.endswith("_") or name.startswith("_"))}
+
     def _json(self) -> str:
-        values = {name: value for name, value in vars(self).items() if not (name.endswith("_") or name.startswith("_"))}
+        values = self._values()
         neuron = {name: values.pop(name) for name in _NEURON}
         return parameters({"neuron": {**neuron, "time": "grid"}, **values})
 
@@ -289,7 +292,7 @@ class ConeRProblem:
         if progress is not None:
             callback("progress", progress)
         found, signal = self._problem.fit(instance("cone", cone, ConeR)._json(), first, progress)
-        _keep(cone, found, self)
+        _keep(cone, found, self.silent_rows, self._problem.rows)
         if signal is not None:
             raise signal
         _warn(cone)
@@ -304,7 +307,7 @@ class ConeRProblem:
         return start.weights_, multipliers if rows == self._problem.rows else None
 
 
-def _keep(cone: ConeR, found: Any, problem: Any) -> None:
+def _keep(cone: ConeR, found: Any, silent_rows: int, all_rows: int) -> None:
     """Put what was found on the learner."""
     weights, objective, parts, gap, (rounds, rows, solved, native), (unreachable, refires), multipliers = found
     cone.weights_ = weights
@@ -313,11 +316,11 @@ def _keep(cone: ConeR, found: Any, problem: Any) -> None:
     cone.gap_ = gap
     cone.status_ = "solved" if solved else "stopped"
     cone.engine_ = "native" if native else "cone solver"
-    cone.rounds_, cone.rows_, cone.silent_rows_ = rounds, rows, problem.silent_rows
+    cone.rounds_, cone.rows_, cone.silent_rows_ = rounds, rows, silent_rows
     cone.unreachable_ = unreachable
     cone.refires_ = refires
     cone.neuron_ = Neuron(**{name: getattr(cone, name) for name in _NEURON}, time="grid")
-    cone._multipliers = (problem._problem.rows, multipliers)
+    cone._multipliers = (all_rows, multipliers)
 
 
 def _shown(bound: float | Sequence[float]) -> str:

@@ -4,10 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::augmented::Start;
 use super::bounds::{Bound, bounds_of, check_bounds};
-use super::check_examples;
-use super::point::dot;
+use super::point::{add, dot};
 use super::rounds::START_NEAR_MS;
-use super::rows::{SilentRows, TargetRow, target_rows};
+use super::rows::{Layout, SilentRows, TargetRow, target_rows};
+use super::{check_examples, check_trains};
 use crate::neuron::{Neuron, Time};
 use crate::{Result, SpikeTrains, Stop, problem};
 
@@ -147,6 +147,20 @@ impl ConeR {
         self.delta_t_ms.unwrap_or(0.1 * self.neuron.tau)
     }
 
+    /// Checks that the horizon lies behind the last target of pattern `p`.
+    pub(super) fn check_horizon(&self, p: usize, targets: &[f64]) -> Result<()> {
+        match (self.horizon, targets.last()) {
+            (Some(horizon), Some(&last)) if last > horizon => {
+                Err(problem!("pattern {p}: last target at {last} ms, the horizon is {horizon} ms"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    pub(super) fn layout(&self) -> Layout<'_> {
+        Layout { neuron: &self.neuron, horizon: self.horizon, margin: self.margin, near_ms: START_NEAR_MS }
+    }
+
     /// `lambda` over its sum, as in 6.3.3.
     fn shares(&self) -> [f64; 5] {
         let sum: f64 = self.lambdas.iter().sum();
@@ -283,30 +297,90 @@ impl Problem {
         parameters.check()?;
         let neuron = &parameters.neuron;
         check_examples(neuron, patterns, targets)?;
-        if let Some(horizon) = parameters.horizon {
-            for (p, targets) in targets.iter().enumerate() {
-                if let Some(last) = targets.last().filter(|&&t| t > horizon) {
-                    return Err(problem!("pattern {p}: last target at {last} ms, the horizon is {horizon} ms"));
-                }
-            }
+        for (p, targets) in targets.iter().enumerate() {
+            parameters.check_horizon(p, targets)?;
         }
+        Self::laid_out(parameters, patterns, targets, stop)
+    }
+
+    /// Lays out one pattern, which may be without targets: others will follow.
+    pub(super) fn of_one(parameters: &ConeR, pattern: &SpikeTrains, targets: &[f64]) -> Result<Self> {
+        Self::laid_out(parameters, std::slice::from_ref(pattern), &[targets.to_vec()], Stop::never())
+    }
+
+    fn laid_out(parameters: &ConeR, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Self> {
+        let neuron = &parameters.neuron;
         let rows = target_rows(neuron, parameters.delta_t(), patterns, targets);
         stop.check()?;
-        let (horizon, margin) = (parameters.horizon, parameters.margin);
-        let silent = SilentRows::new(neuron, horizon, margin, START_NEAR_MS, patterns, targets, stop)?;
+        let silent = SilentRows::new(parameters.layout(), patterns, targets, stop)?;
         let trains = patterns[0].len();
-        let behind: Vec<f64> = rows.iter().flat_map(|r| r.behind.iter().copied()).collect();
-        let mut gram = vec![0.0; trains * trains];
-        for row in &rows {
+        let mut problem = Self {
+            base: parameters.clone(),
+            patterns: patterns.to_vec(),
+            trains,
+            targets: rows,
+            silent,
+            behind: vec![],
+            gram: vec![0.0; trains * trains],
+        };
+        for k in 0..problem.targets.len() {
             stop.check()?;
-            for (column, &v) in gram.chunks_exact_mut(trains).zip(&row.behind) {
-                if v != 0.0 {
-                    column.iter_mut().zip(&row.behind).for_each(|(g, r)| *g += v * r);
-                }
-            }
+            problem.lift(k, 1.0);
         }
-        let patterns = patterns.to_vec();
-        Ok(Self { base: parameters.clone(), patterns, trains, targets: rows, silent, behind, gram })
+        Ok(problem)
+    }
+
+    /// Counts the row behind target `k` into B's matrix, or, with -1, out of it.
+    fn lift(&mut self, k: usize, sign: f64) {
+        let row = &self.targets[k].behind;
+        if sign > 0.0 {
+            self.behind.extend_from_slice(row);
+        }
+        for (column, &v) in self.gram.chunks_exact_mut(self.trains).zip(row) {
+            add(column, sign * v, row);
+        }
+    }
+
+    /// Adds one more pattern; gives how many silent and free rows it has.
+    pub(super) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64]) -> usize {
+        let before = self.silent.len();
+        self.silent.push(self.base.layout(), pattern, targets);
+        let (neuron, delta_t) = (&self.base.neuron, self.base.delta_t());
+        let rows = target_rows(neuron, delta_t, std::slice::from_ref(pattern), &[targets.to_vec()]);
+        let number = self.patterns.len();
+        self.patterns.push(pattern.clone());
+        for row in rows {
+            self.targets.push(TargetRow { pattern: number, ..row });
+            self.lift(self.targets.len() - 1, 1.0);
+        }
+        self.silent.len() - before
+    }
+
+    /// Takes the first pattern away; gives how many silent and free rows, and how many targets, went with it.
+    pub(super) fn drop_first(&mut self) -> (usize, usize) {
+        let before = self.silent.len();
+        self.silent.drop_first();
+        self.patterns.remove(0);
+        let gone = self.targets.partition_point(|row| row.pattern == 0);
+        for k in 0..gone {
+            self.lift(k, -1.0);
+        }
+        self.behind.drain(..gone * self.trains);
+        self.targets.drain(..gone);
+        self.targets.iter_mut().for_each(|row| row.pattern -= 1);
+        (before - self.silent.len(), gone)
+    }
+
+    pub(super) fn check_trains(&self, p: usize, pattern: &SpikeTrains) -> Result<()> {
+        check_trains(p, pattern, self.trains)
+    }
+
+    pub(super) fn patterns(&self) -> usize {
+        self.patterns.len()
+    }
+
+    pub(super) fn silent_and_free_rows(&self) -> usize {
+        self.silent.len()
     }
 
     /// How many rows there are: silent ones, grid points at which nothing is asked, targets.
@@ -349,7 +423,7 @@ impl Problem {
             },
             b: match parameters.divide_b_by {
                 Divisor::Largest => over(b, b_max),
-                Divisor::Targets => b / self.targets.len() as f64,
+                Divisor::Targets => b / self.targets.len().max(1) as f64,
             },
             c: over(c, c_max),
             d: over(d, d_max),
@@ -376,6 +450,18 @@ impl Problem {
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
     ) -> Result<Fit> {
+        self.fit_counting(parameters, start, None, progress, stop)
+    }
+
+    /// As `fit`; counts refiring on one pattern alone where one is named.
+    pub(super) fn fit_counting(
+        &self,
+        parameters: &ConeR,
+        start: Option<(&[f64], Option<&Shares>)>,
+        pattern: Option<usize>,
+        progress: &mut dyn FnMut(Round),
+        stop: Stop<'_>,
+    ) -> Result<Fit> {
         self.check_same_rows(parameters)?;
         let objective = self.objective(parameters)?;
         let start = self.start_from(&objective, start)?;
@@ -391,7 +477,7 @@ impl Problem {
             engine: found.engine,
             multipliers: Shares { rows: kept().map(|s| s.0).collect(), values: kept().map(|s| *s.1).collect() },
             unreachable: self.unreachable(&objective),
-            refires: self.refires(&found.weights)?,
+            refires: self.refires(&found.weights, pattern)?,
             weights: found.weights,
         })
     }
@@ -443,9 +529,9 @@ impl Problem {
         self.targets.iter().filter(out_of_reach).map(|r| (r.pattern, r.target)).collect()
     }
 
-    fn refires(&self, weights: &[f64]) -> Result<usize> {
+    fn refires(&self, weights: &[f64], only: Option<usize>) -> Result<usize> {
         let mut refires = 0;
-        for (p, pattern) in self.patterns.iter().enumerate() {
+        for (p, pattern) in self.patterns.iter().enumerate().filter(|(p, _)| only.is_none_or(|one| one == *p)) {
             let spikes = self.base.neuron.run(weights, pattern, 1.0, Stop::never())?;
             let targets: Vec<f64> = self.targets.iter().filter(|r| r.pattern == p).map(|r| r.t).collect();
             let again = |a: f64, b: f64| b - a <= self.base.neuron.tau && !targets.iter().any(|&t| a < t && t <= b);

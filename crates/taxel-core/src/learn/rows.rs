@@ -35,15 +35,27 @@ struct GridInput {
     b: f64,
 }
 
+/// A grid point at which the state of the kernels jumps, and what makes it jump.
+#[derive(Debug, Clone, Copy)]
+struct Station {
+    point: u32,
+    /// Everything before is lost here (`Reset`), ahead of the inputs.
+    reset: bool,
+    /// Where the inputs that come here end among all of the sheet; they begin where those of the station before end.
+    inputs: u32,
+}
+
 /// The silent rows of one pattern.
 #[derive(Debug, Clone)]
 struct Sheet {
     inputs: Vec<GridInput>,
-    /// Grid points at which everything before is lost (`Reset`), ascending.
-    resets: Vec<u32>,
+    /// Ascending by point.
+    stations: Vec<Station>,
     /// The number of its first row among all.
     first: usize,
     points: usize,
+    /// How many targets its pattern has.
+    targets: usize,
 }
 
 /// All silent rows: one a grid point that lies neither at a target nor in the refractory time behind it.
@@ -53,12 +65,47 @@ pub(super) struct SilentRows {
     trains: usize,
     shape: Shape,
     step_ms: f64,
-    /// One grid step.
-    step: Step,
+    /// What 0, 1, 2 ... grid steps do: so a run of points without an input needs no recursion.
+    steps: Steps,
     /// What the potential must not exceed, mV; infinite where nothing is asked.
     pub(super) limit: Vec<f64>,
     /// The rows (by number) of each target's pattern that lie in the `near_ms` before it.
     pub(super) before_targets: Vec<std::ops::Range<usize>>,
+}
+
+/// The entries of `Step` for so many grid steps.
+#[derive(Debug, Clone)]
+struct Steps {
+    aa: [f64; RUN + 1],
+    ba: [f64; RUN + 1],
+    bb: [f64; RUN + 1],
+}
+
+/// The longest run of points that is done in one go.
+const RUN: usize = 128;
+
+impl Steps {
+    fn new(shape: Shape, step_ms: f64) -> Self {
+        let step = |k: usize| shape.step(k as f64 * step_ms);
+        Self {
+            aa: std::array::from_fn(|k| step(k).aa),
+            ba: std::array::from_fn(|k| step(k).ba),
+            bb: std::array::from_fn(|k| step(k).bb),
+        }
+    }
+
+    fn of(&self, k: usize) -> Step {
+        Step { aa: self.aa[k], ba: self.ba[k], bb: self.bb[k] }
+    }
+}
+
+/// What a pattern's silent rows are laid out with.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layout<'a> {
+    pub(super) neuron: &'a Neuron,
+    pub(super) horizon: Option<f64>,
+    pub(super) margin: f64,
+    pub(super) near_ms: f64,
 }
 
 /// The last target before `t`, or none.
@@ -123,61 +170,84 @@ fn lost(neuron: &Neuron, targets: &[f64], s: f64, t: f64) -> bool {
 impl SilentRows {
     /// Lays the grid over each pattern, from its start to its stop, or one `tau` past its last target, or `horizon`.
     pub(super) fn new(
-        neuron: &Neuron,
-        horizon: Option<f64>,
-        margin: f64,
-        near_ms: f64,
+        layout: Layout<'_>,
         patterns: &[SpikeTrains],
         targets: &[Vec<f64>],
         stop: Stop<'_>,
     ) -> Result<Self> {
-        let step = neuron.step_ms;
-        let shape = neuron.shape();
-        let (mut sheets, mut limit, mut before_targets) = (Vec::new(), Vec::new(), Vec::new());
+        let (shape, step_ms) = (layout.neuron.shape(), layout.neuron.step_ms);
+        let mut rows = Self {
+            sheets: vec![],
+            trains: patterns[0].len(),
+            shape,
+            step_ms,
+            steps: Steps::new(shape, step_ms),
+            limit: vec![],
+            before_targets: vec![],
+        };
         for (pattern, targets) in patterns.iter().zip(targets) {
             stop.check()?;
-            let time = |point: f64| pattern.start + point * step;
-            let last = targets.last().map_or(pattern.stop, |t| pattern.stop.max(t + neuron.tau));
-            let end = horizon.unwrap_or(last);
-            let points = (((end - pattern.start) / step + EDGE).floor() + 1.0).max(0.0) as usize;
-            let first = limit.len();
-            let mut next = 0;
-            for k in 0..points {
-                let t = time(k as f64);
-                while next < targets.len() && targets[next] + neuron.refractory + EDGE < t {
-                    next += 1;
-                }
-                let free = next < targets.len() && targets[next] - EDGE <= t;
-                limit.push(if free { f64::INFINITY } else { threshold(neuron, pattern.start, targets, t) - margin });
-            }
-            let point_after = |t: f64| {
-                let k = ((t - pattern.start) / step).floor() as u32;
-                if time(f64::from(k)) > t { k } else { k + 1 }
-            };
-            for &t in targets {
-                let after = (point_after(t) as usize).min(points);
-                let near = (near_ms / step).ceil() as usize;
-                before_targets.push(first + after.saturating_sub(near + 1)..first + after);
-            }
-            let mut inputs = Vec::with_capacity(pattern.times.len());
-            for spike in pattern.by_time() {
-                let point = ((spike.t - pattern.start) / step).ceil();
-                // An input on a point itself is felt behind it; where its kernel begins above 0, from the next point on.
-                let late = time(point) - spike.t <= 0.0 && shape.input().b != 0.0;
-                let felt = if late { point + 1.0 } else { point };
-                if felt < points as f64 && !lost(neuron, targets, spike.t, time(felt)) {
-                    let State { a, b } = shape.after(shape.input(), (time(felt) - spike.t).max(0.0));
-                    inputs.push(GridInput { point: felt as u32, train: spike.train, a, b });
-                }
-            }
-            let resets = match neuron.after_spike {
-                AfterSpike::Reset => targets.iter().map(|&t| point_after(t)).collect(),
-                AfterSpike::Keep | AfterSpike::Ignore => vec![],
-            };
-            sheets.push(Sheet { inputs, resets, first, points });
+            rows.push(layout, pattern, targets);
         }
-        let trains = patterns[0].len();
-        Ok(Self { sheets, trains, shape, step_ms: step, step: shape.step(step), limit, before_targets })
+        Ok(rows)
+    }
+
+    /// Adds the rows of one more pattern.
+    pub(super) fn push(&mut self, layout: Layout<'_>, pattern: &SpikeTrains, targets: &[f64]) {
+        let Layout { neuron, horizon, margin, near_ms } = layout;
+        let step = self.step_ms;
+        let time = |point: f64| pattern.start + point * step;
+        let last = targets.last().map_or(pattern.stop, |t| pattern.stop.max(t + neuron.tau));
+        let end = horizon.unwrap_or(last);
+        let points = (((end - pattern.start) / step + EDGE).floor() + 1.0).max(0.0) as usize;
+        let first = self.limit.len();
+        let mut next = 0;
+        for k in 0..points {
+            let t = time(k as f64);
+            while next < targets.len() && targets[next] + neuron.refractory + EDGE < t {
+                next += 1;
+            }
+            let free = next < targets.len() && targets[next] - EDGE <= t;
+            self.limit.push(if free { f64::INFINITY } else { threshold(neuron, pattern.start, targets, t) - margin });
+        }
+        let point_after = |t: f64| {
+            let k = ((t - pattern.start) / step).floor() as u32;
+            if time(f64::from(k)) > t { k } else { k + 1 }
+        };
+        for &t in targets {
+            let after = (point_after(t) as usize).min(points);
+            let near = (near_ms / step).ceil() as usize;
+            self.before_targets.push(first + after.saturating_sub(near + 1)..first + after);
+        }
+        let mut inputs = Vec::with_capacity(pattern.times.len());
+        for spike in pattern.by_time() {
+            let point = ((spike.t - pattern.start) / step).ceil();
+            // An input on a point itself is felt behind it; where its kernel begins above 0, from the next point on.
+            let late = time(point) - spike.t <= 0.0 && self.shape.input().b != 0.0;
+            let felt = if late { point + 1.0 } else { point };
+            if felt < points as f64 && !lost(neuron, targets, spike.t, time(felt)) {
+                let State { a, b } = self.shape.after(self.shape.input(), (time(felt) - spike.t).max(0.0));
+                inputs.push(GridInput { point: felt as u32, train: spike.train, a, b });
+            }
+        }
+        inputs.sort_by_key(|i| i.point);
+        let resets = match neuron.after_spike {
+            AfterSpike::Reset => targets.iter().map(|&t| point_after(t)).filter(|&r| (r as usize) < points).collect(),
+            AfterSpike::Keep | AfterSpike::Ignore => vec![],
+        };
+        let stations = stations(&inputs, &resets);
+        self.sheets.push(Sheet { inputs, stations, first, points, targets: targets.len() });
+    }
+
+    /// Takes the rows of the first pattern away; the others are numbered anew from 0.
+    pub(super) fn drop_first(&mut self) {
+        let gone = self.sheets.remove(0);
+        self.limit.drain(..gone.points);
+        self.before_targets.drain(..gone.targets);
+        self.sheets.iter_mut().for_each(|sheet| sheet.first -= gone.points);
+        for rows in &mut self.before_targets {
+            *rows = rows.start - gone.points..rows.end - gone.points;
+        }
     }
 
     /// How many rows, those at which nothing is asked included.
@@ -185,44 +255,84 @@ impl SilentRows {
         self.limit.len()
     }
 
+    /// What `points` grid steps do.
+    fn step(&self, points: u32) -> Step {
+        if points as usize <= RUN {
+            self.steps.of(points as usize)
+        } else {
+            self.shape.step(f64::from(points) * self.step_ms)
+        }
+    }
+
     /// The potential on every row, mV.
     pub(super) fn potential(&self, weights: &[f64], out: &mut Vec<f64>) {
         out.clear();
-        out.reserve(self.len());
+        out.resize(self.len(), 0.0);
+        if weights.iter().all(|&w| w == 0.0) {
+            return;
+        }
         for sheet in &self.sheets {
-            let (mut a, mut b) = (0.0, 0.0);
-            let (mut input, mut reset) = (sheet.inputs.iter().peekable(), sheet.resets.iter().peekable());
-            for point in 0..sheet.points as u32 {
-                (a, b) = (a * self.step.aa, b * self.step.bb + a * self.step.ba);
-                while reset.next_if(|&&r| r == point).is_some() {
-                    (a, b) = (0.0, 0.0);
-                }
-                while let Some(i) = input.next_if(|i| i.point == point) {
+            let rows = &mut out[sheet.first..sheet.first + sheet.points];
+            let mut state = State::default();
+            let (mut input, mut at) = (0, 0);
+            for (k, station) in sheet.stations.iter().enumerate() {
+                state = if station.reset { State::default() } else { self.step(station.point - at).apply(state) };
+                at = station.point;
+                for i in &sheet.inputs[input..station.inputs as usize] {
                     let w = weights[i.train as usize];
-                    a += w * i.a;
-                    b += w * i.b;
+                    state.a += w * i.a;
+                    state.b += w * i.b;
                 }
-                out.push(b);
+                input = station.inputs as usize;
+                let end = sheet.stations.get(k + 1).map_or(sheet.points, |next| next.point as usize);
+                self.run(state, &mut rows[at as usize..end]);
             }
+        }
+    }
+
+    /// The potential on a run of rows without an input, from the state at the first of them.
+    fn run(&self, mut state: State, rows: &mut [f64]) {
+        for rows in rows.chunks_mut(RUN) {
+            let steps = self.steps.ba.iter().zip(&self.steps.bb);
+            rows.iter_mut().zip(steps).for_each(|(row, (ba, bb))| *row = state.a * ba + state.b * bb);
+            state = self.steps.of(rows.len()).apply(state);
         }
     }
 
     /// Adds the sum of all rows, each times its factor, to `sum` (one entry a train): the adjoint of `potential`.
     pub(super) fn add_sum(&self, factors: &[f64], sum: &mut [f64]) {
         for sheet in &self.sheets {
-            let (mut a, mut b) = (0.0, 0.0);
-            let (mut input, mut reset) = (sheet.inputs.iter().rev().peekable(), sheet.resets.iter().rev().peekable());
-            for point in (0..sheet.points as u32).rev() {
-                b += factors[sheet.first + point as usize];
-                while let Some(i) = input.next_if(|i| i.point == point) {
-                    sum[i.train as usize] += a * i.a + b * i.b;
+            let factors = &factors[sheet.first..sheet.first + sheet.points];
+            // How much the rows from here on hear of the state here.
+            let mut heard = State::default();
+            let mut end = sheet.points;
+            for (k, station) in sheet.stations.iter().enumerate().rev() {
+                let at = station.point as usize;
+                heard = self.run_back(heard, &factors[at..end]);
+                let from = if k == 0 { 0 } else { sheet.stations[k - 1].inputs as usize };
+                for i in &sheet.inputs[from..station.inputs as usize] {
+                    sum[i.train as usize] += heard.a * i.a + heard.b * i.b;
                 }
-                while reset.next_if(|&&r| r >= point).is_some() {
-                    (a, b) = (0.0, 0.0);
+                if station.reset {
+                    heard = State::default();
                 }
-                (a, b) = (a * self.step.aa + b * self.step.ba, b * self.step.bb);
+                end = at;
             }
         }
+    }
+
+    /// How much a run of rows, and what comes behind it, hear of the state at the first of them.
+    fn run_back(&self, mut heard: State, factors: &[f64]) -> State {
+        for factors in factors.rchunks(RUN) {
+            let step = self.steps.of(factors.len());
+            let State { a, b } = heard;
+            heard = State { a: a * step.aa + b * step.ba, b: b * step.bb };
+            if factors.iter().any(|&f| f != 0.0) {
+                heard.a += factors.iter().zip(&self.steps.ba).map(|(f, ba)| f * ba).sum::<f64>();
+                heard.b += factors.iter().zip(&self.steps.bb).map(|(f, bb)| f * bb).sum::<f64>();
+            }
+        }
+        heard
     }
 
     /// The coefficients of the named rows (ascending), row after row.
@@ -231,39 +341,57 @@ impl SilentRows {
         let mut out = vec![0.0; rows.len() * n];
         let mut place = 0;
         for sheet in &self.sheets {
+            if place == rows.len() || rows[place] >= sheet.first + sheet.points {
+                continue;
+            }
             let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
-            let (mut input, mut reset, mut at) = (0, 0, 0_u32);
+            let (mut station, mut input, mut at) = (0, 0, 0_u32);
             while place < rows.len() && rows[place] < sheet.first + sheet.points {
                 let point = (rows[place] - sheet.first) as u32;
-                let reset_from = reset;
-                while reset < sheet.resets.len() && sheet.resets[reset] <= point {
-                    reset += 1;
-                }
-                if reset > reset_from {
+                let next = station + sheet.stations[station..].partition_point(|s| s.point <= point);
+                let passed = &sheet.stations[station..next];
+                if let Some(reset) = passed.iter().rposition(|s| s.reset) {
                     a.fill(0.0);
                     b.fill(0.0);
-                    while input < sheet.inputs.len() && sheet.inputs[input].point < sheet.resets[reset - 1] {
-                        input += 1;
-                    }
-                } else {
-                    let step = self.shape.step(f64::from(point - at) * self.step_ms);
+                    let before = station + reset;
+                    input = if before == 0 { 0 } else { sheet.stations[before - 1].inputs as usize };
+                } else if point > at {
+                    let step = self.step(point - at);
                     for (a, b) in a.iter_mut().zip(&mut b) {
                         *b = *b * step.bb + *a * step.ba;
                         *a *= step.aa;
                     }
                 }
-                while input < sheet.inputs.len() && sheet.inputs[input].point <= point {
-                    let i = sheet.inputs[input];
-                    let now = self.shape.after(State { a: i.a, b: i.b }, f64::from(point - i.point) * self.step_ms);
+                let end = passed.last().map_or(input, |s| s.inputs as usize);
+                for i in &sheet.inputs[input..end] {
+                    let now = self.step(point - i.point).apply(State { a: i.a, b: i.b });
                     a[i.train as usize] += now.a;
                     b[i.train as usize] += now.b;
-                    input += 1;
                 }
+                (station, input, at) = (next, end, point);
                 out[place * n..(place + 1) * n].copy_from_slice(&b);
-                at = point;
                 place += 1;
             }
         }
         out
     }
+}
+
+/// Where the state jumps, by inputs and resets, both ascending.
+fn stations(inputs: &[GridInput], resets: &[u32]) -> Vec<Station> {
+    let mut found = Vec::new();
+    let (mut input, mut reset) = (0, 0);
+    while input < inputs.len() || reset < resets.len() {
+        let point = inputs.get(input).map(|i| i.point).into_iter().chain(resets.get(reset).copied()).min();
+        let Some(point) = point else { break };
+        let here = reset < resets.len() && resets[reset] == point;
+        while reset < resets.len() && resets[reset] == point {
+            reset += 1;
+        }
+        while input < inputs.len() && inputs[input].point == point {
+            input += 1;
+        }
+        found.push(Station { point, reset: here, inputs: input as u32 });
+    }
+    found
 }

@@ -339,7 +339,8 @@ def study(
     setting = Setting(folders, tests, {f"{p.source}/{p.protocol.name}": p.scopes for p in plans})
     results = Results(report / "results.jsonl", code_digest(_CODE))
     call = partial(realise, setting=setting)
-    outcomes, full, seconds = [], [], 0.0
+    outcomes, seconds = [], 0.0
+    full: list[dict[str, Any]] = []
     for plan in plans:
         title = f"{plan.source}, {plan.protocol.name}"
         first = _first(plan, size)

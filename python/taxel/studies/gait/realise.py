@@ -60,7 +60,8 @@ def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str,
     ----------
     params : dict
         ``kind`` ("neuron", "search" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of groups;
-        none: the test folder is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a person), ``placed``;
+        none: the test folder is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a person),
+        ``placed``;
         of a neuron its ``point``; of a search a ``point``, the ``lambda_1`` to try one after the other, and which of
         the groups left out are ``judged``; of a rule ``rule`` and ``encoder``.
     seed : int

@@ -1,0 +1,155 @@
+"""CONE-R as data arrives: a sliding window of patterns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Self
+
+from numpy.typing import ArrayLike
+
+from taxel import _core
+from taxel._arguments import callback, floats, instance, several, whole
+from taxel._core import ProblemError
+from taxel.learn.cone_r import ConeR, _keep, _warn
+from taxel.spikes import SpikeTrains
+
+__all__ = ["OnlineConeR"]
+
+
+class OnlineConeR(ConeR):
+    """Learn weights by CONE-R as patterns arrive: one comes into a sliding window, the oldest leaves it.
+
+    After each pattern the weights are those of a fit to the whole window, to the same proven gap, in a fraction of its
+    time: rows are laid out once, and the solver starts from the fit before.
+
+    Parameters
+    ----------
+    window : int, 1 or more
+        How many patterns it holds.
+    **parameters
+        Those of `taxel.learn.ConeR`.
+
+    Attributes
+    ----------
+    patterns_ : int
+        How many patterns the window holds now.
+    weights_, objective_, parts_, gap_, status_, engine_, rounds_, rows_, silent_rows_, unreachable_, neuron_
+        Of the last fit, as in `ConeR`; patterns are counted from the oldest in the window.
+    refires_ : int
+        On the newest pattern alone.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    The thesis names it as a limit of CONE that it cannot learn on line, and suggests a sliding window (chapter 6).
+
+    Examples
+    --------
+    >>> cone = OnlineConeR(window=2, tau=10.0, lb=-1.0, ub=1.0, after_spike="reset")
+    >>> for shift in (0.0, 1.0, 2.0):
+    ...     trains = SpikeTrains.from_lists([[5.0 + shift], [12.0 + shift], [30.0]], stop=60.0)
+    ...     cone = cone.partial_fit(trains, [20.0 + shift])
+    >>> cone.patterns_, cone.status_
+    (2, 'solved')
+    """
+
+    patterns_: int
+
+    def __init__(self, *, window: int = 200, **parameters: Any) -> None:
+        for name in parameters:
+            if name not in (known := ConeR.__init__.__kwdefaults__ or {}):
+                raise ProblemError(f"OnlineConeR: no parameter {name!r}: there are window, {', '.join(known)}")
+        self.window = whole("window", window, 1)
+        super().__init__(**parameters)
+        self._stream = self._new_stream()
+
+    def partial_fit(self, pattern: SpikeTrains, targets: ArrayLike) -> Self:
+        """Take one more pattern into the window, and fit the weights to what it holds then.
+
+        Parameters
+        ----------
+        pattern : SpikeTrains
+            The same trains as in all patterns before.
+        targets : float sequence, ms
+            When the neuron shall fire; an empty one teaches silence.
+
+        Returns
+        -------
+        OnlineConeR
+            Itself.
+
+        Raises
+        ------
+        ProblemError : a pattern or targets that make no sense (names them, counted from the first that ever came); the
+            window is then as before
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second; the pattern is in the window, the best so far is kept
+
+        Warns
+        -----
+        UserWarning : as `ConeR.fit`
+        """
+        self._add(pattern, targets, "pattern", "targets")
+        return self._fit()
+
+    def fit(
+        self,
+        patterns: Sequence[SpikeTrains],
+        targets: Sequence[ArrayLike],
+        *,
+        start: ConeR | ArrayLike | None = None,
+        progress: Callable[[int, int, float, float], object] | None = None,
+    ) -> Self:
+        """Forget all that came, take these patterns into the window (the last of them stay), and fit once.
+
+        Parameters
+        ----------
+        patterns, targets
+            As in `ConeR.fit`.
+        start, progress
+            Not for a window: it starts from its own last fit.
+
+        Returns
+        -------
+        OnlineConeR
+            Itself.
+
+        Raises
+        ------
+        ProblemError : patterns or targets that make no sense (names pattern and target)
+        """
+        if start is not None:
+            raise ProblemError("start: a window starts from its own last fit")
+        if progress is not None:
+            callback("progress", progress)
+            raise ProblemError("progress: a window tells none")
+        trains, times = several("patterns", patterns), several("targets", targets)
+        if len(trains) != len(times) or not trains:
+            raise ProblemError(f"targets: {len(times)} lists for {len(trains)} patterns, must be one a pattern")
+        self._stream = self._new_stream()
+        for p, (pattern, wanted) in enumerate(zip(trains, times, strict=True)):
+            self._add(pattern, wanted, f"pattern {p}", f"targets of pattern {p}")
+        return self._fit()
+
+    def _add(self, pattern: SpikeTrains, targets: ArrayLike, name: str, wanted: str) -> None:
+        self._stream.add(instance(name, pattern, SpikeTrains)._parts(), floats(wanted, targets))
+
+    def _fit(self) -> Self:
+        found, signal = self._stream.fit()
+        _keep(self, found, self._stream.silent_rows, 0)
+        self.patterns_ = self._stream.patterns
+        if signal is not None:
+            raise signal
+        _warn(self)
+        return self
+
+    def _new_stream(self) -> _core.OnlineConeR:
+        return _core.OnlineConeR(self._json(), self.window)
+
+    def _values(self) -> dict[str, Any]:
+        return {name: value for name, value in super()._values().items() if name != "window"}
+
+    def __repr__(self) -> str:
+        return f"Online{super().__repr__().replace('(', f'(window={self.window}, ', 1).replace(', )', ')')}"

@@ -1,0 +1,124 @@
+"""A sliding window of patterns against fits to the same window from nothing."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import warnings
+
+import numpy as np
+import pytest
+
+from taxel import ProblemError, SpikeTrains
+from taxel.learn import ConeR, OnlineConeR
+
+
+@pytest.fixture(autouse=True)
+def _quiet():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def stream(seed, count, trains=20, duration=120.0):
+    """Patterns with one or two targets, some with none."""
+    random = np.random.default_rng(seed)
+    for _ in range(count):
+        times = [np.sort(random.uniform(0, duration, random.integers(1, 4))) for _ in range(trains)]
+        targets = np.sort(random.uniform(30, duration, random.choice([0, 1, 1, 2])))
+        if len(targets) == 2 and targets[1] - targets[0] < 8:
+            targets = targets[:1]
+        yield SpikeTrains.from_lists(times, stop=duration + 10), targets
+
+
+OPTIONS = [
+    {},
+    {"after_spike": "reset", "divide_b_by": "targets", "lambdas": (0, 4, 100, 100, 80)},
+    {"norm": "square", "after_spike": "ignore", "margin": 0.01},
+    {"lambdas": (4, 0, 100, 100, 80), "lb": -0.1, "ub": 0.4, "kernel": "double_exponential"},
+]
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+@pytest.mark.parametrize("window", [1, 4, 7])
+def test_at_each_step_the_objective_is_that_of_a_fit_to_the_window_from_nothing(options, window):
+    online = OnlineConeR(window=window, tau=12.0, tolerance=3e-7, **options)
+    kept = []
+    for pattern, targets in stream(window, 12):
+        online.partial_fit(pattern, targets)
+        kept = [*kept, (pattern, targets)][-window:]
+        assert online.patterns_ == len(kept)
+        assert online.status_ == "solved"
+        if any(len(t) for _, t in kept):
+            cold = ConeR(tau=12.0, tolerance=3e-7, **options).fit([p for p, _ in kept], [t for _, t in kept])
+            assert online.objective_ == pytest.approx(cold.objective_, rel=1e-6, abs=1e-12)
+            assert online.silent_rows_ == cold.silent_rows_
+            assert online.unreachable_ == cold.unreachable_
+
+
+def test_what_left_the_window_leaves_no_trace():
+    patterns = list(stream(3, 9))
+    long, short = OnlineConeR(window=4, tau=12.0), OnlineConeR(window=4, tau=12.0)
+    for pattern, targets in patterns:
+        long.partial_fit(pattern, targets)
+    for pattern, targets in patterns[-4:]:
+        short.partial_fit(pattern, targets)
+    assert long.objective_ == pytest.approx(short.objective_, rel=2e-6)
+
+
+def test_a_fit_at_once_is_the_fit_of_the_last_patterns_and_the_stream_goes_on_from_it():
+    patterns = list(stream(4, 8))
+    once = OnlineConeR(window=5, tau=12.0).fit([p for p, _ in patterns[:7]], [t for _, t in patterns[:7]])
+    steps = OnlineConeR(window=5, tau=12.0)
+    for pattern, targets in patterns[:7]:
+        steps.partial_fit(pattern, targets)
+    assert once.objective_ == pytest.approx(steps.objective_, rel=2e-6)
+    once.partial_fit(*patterns[7])
+    steps.partial_fit(*patterns[7])
+    assert once.objective_ == pytest.approx(steps.objective_, rel=2e-6)
+
+
+def test_a_pattern_that_makes_no_sense_is_named_and_leaves_the_window_as_it_was():
+    online, same = OnlineConeR(window=3, tau=12.0), OnlineConeR(window=3, tau=12.0)
+    patterns = list(stream(5, 6))
+    for k, (pattern, targets) in enumerate(patterns):
+        online.partial_fit(pattern, targets)
+        same.partial_fit(pattern, targets)
+        for bad, at, said in (
+            (SpikeTrains.from_lists([[1.0]], stop=5.0), [2.0], f"pattern {k + 1}: 1 trains, pattern 0 has 20"),
+            (pattern, [30.0, 31.0], rf"pattern {k + 1}, target 1 \(31 ms\): 1 ms after target 0, inside the refr"),
+            (pattern, [float("nan")], f"pattern {k + 1}, target 0: time is NaN"),
+            (SpikeTrains.from_lists([[]] * 20, stop=5.0), [2.0], f"pattern {k + 1}: has no spike"),
+        ):
+            with pytest.raises(ProblemError, match=said):
+                online.partial_fit(bad, at)
+    assert online.objective_ == same.objective_
+    assert np.array_equal(online.weights_, same.weights_)
+
+
+def test_an_empty_window_and_a_misspelt_parameter_are_one_clear_error_each():
+    with pytest.raises(ProblemError, match="window is 0"):
+        OnlineConeR(window=0)
+    with pytest.raises(ProblemError, match="no parameter 'lambda'"):
+        OnlineConeR(**{"lambda": 1})
+    with pytest.raises(ProblemError, match="must be one a pattern"):
+        OnlineConeR().fit([], [])
+    with pytest.raises(ProblemError, match="start: a window starts from its own last fit"):
+        OnlineConeR().fit(*zip(*stream(0, 2), strict=True), start=[0.0])
+
+
+def test_control_c_keeps_the_best_so_far_and_the_pattern():
+    online = OnlineConeR(window=50, tau=40.0, tolerance=1e-10, lambdas=(4, 0, 100, 100, 80))
+    timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
+    timer.start()
+
+    def learn_for_ever():
+        for seed in range(1000):
+            for pattern, targets in stream(seed, 50, trains=400, duration=1000.0):
+                online.partial_fit(pattern, targets)
+
+    with pytest.raises(KeyboardInterrupt):
+        learn_for_ever()
+    assert online.status_ in ("solved", "stopped")
+    assert online.patterns_ >= 1
+    assert repr(online).startswith("OnlineConeR(window=50, tau=40.0")
