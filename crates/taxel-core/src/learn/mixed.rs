@@ -48,12 +48,20 @@ pub(super) enum Engine {
 
 /// Where a later call with more rows can go on.
 #[derive(Debug, Clone)]
-pub(super) struct Start(State);
+pub(super) struct Start {
+    state: State,
+    /// The last polished point, in the program's units, and what binds there.
+    exact: Option<(Point, Guess)>,
+}
 
 impl Start {
     /// Forgets inequality rows, as the caller does; those added later than the call come last.
     pub(super) fn retain(&mut self, keep: &[bool]) {
-        self.0.retain(keep);
+        self.state.retain(keep);
+        if let Some((point, guess)) = &mut self.exact {
+            retain(&mut point.inequality, keep);
+            retain(&mut guess.binding, keep);
+        }
     }
 }
 
@@ -110,11 +118,20 @@ pub(super) fn minimise(
 ) -> Result<Found> {
     let program = Program::new(terms, rows, lower, upper);
     let interior = Interior::new(&program);
-    let mut state = start.map_or_else(|| interior.start(), |s| interior.resume(&s.0));
     let mut best = Best::new(&program);
+    if let Some(Start { state, exact: Some((point, guess)) }) = start
+        && tolerance <= LOOSE
+    {
+        // A few new rows often need no more than a few exchanges.
+        best.exchange(point, guess, tolerance, stop);
+        if best.gap() <= tolerance || stop.asked() {
+            return Ok(best.found(Engine::Native, stop.asked(), state.clone()));
+        }
+    }
+    let mut state = start.map_or_else(|| interior.start(), |s| interior.resume(&s.state));
     if tolerance > LOOSE {
         let near = interior.solve(&mut state, tolerance, stop);
-        best.offer(near.point);
+        best.offer(near.point, None);
         return Ok(best.found(Engine::Native, stop.asked(), state));
     }
     for aim in TRIES {
@@ -139,6 +156,7 @@ pub(super) fn minimise(
 struct Best<'a> {
     program: &'a Program,
     point: Point,
+    guess: Option<Guess>,
     met: bool,
     objective: f64,
     bound: f64,
@@ -154,26 +172,38 @@ impl<'a> Best<'a> {
             pull: vec![0.0; program.width()],
         };
         // No term is below 0.
-        Self { program, point, met: false, objective: f64::INFINITY, bound: 0.0 }
+        Self { program, point, guess: None, met: false, objective: f64::INFINITY, bound: 0.0 }
     }
 
-    fn offer(&mut self, point: Point) {
+    fn offer(&mut self, point: Point, guess: Option<Guess>) {
         let objective = self.program.objective(&point.weights);
         let met = self.program.met(&point.weights);
         self.bound = self.bound.max(self.program.bound(&point));
         if self.objective.is_infinite() || (met && !self.met) || (met == self.met && objective < self.objective) {
-            (self.point, self.met, self.objective) = (point, met, objective);
+            (self.point, self.guess, self.met, self.objective) = (point, guess, met, objective);
         }
     }
 
     fn improve(&mut self, near: &Point, guess: Guess, tolerance: f64, stop: Stop<'_>) {
-        if let Some(point) = polish(self.program, near, guess, tolerance, stop) {
-            self.offer(point);
+        if let Some((point, guess)) = polish(self.program, near, guess, tolerance, stop) {
+            self.offer(point, Some(guess));
         }
         if self.gap() > tolerance
             && let Some(point) = meet(self.program, near)
         {
-            self.offer(point);
+            self.offer(point, None);
+        }
+    }
+
+    /// Goes on from a polished point with rows added since.
+    fn exchange(&mut self, point: &Point, guess: &Guess, tolerance: f64, stop: Stop<'_>) {
+        let (mut point, mut guess) = (point.clone(), guess.clone());
+        let below = times(&self.program.below, &point.weights);
+        let added = below.iter().zip(&self.program.limit).skip(guess.binding.len());
+        guess.binding.extend(added.map(|(u, limit)| u > limit));
+        point.inequality.resize(guess.binding.len(), 0.0);
+        if let Some((point, guess)) = polish(self.program, &point, guess, tolerance, stop) {
+            self.offer(point, Some(guess));
         }
     }
 
@@ -201,7 +231,7 @@ impl<'a> Best<'a> {
             met: self.met,
             engine,
             stopped,
-            start: Start(state),
+            start: Start { state, exact: self.guess.map(|guess| (self.point, guess)) },
         }
     }
 }
@@ -234,6 +264,12 @@ struct Program {
     cost: f64,
     of_equal: Vec<f64>,
     of_below: Vec<f64>,
+}
+
+/// Keeps what is kept, and all behind.
+fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut keep = keep.iter();
+    values.retain(|_| keep.next().copied().unwrap_or(true));
 }
 
 /// The power of 2 next to a positive number; 1 for any other.

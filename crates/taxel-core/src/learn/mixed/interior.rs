@@ -5,13 +5,12 @@
 //! and Todd do, and adds a multiple of one and one rank to the Newton matrix; its length is eliminated as well. So each
 //! iteration takes the Cholesky factors of one matrix of synapses and one of equality rows.
 
-use faer::Mat;
-
 use super::dense::{Cholesky, add_gram, add_sum, dot, outer, times};
 use super::polish::Guess;
-use super::{Place, Point, Program};
+use super::{Place, Point, Program, retain};
 use crate::Stop;
 use crate::learn::cone_r::Norm;
+use faer::Mat;
 
 const MOST_ITERATIONS: usize = 100;
 /// Share of the way to the next wall that a step takes at most.
@@ -77,10 +76,8 @@ struct Step {
 impl State {
     /// Forgets the rows that are not kept.
     pub(super) fn retain(&mut self, keep: &[bool]) {
-        let mut keeps = keep.iter();
-        self.slack.retain(|_| keeps.next().copied().unwrap_or(true));
-        let mut keeps = keep.iter();
-        self.inequality.retain(|_| keeps.next().copied().unwrap_or(true));
+        retain(&mut self.slack, keep);
+        retain(&mut self.inequality, keep);
     }
 
     fn go(&mut self, reach: f64, step: &Step) {
@@ -173,6 +170,12 @@ pub(super) struct Interior<'a> {
     /// `2 lift B'B` and the curvature of a square, lower triangle.
     curvature: Mat<f64>,
     normed: bool,
+}
+
+/// Memory that every iteration needs anew.
+struct Room {
+    matrix: Mat<f64>,
+    scaled: Vec<f64>,
 }
 
 /// What a factored Newton matrix needs to solve for a direction.
@@ -334,7 +337,7 @@ impl<'a> Interior<'a> {
         sum / count as f64
     }
 
-    fn newton<'b>(&'b self, state: &'b State, w: &[f64]) -> Option<Newton<'b>> {
+    fn newton<'b>(&'b self, state: &'b State, w: &[f64], room: &mut Room) -> Option<Newton<'b>> {
         let n = self.program.width();
         let of_part: Vec<f64> = self
             .parts
@@ -347,13 +350,19 @@ impl<'a> Interior<'a> {
         self.parts.iter().zip(&of_part).for_each(|(p, d)| softness[p.synapse] += 1.0 / d);
         let diagonal: Vec<f64> = softness.iter().map(|s| if *s > 0.0 { 1.0 / s } else { FIXED }).collect();
         let ratio: Vec<f64> = state.inequality.iter().zip(&state.slack).map(|(z, s)| z / s).collect();
-        let mut matrix = self.curvature.clone();
-        let mut scaled = self.program.below.clone();
+        let mut matrix = std::mem::replace(&mut room.matrix, Mat::new());
+        matrix.copy_from(&self.curvature);
+        let scaled = &mut room.scaled;
+        scaled.clear();
+        scaled.extend_from_slice(&self.program.below);
         for (row, ratio) in scaled.chunks_exact_mut(n.max(1)).zip(&ratio) {
             let root = ratio.sqrt();
             row.iter_mut().for_each(|v| *v *= root);
         }
-        add_gram(&scaled, n, 1.0, &mut matrix);
+        // Equality rows change nothing here, but near a vertex the rest alone is singular up to rounding.
+        let weight = ratio.iter().fold(1.0_f64, |m, r| m.max(*r)).min(1e12);
+        scaled.extend(self.program.equal.iter().map(|v| v * weight.sqrt()));
+        add_gram(scaled, n, 1.0, &mut matrix);
         let scaling = self.normed.then(|| Scaling::new((state.length, w), (state.dual.0, &state.dual.1)));
         let mut ridge = 0.0;
         if let Some(scaling) = &scaling {
@@ -362,9 +371,6 @@ impl<'a> Interior<'a> {
             add_gram(&scaling.w1, n, factor, &mut matrix);
         }
         (0..n).for_each(|j| matrix[(j, j)] += diagonal[j] + ridge);
-        // Equality rows change nothing here, but near a vertex the rest alone is singular up to rounding.
-        let weight = ratio.iter().fold(1.0_f64, |m, r| m.max(*r)).min(1e12);
-        add_gram(&self.program.equal, n, weight, &mut matrix);
         let factor = Cholesky::new(matrix)?;
         let half = factor.halve(&self.program.equal);
         let schur = if self.program.equal_to.is_empty() {
@@ -383,6 +389,8 @@ impl<'a> Interior<'a> {
         let program = self.program;
         let (mut best, mut merit, mut least) = (state.clone(), f64::INFINITY, f64::INFINITY);
         let (mut idle, mut iterations) = (0, 0);
+        let n = program.width();
+        let mut room = Room { matrix: Mat::zeros(n, n), scaled: Vec::new() };
         loop {
             let r = self.residual(state);
             let mu = self.complementarity(state, &r.w);
@@ -405,7 +413,7 @@ impl<'a> Interior<'a> {
                 break;
             }
             iterations += 1;
-            let Some(newton) = self.newton(state, &r.w) else { break };
+            let Some(newton) = self.newton(state, &r.w, &mut room) else { break };
             let affine = newton.direction(&r, &self.complement(state, &newton, 0.0, None));
             let reach = self.reach(state, &r.w, &affine).min(1.0);
             let aimed = (1.0 - reach).powi(3) * mu;
@@ -425,6 +433,7 @@ impl<'a> Interior<'a> {
                     break;
                 }
             }
+            room.matrix = newton.factor.into_matrix();
             state.go(reach, &step);
         }
         *state = best;

@@ -16,6 +16,8 @@ const MOST_REFINEMENTS: usize = 12;
 const SOFT: f64 = 1e-11;
 /// Rows and bounds count as met within this, in units of rows of length 1.
 pub(super) const MET: f64 = 2e-14;
+/// The share of the tolerance at which the gap is small enough.
+const ENOUGH: f64 = 0.01;
 /// Multipliers and slopes of the wrong sign count from here.
 const WRONG: f64 = 1e-11;
 
@@ -26,10 +28,17 @@ pub(super) struct Guess {
     pub(super) binding: Vec<bool>,
 }
 
-/// Solves for the guess, mends it, and so on; gives the points that meet all rows and bounds, best last.
-pub(super) fn polish(program: &Program, near: &Point, guess: Guess, tolerance: f64, stop: Stop<'_>) -> Option<Point> {
+/// Solves for the guess, mends it, and so on; gives the best point that meets all rows and bounds, with its guess.
+pub(super) fn polish(
+    program: &Program,
+    near: &Point,
+    guess: Guess,
+    tolerance: f64,
+    stop: Stop<'_>,
+) -> Option<(Point, Guess)> {
     let mut polish = Polish::new(program, near, guess);
-    let mut best: Option<(f64, Point)> = None;
+    let mut best: Option<(f64, Point, Guess)> = None;
+    let mut most = usize::MAX;
     for _ in 0..MOST_GUESSES {
         if stop.asked() {
             break;
@@ -39,17 +48,20 @@ pub(super) fn polish(program: &Program, near: &Point, guess: Guess, tolerance: f
         if program.met(&point.weights) {
             let gap = program.gap(&point);
             if best.as_ref().is_none_or(|b| gap < b.0) {
-                best = Some((gap, point));
+                best = Some((gap, point, polish.guess.clone()));
             }
-            if gap <= 1e-3 * tolerance {
+            if gap <= ENOUGH * tolerance {
                 break;
             }
         }
-        if !polish.mend() {
+        let exchanged = polish.mend();
+        if exchanged == 0 || exchanged > most {
             break;
         }
+        // Exchanges that do not get fewer lead nowhere.
+        most = 2 * exchanged;
     }
-    best.map(|b| b.1)
+    best.map(|(_, point, guess)| (point, guess))
 }
 
 /// The nearest point at which equality rows are met to rounding, weights moving the less the nearer they are to a wall.
@@ -219,8 +231,8 @@ impl<'a> Polish<'a> {
         Some(())
     }
 
-    /// Exchanges what has the wrong sign; false where nothing has.
-    fn mend(&mut self) -> bool {
+    /// Exchanges what has the wrong sign; says how much that is.
+    fn mend(&mut self) -> usize {
         let program = self.program;
         let gradient = self.gradient();
         let mut changed = 0;
@@ -266,6 +278,6 @@ impl<'a> Polish<'a> {
             }
         }
         self.snap();
-        changed > 0
+        changed
     }
 }
