@@ -351,9 +351,7 @@ def peak_tempotron(
 def change_tempotron(
     parameters: str, weights: NDArray[np.float64], pattern: tuple[Any, ...], label: bool
 ) -> NDArray[np.float64]: ...
-    @property
-    def rows(self) -> int: ...
-    def fit(self, parameters: str, start: _Start | None, progress: Any) -> tuple[_Fit, BaseException | None]: ...
+
 # cone_x: parameters as JSON; rows by name (kind, pattern, target or time), stated as (coefficients, limit)
 
 _Row = tuple[str, int, float]
