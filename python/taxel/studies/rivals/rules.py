@@ -21,7 +21,7 @@ CHOSEN_ON = range(1000, 1006)
 PUBLISHED = {"E-learning": 0.22, "PSD": 0.144, "SPAN": 0.075, "ReSuMe": 0.04, "I-learning": 0.02}
 
 #: Membrane, synapse and threshold of Gardner and Grüning.
-NEURON = {"tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
+NEURON: dict[str, Any] = {"tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
 
 
 @dataclass(frozen=True)
@@ -71,13 +71,24 @@ RULES = {
     "PSD": Rule(lambda **o: PSD(**{"theta_0": 15.0, **o}), "batch", _G16, 0.125, "rate, threshold, updates"),
     "FP": Rule(lambda **o: FP(window_ms=1.0, **{**NEURON, **o}), "pattern", 1.0, 0.17, "rate, window 1 ms, neuron"),
     "HTP": Rule(lambda **o: HTP(window_ms=1.0, **{**NEURON, **o}), "pattern", 1.0, 0.15, "rate, window 1 ms, neuron"),
-    "ConeX": Rule(ConeX, "solved", 0.0, 0.3, "bounds ±1000 mV stand for none"),
+    "ConeX": Rule(ConeX, "solved", 0.0, 0.3, "bounds of 67 thresholds stand for none"),
 }
 
-#: How ConeX comes nearest to each protocol's neuron; one spike a pattern, so only what follows it can differ.
-_CONE = {
-    "a": {"kernel": "double_exponential", "tau": 10.0, "tau_s": 5.0, "theta_0": 15.0, "after_spike": "reset"},
-    "b": {"after_spike": "keep"},
+#: How ConeX comes nearest to each protocol's neuron; one spike a pattern, so only what follows it can differ. In "a" all
+#: potentials and weights are in fiftieths: it meets targets to 1e-12 mV, which is below the rounding of 15 mV.
+_CONE: dict[str, dict[str, Any]] = {
+    "a": {
+        "kernel": "double_exponential",
+        "tau": 10.0,
+        "tau_s": 5.0,
+        "theta_0": 0.3,
+        "theta_plus": 0.0,
+        "refractory": 0.0,
+        "after_spike": "reset",
+        "lb": -20.0,
+        "ub": 20.0,
+    },
+    "b": {"after_spike": "keep", "lb": -20.0, "ub": 20.0},
 }
 
 
@@ -85,8 +96,7 @@ def learner(name: str, protocol: str, inputs: int, count: int, seed: int, **trai
     """Return a rule's learner for a protocol: in "a" on Gardner and Grüning's neuron, in "b" on its own."""
     rule = RULES[name]
     if name == "ConeX":
-        bare = {"theta_plus": 0.0, "refractory": 0.0} if protocol == "a" else {}
-        return ConeX(**_CONE[protocol], **bare, lb=-1000.0, ub=1000.0, lambdas=(0.0, 1.0, 0.0))
+        return ConeX(**_CONE[protocol], lambdas=(0.0, 1.0, 0.0))
     share = rule.rate * NEURON["theta_0"] / inputs
     options: dict[str, Any] = {
         "eta": share / count if rule.updates == "batch" else share,
