@@ -168,8 +168,8 @@ STUDY = Study(
         "more, their SRM0 (10 and 5 ms, threshold 15 mV, which a spike takes off); after 500 epochs, over 20 "
         "runs, on average 90 % of patterns have their one spike within 1 ms. (b) The thesis' patterns: inputs on whole "
         "ms, targets at 200 c / 6 ms, each rule's own neuron; all of 100 runs have every pattern right within 1 ms "
-        "after at most 2000 epochs, and a load is left at the first run that fails. No bounds; 67 thresholds for ConeX, "
-        "whose silence holds at every instant, and which in (a) loses all inputs up to a spike where the SRM0 takes "
+        "after at most 2000 epochs, and a load is left at the first run that fails. No bounds; 67 thresholds for "
+        "ConeX, whose silence holds at every instant, and which in (a) loses all inputs up to a spike where the SRM0 takes "
         "its threshold off. Whether weights change once an epoch (batch) or after each pattern is said with each rule. "
         "What was not published was chosen at 200 inputs on seeds of its own. The Tempotron and SKIM learn no times."
     ),

@@ -74,8 +74,8 @@ RULES = {
     "ConeX": Rule(ConeX, "solved", 0.0, 0.3, "bounds of 67 thresholds stand for none"),
 }
 
-#: How ConeX comes nearest to each protocol's neuron; one spike a pattern, so only what follows it can differ. In "a" all
-#: potentials and weights are in fiftieths: it meets targets to 1e-12 mV, which is below the rounding of 15 mV.
+#: How ConeX comes nearest to each protocol's neuron; one spike a pattern, so only what follows it can differ. In "a"
+#: potentials and weights are in fiftieths: targets are met to 1e-12 mV, which is below the rounding of 15 mV.
 _CONE: dict[str, dict[str, Any]] = {
     "a": {
         "kernel": "double_exponential",
