@@ -163,15 +163,16 @@ STUDY = Study(
     title="how many spike times each rule learns, beside CONE-X",
     where="thesis 6.4.4, beside figure 6.7; Gardner and Grüning 2016",
     protocol=(
-        "One spike an input in 200 ms, one target a pattern, 5 classes; the largest number of patterns, in steps of 5. "
-        "(a) Gardner and Grüning's protocol: inputs at any time, targets at any time from 40 to 200 ms, 7 ms apart or "
-        "more, their SRM0 (10 and 5 ms, threshold 15 mV, which a spike takes off); after 500 epochs, over 20 "
-        "runs, on average 90 % of patterns have their one spike within 1 ms. (b) The thesis' patterns: inputs on whole "
-        "ms, targets at 200 c / 6 ms, each rule's own neuron; all of 100 runs have every pattern right within 1 ms "
-        "after at most 2000 epochs, and a load is left at the first run that fails. No bounds; 67 thresholds for "
-        "ConeX, whose silence holds at every instant, and which in (a) loses all inputs up to a spike where the SRM0 takes "
-        "its threshold off. Whether weights change once an epoch (batch) or after each pattern is said with each rule. "
-        "What was not published was chosen at 200 inputs on seeds of its own. The Tempotron and SKIM learn no times."
+        "One spike an input in 200 ms, one target a pattern, 5 classes; the largest number of patterns, in steps of "
+        "5. (a) Gardner and Grüning's protocol: inputs at any time, targets at any time from 40 to 200 ms, 7 ms apart"
+        " or more, their SRM0 (10 and 5 ms, threshold 15 mV, which a spike takes off); after 500 epochs, over 20 "
+        "runs, on average 90 % of patterns have their one spike within 1 ms. (b) The thesis' patterns: inputs on "
+        "whole ms, targets at 200 c / 6 ms, each rule's own neuron; all of 100 runs have every pattern right within 1"
+        " ms after at most 2000 epochs, and a load is left at the first run that fails. No bounds; 67 thresholds for "
+        "ConeX, whose silence holds at every instant, and which in (a) loses all inputs up to a spike where the SRM0 "
+        "takes its threshold off. Whether weights change once an epoch (batch) or after each pattern is said with "
+        "each rule. What was not published was chosen at 200 inputs on seeds of its own. The Tempotron and SKIM learn"
+        " no times."
     ),
     parameters=PARAMETERS,
     sizes={"toy": TOY},
