@@ -16,9 +16,11 @@ import pytest
 from tests.formats.test_loaders import interpolated
 
 from taxel import FormatError, ProblemError
+from taxel.studies import load
 from taxel.studies.gait import report, study
 from taxel.studies.gait.protocols import PROTOCOLS
 from taxel.studies.gait.recipes import ENCODERS, SEARCH, SETTINGS
+from taxel.studies.page import write_page
 
 
 def walker(folder: Path, name: str, seed: int) -> None:
@@ -68,7 +70,7 @@ def data(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def ran(data, tmp_path_factory) -> tuple[Path, dict]:
-    folder = tmp_path_factory.mktemp("report")
+    folder = tmp_path_factory.mktemp("report") / "gait"
     return folder, study(data, size="toy", report=folder, quiet=True)
 
 
@@ -154,6 +156,20 @@ def test_the_full_search_chooses_inside_each_fold_and_only_on_the_plate(data, ra
 def test_the_settings_of_the_full_search_are_528():
     assert np.prod([len(values) for values in SETTINGS.values()]) == 528
     assert (SETTINGS["tau"][-1], SETTINGS["kappa"][-1], SETTINGS["lambda_1"][0]) == (220.0, 1.3, 4.0)
+
+
+def test_its_part_of_the_page_of_all_studies_is_made_of_the_same_results(data, ran):
+    folder, _ = ran
+    before = (folder / "results.jsonl").stat().st_size
+    section = load("gait").run(folder.parent, size="toy", data=data, quiet=True)
+    assert (folder / "results.jsonl").stat().st_size == before
+    says = [s["says"] for s in section["statements"]]
+    assert "On walking recordings it finds more than 95 % of contact." in says
+    assert {(r["source"], r["row"]) for r in section["said"]["rows"]} == {("gaitpdb", "chosen"), ("gaitpdb", "printed")}
+    assert len(json.loads((folder / "summary.json").read_text())["pictures"]) == 2
+    assert "gait.html" in write_page(folder.parent).read_text()
+    with pytest.raises(ProblemError, match="gait has no parameter 'tau'"):
+        load("gait").run(folder.parent, size="toy", data=data, changes={"tau": 3})
 
 
 def test_other_people_are_judged_by_all_of_these(data, tmp_path):
