@@ -51,7 +51,7 @@ def every(
     report: Report = REPORT,
     as_json: AsJson = False,
 ) -> None:
-    """Run every study, the cheap ones first, and make one page of them.
+    """Run every study and make one page of them.
 
     Studies on recordings are left out, and said to be, where no recordings are.
 

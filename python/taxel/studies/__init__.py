@@ -16,6 +16,8 @@ __all__ = ["STUDIES", "load"]
 
 #: One line on every study, by name, in the order of the page; "fig6.1" lies in ``fig6_1.py``. They load when asked for.
 STUDIES = {
+    "fig6.7": "how many patterns a neuron can learn exactly, by inputs and classes",
+    "exactness": "what slope at the targets buys on a clock, and what exactness and slope cost in capacity",
     "fig6.10": "dense against sparse weights under jitter, background and shunting",
     "fig6.11": "how the weights are distributed, trained without noise and with it",
     "gait": "gait events by one neuron an event, on published walking recordings (6.12 to 6.14)",
