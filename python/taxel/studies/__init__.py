@@ -23,6 +23,7 @@ STUDIES = {
     "gait": "gait events by one neuron an event, on published walking recordings (6.12 to 6.14)",
     "rivals": "how many spike times each rule learns, beside CONE-X, under two criteria",
     "tempotron": "which loads the Tempotron solves, and in how many epochs",
+    "fig6.15": "SKIM against CONE on the gait recordings, in the same folds",
 }
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from taxel._core import ProblemError
 from taxel.detect import score
 from taxel.detections import Detections
-from taxel.learn import ConeR
+from taxel.learn import SKIM, ConeR
 from taxel.studies.gait import insole, rules
 from taxel.studies.gait.folds import Scope
 from taxel.studies.gait.pieces import Piece, joined
@@ -59,11 +59,11 @@ def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str,
     Parameters
     ----------
     params : dict
-        ``kind`` ("neuron", "search" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of groups;
-        none: the test folder is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a person),
-        ``placed``;
-        of a neuron its ``point``; of a search a ``point``, the ``lambda_1`` to try one after the other, and which of
-        the groups left out are ``judged``; of a rule ``rule`` and ``encoder``.
+        ``kind`` ("neuron", "skim", "search" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of
+        groups; none: the test folder is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a
+        person), ``placed``; of a neuron its ``point``; of SKIM a ``point`` and its own options ``skim``; of a search a
+        ``point``, the ``lambda_1`` to try one after the other, and which of the groups left out are ``judged``; of a
+        rule ``rule`` and ``encoder``.
     seed : int
         Draws the footfalls and their order in the training row.
     setting : Setting
@@ -71,7 +71,7 @@ def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str,
     Returns
     -------
     dict
-        ``tested``: by group and unit what was found; ``fit``: what the learner says of itself, or the rule's numbers.
+        ``tested``: by group and unit what was found (of SKIM so ``by_threshold``); ``fit``: what the learner says of itself, or the rule's numbers.
     """
     scope = setting.scope(params)
     encoder = params["encoder"] if params["kind"] == "rule" else params["point"]["encoder"]
@@ -84,6 +84,8 @@ def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str,
     rows = {g: _rows(pieces, params["source"]) for g, pieces in tested.items()}
     if params["kind"] == "neuron":
         return _neuron(params, data, training, rows, seed)
+    if params["kind"] == "skim":
+        return _skim(params, data, training, rows, seed)
     if params["kind"] == "search":
         judged = [row for g in params["judged"] for row in rows[str(g)]]
         return _search(params, data, training, judged, seed)
@@ -176,6 +178,25 @@ def _patterns(params: Mapping[str, Any], training: list[Piece], seed: int) -> li
     if not patterns:
         raise ProblemError(f"{params['source']}, {event}: no event with a spike in what should train")
     return patterns
+
+
+def _skim(
+    params: Mapping[str, Any], data: Encoded, training: list[Piece], rows: dict[str, list[Piece]], seed: int
+) -> dict[str, Any]:
+    """Train SKIM as 6.5.4 does: the neuron's kernel, and every threshold tested."""
+    point, event = params["point"], params["event"]
+    later = data.latency_ms + point["delay_ms"]
+    patterns = _patterns(params, training, seed)
+    skim = SKIM(tau=point["neuron"]["tau"], step_ms=STEP_MS, within_ms=WINDOW_MS, **params["skim"])
+    skim.fit([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
+    tested = {
+        f"{threshold:g}": {
+            g: {p.unit: _scored(skim.predict([p.spikes], threshold=threshold)[0], p, event, later) for p in pieces}
+            for g, pieces in rows.items()
+        }
+        for threshold in skim.thresholds
+    }
+    return {"by_threshold": tested, "fit": {"rows": skim.rows_, "residual": round(skim.residual_, 3)}}
 
 
 def _told(cone: ConeR, patterns: list[Piece], event: str) -> dict[str, Any]:
