@@ -71,7 +71,8 @@ def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str,
     Returns
     -------
     dict
-        ``tested``: by group and unit what was found (of SKIM so ``by_threshold``); ``fit``: what the learner says of itself, or the rule's numbers.
+        ``tested``: by group and unit what was found (of SKIM so ``by_threshold``); ``fit``: what the learner says of
+        itself, or the rule's numbers.
     """
     scope = setting.scope(params)
     encoder = params["encoder"] if params["kind"] == "rule" else params["point"]["encoder"]
