@@ -16,8 +16,16 @@ __all__ = ["STUDIES", "load"]
 
 #: One line on every study, by name, in the order of the page; "fig6.1" lies in ``fig6_1.py``. They load when asked for.
 STUDIES = {
+    "fig6.1": "input spikes, potential, threshold and refractory time, and the output spikes they make",
+    "fig6.2": "kappa lifts the potential behind the target, steepens the crossing and keeps the spike's time",
+    "fig6.3": "the objectives of CONE-X and CONE-R over two weights",
+    "fig6.4": "a larger kappa lifts the potential behind the target and leaves the spike where it is",
+    "fig6.5": "l1 uses few synapses, l2 all of them; the spike stays where it is",
+    "fig6.6": "Poisson trains mapped to five spikes; l1 keeps the potential lower between them",
     "fig6.7": "how many patterns a neuron can learn exactly, by inputs and classes",
     "exactness": "what slope at the targets buys on a clock, and what exactness and slope cost in capacity",
+    "fig6.8": "three noises on a wave train, and what a trained neuron makes of them",
+    "fig6.9": "kappa against jitter, background and shunting, trained without noise and with it",
     "fig6.10": "dense against sparse weights under jitter, background and shunting",
     "fig6.11": "how the weights are distributed, trained without noise and with it",
     "gait": "gait events by one neuron an event, on published walking recordings (6.12 to 6.14)",

@@ -244,10 +244,10 @@ def _fitted(
     setting: Mapping[str, Any],
     patterns: Sequence[SpikeTrains],
     targets: Sequence[NDArray[np.float64]],
-) -> Any:
+) -> learn.ConeR | learn.ConeX:
     options = {**NEURON, **LEARN, **setting, "divide_b_by": params["divide_b_by"]}
     with warnings.catch_warnings():
         # Noise may well take a target out of reach; the distance shows it.
         warnings.simplefilter("ignore", UserWarning)
-        learner = {"cone_r": learn.ConeR}[params["learner"]]
+        learner = learn.ConeX if params["learner"] == "cone_x" else learn.ConeR
         return learner(**options).fit(patterns, targets)
