@@ -19,6 +19,8 @@ from taxel.studies.mapping import LEARN, TABLE
 __all__ = ["DURATION_MS", "feasible", "largest", "patterns", "realise"]
 
 DURATION_MS = 200.0
+#: Where rounding keeps the solver from a proof either way, rows met to this count as met, mV.
+MET_TO = 1e-9
 
 
 def patterns(seed: int, inputs: int, count: int, classes: int) -> tuple[list[SpikeTrains], list[list[float]]]:
@@ -39,6 +41,8 @@ def patterns(seed: int, inputs: int, count: int, classes: int) -> tuple[list[Spi
 def feasible(params: dict[str, Any], count: int, seed: int) -> bool:
     """Return whether one neuron can fire at the targets of `count` patterns and nowhere else.
 
+    At the very edge of capacity rounding may keep the solver from a proof either way: then rows met to 1e-9 mV decide.
+
     Parameters
     ----------
     params : dict
@@ -56,9 +60,7 @@ def feasible(params: dict[str, Any], count: int, seed: int) -> bool:
         **margins,
     )
     cone.fit(*patterns(seed, params["inputs"], count, params["classes"]))
-    if cone.status_ == "stopped":
-        raise ArithmeticError(f"no verdict for {params}, {count} patterns, seed {seed}")
-    return cone.status_ == "solved"
+    return bool(cone.status_ == "solved" or (cone.status_ == "stopped" and cone.violation_ <= MET_TO))
 
 
 def largest(holds: Callable[[int], bool], start: int, step: int, most: int | None = None) -> int:
