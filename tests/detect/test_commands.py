@@ -159,6 +159,35 @@ def test_notes_can_be_the_labels_and_registers_give_the_frame(folder: Path, tmp_
         assert np.abs(frames - np.round(frames)).max() * frame_us < 1.0
 
 
+def test_without_a_recipe_it_starts_from_the_gait_recipe_of_the_unit(tmp_path: Path, capsys) -> None:
+    random = np.random.default_rng(0)
+    values = np.zeros((900, 1, 4))
+    steps = np.arange(50, 850, 100) + random.integers(-10, 10, 8)
+    for k in steps:
+        for n in range(4):
+            values[k + 3 * n : k + 50 + 3 * n, 0, n] = 60.0
+    taxel.convert(taxel.Frames(values, np.arange(900) * 10_000, unit="N"), tmp_path / "walk.npz")
+    labels = tmp_path / "labels.csv"
+    rows = [f"contact,{k * 10_000}\nfoot-off,{(k + 59) * 10_000}\n" for k in steps]
+    labels.write_text("label,t_us\n" + "".join(rows))
+    out = tmp_path / "gait.json"
+    arguments = ("train", tmp_path / "walk.npz", "--labels", labels, "--out", out, "--overwrite")
+    code, said, _ = call(capsys, *arguments, "--json")
+    assert (code, json.loads(said)["recipe"]) == (0, "gaitpdb")
+    assert json.loads(said)["recordings"][0]["score_on_itself"]["missed"] == 0
+    readout = taxel.Readout.load(out)
+    assert readout.encoder == taxel.encode.LevelCrossing([5, 10, 20, 30, 40, 50], release_share=0.7)
+    assert {n.delay_ms for n in readout.neurons.values()} == {8.0}
+    changes = ("--set", "learner.tau=20", "--set", "neurons.contact.delay_ms=10", "--set", "encoder.levels=[5, 50]")
+    code, said, _ = call(capsys, *arguments, *changes)
+    assert (code, "gait recipe gaitpdb" in said) == (0, True)
+    readout = taxel.Readout.load(out)
+    assert (readout.encoder.levels, readout.neurons["contact"].delay_ms) == ([5.0, 50.0], 10.0)
+    assert {neuron.tau for neuron in readout.neurons.values()} == {20.0}
+    assert call(capsys, *arguments, "--recipe", "gaitndd", "--json")[0] == 0
+    assert taxel.Readout.load(out).encoder.running_range is not None
+
+
 def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
     values = np.zeros((400, 2, 2))
     truth = [50, 130, 250, 330]
@@ -192,7 +221,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
         (("encode", "1.npz", "out.npz", "--encoder", "fa2"), "encoder fa2: must be one of"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings=2"), "wings"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings"), "--set wings: must be KEY=VALUE"),
-        (("train", "1.npz", "--labels", "labels.csv", "-o", "new.json"), "recipe: says no encoder"),
+        (("train", "1.npz", "--labels", "labels.csv", "--recipe", "gait", "-o", "new.json"), "gait: no such file"),
         (("train", "1.npz", "--labels", "none.csv", "--encoder", "fa1", "-o", "new.json"), "none.csv: no such file"),
         (
             ("train", "1.npz", "2.npz", "--labels", "truth.csv", "--encoder", "fa1", "-o", "new.json"),
