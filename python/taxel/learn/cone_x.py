@@ -265,7 +265,7 @@ class ConeX:
             When the neuron shall fire, one list a pattern; an empty one teaches silence.
         start : ConeX, optional
             An earlier fit of a similar problem: its rows and multipliers are where this one begins. The result is the
-            same.
+            same; in continuous time but for the share of the margin that is left open (`margin_`).
         progress : function of (round, rows, broken, objective), optional
             Called after each round; `broken` counts the stretches of time in which silence is broken.
 

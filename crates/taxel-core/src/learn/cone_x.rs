@@ -24,10 +24,12 @@ const MET: f64 = 1e-12;
 /// Silence counts as broken from this on, mV, and by this share of the sum of absolute weights: rounding of the sweep.
 const BROKEN: f64 = 1e-13;
 const BROKEN_SHARE: f64 = 2e-16;
-/// Cut with the full margin, ask for this share of it: so rounds end.
-const ASKED_SHARE: f64 = 0.5;
+/// The share of the margin that weights must keep to count as a solution.
+const KEPT_SHARE: f64 = 0.5;
 /// The margin and the slope in continuous time where none is given, mV and mV/ms.
 const MARGIN: f64 = 1e-3;
+/// An objective below this share of what no weights at all have is 0: every lift is reached.
+const NOTHING: f64 = 1e-10;
 /// Rounds end without a verdict after so many.
 const MOST_ROUNDS: usize = 1000;
 
@@ -387,7 +389,8 @@ impl Problem {
         }
         let parts = self.objective.parts(&weights);
         let objective: f64 = parts.iter().sum();
-        let gap = if objective > 0.0 { (objective - least).max(0.0) / objective } else { 0.0 };
+        let nothing = NOTHING * self.objective.b * dot(&self.objective.wanted, &self.objective.wanted);
+        let gap = if objective > nothing { (objective - least).max(0.0) / objective } else { 0.0 };
         let (missed, broken) = (self.missed(&weights)?, self.worst(&weights));
         let kept = missed <= MET && broken <= self.rounding(&weights);
         Ok(Fit {
@@ -417,15 +420,15 @@ impl Problem {
         Ok(worst)
     }
 
-    /// Where silence is broken: with half the margin in continuous time, whole on the grid, where nothing lies between rows.
-    fn broken(&self, weights: &[f64], tolerance: f64) -> Vec<Peak> {
+    /// Where silence is broken with this share of the margin; on the grid the whole, as nothing lies between its rows.
+    fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
         let grid = self.parameters.neuron.time == Time::Grid;
-        self.silence.broken(weights, if grid { 1.0 } else { ASKED_SHARE }, tolerance)
+        self.silence.broken(weights, if grid { 1.0 } else { share }, tolerance)
     }
 
     /// By how much silence is broken at worst, mV; below 0 where it is kept.
     fn worst(&self, weights: &[f64]) -> f64 {
-        self.broken(weights, f64::NEG_INFINITY).iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.excess))
+        self.broken(weights, KEPT_SHARE, f64::NEG_INFINITY).iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.excess))
     }
 
     fn rounding(&self, weights: &[f64]) -> f64 {

@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::{ASKED_SHARE, Best, Engine, MET, MOST_ROUNDS, Problem, Round, Slopes};
+use super::{Best, Engine, MET, MOST_ROUNDS, Problem, Round, Slopes};
 use crate::learn::certificate::Bounds;
 use crate::learn::cone_program::HardRows;
 use crate::learn::dual_active_set::{DualActiveSet, Verdict};
@@ -11,6 +11,8 @@ use crate::learn::silence::Peak;
 use crate::learn::statement::Row;
 use crate::{Result, Stop};
 
+/// As for the shortest weights, with more room: rows that are nearly the same are harder here.
+const ASKED_SHARE: f64 = 0.9;
 /// First rounds look for rows only, at this tolerance; silence is broken there from this share of `theta_0` on, and rows with
 /// that much room to the other share go.
 const NEAR: f64 = 1e-3;
@@ -50,7 +52,8 @@ impl Problem {
             }
             let weights = if near { found.weights } else { self.projected(&rows, found.weights, stop)? };
             let theta = self.parameters.neuron.theta_0;
-            let broken = self.broken(&weights, if near { NEAR_SHARE * theta } else { self.rounding(&weights) });
+            let broken =
+                self.broken(&weights, ASKED_SHARE, if near { NEAR_SHARE * theta } else { self.rounding(&weights) });
             let value: f64 = objective.parts(&weights).iter().sum();
             progress(Round { round: best.rounds, rows: rows.names.len(), broken: broken.len(), objective: value });
             let mut goes_on = found.start;

@@ -2,11 +2,16 @@
 
 use std::collections::HashSet;
 
-use super::{ASKED_SHARE, Certificate, MOST_ROUNDS, Problem, Round, Slopes};
+use super::{Certificate, MOST_ROUNDS, Problem, Round, Slopes};
 use crate::learn::dual_active_set::{DualActiveSet, Multipliers, RowId, Verdict};
 use crate::learn::silence::Peak;
 use crate::learn::statement::{Row, Statement};
 use crate::{Result, Stop, problem};
+
+/// Cuts have the full margin, but this share of it is asked for: each cut has room around it, so rounds end.
+const ASKED_SHARE: f64 = 0.999;
+/// A proof of so many rows or less is made one in which every row is needed.
+const FEW: usize = 60;
 
 /// Where the rounds of the shortest weights ended.
 pub(super) enum End {
@@ -39,12 +44,11 @@ impl Problem {
             let weights = working.engine.weights().to_vec();
             let end = match verdict {
                 Verdict::Infeasible(ray) => {
-                    let proof = Certificate::check(&self.statement, &self.bounds, working.named(&ray.multipliers))?;
-                    proof.map_or(End::Stopped, End::Infeasible)
+                    self.refutation(working.named(&ray.multipliers), stop)?.map_or(End::Stopped, End::Infeasible)
                 }
                 Verdict::Stopped => End::Stopped,
                 Verdict::Optimal => {
-                    let broken = self.broken(&weights, self.rounding(&weights));
+                    let broken = self.broken(&weights, ASKED_SHARE, self.rounding(&weights));
                     let rows = working.rows();
                     let objective = self.objective.parts(&weights).iter().sum();
                     progress(Round { round: rounds, rows, broken: broken.len(), objective });
@@ -58,6 +62,50 @@ impl Problem {
             let held = working.named(&working.engine.multipliers());
             return Ok(Shortest { weights, held, rounds, end });
         }
+    }
+
+    /// The proof, of as few rows as can be found quickly.
+    fn refutation(&self, rows: Vec<(Row, f64)>, stop: Stop<'_>) -> Result<Option<Certificate>> {
+        let Some(proof) = Certificate::check(&self.statement, &self.bounds, rows.clone())? else { return Ok(None) };
+        if rows.len() > FEW {
+            return Ok(Some(proof));
+        }
+        let of_kind = |kind: fn(&Row) -> bool| rows.iter().map(|r| r.0).filter(move |row| kind(row));
+        let mut kept: Vec<Row> = of_kind(|r| matches!(r, Row::Slope { .. }))
+            .chain(of_kind(|r| matches!(r, Row::Silence { .. })))
+            .chain(of_kind(|r| matches!(r, Row::Target { .. })))
+            .collect();
+        let (mut fewest, mut needed) = (proof.clone(), 0);
+        // Without a row that is needed the others can be met; all that come before it are needed as well.
+        while needed < kept.len() && !stop.asked() {
+            let others = kept.iter().enumerate().filter(|(k, _)| *k != needed).map(|(_, row)| *row).collect::<Vec<_>>();
+            match self.conflict(&others, stop)? {
+                Some(fewer) => {
+                    kept.retain(|row| fewer.rows.iter().any(|r| r.0 == *row));
+                    fewest = fewer;
+                }
+                None => needed += 1,
+            }
+        }
+        Ok(Some(if proof.at_all && !fewest.at_all { proof } else { fewest }))
+    }
+
+    /// A proof that these rows cannot be met together.
+    fn conflict(&self, rows: &[Row], stop: Stop<'_>) -> Result<Option<Certificate>> {
+        let mut engine = DualActiveSet::new(&self.bounds.lower, &self.bounds.upper)?;
+        let (mut targets, mut others) = (vec![], vec![]);
+        for &row in rows {
+            let stated = self.statement.state(row)?;
+            if let Row::Target { .. } = row {
+                engine.equality(&stated.coefficients, stated.limit)?;
+                targets.push(row);
+            } else {
+                engine.inequality(&stated.coefficients, stated.limit)?;
+                others.push(row);
+            }
+        }
+        let Verdict::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
+        Certificate::check(&self.statement, &self.bounds, named(&targets, &others, &ray.multipliers))
     }
 
     /// A bound on `|w|^2` below, from any multipliers: what the Lagrangian comes to at least within the bounds.
@@ -193,10 +241,14 @@ impl Working {
         Ok(true)
     }
 
-    /// Multipliers by name.
     fn named(&self, multipliers: &Multipliers) -> Vec<(Row, f64)> {
-        let targets = self.targets.iter().copied().zip(multipliers.equalities.iter().copied());
-        let others = multipliers.inequalities.iter().map(|&(id, z)| (self.names[id.index()], z));
-        targets.chain(others).filter(|(_, u)| *u != 0.0).collect()
+        named(&self.targets, &self.names, multipliers)
     }
+}
+
+/// Multipliers by name.
+fn named(targets: &[Row], others: &[Row], multipliers: &Multipliers) -> Vec<(Row, f64)> {
+    let targets = targets.iter().copied().zip(multipliers.equalities.iter().copied());
+    let others = multipliers.inequalities.iter().map(|&(id, z)| (others[id.index()], z));
+    targets.chain(others).filter(|(_, u)| *u != 0.0).collect()
 }

@@ -1,0 +1,103 @@
+"""6.9 to 6.11 stated plainly, one sum of kernels at a time: the oracle of the tests of ConeX."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from taxel import SpikeTrains
+
+
+def kernel(cone, x):
+    """The kernel, x ms after an input (6.5; the Tempotron's); 0 up to the input itself."""
+    x = np.asarray(x, float)
+    late = np.maximum(x, 0)
+    if cone.kernel == "alpha":
+        return np.where(x > 0, late / cone.tau * np.exp(-late / cone.tau), 0.0)
+    if cone.kernel == "exponential":
+        return np.where(x > 0, np.exp(-late / cone.tau), 0.0)
+    tau_s = cone.tau / 4 if cone.tau_s is None else cone.tau_s
+    top = cone.tau * tau_s / (cone.tau - tau_s) * np.log(cone.tau / tau_s)
+    shape = lambda t: np.exp(-t / cone.tau) - np.exp(-t / tau_s)  # noqa: E731
+    return np.where(x > 0, shape(late) / shape(top), 0.0)
+
+
+def counts(cone, s, fired):
+    """Whether an input at s counts after these spikes; within 1e-6 ms of an edge it is at it."""
+    if cone.after_spike == "reset" and len(fired):
+        return s > fired[-1] + cone.refractory + 1e-6
+    if cone.after_spike == "ignore":
+        return not any(e + 1e-6 < s <= e + cone.refractory + 1e-6 for e in fired)
+    return True
+
+
+def row(cone, pattern, t, fired):
+    """The coefficients of the potential at t."""
+    out = np.zeros(len(pattern))
+    for n, train in enumerate(pattern):
+        heard = [s for s in train[train < t] if counts(cone, s, fired)]
+        out[n] = kernel(cone, t - np.array(heard)).sum()
+    return out
+
+
+def threshold(cone, t, fired, start):
+    spike = fired[-1] if len(fired) else (start if cone.first_threshold == "printed" else None)
+    since = -np.inf if spike is None else t - spike - cone.refractory
+    rec = 2 * cone.tau if cone.tau_rec is None else cone.tau_rec
+    return cone.theta_0 + (cone.theta_plus * np.exp(-since / rec) if since >= -1e-9 else 0.0)
+
+
+def grid_rows(cone, patterns, targets):
+    """Every row of 6.11: at the targets, behind them, at the silent points; and what each asks."""
+    delta = 0.1 * cone.tau if cone.delta_t_ms is None else cone.delta_t_ms
+    at, behind, theta, silent, limit = [], [], [], [], []
+    for p, (pattern, wanted) in enumerate(zip(patterns, targets, strict=True)):
+        for k, t in enumerate(wanted):
+            at.append(row(cone, pattern, t, wanted[:k]))
+            behind.append(row(cone, pattern, t + delta, wanted[:k]))
+            theta.append(threshold(cone, t, wanted[:k], pattern.start))
+        end = max([pattern.stop, *(wanted[-1:] + cone.tau)])
+        if cone.horizon is not None:
+            end = np.broadcast_to(cone.horizon, len(patterns))[p]
+        for k in range(int((end - pattern.start) / cone.step_ms + 1e-9) + 1):
+            t = pattern.start + k * cone.step_ms
+            if any(e - 1e-9 <= t <= e + cone.refractory + 1e-9 for e in wanted):
+                continue
+            fired = [e for e in wanted if e < t]
+            silent.append(row(cone, pattern, t, fired))
+            limit.append(threshold(cone, t, fired, pattern.start) - (cone.margin or 0.0))
+    return tuple(np.array(v) for v in (at, behind, theta, silent, limit))
+
+
+def terms(cone, rows, w):
+    _, behind, theta, _, _ = rows
+    return np.array(
+        [
+            np.abs(w).sum(),
+            np.linalg.norm(w) ** (2 if cone.norm == "square" else 1),
+            ((behind @ w - cone.kappa * theta) ** 2).sum(),
+        ]
+    )
+
+
+def shares(cone, rows):
+    """What each term is multiplied with: its lambda over their sum, over its largest value (6.3.2, 6.3.3)."""
+    n = rows[0].shape[1]
+    most = np.maximum(np.abs(np.broadcast_to(cone.lb, n)), np.abs(np.broadcast_to(cone.ub, n)))
+    high, low = terms(cone, rows, most), terms(cone, rows, -most)
+    largest = np.array([high[0], high[1], low[2]])
+    if cone.divide_b_by == "targets":
+        largest[2] = len(rows[0])
+    return np.array(cone.lambdas) / max(np.sum(cone.lambdas), 1e-300) / largest
+
+
+def examples(seed, trains=20, patterns=2, targets=2, duration=120.0, whole_ms=False, apart=8.0, spikes=4, first=25.0):
+    random = np.random.default_rng(seed)
+    lists, wanted = [], []
+    for _ in range(patterns):
+        times = [np.sort(random.uniform(0, duration, random.integers(1, spikes + 1))) for _ in range(trains)]
+        lists.append(SpikeTrains.from_lists([t.round() if whole_ms else t for t in times], stop=duration + 10))
+        at = np.sort(random.uniform(first, duration, targets))
+        while np.any(np.diff(at) < apart):
+            at = np.sort(random.uniform(first, duration, targets))
+        wanted.append(at.round() if whole_ms else at)
+    return lists, wanted

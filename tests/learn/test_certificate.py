@@ -1,0 +1,159 @@
+"""Certificates of CONE-X: what proves, what does not, and what they say."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from stated import examples
+
+from taxel import ProblemError, SpikeTrains
+from taxel.learn import Certificate, ConeX, Row, check_certificate
+
+
+def refuted(seed=0, **options):
+    """A problem beyond what its inputs can do."""
+    patterns, targets = examples(seed, trains=12, patterns=8, targets=1)
+    cone = ConeX(lb=-1, ub=1, **options).fit(patterns, targets)
+    assert cone.status_ == "infeasible"
+    return cone
+
+
+@pytest.mark.parametrize("options", [{}, {"time": "grid"}, {"kernel": "double_exponential"}, {"after_spike": "reset"}])
+def test_no_is_always_proven_and_nothing_else_is_claimed(options):
+    for seed in range(8):
+        cone = refuted(seed, **options)
+        assert check_certificate(cone.problem_, cone.certificate_)
+        assert np.isnan(cone.weights_).all()
+        assert cone.objective_ == np.inf
+        assert cone.gap_ == 0.0
+        others = np.array([row.kind != "target" for row in cone.certificate_.rows])
+        assert np.all(cone.certificate_.multipliers[others] >= 0)
+
+
+def test_a_dozen_lines_of_numpy_see_the_same_proof():
+    for seed in range(8):
+        cone = refuted(seed, time="grid" if seed % 2 else "continuous")
+        proof, problem = cone.certificate_, cone.problem_
+        stated = [problem.row(row) for row in proof.rows]
+        rows, limits = np.array([s[0] for s in stated]), np.array([s[1] for s in stated])
+        g = proof.multipliers @ rows
+        gap = np.minimum(problem.lb * g, problem.ub * g).sum() - proof.multipliers @ limits
+        assert gap == pytest.approx(proof.gap, rel=1e-6)
+        assert gap > 0
+        # No weights within the bounds meet the rows: tried at many places.
+        random = np.random.default_rng(seed)
+        equal = np.array([row.kind == "target" for row in proof.rows])
+        for w in random.uniform(problem.lb, problem.ub, (200, len(g))):
+            off = rows @ w - limits
+            assert max(np.abs(off[equal]).max(initial=0), off[~equal].max(initial=-1)) > 0
+
+
+def test_every_row_of_a_small_proof_is_needed():
+    for seed in range(6):
+        cone = refuted(seed)
+        proof = cone.certificate_
+        assert 2 <= len(proof.rows) <= 60
+        for k in range(len(proof.rows)):
+            left = [n for n in range(len(proof.rows)) if n != k]
+            less = dataclasses.replace(proof, rows=[proof.rows[n] for n in left], multipliers=proof.multipliers[left])
+            assert not check_certificate(cone.problem_, less)
+
+
+def test_a_certificate_that_was_touched_is_refused():
+    kinds = {"target", "silence"}
+    cone = next(c for c in map(refuted, range(99)) if {r.kind for r in c.certificate_.rows} >= kinds)
+    proof, problem = cone.certificate_, cone.problem_
+    turned = proof.multipliers.copy()
+    silent = next(k for k, row in enumerate(proof.rows) if row.kind == "silence")
+    turned[silent] *= -1
+    assert not check_certificate(problem, dataclasses.replace(proof, multipliers=turned))
+    assert not check_certificate(problem, dataclasses.replace(proof, multipliers=0 * proof.multipliers))
+    assert not check_certificate(problem, dataclasses.replace(proof, multipliers=-proof.multipliers))
+    target = next(k for k, row in enumerate(proof.rows) if row.kind == "target")
+    left = [k for k in range(len(proof.rows)) if k != target]
+    less = dataclasses.replace(proof, rows=[proof.rows[k] for k in left], multipliers=proof.multipliers[left])
+    assert not check_certificate(problem, less)
+    # Wider bounds, another problem: the proof does not carry over.
+    patterns, targets = examples(1, trains=40, patterns=8, targets=1)
+    other = ConeX(lb=-3, ub=3).fit(patterns, targets)
+    assert other.status_ == "solved"
+    strange = [row for row in proof.rows if row.kind != "silence"]
+    assert not check_certificate(other.problem_, Certificate(strange, np.ones(len(strange)), 1.0, False, ""))
+
+
+@pytest.mark.parametrize("time", ["grid", "continuous"])
+@pytest.mark.parametrize("after_spike", ["keep", "reset"])
+def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spike):
+    trains = SpikeTrains.from_lists([[20.0], [25.0], [80.0]], stop=120.0)
+    for ub, target, said in (
+        (0.3, 10.0, "no input counts before it"),
+        (0.3, 30.0, "full weights come to"),
+        (5.0, 10.0, "no input counts before it"),
+    ):
+        cone = ConeX(time=time, after_spike=after_spike, lb=-ub, ub=ub).fit([trains], [[target]])
+        assert cone.status_ == "infeasible"
+        proof = cone.certificate_
+        assert proof.rows == [Row("target", 0, 0)]
+        assert check_certificate(cone.problem_, proof)
+        assert proof.at_all
+        assert said in proof.text
+        assert f"pattern 0 target 0 ({target:.0f} ms)" in str(proof)
+        assert "Impossible at all" in proof.text
+    # An input at the target itself adds nothing there.
+    cone = ConeX(time=time, lb=-9, ub=9).fit([trains], [[20.0]])
+    assert cone.certificate_.rows == [Row("target", 0, 0)]
+    # Least weights that are too much are refuted by one row as well.
+    many = SpikeTrains.from_lists([[20.0]] * 9, stop=120.0)
+    cone = ConeX(time=time, lb=0.5, ub=0.6).fit([many], [[35.0]])
+    assert "the least weights come to" in cone.certificate_.text
+
+
+def test_the_reading_names_the_patterns_targets_and_silences_that_conflict():
+    trains = SpikeTrains.from_lists([[20.0], [25.0], [30.0], [33.0]], stop=100.0)
+    cone = ConeX(lb=-2, ub=2).fit(
+        [trains, trains, SpikeTrains.from_lists([[99.0], [99.5], [], []], stop=100.0)], [[35.0], [], []]
+    )
+    assert cone.status_ == "infeasible"
+    text = str(cone.certificate_)
+    assert "pattern 0 shall fire at target 0 (35 ms)" in text
+    assert "; pattern 1 shall be silent at 3" in text
+    assert "pattern 2" not in text
+    assert repr(cone.certificate_).startswith("<Certificate of ")
+
+
+def test_a_proof_that_needs_its_margin_says_so_and_a_smaller_margin_may_solve_it():
+    trains = SpikeTrains.from_lists([[20.0], [25.0], [30.0]], stop=100.0)
+    near = SpikeTrains.from_lists([[20.0], [25.0], [30.2]], stop=100.0)
+    # Nearly the same inputs, one to fire and one to be silent: only little room between.
+    found = {}
+    for margin in (0.2, 1e-3, 1e-5):
+        cone = ConeX(lb=-9, ub=9, margin=margin, slope=1e-4).fit([trains, near], [[40.0], []])
+        found[margin] = cone.status_
+        if cone.status_ == "infeasible":
+            proof = cone.certificate_
+            assert check_certificate(cone.problem_, proof)
+            assert check_certificate(cone.problem_, proof, margin=False) == proof.at_all
+            if not proof.at_all:
+                assert f"This holds for silence {margin} mV below the threshold" in proof.text
+                assert "Impossible at all" not in proof.text
+    assert found[0.2] == "infeasible"
+    assert found[1e-5] == "solved"
+
+
+def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
+    problem = refuted().problem_
+    for row, said in (
+        (("silence", 99, 5.0), "pattern 99: there are 8"),
+        (("target", 0, 7), "pattern 0, target 7: the pattern has 1 targets"),
+        (("silence", 0, 1e6), "outside of what is asked for"),
+        (("noise", 0, 1.0), 'row of kind "noise"'),
+        (("target", 0, 0.5), "target 0.5: must be a whole number"),
+    ):
+        with pytest.raises(ProblemError, match=said):
+            problem.row(row)
+    with pytest.raises(ProblemError, match="a slope is asked for in continuous time only"):
+        refuted(time="grid").problem_.slope(0, 0)
+    with pytest.raises(ProblemError, match="no point of the grid"):
+        refuted(time="grid").problem_.silence(0, 0.25)

@@ -1,0 +1,386 @@
+"""CONE-X on the grid against 6.11 stated plainly, every row written out, and handed whole to other solvers."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from stated import examples, grid_rows, row, shares, terms, threshold
+
+import taxel
+from taxel import ProblemError, SpikeTrains
+from taxel.learn import ConeX, check_certificate
+
+clarabel = pytest.importorskip("clarabel")
+sparse = pytest.importorskip("scipy.sparse")
+linprog = pytest.importorskip("scipy.optimize").linprog
+
+
+def feasible(cone, rows):
+    """The verdict of HiGHS on every row."""
+    at, _, theta, silent, limit = rows
+    n = at.shape[1]
+    bounds = np.column_stack([np.broadcast_to(cone.lb, n), np.broadcast_to(cone.ub, n)])
+    found = linprog(np.zeros(n), A_ub=silent, b_ub=limit, A_eq=at, b_eq=theta, bounds=bounds, method="highs")
+    assert found.status in (0, 2)
+    return found.status == 0
+
+
+def least(cone, rows):
+    """Minimise 6.11 over every row at once: w, |w|, |w|_2, B's images as variables of their own."""
+    at, behind, theta, silent, limit = rows
+    (k, n), m = at.shape, len(silent)
+    c = shares(cone, rows)
+    scale = 1 / np.max(c * np.maximum(terms(cone, rows, np.full(n, 0.1)), 1e-9))
+    c = c * scale
+    sizes = np.cumsum([0, n, n, 1, k])
+    q, p = np.zeros(sizes[-1]), np.zeros(sizes[-1])
+    q[sizes[1] : sizes[2]] = c[0]
+    p[sizes[3] :] = 2 * c[2]
+    if cone.norm == "square":
+        p[:n] = 2 * c[1]
+    else:
+        q[sizes[2]] = c[1]
+
+    def block(rows, **columns):
+        line = [sparse.csc_matrix((rows, sizes[i + 1] - sizes[i])) for i in range(4)]
+        for name, value in columns.items():
+            line["waty".index(name)] = sparse.csc_matrix(value)
+        return sparse.hstack(line)
+
+    eye = np.eye
+    parts = [
+        (block(k, w=at), theta),
+        (block(k, w=behind, y=-eye(k)), cone.kappa * theta),
+        (block(n, w=eye(n), a=-eye(n)), np.zeros(n)),
+        (block(n, w=-eye(n), a=-eye(n)), np.zeros(n)),
+        (block(n, w=eye(n)), np.broadcast_to(cone.ub, n)),
+        (block(n, w=-eye(n)), -np.broadcast_to(cone.lb, n)),
+        (block(m, w=silent), limit),
+        (block(1, t=-eye(1)), np.zeros(1)),
+        (block(n, w=-eye(n)), np.zeros(n)),
+    ]
+    a, b = sparse.vstack([v[0] for v in parts]).tocsc(), np.concatenate([v[1] for v in parts])
+    cones = [clarabel.ZeroConeT(2 * k), clarabel.NonnegativeConeT(4 * n + m), clarabel.SecondOrderConeT(n + 1)]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.tol_gap_abs, settings.tol_gap_rel, settings.tol_feas = 1e-11, 1e-9, 1e-10
+    answer = clarabel.DefaultSolver(sparse.diags(p).tocsc(), q, a, b, cones, settings).solve()
+    return (c @ terms(cone, rows, np.array(answer.x[:n]))) / scale
+
+
+OPTIONS = [
+    {},
+    {"after_spike": "reset"},
+    {"after_spike": "ignore", "refractory": 6.0},
+    {"lambdas": (1, 0, 0)},
+    {"lambdas": (2, 2, 200), "after_spike": "reset"},
+    {"lambdas": (2, 2, 200), "divide_b_by": "targets", "kappa": 1.08},
+    {"lambdas": (0, 1, 100), "norm": "square", "divide_b_by": "targets"},
+    {"lambdas": (0, 1, 0), "norm": "square", "margin": 0.01},
+    {"lambdas": (0, 0, 1), "delta_t_ms": 4.0},
+    {"lambdas": (1, 4, 0), "first_threshold": "printed", "after_spike": "ignore"},
+    {"lambdas": (1, 1, 0), "lb": np.linspace(-2.0, -1.0, 20), "ub": np.linspace(3.0, 1.0, 20), "horizon": 150.0},
+    {"kernel": "double_exponential", "horizon": 140.0},
+    {"kernel": "double_exponential", "tau_s": 2.0, "lambdas": (2, 2, 200), "after_spike": "reset"},
+    {"kernel": "exponential", "tau": 8.0, "lambdas": (1, 1, 0)},
+    {"step_ms": 0.5, "theta_plus": 1.0, "tau_rec": 60.0},
+]
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=lambda o: ",".join(o) or "printed")
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
+def test_on_the_grid_verdict_and_objective_are_those_of_every_row_handed_whole_to_a_solver(options, seed):
+    patterns, targets = examples(seed, whole_ms=seed % 2 == 0, patterns=2 if seed < 4 else 6)
+    cone = ConeX(**{"time": "grid", "tau": 12.0, "lb": -3.0, "ub": 3.0, **options}).fit(patterns, targets)
+    rows = grid_rows(cone, patterns, targets)
+    assert (cone.status_ == "solved") == feasible(cone, rows)
+    if cone.status_ == "infeasible":
+        assert check_certificate(cone.problem_, cone.certificate_)
+        return
+    w = cone.weights_
+    value = shares(cone, rows) * terms(cone, rows, w)
+    assert list(cone.parts_.values()) == pytest.approx(list(value), rel=1e-9, abs=1e-15)
+    assert cone.objective_ == pytest.approx(value.sum(), rel=1e-12)
+    nothing = 1e-10 * (shares(cone, rows) @ terms(cone, rows, 0 * w))
+    assert cone.objective_ == pytest.approx(least(cone, rows), rel=1e-6, abs=nothing)
+    assert cone.gap_ <= 1e-8
+    assert np.abs(rows[0] @ w - rows[2]).max() <= 1e-12
+    assert (rows[3] @ w - rows[4]).max() <= 1e-12
+    assert np.all(w >= np.array(cone.lb))
+    assert np.all(w <= np.array(cone.ub))
+    assert cone.margin_.mv == pytest.approx(np.min(rows[4] + (cone.margin or 0.0) - rows[3] @ w), abs=1e-12)
+
+
+def test_verdicts_over_the_edge_of_what_can_be_met_are_those_of_highs_and_each_no_is_proven():
+    verdicts = []
+    for seed in range(60):
+        patterns, targets = examples(
+            seed, trains=16, patterns=3 + seed % 4, targets=1 + seed % 2, whole_ms=seed % 3 == 0
+        )
+        cone = ConeX(time="grid", after_spike=("keep", "ignore", "reset")[seed % 3], lb=-2.0, ub=2.0, lambdas=(0, 0, 0))
+        cone.fit(patterns, targets)
+        verdicts.append(cone.status_ == "solved")
+        assert verdicts[-1] == feasible(cone, grid_rows(cone, patterns, targets)), seed
+        if cone.status_ == "infeasible":
+            assert check_certificate(cone.problem_, cone.certificate_)
+            assert cone.certificate_.at_all
+        else:
+            assert (cone.objective_, cone.gap_) == (0.0, 0.0)
+    assert 10 < sum(verdicts) < 50
+
+
+def test_the_problem_states_the_rows_of_the_grid_by_pattern_and_time():
+    patterns, targets = examples(3)
+    for options in OPTIONS:
+        cone = ConeX(**{"time": "grid", "lb": -3.0, "ub": 3.0, **options}).fit(patterns, targets)
+        problem, rows = cone.problem_, grid_rows(cone, patterns, targets)
+        for k, (p, target) in enumerate([(0, 0), (0, 1), (1, 0), (1, 1)]):
+            at, theta = problem.target(p, target)
+            behind, wanted = problem.behind(p, target)
+            assert at == pytest.approx(rows[0][k], abs=1e-14)
+            assert behind == pytest.approx(rows[1][k], abs=1e-14)
+            assert (theta, wanted) == pytest.approx((rows[2][k], cone.kappa * rows[2][k]), rel=1e-14)
+        end = np.broadcast_to(np.inf if cone.horizon is None else cone.horizon, 2)[1]
+        for t in np.arange(0.0, min(end, 125.0), 7.0):
+            fired = [e for e in targets[1] if e < t]
+            if any(e - 1e-9 <= t <= e + cone.refractory + 1e-9 for e in targets[1]):
+                with pytest.raises(ProblemError, match="lies at a target or in its refractory time"):
+                    problem.silence(1, t)
+                continue
+            coefficients, limit = problem.silence(1, t)
+            assert coefficients == pytest.approx(row(cone, patterns[1], t, fired), abs=1e-14)
+            assert limit == pytest.approx(threshold(cone, t, fired, 0.0) - (cone.margin or 0.0), rel=1e-14)
+            assert problem.silence(1, t, margin=False)[1] == pytest.approx(threshold(cone, t, fired, 0.0), rel=1e-14)
+
+
+@pytest.mark.parametrize("kernel", ["alpha", "double_exponential"])
+@pytest.mark.parametrize("first_threshold", ["theta_0", "printed"])
+@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
+def test_the_problem_states_rows_at_any_instant_with_their_tapered_margin_and_slope(
+    kernel, first_threshold, after_spike
+):
+    patterns, targets = examples(5)
+    cone = ConeX(
+        kernel=kernel, first_threshold=first_threshold, after_spike=after_spike, margin=0.02, slope=0.004, lb=-3, ub=3
+    )
+    cone.fit(patterns, targets)
+    wanted, near = targets[0], 1e-4
+    for k, t in enumerate(wanted):
+        coefficients, limit = cone.problem_.slope(0, k)
+        late, before = (row(cone, patterns[0], x, wanted[:k]) for x in (t, t - near))
+        assert coefficients == pytest.approx(-(late - before) / near, abs=1e-3)
+        theta = [threshold(cone, x, wanted[:k], 0.0) for x in (t, t - near)]
+        assert limit == pytest.approx(-(theta[0] - theta[1]) / near - 0.004, abs=1e-5)
+        assert cone.problem_.slope(0, k, margin=False)[1] == pytest.approx(limit + 0.004, abs=1e-15)
+    tau, tau_s = 15.0, 3.75
+
+    def family(x):
+        if kernel == "alpha":
+            return 0.004 * x * np.exp(x / tau)
+        return 0.004 / (1 / tau_s - 1 / tau) * (np.exp(x / tau_s) - np.exp(x / tau))
+
+    last = 0.0
+    for t in np.linspace(0.1, 129.9, 400):
+        fired = [e for e in wanted if e < t]
+        if fired and t < fired[-1] + 3.0:
+            continue
+        ahead = [e - t for e in wanted if e >= t]
+        margin = min(0.02, family(ahead[0])) if ahead else 0.02
+        coefficients, limit = cone.problem_.silence(0, t)
+        assert coefficients == pytest.approx(row(cone, patterns[0], t, fired), abs=1e-14)
+        assert threshold(cone, t, fired, 0.0) - limit == pytest.approx(margin, abs=1e-12)
+        last = max(last, margin)
+    assert last == 0.02
+
+
+def test_a_start_from_an_earlier_fit_changes_the_way_but_not_the_result():
+    patterns, targets = examples(6, trains=60, patterns=8, targets=2, duration=200.0)
+    for options in ({}, {"lambdas": (2, 2, 200)}, {"time": "grid"}):
+        common = {"lb": -1.0, "ub": 1.0, **options}
+        cold = ConeX(**common, kappa=1.1).fit(patterns, targets)
+        assert cold.status_ == "solved"
+        again = ConeX(**common, kappa=1.1).fit(patterns, targets, start=cold)
+        assert again.status_ == "solved"
+        assert again.objective_ == pytest.approx(cold.objective_, rel=1e-7)
+        assert again.rounds_ <= cold.rounds_
+        # Other bounds, other targets, other margins: rows that are not there any more are left out.
+        moved = [t + 0.25 for t in targets]
+        for other, times in (
+            ({**common, "ub": 0.8}, targets),
+            (common, moved),
+            ({**common, "refractory": 5.0}, targets),
+        ):
+            fresh, warm = ConeX(**other).fit(patterns, times), ConeX(**other).fit(patterns, times, start=cold)
+            assert warm.status_ == fresh.status_
+            if fresh.status_ == "solved":
+                # In continuous time a little of the margin is left open.
+                near = 1e-7 if "time" in options else 1e-5 if "lambdas" not in options else 1e-3
+                assert warm.objective_ == pytest.approx(fresh.objective_, rel=near)
+    with pytest.raises(ProblemError, match="start: has not been fitted"):
+        ConeX().fit(patterns, targets, start=ConeX())
+
+
+def test_the_same_fit_again_gives_the_same_bits():
+    patterns, targets = examples(8, trains=40)
+    for lambdas in ((0, 1, 0), (2, 2, 200)):
+        first, again = (ConeX(lambdas=lambdas, lb=-1, ub=1).fit(patterns, targets).weights_ for _ in range(2))
+        assert first.tobytes() == again.tobytes()
+
+
+def test_a_shift_in_time_and_another_order_of_trains_change_nothing():
+    patterns, targets = examples(9, trains=40, whole_ms=True)
+    here = ConeX(lb=-1, ub=1).fit(patterns, targets)
+    order = np.random.default_rng(1).permutation(40)
+    there = [
+        SpikeTrains.from_lists([p[n] + 1000.0 for n in order], start=p.start + 1000.0, stop=p.stop + 1000.0)
+        for p in patterns
+    ]
+    moved = ConeX(lb=-1, ub=1).fit(there, [t + 1000.0 for t in targets])
+    assert (here.status_, moved.status_) == ("solved", "solved")
+    assert moved.objective_ == pytest.approx(here.objective_, rel=1e-8)
+    assert moved.weights_ == pytest.approx(here.weights_[order], abs=1e-6)
+
+
+def test_a_pattern_without_targets_teaches_silence():
+    (pattern,), targets = examples(11, trains=40, patterns=1, targets=1)
+    # The same played faster: its potential comes higher, so the untaught neuron fires.
+    fast = SpikeTrains.from_lists([0.8 * train for train in pattern], stop=pattern.stop)
+    loud = ConeX(lb=-1, ub=1).fit([pattern], targets)
+    taught = ConeX(lb=-1, ub=1).fit([pattern, fast], [targets[0], []])
+    assert taught.status_ == "solved"
+    assert len(loud.neuron_.run(loud.weights_, fast)) > 0
+    assert len(taught.neuron_.run(taught.weights_, fast)) == 0
+    assert list(taught.neuron_.run(taught.weights_, pattern)) == pytest.approx(list(targets[0]), abs=1e-6)
+
+
+def test_the_horizon_frees_what_lies_behind_it_in_each_pattern():
+    patterns, targets = examples(12, trains=30, patterns=2, targets=1)
+    ends = [float(t[-1]) + 5.0 for t in targets]
+    whole, short = ConeX(lb=-1, ub=1).fit(patterns, targets), ConeX(lb=-1, ub=1, horizon=ends).fit(patterns, targets)
+    assert short.objective_ <= whole.objective_
+    with pytest.raises(ProblemError, match="outside of what is asked for"):
+        short.problem_.silence(0, ends[0] + 1.0)
+
+
+def large():
+    random = np.random.default_rng(0)
+    patterns = [SpikeTrains.from_lists(random.uniform(0, 200, (1500, 1)), stop=200.0) for _ in range(430)]
+    return patterns, [[50.0 + 50.0 * (k % 3)] for k in range(430)]
+
+
+@pytest.mark.parametrize("lambdas", [(0, 1, 0), (1, 0, 0)])
+def test_max_seconds_ends_a_fit_with_the_best_so_far(lambdas):
+    patterns, targets = examples(6, trains=120, patterns=20, targets=2, duration=200.0)
+    cone = ConeX(lambdas=lambdas, lb=-1, ub=1, max_seconds=1e-9).fit(patterns, targets)
+    assert cone.status_ == "stopped"
+    assert cone.weights_.shape == (120,)
+    assert np.isfinite(cone.weights_).all()
+    assert np.isfinite([cone.objective_, cone.gap_, cone.violation_]).all()
+    assert cone.certificate_ is None
+    full = ConeX(lambdas=lambdas, lb=-1, ub=1, max_seconds=600).fit(patterns, targets)
+    assert full.status_ == "solved"
+
+
+def test_control_c_stops_a_fit_at_once_keeps_the_best_so_far_and_then_raises():
+    patterns, targets = large()
+    cone = ConeX(horizon=200.0)
+    threading.Timer(1.5, signal.raise_signal, [signal.SIGINT]).start()
+    begun = time.monotonic()
+
+    def fit_for_ever():
+        for _ in range(1000):
+            cone.fit(patterns, targets)
+
+    with pytest.raises(KeyboardInterrupt):
+        fit_for_ever()
+    assert time.monotonic() - begun < 60
+    assert cone.status_ in ("stopped", "solved", "infeasible")
+
+
+def test_progress_is_told_round_by_round():
+    patterns, targets = examples(12, trains=40, patterns=4)
+    told = []
+    cone = ConeX(lb=-1, ub=1).fit(patterns, targets, progress=lambda *round: told.append(round))
+    assert [r[0] for r in told] == list(range(1, cone.rounds_ + 1))
+    assert told[-1][2] == 0
+    assert told[-1][3] == cone.objective_
+    with pytest.raises(ZeroDivisionError):
+        ConeX(lb=-1, ub=1).fit(patterns, targets, progress=lambda *_: 1 / 0)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"tau": 0}, "tau is 0 ms: must be above 0"),
+        ({"kernel": "exponential"}, 'kernel is "exponential" and time "continuous": its potential only jumps'),
+        ({"kernel": "box"}, "unknown variant `box`"),
+        ({"kappa": 0}, "kappa is 0"),
+        ({"delta_t_ms": -1}, "delta_t_ms is -1"),
+        ({"lambdas": (1, 2)}, "length 2"),
+        ({"lambdas": (1, 2, -3)}, r"lambdas\[2\] is -3"),
+        ({"ub": float("inf")}, "ub is inf: must be finite"),
+        ({"lb": [0.0, float("nan")]}, r"lb\[1\] is nan: must be finite"),
+        ({"lb": "low"}, "lb is 'low': must be a number"),
+        ({"margin": 0.0}, "margin is 0 mV: must be above 0 in continuous time"),
+        ({"slope": -1.0}, "slope is -1 mV/ms"),
+        ({"slope": 0.1, "time": "grid"}, 'slope is 0.1 mV/ms: belongs to time "continuous"'),
+        ({"horizon": float("nan")}, "horizon is nan"),
+        ({"tolerance": 0}, "tolerance is 0: must lie between"),
+        ({"max_seconds": 0}, "max_seconds is 0: must be above 0"),
+        ({"norm": "max"}, "unknown variant `max`"),
+    ],
+)
+def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
+    with pytest.raises(ProblemError, match=said) as error:
+        ConeX(**options)
+    assert "\n" not in str(error.value)
+
+
+def lists(*times):
+    return SpikeTrains.from_lists(times, stop=100.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "patterns", "targets", "said"),
+    [
+        ({}, [], [], "patterns: there is none"),
+        ({}, [lists([1.0])], [], "targets: 0 lists for 1 patterns"),
+        ({}, [lists([], [])], [[5.0]], "pattern 0: has no spike"),
+        ({}, [lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], "pattern 1: 2 trains, pattern 0 has 1"),
+        ({}, [lists([1.0])], [[float("nan")]], "pattern 0, target 0: time is NaN"),
+        ({}, [lists([1.0])], [[30.0, 20.0]], "pattern 0, target 1: 20 ms comes after 30 ms"),
+        (
+            {},
+            [lists([1.0])],
+            [[30.0, 31.5]],
+            r"pattern 0, target 1 \(31.5 ms\): 1.5 ms after target 0, inside the refr",
+        ),
+        ({}, [lists([1.0])], [[130.0]], "pattern 0, target 0: 130 ms lies outside the pattern's window 0 to 100"),
+        ({}, ["spikes"], [[5.0]], "pattern 0 is 'spikes': must be a taxel.SpikeTrains"),
+        ({"lb": 0.3, "ub": 0.2}, [lists([1.0])], [[5.0]], "0.3 to 0.2 mV|lb is 0.3 mV, above ub"),
+        ({"lb": [0.0, 0.0, 0.0]}, [lists([1.0])], [[5.0]], "lb: 3"),
+        ({"horizon": [9.0, 9.0]}, [lists([1.0])], [[5.0]], "horizon: 2 values"),
+        ({"horizon": 50.0}, [lists([1.0])], [[60.0]], "pattern 0: last target at 60 ms, the horizon is 50 ms"),
+    ],
+)
+def test_examples_that_make_no_sense_are_one_clear_error_each(options, patterns, targets, said):
+    with pytest.raises(ProblemError, match=said) as error:
+        ConeX(**options).fit(patterns, targets)
+    assert "\n" not in str(error.value)
+
+
+def test_the_defaults_that_python_shows_are_those_of_the_core():
+    core = taxel._core.check_cone_x("{}")
+    assert taxel._core.check_cone_x(ConeX()._json()) == core
+    assert repr(ConeX(tau=3.0, lb=[0.0, 1.0])) == "ConeX(tau=3.0, lb=[0.0, 1.0])"
+
+
+def test_a_fitted_cone_can_be_read_out():
+    patterns, targets = examples(5, trains=30)
+    cone = ConeX(lb=-1, ub=1).fit(patterns, targets)
+    assert cone.neuron_ == taxel.Neuron()
+    assert cone.status_ == "solved"
