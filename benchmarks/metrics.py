@@ -125,6 +125,13 @@ def large(*, quick):
             "cpu_minutes": took,
             "cpu_minutes for all pairs, scaled": took * whole / pairs,
         }
+    if not quick:
+        every = [*patterns, *(pattern(random) for _ in range(MATRIX - most))]
+        found["van Rossum summed over taxels, the whole matrix"] = {
+            "patterns": MATRIX,
+            "pairs": whole,
+            "cpu_minutes": minutes("van_rossum", every, tau=TAU),
+        }
     return {"matrix": MATRIX, "taxels": TAXELS, "spikes a taxel": SPIKES, "results": found}
 
 
