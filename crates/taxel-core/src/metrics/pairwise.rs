@@ -31,6 +31,11 @@ impl<'a> Work<'a> {
         Self { threads, vectors: Vectors::best(), stop, progress }
     }
 
+    /// Does tasks as [`Self::each`] does, without telling of them.
+    pub(super) fn quietly(&mut self, tasks: usize, task: impl Fn(usize, Stop<'_>) -> Result<()> + Sync) -> Result<()> {
+        Work { progress: &mut |_, _| (), ..*self }.each(tasks, &|_| (0, 0), task)
+    }
+
     /// Does `tasks` tasks, each whole on one thread, in their order where there is one thread.
     ///
     /// The stop that a task gets is for its thread. `told` turns how many tasks are done into pairs done and all of them.
@@ -63,12 +68,18 @@ impl<'a> Work<'a> {
         let asked = || stop.asked() || halt.load(Relaxed);
         let halted = || halt.load(Relaxed);
         let helpers = self.threads.min(tasks).saturating_sub(1);
+        let (caller, working) = (thread::current(), AtomicUsize::new(helpers));
         thread::scope(|scope| {
-            let help = || run(Stop::when(&halted), &mut |_| ());
+            let help = || {
+                let outcome = run(Stop::when(&halted), &mut |_| ());
+                working.fetch_sub(1, Relaxed);
+                caller.unpark();
+                outcome
+            };
             let handles: Vec<_> = (0..helpers).map(|_| scope.spawn(help)).collect();
             let mut outcome = run(Stop::when(&asked), &mut tell);
             // Whoever presses Ctrl-C while only others still work is heard, too.
-            while handles.iter().any(|h| !h.is_finished()) {
+            while working.load(Relaxed) > 0 && handles.iter().any(|h| !h.is_finished()) {
                 if stop.asked() {
                     halt.store(true, Relaxed);
                     outcome = Err(Error::Interrupted);

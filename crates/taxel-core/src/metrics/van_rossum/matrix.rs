@@ -1,5 +1,7 @@
 //! Matrices of van Rossum distances, train after train by stored exponentials.
 
+use std::sync::OnceLock;
+
 use super::{NEAR, VanRossum};
 use crate::Result;
 use crate::metrics::pairwise::Matrix;
@@ -22,8 +24,9 @@ impl VanRossum {
         let pairs = matrix.pairs();
         for n in 0..a.trains {
             let frame = Frame::around(self.tau, &[a, others], Some(n));
-            let rows = frame.as_ref().map(|f| Side::new(f, a, n));
-            let columns = b.and_then(|b| frame.as_ref().map(|f| Side::new(f, b, n)));
+            let rows = Train::all(frame.as_ref(), a, n, work)?;
+            let columns = b.map(|b| Train::all(frame.as_ref(), b, n, work)).transpose()?;
+            let columns = columns.as_ref().unwrap_or(&rows);
             let told = |group: usize| {
                 let share = pairs * (group * ROWS).min(a.count) / a.count;
                 ((pairs * n + share) / a.trains, pairs)
@@ -33,7 +36,7 @@ impl VanRossum {
                 for j in matrix.first(group.start)..others.count {
                     stop.check()?;
                     for i in group.clone().filter(|&i| j >= matrix.first(i)) {
-                        let far = rows.as_ref().and_then(|rows| rows.far(i, columns.as_ref().unwrap_or(rows), j));
+                        let far = rows[i].get().zip(columns[j].get()).and_then(|(row, column)| row.far(column));
                         let distance = match far {
                             Some(square) => self.normalisation.root(square, self.tau),
                             None => self.between(a.train(i, n), others.train(j, n)),
@@ -48,38 +51,47 @@ impl VanRossum {
     }
 }
 
-/// Train n of each pattern of one side.
-struct Side {
-    queries: Vec<Vec<Query>>,
-    entries: Vec<Entries>,
-    sums: Vec<Vec<[f64; 2]>>,
+/// A train as others are compared with it.
+struct Train {
+    queries: Vec<Query>,
+    entries: Entries,
+    sums: Vec<[f64; 2]>,
     /// Squared distance from no spike at all, in units of tau / 2.
-    square: Vec<f64>,
+    square: f64,
 }
 
-impl Side {
-    fn new(frame: &Frame, patterns: &Patterns<'_>, n: usize) -> Self {
-        let mut side = Self { queries: Vec::new(), entries: Vec::new(), sums: Vec::new(), square: Vec::new() };
-        for p in 0..patterns.count {
-            let train = patterns.train(p, n);
-            let (entries, _) = Entries::new(frame, train.iter().copied());
-            let queries: Vec<Query> = train.iter().map(|&t| frame.query(t)).collect();
-            let mut sums = Vec::new();
-            entries.sums(|_| 1.0, &mut sums);
-            side.square.push(entries.product(&sums, &queries));
-            side.queries.push(queries);
-            side.entries.push(entries);
-            side.sums.push(sums);
-        }
-        side
+impl Train {
+    fn new(frame: &Frame, spikes: &[f64]) -> Self {
+        let (entries, _) = Entries::new(frame, spikes.iter().copied());
+        let queries: Vec<Query> = spikes.iter().map(|&t| frame.query(t)).collect();
+        let mut sums = Vec::new();
+        entries.sums(|_| 1.0, &mut sums);
+        let square = entries.product(&sums, &queries);
+        Self { queries, entries, sums, square }
     }
 
-    /// The squared distance of train i from train j of the other side, in units of tau / 2; none where it is so small
-    /// beside both trains' own squares that their difference has lost its digits.
+    /// Train n of each pattern.
+    fn all(
+        frame: Option<&Frame>,
+        patterns: &Patterns<'_>,
+        n: usize,
+        work: &mut Work<'_>,
+    ) -> Result<Vec<OnceLock<Self>>> {
+        let trains: Vec<OnceLock<Self>> = (0..patterns.count).map(|_| OnceLock::new()).collect();
+        let Some(frame) = frame else { return Ok(trains) };
+        work.quietly(trains.len(), |p, _| {
+            trains[p].get_or_init(|| Self::new(frame, patterns.train(p, n)));
+            Ok(())
+        })?;
+        Ok(trains)
+    }
+
+    /// The squared distance from another train, in units of tau / 2; none where it is so small beside both trains' own
+    /// squares that their difference has lost its digits.
     #[inline]
-    fn far(&self, i: usize, other: &Self, j: usize) -> Option<f64> {
-        let own = self.square[i] + other.square[j];
-        let square = own - 2.0 * self.entries[i].product(&self.sums[i], &other.queries[j]);
+    fn far(&self, other: &Self) -> Option<f64> {
+        let own = self.square + other.square;
+        let square = own - 2.0 * self.entries.product(&self.sums, &other.queries);
         (square > NEAR * own).then_some(square)
     }
 }

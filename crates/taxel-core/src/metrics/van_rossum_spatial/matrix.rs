@@ -180,7 +180,7 @@ impl Stored<'_> {
         let offsets = vec![0; patterns.trains + 1];
         let none = Patterns { count: 1, times: &[], offsets: &offsets, ..patterns.clone() };
         let found = Matrix::new(patterns.count, Some(1));
-        work.each(patterns.count, &|_| (0, 1), |i, stop| {
+        work.quietly(patterns.count, |i, stop| {
             found.add(i, 0, self.metric.square(self.kernel, (patterns, i), (&none, 0), stop)?);
             Ok(())
         })?;
