@@ -206,41 +206,6 @@ class SpikeTrains:
         values = None if self.values is None else np.tile(self.values, len(delays))
         return SpikeTrains(times, [*offsets, len(times)], self.start, self.stop + delays[-1], values)
 
-    def delayed(self, delays_ms: ArrayLike) -> SpikeTrains:
-        """Return every train once at each delay: what a learner needs to choose among delays.
-
-        Parameters
-        ----------
-        delays_ms : float64, shape (delays,), ms, 0 or more, ascending
-
-        Returns
-        -------
-        SpikeTrains
-            First all trains at the first delay, then all at the second: train `n` at delay `d` is number
-            ``d * len(trains) + n``, so ``weights.reshape(delays, trains)`` has the weights by delay and train. The window
-            ends later by the longest delay.
-
-        Raises
-        ------
-        ProblemError : delays that are negative, not finite or do not ascend
-
-        Examples
-        --------
-        >>> trains = SpikeTrains.from_lists([[1.0], [4.0]], stop=5.0)
-        >>> list(trains.delayed([0.0, 2.5]))
-        [array([1.]), array([4.]), array([3.5]), array([6.5])]
-        """
-        delays = floats("delays_ms", delays_ms)
-        wrong = np.flatnonzero(~(np.isfinite(delays) & (delays >= 0)))
-        if len(wrong):
-            raise ProblemError(f"delays_ms[{wrong[0]}] is {delays[wrong[0]]}: must be 0 or more and finite")
-        if not len(delays) or (np.diff(delays) <= 0).any():
-            raise ProblemError("delays_ms: must ascend, one delay or more")
-        times = np.add.outer(delays, self.times).reshape(-1)
-        offsets = np.add.outer(np.arange(len(delays)) * len(self.times), self.offsets[:-1]).reshape(-1)
-        values = None if self.values is None else np.tile(self.values, len(delays))
-        return SpikeTrains(times, [*offsets, len(times)], self.start, self.stop + delays[-1], values)
-
     def _where(self, keep: NDArray[np.bool_], start: float, stop: float) -> SpikeTrains:
         offsets = np.concatenate([[0], np.cumsum(keep)])[self.offsets]
         values = None if self.values is None else self.values[keep]

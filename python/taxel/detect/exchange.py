@@ -265,9 +265,6 @@ def _layers(graph: NIRGraph) -> tuple[NDArray[np.float64], list[float], Any]:
     def alone(name: str) -> str | None:
         return into[name][0] if len(into.get(name, [])) == 1 else None
 
-    def alone(name: str) -> str | None:
-        return into[name][0] if len(into.get(name, [])) == 1 else None
-
     source, target = only("Input"), only("Output")
     cells = into.get(target, [])
     if len(cells) != 1 or kinds[cells[0]] not in ("LIF", "CubaLIF"):

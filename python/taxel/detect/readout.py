@@ -114,7 +114,6 @@ class Readout:
                     "after_spike": first.after_spike,
                     "run_threshold": number("run_threshold", run_threshold),
                     "delays_ms": floats("delays_ms", delays_ms),
-                    "delays_ms": floats("delays_ms", delays_ms),
                     "neurons": {
                         label: {
                             "neuron": json.loads(one.neuron._json()),
@@ -173,11 +172,6 @@ class Readout:
     def run_threshold(self) -> float:
         """The factor on every threshold after training."""
         return float(self._parts["run_threshold"])
-
-    @property
-    def delays_ms(self) -> NDArray[np.float64]:
-        """The delays at each of which every train is heard, ms."""
-        return np.array(self._parts.get("delays_ms", [0.0]), np.float64)
 
     @property
     def delays_ms(self) -> NDArray[np.float64]:
@@ -253,78 +247,6 @@ class Readout:
         -----
         Input, for each delay a `Delay` (where above 0) and a `Linear`, then `CubaLIF` (alpha kernel: both time
         constants equal) or `LIF` (exponential kernel).
-        """
-        from taxel.detect.exchange import write_nir  # noqa: PLC0415  nir is an extra
-
-        return write_nir(self, path, spike_ms=spike_ms, overwrite=overwrite)
-
-    @classmethod
-    def from_nir(
-        cls,
-        path: str | os.PathLike[str],
-        *,
-        encoder: Encoder | None = None,
-        neuron: Neuron | None = None,
-        spike_ms: float | None = None,
-    ) -> Readout:
-        """Read a readout from a NIR graph of one layer.
-
-        One that `to_nir` wrote comes back as it was. Where its nodes were changed since, they hold; what they do not
-        say is taken from the metadata.
-
-        Parameters
-        ----------
-        path : path
-        encoder : Encoder, optional
-            Whose trains the graph's inputs are; needed where the file does not say.
-        neuron : Neuron, optional
-            Everything that NIR does not say: refractory time, threshold rise, what remains after a spike.
-        spike_ms : float, ms, above 0, optional
-            As in `to_nir`; left out, what the file says, else Dirac pulses.
-
-        Returns
-        -------
-        Readout
-
-        Raises
-        ------
-        FormatError : no NIR file, or a graph that no readout can stand for (names file and node)
-        FileNotFoundError : no such file
-        ProblemError : no encoder is known
-        ImportError : nir is not installed (``pip install taxel[nir]``)
-        """
-        from taxel.detect.exchange import read_nir  # noqa: PLC0415  nir is an extra
-
-        return read_nir(path, encoder=encoder, neuron=neuron, spike_ms=spike_ms)
-
-    def to_nir(
-        self, path: str | os.PathLike[str], *, spike_ms: float | None = None, overwrite: bool = False
-    ) -> list[str]:
-        """Write the readout as a NIR graph (HDF5, SI units) for other simulators and for chips.
-
-        Parameters
-        ----------
-        path : path
-        spike_ms : float, ms, above 0, optional
-            How long a spike of value 1 lasts for the reader. Left out, spikes are Dirac pulses, as NIR's equations have
-            them. A simulator that adds 1 in the step of the spike wants its step here: snnTorch 0.1.
-        overwrite : bool
-
-        Returns
-        -------
-        list of str
-            What NIR cannot hold, one line each. It stands in the file's metadata, where `from_nir` finds it again.
-
-        Raises
-        ------
-        FileExistsError : the file is there already and `overwrite` is false
-        ProblemError : exponential kernels together with others
-        ImportError : nir is not installed (``pip install taxel[nir]``)
-
-        Notes
-        -----
-        Input, one `Delay` for each delay above 0, one `Linear`, then `CubaLIF` (alpha kernel: both time constants equal)
-        or `LIF` (exponential kernel).
         """
         from taxel.detect.exchange import write_nir  # noqa: PLC0415  nir is an extra
 

@@ -28,6 +28,7 @@ STUDIES = {
     "fig6.9": "kappa against jitter, background and shunting, trained without noise and with it",
     "fig6.10": "dense against sparse weights under jitter, background and shunting",
     "fig6.11": "how the weights are distributed, trained without noise and with it",
+    "delays": "what learnt delays buy: copies of every input, chosen from by l1",
     "gait": "gait events by one neuron an event, on published walking recordings (6.12 to 6.14)",
     "rivals": "how many spike times each rule learns, beside CONE-X, under two criteria",
     "tempotron": "which loads the Tempotron solves, and in how many epochs",
