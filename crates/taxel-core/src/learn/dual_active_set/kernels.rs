@@ -318,29 +318,61 @@ kernel! {
     }
 }
 
+/// The inverse of the eight by eight triangle at k, by columns.
+#[inline(always)]
+fn inverted(l: &[f64], stride: usize, inverse: &[f64], k: usize) -> [[f64; LANES]; LANES] {
+    let mut columns = [[0.0; LANES]; LANES];
+    for (j, column) in columns.iter_mut().enumerate() {
+        column[j] = inverse[k + j];
+        for i in j + 1..LANES {
+            let sum: f64 = (j..i).map(|h| l[(k + h) * stride + k + i] * column[h]).sum();
+            column[i] = -sum * inverse[k + i];
+        }
+    }
+    columns
+}
+
+/// Right sides that L passes by at once, and lines of them that stay in the nearest cache.
+const SIDES: usize = 16;
+const NEAR: usize = 16;
+
 kernel! {
     /// `forward` for many right sides, columns of `x_stride` numbers each.
     fn forward_many<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64], x_stride: usize) {
         let padded = m.next_multiple_of(LANES);
-        // Few enough right sides that they stay near while L passes by.
-        for x in x.chunks_mut(16 * x_stride) {
+        for x in x.chunks_mut(SIDES * x_stride) {
             for k in (0..m).step_by(LANES) {
-                for x in x.chunks_exact_mut(x_stride) {
-                    triangle(l, stride, inverse, k, (m - k).min(LANES), x);
-                }
-                if k + LANES >= padded {
+                if k + LANES > m {
+                    for x in x.chunks_exact_mut(x_stride) {
+                        triangle(l, stride, inverse, k, m - k, x);
+                    }
                     continue;
                 }
-                let columns = below(l, stride, k, padded);
-                for x in x.chunks_mut(2 * x_stride) {
-                    if x.len() == 2 * x_stride {
+                let own = inverted(l, stride, inverse, k);
+                for x in x.chunks_exact_mut(x_stride) {
+                    let here = &mut lines_mut(&mut x[k..k + LANES])[0];
+                    let (mut even, mut odd) = (V::splat(0.0), V::splat(0.0));
+                    for j in (0..LANES).step_by(2) {
+                        even = even.add_product(V::splat(here[j]), V::load(&own[j]));
+                        odd = odd.add_product(V::splat(here[j + 1]), V::load(&own[j + 1]));
+                    }
+                    even.add_product(V::splat(1.0), odd).store(here);
+                }
+                for from in (k + LANES..padded).step_by(NEAR * LANES) {
+                    let to = (from + NEAR * LANES).min(padded);
+                    let columns: [_; LANES] = std::array::from_fn(|j| lines(&l[(k + j) * stride + from..(k + j) * stride + to]));
+                    for x in x.chunks_mut(2 * x_stride) {
+                        if x.len() < 2 * x_stride {
+                            let by = std::array::from_fn(|j| -x[k + j]);
+                            add::<V, LANES>(columns, by, lines_mut(&mut x[from..to]));
+                            continue;
+                        }
                         let (a, b) = x.split_at_mut(x_stride);
-                        let (a, b) = (&mut a[k..padded], &mut b[k..padded]);
-                        let ((of_a, a), (of_b, b)) = (a.split_at_mut(LANES), b.split_at_mut(LANES));
-                        let of_a: [V; LANES] = std::array::from_fn(|j| V::splat(-of_a[j]));
-                        let of_b: [V; LANES] = std::array::from_fn(|j| V::splat(-of_b[j]));
-                        let columns = columns.map(|column| &column[..a.len() / LANES]);
-                        for (i, (a, b)) in lines_mut(a).iter_mut().zip(lines_mut(b)).enumerate() {
+                        let of_a: [V; LANES] = std::array::from_fn(|j| V::splat(-a[k + j]));
+                        let of_b: [V; LANES] = std::array::from_fn(|j| V::splat(-b[k + j]));
+                        let (a, b) = (lines_mut(&mut a[from..to]), lines_mut(&mut b[from..to]));
+                        let columns = columns.map(|column| &column[..a.len()]);
+                        for (i, (a, b)) in a.iter_mut().zip(b).enumerate() {
                             let (mut sum_a, mut sum_b) = (V::load(a), V::load(b));
                             for j in 0..LANES {
                                 let column = V::load(&columns[j][i]);
@@ -350,9 +382,6 @@ kernel! {
                             sum_a.store(a);
                             sum_b.store(b);
                         }
-                    } else {
-                        let by = std::array::from_fn(|j| -x[k + j]);
-                        add::<V, LANES>(columns, by, lines_mut(&mut x[k + LANES..padded]));
                     }
                 }
             }
