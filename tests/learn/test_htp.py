@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from rival_examples import kernel, patterns, summed
+from rival_examples import kernel, patterns
 
 from taxel import Neuron, ProblemError
-from taxel.learn import HTP
+from taxel.learn import HTP, ConeX, ConeXProblem
 
 linprog = pytest.importorskip("scipy.optimize").linprog
 GIVEN = {"initial": (0.0, 1.0), "updates": "pattern", "tau": 10.0, "tau_s": 5.0, "theta_0": 15.0}
@@ -14,17 +14,17 @@ STEP = 0.1
 
 def cone_x_rows(pattern, targets):
     """6.9 with after_spike "reset", no refractory time, no threshold rise, on the grid: target rows, silent rows."""
-    at, silent, times = [], [], []
-    for k, t in enumerate(targets):
-        at.append(summed(pattern, t, lambda s: kernel(s, 10.0, 5.0), targets[k - 1] if k else -np.inf))
-    for k in range(int(pattern.stop / STEP + 1e-9) + 1):
-        t = k * STEP
-        if np.any(np.abs(targets - t) < 1e-9):
-            continue
-        earlier = targets[targets < t]
-        silent.append(summed(pattern, t, lambda s: kernel(s, 10.0, 5.0), earlier[-1] if len(earlier) else -np.inf))
-        times.append(t)
-    return np.array(at), np.array(silent), np.array(times)
+    times = STEP * np.arange(int(pattern.stop / STEP + 1e-9) + 1)
+    times = times[np.min(np.abs(times[:, None] - targets[None]), axis=1) >= 1e-9]
+
+    def rows(at):
+        earlier = np.searchsorted(targets, at)
+        lost_up_to = np.concatenate([[-np.inf], targets])[earlier][:, None]
+        return np.stack(
+            [(kernel(at[:, None] - train[None], 10.0, 5.0) * (train[None] > lost_up_to)).sum(1) for train in pattern], 1
+        )
+
+    return rows(targets), rows(times), times
 
 
 def demands(learner, pattern, targets, weights):
@@ -72,6 +72,37 @@ def test_what_meets_the_rows_of_cone_x_is_not_corrected():
     assert not learner.change(found.x, pattern, wanted)[0].any()
     broken = found.x * 1.01  # the potential now comes to the threshold before its target
     assert learner.change(broken, pattern, wanted)[0].any()
+
+
+def cone_x(**options):
+    """CONE-X with HTP's neuron: no refractory time, no threshold rise; bounds far out."""
+    bare = {"theta_plus": 0.0, "refractory": 0.0, "after_spike": "reset", "lb": -50.0, "ub": 50.0}
+    kernel = {"kernel": "double_exponential", "tau": 10.0, "tau_s": 5.0, "theta_0": 0.3}
+    return ConeX(**bare, **kernel, time="grid", step_ms=STEP, **options)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_rows_that_cone_x_states_are_those_of_htp(seed):
+    (pattern,), (wanted,) = patterns(seed, trains=30, count=1, targets=3, spikes=3)
+    problem = ConeXProblem(cone_x(), [pattern], [wanted])
+    at, silent, times = cone_x_rows(pattern, wanted)
+    for k in range(3):
+        coefficients, limit = problem.target(0, k)
+        assert coefficients == pytest.approx(at[k], abs=1e-12)
+        assert limit == pytest.approx(0.3)
+    for k in range(0, len(times), 37):
+        coefficients, limit = problem.silence(0, times[k])
+        assert coefficients == pytest.approx(silent[k], abs=1e-9)
+        assert limit == pytest.approx(0.3)
+
+
+def test_what_cone_x_ends_with_is_not_corrected():
+    (pattern,), (wanted,) = patterns(9, trains=80, count=1, targets=3, spikes=2)
+    cone = cone_x(margin=1e-4).fit([pattern], [wanted])
+    assert cone.status_ == "solved"
+    learner = HTP(window_ms=0.0, eta=1.0, epochs=1, **{**GIVEN, "theta_0": 0.3})
+    # A target is met to rounding, from below as well.
+    assert not learner.change(cone.weights_ * (1 + 1e-9), pattern, wanted)[0].any()
 
 
 def test_what_htp_ends_with_meets_the_rows_of_cone_x():

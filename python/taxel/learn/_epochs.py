@@ -75,7 +75,8 @@ class EpochLearner:
 
         Returns
         -------
-        Itself; ``max_seconds`` ends it with the best weights so far and `status_` "stopped".
+        EpochLearner
+            Itself; ``max_seconds`` ends it with the best weights so far and `status_` "stopped".
 
         Raises
         ------
