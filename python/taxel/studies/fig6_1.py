@@ -27,7 +27,7 @@ PARAMETERS: dict[str, Any] = {
     "stop": 140.0,
     "targets": [50.0, 100.0],
     "after_spike": "keep",
-    "step_ms": 0.05,
+    "step_ms": 0.1,
     "seed": 3,
 }
 

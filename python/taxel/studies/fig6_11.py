@@ -25,12 +25,14 @@ PARAMETERS: dict[str, Any] = {
     "lambdas": [2.0, 2.0, 100.0, 100.0, 100.0],
     "readings": ["targets", "B_max"],
     "trainings": ["clean", "jitter", "background", "shunting"],
-    "bin_mv": 0.01,
+    "bin_mv": 0.001,
     "repetitions": waves.REPETITIONS,
 }
 TOY: dict[str, Any] = {"realisations": 3, "repetitions": 5}
 #: A mode stands out from its valley by this share of the tallest mode.
 STANDS_OUT = 0.05
+#: Bins with a smaller share are not drawn.
+DRAWN_FROM = 2e-4
 
 
 def tasks(p: Parameters) -> list[Task]:
@@ -103,7 +105,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         why = READINGS[reading]
         for training in p["trainings"]:
             where = [float(centres[k]) for k in modes(np.array(said["shares"][reading][training]))]
-            ours = "modes at " + ", ".join(f"{w:+.2f}" for w in where) + " mV"
+            ours = "modes at " + ", ".join(f"{w:+.3f}" for w in where) + " mV"
             if training == "clean":
                 says, published = "Trained without noise, the weights have several modes.", "multi-modal"
                 holds = len(where) > 1
@@ -124,9 +126,13 @@ def draw(p: Parameters, said: Said) -> Figure:
         axes[0, column].set_title(READINGS[reading])
         for row, training in enumerate(p["trainings"]):
             shares = 100 * np.array(said["shares"][reading][training])
-            axes[row, column].bar(said["centres"], shares, width=0.9 * p["bin_mv"], color="C0" if row else "0.4")
+            edges = np.append(np.array(said["centres"]) - 0.5 * p["bin_mv"], said["centres"][-1] + 0.5 * p["bin_mv"])
+            axes[row, column].stairs(shares, edges, fill=True, color="C0" if row else "0.4")
             axes[row, column].set_ylabel(f"{'no noise' if training == 'clean' else training}\n% of weights")
         axes[-1, column].set_xlabel("weight, mV")
+    held = np.array([shares for trainings in said["shares"].values() for shares in trainings.values()]).max(axis=0)
+    drawn = np.array(said["centres"])[held > DRAWN_FROM]
+    axes[0, 0].set_xlim(drawn[0] - 2 * p["bin_mv"], drawn[-1] + 2 * p["bin_mv"])
     return figure
 
 

@@ -27,7 +27,7 @@ PARAMETERS: dict[str, Any] = {
     "kappa": 1.2,
     "lambdas_x": [2.0, 2.0, 200.0],
     "lambdas_r": [2.0, 2.0, 100.0, 100.0, 100.0],
-    "points": 161,
+    "points": 101,
 }
 DELTA_T = 1.5
 

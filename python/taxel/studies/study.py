@@ -291,7 +291,7 @@ def write_section(folder: Path, section: Section, pictures: Sequence[Figure]) ->
         figure.savefig(buffer, format="png", dpi=150, bbox_inches="tight", facecolor="white")
         write_whole(folder / name, partial(_put, buffer.getvalue()), overwrite=True)
         names.append(name)
-    text = json.dumps(section | {"pictures": names}, indent=1) + "\n"
+    text = json.dumps(section | {"pictures": names}) + "\n"
     write_whole(folder / "summary.json", partial(_put, text.encode()), overwrite=True)
 
 
