@@ -14,7 +14,6 @@ mod fp;
 mod htp;
 mod inst;
 mod minimise;
-#[allow(dead_code)]
 mod mixed;
 mod online_cone_r;
 mod point;

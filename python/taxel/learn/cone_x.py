@@ -142,7 +142,8 @@ class ConeX:
     parts_ : dict
         Its terms: l1, l2, B.
     gap_ : float
-        Proven relative distance of the objective to the least one, whatever the engine said.
+        Proven relative distance of the objective to the least one, whatever the engine said; 0 where the objective is
+        below 1e-10 of that of no weights.
     margin_ : Margin
         The margin that holds, at least half of what was asked for; on the grid, as `mv`, the least threshold -
         potential over the silent points.

@@ -29,7 +29,7 @@ const KEPT_SHARE: f64 = 0.5;
 /// The margin and the slope in continuous time where none is given, mV and mV/ms.
 const MARGIN: f64 = 1e-3;
 /// An objective below this share of what no weights at all have is 0: every lift is reached.
-const NOTHING: f64 = 1e-10;
+pub(super) const NOTHING: f64 = 1e-10;
 /// Rounds end without a verdict after so many.
 const MOST_ROUNDS: usize = 1000;
 

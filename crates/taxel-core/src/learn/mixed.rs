@@ -14,6 +14,7 @@ use dense::{add_sum, dot, times};
 
 use super::cone_program::{ConeProgram, HardRows, Hinges};
 use super::cone_r::Norm;
+use super::cone_x::NOTHING;
 use crate::{Error, Result, Stop};
 use interior::{Interior, State};
 use polish::{Guess, meet, polish};
@@ -22,8 +23,6 @@ use polish::{Guess, meet, polish};
 const LOOSE: f64 = 1e-5;
 /// Gaps at which a polish is tried.
 const TRIES: [f64; 3] = [1e-6, 1e-9, 1e-12];
-/// An objective below this share of that of no weights at all is 0.
-const NOTHING: f64 = 1e-10;
 
 /// The terms of the objective, weighted and normalised.
 #[derive(Debug, Clone, Copy)]
@@ -69,24 +68,13 @@ impl Start {
 #[derive(Debug, Clone)]
 pub(super) struct Found {
     pub(super) weights: Vec<f64>,
-    /// Multipliers by row, of the Lagrangian `objective + equality.(equal w - equal_to) + inequality.(below w - limit)`.
-    pub(super) equality: Vec<f64>,
+    /// Multipliers of the inequality rows, at least 0.
     pub(super) inequality: Vec<f64>,
-    pub(super) objective: f64,
     /// The least objective over these rows is no lower, hence over these and more.
     pub(super) bound: f64,
-    /// Whether rows and bounds are met to rounding.
-    pub(super) met: bool,
     pub(super) engine: Engine,
     pub(super) stopped: bool,
     pub(super) start: Start,
-}
-
-impl Found {
-    /// The proven relative distance to the least objective over these rows.
-    pub(super) fn gap(&self) -> f64 {
-        relative(self.objective, self.bound)
-    }
 }
 
 /// Weights and multipliers; `pull` stands for the slope of `l2 |w|_2`, no longer than `l2`.
@@ -102,7 +90,7 @@ pub(super) struct Point {
 ///
 /// With a `tolerance` of more than 1e-5 the weights are those of an interior point near the optimum: rows are met about as
 /// well, and the rows they break are worth adding. Below that, rows are met to rounding and the gap is `tolerance` where
-/// `gap` says so.
+/// the bound says so.
 ///
 /// # Errors
 ///
@@ -219,16 +207,11 @@ impl<'a> Best<'a> {
 
     fn found(self, engine: Engine, stopped: bool, state: State) -> Found {
         let program = self.program;
-        let unscaled = |multipliers: &[f64], scales: &[f64]| {
-            multipliers.iter().zip(scales).map(|(m, s)| m * program.cost / s).collect()
-        };
+        let multipliers = self.point.inequality.iter().zip(&program.of_below);
         Found {
             weights: self.point.weights.iter().map(|w| w * program.weight).collect(),
-            equality: unscaled(&self.point.equality, &program.of_equal),
-            inequality: unscaled(&self.point.inequality, &program.of_below),
-            objective: self.objective * program.cost,
+            inequality: multipliers.map(|(z, scale)| z * program.cost / scale).collect(),
             bound: self.bound * program.cost,
-            met: self.met,
             engine,
             stopped,
             start: Start { state, exact: self.guess.map(|guess| (self.point, guess)) },
@@ -259,10 +242,9 @@ struct Program {
     limit: Vec<f64>,
     lower: Vec<f64>,
     upper: Vec<f64>,
-    /// What a weight, the objective and each row were divided by.
+    /// What a weight, the objective and each inequality row were divided by.
     weight: f64,
     cost: f64,
-    of_equal: Vec<f64>,
     of_below: Vec<f64>,
 }
 
@@ -292,7 +274,7 @@ impl Program {
             }
             (rows, limits, scales)
         };
-        let (equal, equal_to, of_equal) = scaled(rows.equal, rows.equal_to);
+        let (equal, equal_to, _) = scaled(rows.equal, rows.equal_to);
         let (below, limit, of_below) = scaled(rows.below, rows.limit);
         let behind: Vec<f64> = terms.behind.iter().map(|v| v * weight).collect();
         let square = terms.norm == Norm::Square;
@@ -318,7 +300,6 @@ impl Program {
             upper: upper.iter().map(|w| w / weight).collect(),
             weight,
             cost,
-            of_equal,
             of_below,
         }
     }

@@ -84,10 +84,6 @@ impl Cholesky {
         );
         out
     }
-
-    pub(super) fn lower(&self) -> MatRef<'_, f64> {
-        self.0.as_ref()
-    }
 }
 
 /// `rows rows'`, its lower triangle.

@@ -34,8 +34,6 @@ pub(super) struct Iterate {
     pub(super) point: Point,
     /// What seems to bind.
     pub(super) guess: Guess,
-    pub(super) gap: f64,
-    pub(super) iterations: usize,
 }
 
 /// One weight's way up or down from its base.
@@ -437,7 +435,7 @@ impl<'a> Interior<'a> {
             state.go(reach, &step);
         }
         *state = best;
-        self.finish(state, merit, iterations)
+        self.finish(state)
     }
 
     /// The least value over the box of what the multipliers leave, up to rounding.
@@ -529,10 +527,14 @@ impl<'a> Interior<'a> {
         most
     }
 
-    fn finish(&self, state: &State, gap: f64, iterations: usize) -> Iterate {
+    fn finish(&self, state: &State) -> Iterate {
         let program = self.program;
         let weights = self.weights(&state.x);
         let n = program.width();
+        // What binds has a multiplier larger for its kind than its distance; costs are about 1.
+        let typical = |v: &[f64]| dot(v, v) / v.iter().sum::<f64>().max(f64::MIN_POSITIVE);
+        let (far, force) = (typical(&state.x).clamp(1e-3, 1.0), typical(&state.low).max(1.0));
+        let (room, press) = (typical(&state.slack).clamp(1e-3, 1.0), typical(&state.inequality).max(1.0));
         let mut at_low = vec![true; n];
         let mut places: Vec<Place> = program
             .lower
@@ -542,10 +544,10 @@ impl<'a> Interior<'a> {
             .collect();
         for (j, part) in self.parts.iter().enumerate() {
             let k = part.synapse;
-            if state.x[j] >= state.low[j] {
+            if state.x[j] / far >= state.low[j] / force {
                 at_low[k] = false;
             }
-            if part.range - state.x[j] < state.high[j] {
+            if (part.range - state.x[j]) / far < state.high[j] / force {
                 places[k] = if part.sign > 0.0 { Place::Upper } else { Place::Lower };
             }
         }
@@ -555,11 +557,11 @@ impl<'a> Interior<'a> {
                 *place = if split { Place::Zero } else { Place::Lower };
             }
         }
-        let binding = state.slack.iter().zip(&state.inequality).map(|(s, z)| s < z).collect();
+        let binding = state.slack.iter().zip(&state.inequality).map(|(s, z)| s / room < z / press).collect();
         let pull = if self.normed { state.dual.1.iter().map(|y| -y).collect() } else { vec![0.0; n] };
         let (equality, inequality) = (state.equality.clone(), state.inequality.clone());
         let point = Point { weights, equality, inequality, pull };
-        Iterate { point, guess: Guess { places, binding }, gap, iterations }
+        Iterate { point, guess: Guess { places, binding } }
     }
 }
 
