@@ -183,7 +183,7 @@ def test_without_a_recipe_it_starts_from_the_gait_recipe_of_the_unit(tmp_path: P
     assert (code, "gait recipe gaitpdb" in said) == (0, True)
     readout = taxel.Readout.load(out)
     assert (readout.encoder.levels, readout.neurons["contact"].delay_ms) == ([5.0, 50.0], 10.0)
-    assert {neuron.tau for neuron in readout.neurons.values()} == {20.0}
+    assert {trained.neuron.tau for trained in readout.neurons.values()} == {20.0}
     assert call(capsys, *arguments, "--recipe", "gaitndd", "--json")[0] == 0
     assert taxel.Readout.load(out).encoder.running_range is not None
 
