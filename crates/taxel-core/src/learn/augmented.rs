@@ -20,7 +20,7 @@ use crate::Stop;
 const TARGETS_FROM: f64 = 2.0;
 const SILENCE_FROM: f64 = 0.1;
 /// From a fit nearby: over so many.
-const WARM_FROM: f64 = 0.02;
+const WARM_FROM: f64 = 0.002;
 /// A round shrinks them by so much, down to so many thresholds.
 const SHRINK: f64 = 0.25;
 const SHARPEST: f64 = 1e-8;
@@ -191,7 +191,7 @@ impl<'a> Engine<'a> {
         }
         let most = (dot(&pull, &pull) / n as f64).sqrt();
         let size = (objective.l1 + objective.l2 / (n as f64).sqrt()).max(1e-3 * most).max(1e-12);
-        engine.sigma = if warm { 50.0 } else { 1.0 } * size / widest;
+        engine.sigma = if warm { 500.0 } else { 1.0 } * size / widest;
         engine.rho = if warm { 1e-3 } else { 0.1 } * size / widest;
         if warm {
             engine.hold_still();
@@ -312,7 +312,7 @@ impl<'a> Engine<'a> {
         let count = self.inside.len();
         let length = dot(&self.weights, &self.weights).sqrt();
         loop {
-            self.hessian.iter_mut().zip(&problem.gram).for_each(|(h, g)| *h = 2.0 * o.b * g);
+            self.hessian.iter_mut().zip(problem.gram.iter()).for_each(|(h, g)| *h = 2.0 * o.b * g);
             let ridge = match o.norm {
                 Norm::Square => 2.0 * o.l2,
                 Norm::Norm if length > 0.0 => {

@@ -1,5 +1,7 @@
 //! CONE-R (6.12 to 6.14): the best weights where targets and silence cannot all be met, solved to a proven gap.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::augmented::Start;
@@ -257,11 +259,11 @@ pub struct Problem {
     pub(super) base: ConeR,
     patterns: Vec<SpikeTrains>,
     pub(super) trains: usize,
-    pub(super) targets: Vec<TargetRow>,
+    pub(super) targets: Arc<Vec<TargetRow>>,
     pub(super) silent: SilentRows,
     /// Rows behind the targets, one after the other, and their `B'B` by columns.
-    pub(super) behind: Vec<f64>,
-    pub(super) gram: Vec<f64>,
+    pub(super) behind: Arc<Vec<f64>>,
+    pub(super) gram: Arc<Vec<f64>>,
 }
 
 /// Everything that turns potentials into 6.14: the parameters with their normalisers.
@@ -318,10 +320,10 @@ impl Problem {
             base: parameters.clone(),
             patterns: patterns.to_vec(),
             trains,
-            targets: rows,
+            targets: Arc::new(rows),
             silent,
-            behind: vec![],
-            gram: vec![0.0; trains * trains],
+            behind: Arc::default(),
+            gram: Arc::new(vec![0.0; trains * trains]),
         };
         for k in 0..problem.targets.len() {
             stop.check()?;
@@ -334,9 +336,9 @@ impl Problem {
     fn lift(&mut self, k: usize, sign: f64) {
         let row = &self.targets[k].behind;
         if sign > 0.0 {
-            self.behind.extend_from_slice(row);
+            Arc::make_mut(&mut self.behind).extend_from_slice(row);
         }
-        for (column, &v) in self.gram.chunks_exact_mut(self.trains).zip(row) {
+        for (column, &v) in Arc::make_mut(&mut self.gram).chunks_exact_mut(self.trains).zip(row) {
             add(column, sign * v, row);
         }
     }
@@ -350,7 +352,7 @@ impl Problem {
         let number = self.patterns.len();
         self.patterns.push(pattern.clone());
         for row in rows {
-            self.targets.push(TargetRow { pattern: number, ..row });
+            Arc::make_mut(&mut self.targets).push(TargetRow { pattern: number, ..row });
             self.lift(self.targets.len() - 1, 1.0);
         }
         self.silent.len() - before
@@ -365,10 +367,24 @@ impl Problem {
         for k in 0..gone {
             self.lift(k, -1.0);
         }
-        self.behind.drain(..gone * self.trains);
-        self.targets.drain(..gone);
-        self.targets.iter_mut().for_each(|row| row.pattern -= 1);
+        Arc::make_mut(&mut self.behind).drain(..gone * self.trains);
+        let targets = Arc::make_mut(&mut self.targets);
+        targets.drain(..gone);
+        targets.iter_mut().for_each(|row| row.pattern -= 1);
         (before - self.silent.len(), gone)
+    }
+
+    /// The same, but of the silent rows the named ones alone, written out; for solving, not for judging.
+    pub(super) fn of_rows(&self, rows: &[usize]) -> Self {
+        Self {
+            base: self.base.clone(),
+            patterns: vec![],
+            trains: self.trains,
+            targets: Arc::clone(&self.targets),
+            silent: self.silent.written_out(rows),
+            behind: Arc::clone(&self.behind),
+            gram: Arc::clone(&self.gram),
+        }
     }
 
     pub(super) fn check_trains(&self, p: usize, pattern: &SpikeTrains) -> Result<()> {

@@ -5,6 +5,7 @@
 //! Silent rows are never stored: one sweep over the grid gives the potential on all of them (the kernel needs two numbers
 //! a pattern), one sweep backwards gives a weighted sum of all of them.
 
+use super::point::{add, dot};
 use crate::neuron::{AfterSpike, FirstThreshold, Neuron, Shape, State, Step};
 use crate::{Result, SpikeTrains, Stop};
 
@@ -67,6 +68,8 @@ pub(super) struct SilentRows {
     step_ms: f64,
     /// What 0, 1, 2 ... grid steps do: so a run of points without an input needs no recursion.
     steps: Steps,
+    /// Some rows of a grid written out, one after the other, in place of sheets.
+    written: Option<Vec<f64>>,
     /// What the potential must not exceed, mV; infinite where nothing is asked.
     pub(super) limit: Vec<f64>,
     /// The rows (by number) of each target's pattern that lie in the `near_ms` before it.
@@ -182,6 +185,7 @@ impl SilentRows {
             shape,
             step_ms,
             steps: Steps::new(shape, step_ms),
+            written: None,
             limit: vec![],
             before_targets: vec![],
         };
@@ -250,6 +254,18 @@ impl SilentRows {
         }
     }
 
+    /// The named rows (ascending) alone, written out.
+    pub(super) fn written_out(&self, rows: &[usize]) -> Self {
+        Self {
+            sheets: vec![],
+            steps: self.steps.clone(),
+            written: Some(self.coefficients(rows)),
+            limit: rows.iter().map(|&row| self.limit[row]).collect(),
+            before_targets: vec![],
+            ..*self
+        }
+    }
+
     /// How many rows, those at which nothing is asked included.
     pub(super) fn len(&self) -> usize {
         self.limit.len()
@@ -270,6 +286,10 @@ impl SilentRows {
         out.resize(self.len(), 0.0);
         if weights.iter().all(|&w| w == 0.0) {
             return;
+        }
+        if let Some(written) = &self.written {
+            let rows = out.iter_mut().zip(written.chunks_exact(self.trains));
+            return rows.for_each(|(out, row)| *out = dot(row, weights));
         }
         for sheet in &self.sheets {
             let rows = &mut out[sheet.first..sheet.first + sheet.points];
@@ -301,6 +321,10 @@ impl SilentRows {
 
     /// Adds the sum of all rows, each times its factor, to `sum` (one entry a train): the adjoint of `potential`.
     pub(super) fn add_sum(&self, factors: &[f64], sum: &mut [f64]) {
+        if let Some(written) = &self.written {
+            let rows = factors.iter().zip(written.chunks_exact(self.trains));
+            return rows.for_each(|(&factor, row)| add(sum, factor, row));
+        }
         for sheet in &self.sheets {
             let factors = &factors[sheet.first..sheet.first + sheet.points];
             // How much the rows from here on hear of the state here.
@@ -338,6 +362,9 @@ impl SilentRows {
     /// The coefficients of the named rows (ascending), row after row.
     pub(super) fn coefficients(&self, rows: &[usize]) -> Vec<f64> {
         let n = self.trains;
+        if let Some(written) = &self.written {
+            return rows.iter().flat_map(|row| &written[row * n..(row + 1) * n]).copied().collect();
+        }
         let mut out = vec![0.0; rows.len() * n];
         let mut place = 0;
         for sheet in &self.sheets {
