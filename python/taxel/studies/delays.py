@@ -12,7 +12,7 @@ from taxel import learn
 from taxel.learn import ConeX
 from taxel.spikes import SpikeTrains
 from taxel.studies import capacity
-from taxel.studies.capacity import DURATION_MS, largest, patterns
+from taxel.studies.capacity import DURATION_MS, MET_TO, largest, patterns
 from taxel.studies.runner import Task
 from taxel.studies.study import Parameters, Row, Said, Statement, Study
 
@@ -75,10 +75,7 @@ def fit(params: dict[str, Any], count: int, seed: int, lambdas: tuple[float, flo
     """Learn so many patterns of a realisation as an arm hears them."""
     drawn, targets = patterns(seed, params["inputs"], count, params["classes"])
     cone = ConeX(**LEARN, lambdas=lambdas, time=params["time"], horizon=DURATION_MS)
-    cone.fit(delayed(params, drawn, seed), targets)
-    if cone.status_ == "stopped":
-        raise ArithmeticError(f"no verdict for {params}, {count} patterns, seed {seed}")
-    return cone
+    return cone.fit(delayed(params, drawn, seed), targets)
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
@@ -93,7 +90,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     if params["asks"] == "weights":
         count = max(round(params["share"] * inputs / step), 1) * step
         cone = fit(params, count, seed, (1.0, 0.0, 0.0))
-        if cone.status_ == "infeasible":
+        if cone.status_ != "solved":
             return {"p": count, "solved": False}
         chosen = (np.abs(cone.weights_) > NONE).reshape(-1, inputs)
         return {"p": count, "solved": True, "weights": int(chosen.sum()), "heard": int(chosen.any(axis=0).sum())}
@@ -107,8 +104,9 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
 
 
 def bears(params: dict[str, Any], seed: int, count: int) -> bool:
-    """Return whether a realisation is feasible with so many patterns."""
-    return fit(params, count, seed, (0.0, 1.0, 0.0)).status_ == "solved"
+    """Return whether a realisation bears so many patterns; at the very edge as `capacity.feasible` decides."""
+    cone = fit(params, count, seed, (0.0, 1.0, 0.0))
+    return bool(cone.status_ == "solved" or (cone.status_ == "stopped" and cone.violation_ <= MET_TO))
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
@@ -159,7 +157,8 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "not in the thesis",
             f"largest load p / N at {at}: {loads}",
             bool(copied > plain),
-            f"bounds of ±0.3 mV a copy, so {max(p['copies'])} times as many weights",
+            f"{max(p['copies'])} times as many weights: a weight bears {copied / max(p['copies']):.2f} patterns with "
+            f"them and {plain:g} without",
         ),
         Statement(
             "One fixed random delay an input buys nothing where the inputs' times are random already.",
