@@ -20,7 +20,7 @@ STUDIES = {
     "fig6.2": "kappa lifts the potential behind the target, steepens the crossing and keeps the spike's time",
     "fig6.3": "the objectives of CONE-X and CONE-R over two weights",
     "fig6.4": "a larger kappa lifts the potential behind the target and leaves the spike where it is",
-    "fig6.5": "l1 uses few synapses, l2 all of them; the spike stays where it is",
+    "fig6.5": "the l1 norm uses few synapses, l2 all of them; the spike stays where it is",
     "fig6.6": "Poisson trains mapped to five spikes; l1 keeps the potential lower between them",
     "fig6.7": "how many patterns a neuron can learn exactly, by inputs and classes",
     "exactness": "what slope at the targets buys on a clock, and what exactness and slope cost in capacity",

@@ -34,6 +34,9 @@ TOY: dict[str, Any] = {
     "repetitions": 5,
 }
 
+#: Levels of noise over which a statement is judged: above the first, up to the second.
+ANY, WEAK, STRONG = (0.0, 100.0), (0.0, 5.0), (15.0, 100.0)
+
 
 def tasks(p: Parameters) -> list[Task]:
     """List the realisations: CONE-R in both trainings."""
@@ -50,28 +53,19 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
     found = []
     for reading in p["readings"]:
-        curves = said["curves"][reading]
-        why = READINGS[reading]
+        curves, why = said["curves"][reading], READINGS[reading]
         clean = curves["clean"]
-        if "jitter" in clean:
-            dense, sparse = _ends(clean["jitter"], lambda level: level > 0)
-            found.append(_compared("Noise-free training: dense is best against jitter.", dense, sparse, True, why))
-        if "background" in clean:
-            dense, sparse = _ends(clean["background"], lambda level: level > 0)
-            found.append(
-                _compared("Noise-free training: sparse is best against background.", dense, sparse, False, why)
-            )
-        if "shunting" in clean:
-            dense, sparse = _ends(clean["shunting"], lambda level: 0 < level <= 10)
-            found.append(
-                _compared("Noise-free training, weak shunting (up to 10 %): sparse is worse.", dense, sparse, True, why)
-            )
-            dense, sparse = _ends(clean["shunting"], lambda level: level >= 20)
-            found.append(
-                _compared(
-                    "Noise-free training, strong shunting (20 % and more): sparse is better.", dense, sparse, False, why
-                )
-            )
+        claims = (
+            ("jitter", "dense is best against jitter", True, ANY),
+            ("background", "sparse is best against background", False, ANY),
+            ("shunting", "against weak shunting sparse is worse", True, WEAK),
+            ("shunting", "against strong shunting sparse is better", False, STRONG),
+        )
+        found += [
+            _compared(f"Noise-free training: {says}.", clean[noise], dense_is_better, levels, why)
+            for noise, says, dense_is_better, levels in claims
+            if noise in clean
+        ]
         spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
         found.append(
             Statement(
@@ -86,19 +80,26 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     return found
 
 
-def _ends(curve: dict[str, Any], wanted: Any) -> tuple[float, float]:
-    columns = [k for k, level in enumerate(curve["levels"]) if wanted(level)]
-    mean = np.array(curve["mean"])[:, columns].mean(axis=1)
-    return float(mean[0]), float(mean[-1])
-
-
-def _compared(says: str, dense: float, sparse: float, dense_is_better: bool, why: str) -> Statement:
-    holds = dense < sparse if dense_is_better else sparse < dense
+def _compared(
+    says: str, curve: dict[str, Any], dense_is_better: bool, among: tuple[float, float], why: str
+) -> Statement:
+    levels, mean = np.array(curve["levels"], float), np.array(curve["mean"])
+    dense, sparse = mean[0], mean[-1]
+    here = (levels > among[0]) & (levels <= among[1])
+    means = dense[here].mean(), sparse[here].mean()
+    gain = sparse - dense
+    turns = [
+        levels[k] + (levels[k + 1] - levels[k]) * gain[k] / (gain[k] - gain[k + 1])
+        for k in range(len(levels) - 1)
+        if levels[k] > 0 and gain[k] * gain[k + 1] < 0
+    ]
+    crossing = f"; they cross at {', '.join(f'{t:.1f}' for t in turns)}" if turns else "; they do not cross"
+    over = f"{levels[here].min():g} to {levels[here].max():g}"
     return Statement(
         says,
         "dense below sparse" if dense_is_better else "sparse below dense",
-        f"distance, mean: {dense:.2f} dense (0 : 4), {sparse:.2f} sparse (4 : 0)",
-        bool(holds),
+        f"distance, mean over {over}: {means[0]:.2f} dense (0 : 4), {means[1]:.2f} sparse (4 : 0){crossing}",
+        bool(means[0] < means[1] if dense_is_better else means[1] < means[0]),
         why,
     )
 

@@ -142,7 +142,7 @@ def draw(p: Parameters, said: Said) -> Figure:
 
 STUDY = Study(
     name="fig6.5",
-    title="l1 uses few synapses, l2 all of them; the spike stays where it is",
+    title="the l1 norm uses few synapses, l2 all of them; the spike stays where it is",
     where="thesis 6.4.2, figure 6.5",
     protocol=(
         "As figure 6.4, with kappa 1 and lambda 1 : lambda 2 varied (lambda 3 = 0). The first pattern is drawn; the "
