@@ -6,7 +6,7 @@
 #[cfg(target_arch = "x86_64")]
 use std::arch::x86_64::*;
 
-use crate::{Result, Stop};
+use crate::{Result, Stop, problem};
 
 /// Vector instructions that matrices may use.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -105,7 +105,6 @@ impl Block {
             "lanes must be the machine's"
         );
         let hi = match vectors {
-            Vectors::None => unreachable!("one pair has no lanes"),
             // SAFETY: the machine has AVX2, lanes are 4 vectors of it, and times and costs hold as many rows as there
             // are spikes, and one more: all just asserted or made so.
             #[cfg(target_arch = "x86_64")]
@@ -113,8 +112,7 @@ impl Block {
             // SAFETY: as above, with AVX-512.
             #[cfg(target_arch = "x86_64")]
             Vectors::Avx512 => unsafe { avx512(self, a, q, reach, cost, stop) },
-            #[cfg(not(target_arch = "x86_64"))]
-            _ => unreachable!("not this machine's"),
+            _ => Err(problem!("vectors: {vectors:?} puts no pairs side by side on this machine")),
         }?;
         let of = |(lane, &length): (usize, &usize)| {
             let column = length.min(hi);
