@@ -376,7 +376,7 @@ def test_examples_that_make_no_sense_are_one_clear_error_each(options, patterns,
 def test_the_defaults_that_python_shows_are_those_of_the_core():
     core = taxel._core.check_cone_x("{}")
     assert taxel._core.check_cone_x(ConeX()._json()) == core
-    assert repr(ConeX(tau=3.0, lb=[0.0, 1.0])) == "ConeX(tau=3.0, lb=[0.0, 1.0])"
+    assert repr(ConeX(tau=3.0, lb=[0.0, 0.1])) == "ConeX(tau=3.0, lb=[0.0, 0.1])"
 
 
 def test_a_fitted_cone_can_be_read_out():

@@ -48,38 +48,8 @@ pub use span::Span;
 pub use stepped::{Current, Reset, SteppedNeuron};
 pub use tempotron::{Peak, Tempotron};
 
-use serde::{Deserialize, Serialize};
-
 use crate::neuron::Neuron;
 use crate::{Result, SpikeTrains, problem};
-
-/// One value for all, or one each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged)]
-pub enum OneOrEach {
-    /// For all.
-    One(f64),
-    /// One each.
-    Each(Vec<f64>),
-}
-
-impl OneOrEach {
-    fn values(&self) -> &[f64] {
-        match self {
-            Self::One(value) => std::slice::from_ref(value),
-            Self::Each(values) => values,
-        }
-    }
-
-    /// The values as `count` of them.
-    fn each(&self, name: &str, count: usize, of: &str) -> Result<Vec<f64>> {
-        match self {
-            Self::One(value) => Ok(vec![*value; count]),
-            Self::Each(values) if values.len() == count => Ok(values.clone()),
-            Self::Each(values) => Err(problem!("{name}: {} values, must be one, or one a {of}, {count}", values.len())),
-        }
-    }
-}
 
 /// Checks what every learner is given: one list of targets (ms, ascending) a pattern, the same trains in each pattern.
 ///

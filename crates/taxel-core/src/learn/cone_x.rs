@@ -10,11 +10,12 @@ mod shortest;
 
 use serde::{Deserialize, Serialize};
 
+use super::bounds::{Bound, bounds_of, check_bounds};
 use super::certificate::{Bounds, Certificate};
+use super::check_examples;
 use super::cone_r::{Divisor, Norm};
 use super::silence::{Peak, Silence};
 use super::statement::{Margin, Row, Stated, Statement};
-use super::{OneOrEach, check_examples};
 use crate::neuron::{Neuron, Time};
 use crate::{Result, SpikeTrains, Stop, problem};
 use shortest::{End, Shortest};
@@ -46,9 +47,9 @@ pub struct ConeX {
     /// `lambda_1` to `lambda_3`: l1, l2, B; only their ratios matter, all 0 asks for any weights.
     pub lambdas: [f64; 3],
     /// Least weight, mV, one for all or one a synapse.
-    pub lb: OneOrEach,
+    pub lb: Bound,
     /// Largest weight, mV, one for all or one a synapse.
-    pub ub: OneOrEach,
+    pub ub: Bound,
     /// What B is divided by.
     pub divide_b_by: Divisor,
     /// The l2 term as norm or as square.
@@ -59,9 +60,38 @@ pub struct ConeX {
     pub slope: Option<f64>,
     /// Where silence ends, ms, one for all or one a pattern; the later of a pattern's end and its last target + `tau` where
     /// left out.
-    pub horizon: Option<OneOrEach>,
+    pub horizon: Option<Horizon>,
     /// The relative gap between objective and proven bound at which a fit counts as solved.
     pub tolerance: f64,
+}
+
+/// Where silence ends, ms.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "a horizon must be a number, or one a pattern, ms")]
+pub enum Horizon {
+    /// The same in all patterns.
+    All(f64),
+    /// One a pattern.
+    Each(Vec<f64>),
+}
+
+impl Horizon {
+    fn values(&self) -> &[f64] {
+        match self {
+            Self::All(value) => std::slice::from_ref(value),
+            Self::Each(values) => values,
+        }
+    }
+
+    fn each(&self, patterns: usize) -> Result<Vec<f64>> {
+        match self {
+            Self::All(value) => Ok(vec![*value; patterns]),
+            Self::Each(values) if values.len() == patterns => Ok(values.clone()),
+            Self::Each(values) => {
+                Err(problem!("horizon: {} values, must be one, or one a pattern, {patterns}", values.len()))
+            }
+        }
+    }
 }
 
 impl Default for ConeX {
@@ -71,8 +101,8 @@ impl Default for ConeX {
             kappa: 1.2,
             delta_t_ms: None,
             lambdas: [0.0, 1.0, 0.0],
-            lb: OneOrEach::One(-0.3),
-            ub: OneOrEach::One(0.3),
+            lb: Bound::All(-0.3),
+            ub: Bound::All(0.3),
             divide_b_by: Divisor::Largest,
             norm: Norm::Norm,
             margin: None,
@@ -100,11 +130,7 @@ impl ConeX {
         if let Some(k) = self.lambdas.iter().position(|l| !(l.is_finite() && *l >= 0.0)) {
             return Err(problem!("lambdas[{k}] is {}: must be 0 or more and finite", self.lambdas[k]));
         }
-        for (name, bound) in [("lb", &self.lb), ("ub", &self.ub)] {
-            if let Some(value) = bound.values().iter().find(|v| !v.is_finite()) {
-                return Err(problem!("{name} is {value} mV: must be finite, no proof holds without bounds"));
-            }
-        }
+        check_bounds(&self.lb, &self.ub)?;
         let Margin { height, slope } = self.margin();
         for (name, value, unit) in [("margin", height, "mV"), ("slope", slope, "mV/ms")] {
             if !(value.is_finite() && value >= 0.0) {
@@ -117,7 +143,7 @@ impl ConeX {
         if slope > 0.0 && self.neuron.time == Time::Grid {
             return Err(problem!("slope is {slope} mV/ms: belongs to time \"continuous\", on the grid nothing tapers"));
         }
-        if let Some(horizon) = self.horizon.iter().flat_map(OneOrEach::values).find(|h| !h.is_finite()) {
+        if let Some(horizon) = self.horizon.iter().flat_map(Horizon::values).find(|h| !h.is_finite()) {
             return Err(problem!("horizon is {horizon} ms: must be finite"));
         }
         if !(1e-12..=0.1).contains(&self.tolerance) {
@@ -288,14 +314,10 @@ impl Problem {
         let neuron = &parameters.neuron;
         check_examples(neuron, patterns, targets)?;
         let trains = patterns[0].len();
-        let lower = parameters.lb.each("lb", trains, "synapse")?;
-        let upper = parameters.ub.each("ub", trains, "synapse")?;
-        if let Some(n) = (0..trains).find(|&n| lower[n] > upper[n]) {
-            return Err(problem!("synapse {n}: lb is {} mV, above ub, {} mV", lower[n], upper[n]));
-        }
+        let (lower, upper) = bounds_of(&parameters.lb, &parameters.ub, trains)?;
         let bounds = Bounds { lower, upper };
         let mut ends = match &parameters.horizon {
-            Some(horizon) => horizon.each("horizon", patterns.len(), "pattern")?,
+            Some(horizon) => horizon.each(patterns.len())?,
             None => patterns.iter().map(|pattern| pattern.stop).collect(),
         };
         for (p, ((end, targets), pattern)) in ends.iter_mut().zip(targets).zip(patterns).enumerate() {

@@ -70,11 +70,14 @@ impl Problem {
         if rows.len() > FEW {
             return Ok(Some(proof));
         }
-        let of_kind = |kind: fn(&Row) -> bool| rows.iter().map(|r| r.0).filter(move |row| kind(row));
-        let mut kept: Vec<Row> = of_kind(|r| matches!(r, Row::Slope { .. }))
-            .chain(of_kind(|r| matches!(r, Row::Silence { .. })))
-            .chain(of_kind(|r| matches!(r, Row::Target { .. })))
-            .collect();
+        // Those that say least in words are tried first.
+        let worth = |row: &Row| match row {
+            Row::Slope { .. } => 0,
+            Row::Silence { .. } => 1,
+            Row::Target { .. } => 2,
+        };
+        let mut kept: Vec<Row> = rows.iter().map(|r| r.0).collect();
+        kept.sort_by_key(worth);
         let (mut fewest, mut needed) = (proof.clone(), 0);
         // Without a row that is needed the others can be met; all that come before it are needed as well.
         while needed < kept.len() && !stop.asked() {
