@@ -232,6 +232,7 @@ class Study:
             "protocol": self.protocol,
             "size": size,
             "parameters": parameters,
+            "changed": sorted(changes or {}),
             "realisations": len(wanted),
             "statements": [asdict(s) for s in self.statements(parameters, said)],
             "said": said,
