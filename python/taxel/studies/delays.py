@@ -25,7 +25,7 @@ PARAMETERS: dict[str, Any] = {
     "realisations": 30,
     "inputs": [50, 100, 150],
     "classes": 3,
-    "copies": [2, 4, 8],
+    "copies": [2, 4],
     "longest_ms": 90.0,
     "shares": [0.1, 0.2],
     "time": "continuous",
