@@ -33,10 +33,10 @@ impl VanRossum {
             };
             work.each(a.count.div_ceil(ROWS), &told, |group, stop| {
                 let group = group * ROWS..((group + 1) * ROWS).min(a.count);
-                for j in matrix.first(group.start)..others.count {
+                for (j, column) in columns.iter().enumerate().skip(matrix.first(group.start)) {
                     stop.check()?;
                     for i in group.clone().filter(|&i| j >= matrix.first(i)) {
-                        let far = rows[i].get().zip(columns[j].get()).and_then(|(row, column)| row.far(column));
+                        let far = rows[i].get().zip(column.get()).and_then(|(row, column)| row.far(column));
                         let distance = match far {
                             Some(square) => self.normalisation.root(square, self.tau),
                             None => self.between(a.train(i, n), others.train(j, n)),
