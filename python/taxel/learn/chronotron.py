@@ -28,7 +28,7 @@ class Chronotron(EpochLearner):
         Whether weights change once an epoch, or after each pattern in an order drawn anew.
     tau, tau_s : float, ms
         Membrane and synapse: an input of weight 1 makes a potential ``V0 (exp(-s/tau) - exp(-s/tau_s))`` that peaks at
-        1 mV. 15 and `tau` / 4 (**).
+        1 mV. 15 and `tau` / 4 (‡).
     theta_0 : float, mV, above 0
         Threshold.
     after_spike : {"subtract", "membrane", "reset"}
@@ -36,9 +36,9 @@ class Chronotron(EpochLearner):
         all inputs up to the spike are lost. "subtract" for E-learning, "membrane" for I-learning, where left out.
     tau_q : float, ms, above 0, optional
         E-learning: a move over `dt` costs ``(dt / tau_q)**2 / 2``, to add or to remove a spike 1; `tau` where left
-        out (**).
+        out (‡).
     gamma_r : float, ms, above 0, optional
-        E-learning: weight of the moves; `tau_q` where left out (**).
+        E-learning: weight of the moves; `tau_q` where left out (‡).
     step_ms : float, ms, above 0
         The neuron is looked at every so often; inputs keep their true times.
     within_ms : float, ms, above 0
@@ -54,7 +54,7 @@ class Chronotron(EpochLearner):
     ----------
     weights_ : float64, shape (trains,), mV
         Those with most patterns right, the latest such.
-    right_ : float64, shape (epochs_ + 1,)
+    right_ : float64, shape (epochs done + 1,)
         The share of patterns right after 0, 1, 2 ... epochs.
     epochs_, best_epoch_ : int
         Epochs done; after how many the weights were those.
@@ -73,7 +73,7 @@ class Chronotron(EpochLearner):
     least cost (ties: remove, add, move), and ``change`` is the sum over added targets of ``L(t)``, less that over
     removed spikes, plus ``gamma_r / tau_q**2`` times the sum over moves of ``(t - target) L(t)``; `L` is the
     potential that an input makes. A late spike raises weights. Read in public codes (Tempotrons.jl 8329a17, whose
-    defaults are marked (**), and nircaf/Chronotron 7781434), as was the reset.
+    defaults are marked (‡), and nircaf/Chronotron 7781434), as was the reset.
 
     I-learning: ``change`` is the current ``exp(-s/tau_s)`` of earlier inputs at the targets, less that at output
     spikes, with the sign of the weight. That changes go by the current was read in the paper's abstract; the sign is

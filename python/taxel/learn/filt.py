@@ -16,23 +16,23 @@ class FILT(EpochLearner):
     Parameters
     ----------
     tau_q : float, ms, above 0
-        Time constant of the filter (*).
+        Time constant of the filter (†).
     eta : float, above 0, optional
-        Learning rate, weight a unit of `change`; ``600 / (trains * targets of all patterns)`` where left out (*).
+        Learning rate, weight a unit of `change`; ``600 / (trains * targets of all patterns)`` where left out (†).
     initial : (float, float), mV, optional
-        First weights are drawn evenly between these two; ``(0, 200 / trains)`` where left out (*).
+        First weights are drawn evenly between these two; ``(0, 200 / trains)`` where left out (†).
     epochs : int
-        Epochs at most (*).
+        Epochs at most (†).
     updates : {"batch", "pattern"}
-        Whether weights change once an epoch (*), or after each pattern in an order drawn anew.
+        Whether weights change once an epoch (†), or after each pattern in an order drawn anew.
     tau, tau_s : float, ms
         Membrane and synapse: an input of weight 1 makes a potential ``V0 (exp(-s/tau) - exp(-s/tau_s))`` that peaks at
-        1 mV. (*)
+        1 mV. (†)
     theta_0 : float, mV, above 0
-        Threshold. (*)
+        Threshold. (†)
     after_spike : {"subtract", "membrane", "reset"}
         What an output spike does: the potential falls by ``theta_0 exp(-s/tau)``; it is put to 0 and currents go on; or
-        all inputs up to the spike are lost. (*: "subtract")
+        all inputs up to the spike are lost. (†: "subtract")
     step_ms : float, ms, above 0
         The neuron is looked at every so often; inputs keep their true times.
     within_ms : float, ms, above 0
@@ -48,7 +48,7 @@ class FILT(EpochLearner):
     ----------
     weights_ : float64, shape (trains,), mV
         Those with most patterns right, the latest such.
-    right_ : float64, shape (epochs_ + 1,)
+    right_ : float64, shape (epochs done + 1,)
         The share of patterns right after 0, 1, 2 ... epochs.
     epochs_, best_epoch_ : int
         Epochs done; after how many the weights were those.
@@ -64,7 +64,7 @@ class FILT(EpochLearner):
     Notes
     -----
     An input counts, `s` ms before a spike, by ``eps_0 (C_m exp(-s/tau) - C_s exp(-s/tau_s))``, and after it by
-    ``eps_0 (C_m - C_s) exp(s/tau_q)``, with ``C = tau / (tau + tau_q)``. Values marked (*) were read in the paper:
+    ``eps_0 (C_m - C_s) exp(s/tau_q)``, with ``C = tau / (tau + tau_q)``. Values marked (†) were read in the paper:
     Gardner and Grüning, "Supervised learning in spiking neural networks for precise temporal encoding", PLoS ONE
     11(8), e0161335, 2016.
 

@@ -48,7 +48,7 @@ class HTP(EpochLearner):
     ----------
     weights_ : float64, shape (trains,), mV
         Those with most patterns right, the latest such.
-    right_ : float64, shape (epochs_ + 1,)
+    right_ : float64, shape (epochs done + 1,)
         The share of patterns right after 0, 1, 2 ... epochs.
     epochs_, best_epoch_ : int
         Epochs done; after how many the weights were those.

@@ -16,21 +16,21 @@ class INST(EpochLearner):
     Parameters
     ----------
     eta : float, above 0, optional
-        Learning rate, weight a unit of `change`; ``600 / (trains * targets of all patterns)`` where left out (*).
+        Learning rate, weight a unit of `change`; ``600 / (trains * targets of all patterns)`` where left out (†).
     initial : (float, float), mV, optional
-        First weights are drawn evenly between these two; ``(0, 200 / trains)`` where left out (*).
+        First weights are drawn evenly between these two; ``(0, 200 / trains)`` where left out (†).
     epochs : int
-        Epochs at most (*).
+        Epochs at most (†).
     updates : {"batch", "pattern"}
-        Whether weights change once an epoch (*), or after each pattern in an order drawn anew.
+        Whether weights change once an epoch (†), or after each pattern in an order drawn anew.
     tau, tau_s : float, ms
         Membrane and synapse: an input of weight 1 makes a potential ``V0 (exp(-s/tau) - exp(-s/tau_s))`` that peaks at
-        1 mV. (*)
+        1 mV. (†)
     theta_0 : float, mV, above 0
-        Threshold. (*)
+        Threshold. (†)
     after_spike : {"subtract", "membrane", "reset"}
         What an output spike does: the potential falls by ``theta_0 exp(-s/tau)``; it is put to 0 and currents go on; or
-        all inputs up to the spike are lost. (*: "subtract")
+        all inputs up to the spike are lost. (†: "subtract")
     step_ms : float, ms, above 0
         The neuron is looked at every so often; inputs keep their true times.
     within_ms : float, ms, above 0
@@ -46,7 +46,7 @@ class INST(EpochLearner):
     ----------
     weights_ : float64, shape (trains,), mV
         Those with most patterns right, the latest such.
-    right_ : float64, shape (epochs_ + 1,)
+    right_ : float64, shape (epochs done + 1,)
         The share of patterns right after 0, 1, 2 ... epochs.
     epochs_, best_epoch_ : int
         Epochs done; after how many the weights were those.
@@ -61,7 +61,7 @@ class INST(EpochLearner):
 
     Notes
     -----
-    ``change`` is the sum over targets of ``eps(t - t_ij)``, less the same over output spikes. Values marked (*)
+    ``change`` is the sum over targets of ``eps(t - t_ij)``, less the same over output spikes. Values marked (†)
     were read in the paper: Gardner and Grüning, "Supervised learning in spiking neural networks for precise temporal
     encoding", PLoS ONE 11(8), e0161335, 2016. Its capacities, 15, 30, 40 patterns at 200, 400, 600 inputs, are rerun
     by ``taxel study rivals``.

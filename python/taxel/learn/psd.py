@@ -25,7 +25,7 @@ class PSD(EpochLearner):
         Whether weights change once an epoch, or after each pattern in an order drawn anew.
     tau, tau_1, tau_2 : float, ms
         Membrane; slow and fast time constant of the current ``V0 (exp(-s/tau_1) - exp(-s/tau_2))``, peak 1, which the
-        membrane filters once more, over 1 MOhm (**).
+        membrane filters once more, over 1 MOhm (‡).
     theta_0 : float, mV, above 0
         Threshold.
     after_spike : {"subtract", "membrane", "reset"}
@@ -51,7 +51,7 @@ class PSD(EpochLearner):
     ----------
     weights_ : float64, shape (trains,), mV
         Those with most patterns right, the latest such.
-    right_ : float64, shape (epochs_ + 1,)
+    right_ : float64, shape (epochs done + 1,)
         The share of patterns right after 0, 1, 2 ... epochs.
     epochs_, best_epoch_ : int
         Epochs done; after how many the weights were those.
@@ -67,7 +67,7 @@ class PSD(EpochLearner):
     Notes
     -----
     ``change`` is the sum over targets of the current of earlier inputs, less the same over output spikes: Yu,
-    Tang, Tan and Li, PLoS ONE 8(11), e78318, 2013. Values marked (**), and the step, were read in public MATLAB code
+    Tang, Tan and Li, PLoS ONE 8(11), e78318, 2013. Values marked (‡), and the step, were read in public MATLAB code
     of the field (Zyj061/SNN_Sparse_temporal_coding, cf813da), not in the paper, whose protocol and criterion could
     not be read: the rest the caller gives.
 

@@ -32,11 +32,11 @@ class ReSuMe(EpochLearner):
         What an output spike does: the potential falls by ``theta_0 exp(-s/tau)``; it is put to 0 and currents go on; or
         all inputs up to the spike are lost. Leaky integrate and fire ("membrane") was used.
     a : float
-        What every synapse gets at each spike, input or not (**).
+        What every synapse gets at each spike, input or not (‡).
     amplitude : float, above 0
-        Height of the window (**).
+        Height of the window (‡).
     tau_w : float, ms, above 0, optional
-        Time constant of the window; `tau` where left out (**).
+        Time constant of the window; `tau` where left out (‡).
     step_ms : float, ms, above 0
         The neuron is looked at every so often; inputs keep their true times.
     within_ms : float, ms, above 0
@@ -52,7 +52,7 @@ class ReSuMe(EpochLearner):
     ----------
     weights_ : float64, shape (trains,), mV
         Those with most patterns right, the latest such.
-    right_ : float64, shape (epochs_ + 1,)
+    right_ : float64, shape (epochs done + 1,)
         The share of patterns right after 0, 1, 2 ... epochs.
     epochs_, best_epoch_ : int
         Epochs done; after how many the weights were those.
@@ -69,7 +69,7 @@ class ReSuMe(EpochLearner):
     -----
     ``change`` is the sum over targets of ``a + sum of amplitude * exp(-(t - t_ij) / tau_w)`` over earlier
     inputs, less the same over output spikes: equation 2.10 of Ponulak and Kasiński, Neural Computation 22:467, 2010,
-    as the public code Tempotrons.jl (8329a17) cites it; values marked (**) are that code's defaults. The paper's own
+    as the public code Tempotrons.jl (8329a17) cites it; values marked (‡) are that code's defaults. The paper's own
     constants, protocol and epochs could not be read: the caller gives them. Its load .04 was measured by Florian
     (2012), not by its authors.
 

@@ -31,7 +31,7 @@ class SKIM:
     step_ms : float, ms, above 0
         Time between rows; 1 as the thesis samples.
     pulse_ms : float, ms, above 0
-        How long the wanted output is 1 from a target on; 10 steps of 1 ms (*).
+        How long the wanted output is 1 from a target on; 10 steps of 1 ms (†).
     ridge : float, 0 or more
         Added to the sum of squares, times the squares of the weights.
     branches : int, 1 or more, optional
@@ -69,7 +69,7 @@ class SKIM:
 
     Notes
     -----
-    Tapson et al., Frontiers in Neuroscience 7:153, 2013: pulses of 10 steps (*) and a kernel that is then compressed
+    Tapson et al., Frontiers in Neuroscience 7:153, 2013: pulses of 10 steps (†) and a kernel that is then compressed
     were read in its Figure 3 and Table 1; its layer sizes, random weights and delays could not be read. An output
     spike is the first row at or above the threshold after one below it (a reading of ours: the thesis only says that
     SKIM's output needs such a step). Rows are brought to triangular form block by block, by reflections, so memory

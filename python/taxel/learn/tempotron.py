@@ -23,15 +23,15 @@ class Tempotron:
     ----------
     tau, tau_s : float, ms
         Membrane and synapse: an input of weight 1 makes a potential ``V0 (exp(-s/tau) - exp(-s/tau_s))`` that peaks
-        at 1. 15, and a quarter of `tau` where `tau_s` is left out (*).
+        at 1. 15, and a quarter of `tau` where `tau_s` is left out (†).
     theta_0 : float, above 0
         Threshold: weights are in its unit. At an output spike inputs are shunted: those at or after it are lost.
     eta : float, above 0, optional
-        Learning rate; ``3e-3 * T / (tau * trains * V0)`` where left out (*), `T` being the patterns' mean length.
+        Learning rate; ``3e-3 * T / (tau * trains * V0)`` where left out (†), `T` being the patterns' mean length.
     momentum : float, from 0 up to 1
-        How much of the last change the next one carries on, from error to error (*).
+        How much of the last change the next one carries on, from error to error (†).
     initial_sd : float, 0 or more
-        First weights are drawn normally around 0, this wide (*).
+        First weights are drawn normally around 0, this wide (†).
     epochs : int
         Epochs at most.
     seed : int, 0 or more
@@ -43,7 +43,7 @@ class Tempotron:
     ----------
     weights_ : float64, shape (trains,)
         Those after the epoch with fewest errors, the latest such.
-    right_ : float64, shape (epochs_,)
+    right_ : float64, shape (epochs done,)
         The share of patterns right as they were presented, epoch by epoch.
     epochs_, best_epoch_ : int
         Epochs done; after how many the weights were those.
@@ -57,7 +57,7 @@ class Tempotron:
     Notes
     -----
     Gütig and Sompolinsky, Nature Neuroscience 9:420, 2006; weights change after each wrong pattern. Values
-    marked (*) are those of its capacity runs, as read in secondary sources and public code (laboratory e89a73a,
+    marked (†) are those of its capacity runs, as read in secondary sources and public code (laboratory e89a73a,
     Tempotrons.jl 8329a17), not in the paper. The paper's supplement adds a small constant potential, which is left
     out here; where the potential never rises above rest, the last input's peak is corrected, as there. Peaks are
     exact: between inputs there is one maximum at most, and its time is known. Cost of a presentation: O(1) an input.
