@@ -4,3 +4,6 @@ from hypothesis import settings
 
 settings.register_profile("taxel", deadline=None, derandomize=True)
 settings.load_profile("taxel")
+
+#: Scripts that made kept data are no tests: they need what made it.
+collect_ignore_glob = ["data/*"]
