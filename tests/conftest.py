@@ -1,9 +1,14 @@
 """What all tests share: examples are drawn the same each time, and a busy machine is no failure."""
 
+import signal
+
 from hypothesis import settings
 
 settings.register_profile("taxel", deadline=None, derandomize=True)
 settings.load_profile("taxel")
+
+# A shell that starts the tests in the background has them ignore Ctrl-C, which some of them send.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 #: Scripts that made kept data are no tests: they need what made it.
 collect_ignore_glob = ["data/*"]

@@ -459,7 +459,7 @@ impl Problem {
         least.max(BROKEN_SHARE * weights.iter().map(|w| w.abs()).sum::<f64>())
     }
 
-    /// The largest share of the margin that holds; on the grid the least threshold - potential.
+    /// The largest share of the margin that holds, 0 where silence is broken; on the grid the least threshold - potential.
     fn margin(&self, weights: &[f64]) -> Margin {
         if self.parameters.neuron.time == Time::Grid {
             let worst = self
@@ -478,7 +478,11 @@ impl Problem {
                 share - peak.excess / self.statement.margin_at(sheet, peak.t)
             });
             let next = next.fold(share, f64::min);
-            if next >= share || next.is_nan() {
+            // Weights of a fit that was stopped may keep none at all.
+            if next <= 0.0 || next.is_nan() {
+                return self.statement.margin.times(0.0);
+            }
+            if next >= share {
                 return self.statement.margin.times(share);
             }
             share = next;
