@@ -300,6 +300,8 @@ SOUND: dict[str, Sound] = {
         after_spike="reset",
         first_threshold="theta_0",
         step_ms=1.0,
+        kernel="double_exponential",
+        tau_s=1.0,
         kappa=1.2,
         delta_t_ms=1.0,
         lambdas=[1.0, 1.0, 1.0, 1.0, 1.0],
@@ -319,7 +321,12 @@ SOUND: dict[str, Sound] = {
         {"pattern": PLAIN, "targets": [5.0]},
     ),
     "taxel.learn.OnlineConeR.fit": method(
-        taxel.learn.OnlineConeR(window=3, tau=5.0, ub=1.0), "fit", patterns=[PLAIN], targets=[[5.0]]
+        taxel.learn.OnlineConeR(window=3, tau=5.0, ub=1.0),
+        "fit",
+        patterns=[PLAIN],
+        targets=[[5.0]],
+        start=None,
+        progress=lambda *_: None,
     ),
     "taxel.learn.ConeR.fit": method(
         CONE, "fit", patterns=[PLAIN], targets=[[5.0]], start=[0.1] * 4, progress=lambda *_: None

@@ -54,7 +54,7 @@ def gait(name: str, labels: Iterable[str]) -> dict[str, Any]:
     --------
     >>> recipe = gait("gaitpdb", ["contact", "foot off"])
     >>> recipe["encoder"]["levels"], recipe["neurons"]["foot off"]["delta_t_ms"]
-    ([5, 10, 20, 30, 40, 50], 10.0)
+    ([5.0, 10.0, 20.0, 30.0, 40.0, 50.0], 10.0)
     """
     from taxel.studies.gait.recipes import NOTES  # noqa: PLC0415  the study loads slowly
     from taxel.studies.gait.sources import encoder_of  # noqa: PLC0415
