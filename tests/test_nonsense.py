@@ -326,7 +326,7 @@ SOUND: dict[str, Sound] = {
         patterns=[PLAIN],
         targets=[[5.0]],
         start=None,
-        progress=lambda *_: None,
+        progress=None,
     ),
     "taxel.learn.ConeR.fit": method(
         CONE, "fit", patterns=[PLAIN], targets=[[5.0]], start=[0.1] * 4, progress=lambda *_: None
