@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, Self
 
@@ -9,11 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, floats, instance, number, parameters, several
+from taxel._arguments import callback, floats, instance, parameters, several
+from taxel.learn._examples import examples, seconds
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["AfterSpike", "EpochLearner", "Updates", "examples", "keep", "seconds"]
+__all__ = ["AfterSpike", "EpochLearner", "Updates", "fitted", "keep"]
 
 AfterSpike = Literal["subtract", "membrane", "reset"]
 Updates = Literal["batch", "pattern"]
@@ -22,7 +24,7 @@ Updates = Literal["batch", "pattern"]
 _TRAINING = ("eta", "epochs", "updates", "initial", "within_ms", "until_right", "seed")
 
 
-class EpochLearner:
+class EpochLearner(ABC):
     """Learn spike times by epochs: present each pattern, compare the output spikes with the targets, correct."""
 
     weights_: NDArray[np.float64]
@@ -36,13 +38,13 @@ class EpochLearner:
     #: Entries of `right_` before the first epoch.
     _LOOKS_BEFORE_THE_FIRST = 1
 
+    @abstractmethod
     def _law(self) -> dict[str, Any]:
         """Return the rule's own constants, by its name."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _neuron(self) -> dict[str, Any]:
         """Return the stepped neuron."""
-        raise NotImplementedError
 
     def _json(self) -> str:
         training = {name: getattr(self, name) for name in _TRAINING}
@@ -150,22 +152,6 @@ class EpochLearner:
         values = ((name, getattr(self, name)) for name in names if name != "return")
         shown = (f"{name}={value!r}" for name, value in values if name not in given or value != given[name])
         return f"{type(self).__name__}({', '.join(shown)})"
-
-
-def examples(patterns: object, targets: object) -> tuple[list[tuple[Any, ...]], list[NDArray[np.float64]]]:
-    """Return patterns and targets as the compiled part takes them; refuse what is none, by name."""
-    trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))]
-    return trains, [floats(f"targets of pattern {p}", t) for p, t in enumerate(several("targets", targets))]
-
-
-def seconds(value: object) -> float | None:
-    """Return a limit of time; refuse one that is not above 0."""
-    if value is None:
-        return None
-    limit = number("max_seconds", value)
-    if not limit > 0:
-        raise _core.ProblemError(f"max_seconds is {limit}: must be above 0")
-    return limit
 
 
 def keep(learner: Any, trained: tuple[Any, ...]) -> None:

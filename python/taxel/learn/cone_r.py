@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, floats, instance, parameters, several
+from taxel._arguments import callback, floats, instance, parameters
 from taxel._core import ProblemError
+from taxel.learn._examples import examples
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
@@ -255,11 +256,8 @@ class ConeRProblem:
     """
 
     def __init__(self, cone: ConeR, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
-        trains = [
-            instance(f"pattern {p}", pattern, SpikeTrains) for p, pattern in enumerate(several("patterns", patterns))
-        ]
-        times = [floats(f"targets of pattern {p}", t) for p, t in enumerate(several("targets", targets))]
-        self._problem = _core.ConeRProblem(instance("cone", cone, ConeR)._json(), [p._parts() for p in trains], times)
+        trains, times = examples(patterns, targets)
+        self._problem = _core.ConeRProblem(instance("cone", cone, ConeR)._json(), trains, times)
         self.silent_rows: int = self._problem.silent_rows
 
     def fit(

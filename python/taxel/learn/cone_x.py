@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, flag, floats, instance, number, parameters, several, shown, whole
+from taxel._arguments import callback, flag, floats, instance, number, parameters, shown, whole
 from taxel._core import ProblemError
+from taxel.learn._examples import examples, seconds
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
@@ -285,8 +286,8 @@ class ConeX:
         held = [] if start is None else _held(instance("start", start, ConeX))
         problem = ConeXProblem(self, patterns, targets)
         multipliers = np.array([multiplier for _, multiplier in held], dtype=np.float64)
-        seconds = None if self.max_seconds is None else float(self.max_seconds)
-        found = problem._problem.fit([tuple(row) for row, _ in held], multipliers, progress, seconds)
+        first = [tuple(row) for row, _ in held]
+        found = problem._problem.fit(first, multipliers, progress, seconds(self.max_seconds))
         (status, weights, objective, parts, gap, violation), rest, signal = found
         margin, engine, rounds, (rows, multipliers), certificate = rest
         self.status_ = status
@@ -312,9 +313,7 @@ class ConeX:
     def _json(self) -> str:
         values = {name: value for name, value in vars(self).items() if not name.endswith("_")}
         neuron = {name: values.pop(name) for name in _NEURON}
-        seconds = values.pop("max_seconds")
-        if seconds is not None and not number("max_seconds", seconds) > 0.0:
-            raise ProblemError(f"max_seconds is {seconds}: must be above 0")
+        seconds(values.pop("max_seconds"))
         for name in ("lb", "ub", "horizon"):
             if not (values[name] is None and name == "horizon"):
                 values[name] = _one_or_each(name, values[name])
@@ -338,11 +337,7 @@ class ConeXProblem:
     """
 
     def __init__(self, cone: ConeX, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
-        trains = [
-            instance(f"pattern {p}", pattern, SpikeTrains) for p, pattern in enumerate(several("patterns", patterns))
-        ]
-        self.targets = [floats(f"targets of pattern {p}", t) for p, t in enumerate(several("targets", targets))]
-        parts = [pattern._parts() for pattern in trains]
+        parts, self.targets = examples(patterns, targets)
         self._problem = _core.ConeXProblem(instance("cone", cone, ConeX)._json(), parts, self.targets)
         self.lb, self.ub = self._problem.bounds()
 

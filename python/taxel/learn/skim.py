@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._arguments import floats, instance, number, parameters, several, text
 from taxel._core import ProblemError
-from taxel.learn._epochs import examples, fitted
+from taxel.learn._epochs import fitted
+from taxel.learn._examples import examples
 from taxel.spikes import SpikeTrains
 
 __all__ = ["SKIM"]

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._arguments import callback, flag, floats, instance, parameters, several
-from taxel.learn._epochs import fitted, keep, seconds
+from taxel.learn._epochs import fitted, keep
+from taxel.learn._examples import seconds
 from taxel.spikes import SpikeTrains
 
 __all__ = ["Tempotron"]
