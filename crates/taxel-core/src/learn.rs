@@ -15,6 +15,7 @@ mod htp;
 mod inst;
 mod minimise;
 mod mixed;
+mod nearest;
 mod online_cone_r;
 mod point;
 mod psd;

@@ -15,8 +15,10 @@ use self::factor::Factor;
 use self::kernels::{Aligned, LANES, add_rows, dot, products, rows_times};
 use crate::{Result, Stop, problem};
 
-/// Rows (scaled to length 1) count as met within this.
+/// Rows count as met within this, as they were stated or scaled to length 1, whichever asks for more.
 const TOLERANCE: f64 = 5e-13;
+/// What is asked of a long row, scaled to length 1, at most.
+const FINEST: f64 = 4e-14;
 /// Active rows are refined until they are met to this.
 const REFINED: f64 = 2e-14;
 /// A squared pivot below this is computed again from the vector itself: `1 - |d|^2` has lost its digits.
@@ -94,6 +96,13 @@ struct Row {
     kind: Kind,
     length: f64,
     limit: f64,
+}
+
+impl Row {
+    /// How far off it may be and still count as met.
+    fn tolerance(&self) -> f64 {
+        (TOLERANCE / self.length).clamp(FINEST, TOLERANCE)
+    }
 }
 
 /// The solver, with its working set; see the module.
@@ -292,7 +301,7 @@ impl DualActiveSet {
             candidates.retain(|c| !undecided.contains(&c.0));
             if candidates.is_empty() {
                 self.measure(true);
-                return Ok(if undecided.iter().any(|&slot| self.violation(slot) > TOLERANCE) {
+                return Ok(if undecided.iter().any(|&slot| !self.is_met(slot)) {
                     Verdict::Stopped
                 } else {
                     Verdict::Optimal
@@ -342,7 +351,7 @@ impl DualActiveSet {
                     Kind::Equality(_) if since < 0.0 => (-1.0, -since),
                     _ => (1.0, since),
                 };
-                if self.place[slot].is_some() || violation <= TOLERANCE {
+                if self.place[slot].is_some() || violation <= self.rows[slot].tolerance() {
                     continue;
                 }
                 if let Some(ray) = self.step(slot, sign, violation) {
@@ -469,6 +478,10 @@ impl DualActiveSet {
         if self.is_equality(slot) { self.excess[slot].abs() } else { self.excess[slot] }
     }
 
+    fn is_met(&self, slot: usize) -> bool {
+        self.violation(slot) <= self.rows[slot].tolerance()
+    }
+
     /// `-A'u` over the active rows.
     fn combined(&self) -> Vec<f64> {
         let by: Vec<f64> = self.active.iter().map(|&slot| -self.multipliers[slot]).collect();
@@ -491,19 +504,51 @@ impl DualActiveSet {
     fn measure(&mut self, last: bool) {
         let enough = if last { REFINED } else { 0.1 * TOLERANCE };
         let mut worst = f64::INFINITY;
-        let mut values = vec![0.0; self.live.len()];
         for round in 0..4 {
             self.weights = self.combined();
-            rows_times(&self.coefficients, self.stride, &self.live, &self.weights, &mut values);
-            for (value, &slot) in values.iter().zip(&self.live) {
-                self.excess[slot] = value - self.rows[slot].limit;
-            }
+            self.price();
             let now = self.active.iter().fold(0.0, |worst: f64, &slot| worst.max(self.excess[slot].abs()));
             if now <= enough || now > 0.5 * worst || round == 3 {
                 break;
             }
             worst = now;
             self.refine();
+        }
+        if last {
+            self.project_weights();
+        }
+    }
+
+    /// Moves the weights onto the active rows: with large multipliers their sum is rounded to more than the rows allow.
+    fn project_weights(&mut self) {
+        let off = |residuals: &[f64]| residuals.iter().fold(0.0, |worst: f64, r| worst.max(r.abs()));
+        let mut change = self.residuals(&self.weights);
+        let mut now = off(&change);
+        for _ in 0..4 {
+            if now <= REFINED {
+                break;
+            }
+            self.factor.forward(&mut change);
+            self.factor.backward(&mut change);
+            let by: Vec<f64> = change[..self.active.len()].iter().map(|change| -change).collect();
+            let mut weights = self.weights.clone();
+            add_rows(&self.coefficients, self.stride, &self.active, &by, &mut weights);
+            change = self.residuals(&weights);
+            let then = off(&change);
+            if then >= now {
+                break;
+            }
+            (self.weights, now) = (weights, then);
+        }
+        self.price();
+    }
+
+    /// Computes every row's excess.
+    fn price(&mut self) {
+        let mut values = vec![0.0; self.live.len()];
+        rows_times(&self.coefficients, self.stride, &self.live, &self.weights, &mut values);
+        for (value, &slot) in values.iter().zip(&self.live) {
+            self.excess[slot] = value - self.rows[slot].limit;
         }
     }
 
@@ -519,7 +564,7 @@ impl DualActiveSet {
             }
         }
         for &slot in &self.live {
-            if self.place[slot].is_none() && self.violation(slot) > TOLERANCE {
+            if self.place[slot].is_none() && !self.is_met(slot) {
                 found.push((slot, self.excess[slot]));
             }
         }

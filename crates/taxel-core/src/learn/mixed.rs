@@ -15,9 +15,10 @@ use dense::{add_sum, dot, times};
 use super::cone_program::{ConeProgram, HardRows, Hinges};
 use super::cone_r::Norm;
 use super::cone_x::NOTHING;
+use super::nearest::nearest;
 use crate::{Error, Result, Stop};
 use interior::{Interior, State};
-use polish::{Guess, meet, polish};
+use polish::{Guess, polish};
 
 /// Looser than this, an interior point is answer enough: rows are to be found by it, not weights.
 const LOOSE: f64 = 1e-5;
@@ -124,7 +125,7 @@ pub(super) fn minimise(
     }
     for aim in TRIES {
         let near = interior.solve(&mut state, aim, stop);
-        best.improve(&near.point, near.guess, tolerance, stop);
+        best.improve(&near.point, near.guess, tolerance, stop)?;
         if best.gap() <= tolerance || stop.asked() {
             return Ok(best.found(Engine::Native, stop.asked(), state));
         }
@@ -132,7 +133,7 @@ pub(super) fn minimise(
     match program.clarabel(stop) {
         Ok(point) => {
             let guess = program.guess(&point);
-            best.improve(&point, guess, tolerance, stop);
+            best.improve(&point, guess, tolerance, stop)?;
         }
         Err(Error::Interrupted) => {}
         Err(error) => return Err(error),
@@ -172,15 +173,22 @@ impl<'a> Best<'a> {
         }
     }
 
-    fn improve(&mut self, near: &Point, guess: Guess, tolerance: f64, stop: Stop<'_>) {
-        if let Some((point, guess)) = polish(self.program, near, guess, tolerance, stop) {
+    fn improve(&mut self, near: &Point, guess: Guess, tolerance: f64, stop: Stop<'_>) -> Result<()> {
+        let program = self.program;
+        if let Some((point, guess)) = polish(program, near, guess, tolerance, stop) {
             self.offer(point, Some(guess));
         }
-        if self.gap() > tolerance
-            && let Some(point) = meet(self.program, near)
-        {
-            self.offer(point, None);
+        if self.gap() <= tolerance {
+            return Ok(());
         }
+        // Where what binds cannot be told, good multipliers and the nearest weights that meet the rows will do.
+        self.offer(near.clone(), None);
+        if program.gap(near) <= tolerance
+            && let Some(weights) = nearest(&near.weights, &program.hard(), &program.lower, &program.upper, stop)?
+        {
+            self.offer(Point { weights, ..near.clone() }, None);
+        }
+        Ok(())
     }
 
     /// Goes on from a polished point with rows added since.
@@ -308,6 +316,10 @@ impl Program {
         self.lower.len()
     }
 
+    fn hard(&self) -> HardRows<'_> {
+        HardRows { equal: &self.equal, equal_to: &self.equal_to, below: &self.below, limit: &self.limit }
+    }
+
     fn missed(&self, w: &[f64]) -> Vec<f64> {
         if self.lift > 0.0 {
             times(&self.behind, w).iter().zip(&self.wanted).map(|(u, m)| u - m).collect()
@@ -406,7 +418,7 @@ impl Program {
             gram: &gram,
             bounds: self.lower.iter().zip(&self.upper).map(|(l, u)| [*l, *u]).collect(),
             hinges: &Hinges::default(),
-            hard: HardRows { equal: &self.equal, equal_to: &self.equal_to, below: &self.below, limit: &self.limit },
+            hard: self.hard(),
         };
         let answer = program.solve(1.0, 1e-11, stop)?;
         Ok(Point {

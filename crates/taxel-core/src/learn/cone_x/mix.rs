@@ -5,8 +5,8 @@ use std::collections::HashSet;
 use super::{Best, Engine, MET, MOST_ROUNDS, Problem, Round, Slopes};
 use crate::learn::certificate::Bounds;
 use crate::learn::cone_program::HardRows;
-use crate::learn::dual_active_set::{DualActiveSet, Verdict};
 use crate::learn::mixed::{self, Terms};
+use crate::learn::nearest::nearest;
 use crate::learn::silence::Peak;
 use crate::learn::statement::Row;
 use crate::{Result, Stop};
@@ -50,7 +50,13 @@ impl Problem {
             if found.stopped || best.rounds >= MOST_ROUNDS {
                 return Ok(best);
             }
-            let weights = if near { found.weights } else { self.projected(&rows, found.weights, stop)? };
+            let mut weights = found.weights;
+            if !near
+                && rows.missed(&weights) > 0.5 * MET
+                && let Some(meets) = nearest(&weights, &rows.hard(), lower, upper, stop)?
+            {
+                weights = meets;
+            }
             let theta = self.parameters.neuron.theta_0;
             let broken =
                 self.broken(&weights, ASKED_SHARE, if near { NEAR_SHARE * theta } else { self.rounding(&weights) });
@@ -86,26 +92,6 @@ impl Problem {
             }
             return Ok(best);
         }
-    }
-
-    /// The nearest weights that meet the rows to rounding, where these do not.
-    fn projected(&self, rows: &Dense, weights: Vec<f64>, stop: Stop<'_>) -> Result<Vec<f64>> {
-        if rows.missed(&weights) <= 0.5 * MET {
-            return Ok(weights);
-        }
-        let less = |bounds: &[f64]| -> Vec<f64> { bounds.iter().zip(&weights).map(|(b, w)| b - w).collect() };
-        let mut engine = DualActiveSet::new(&less(&self.bounds.lower), &less(&self.bounds.upper))?;
-        for (row, limit) in rows.equal.chunks_exact(weights.len()).zip(&rows.equal_to) {
-            engine.equality(row, limit - super::dot(row, &weights))?;
-        }
-        for (row, limit) in rows.below.chunks_exact(weights.len()).zip(&rows.limit) {
-            engine.inequality(row, limit - super::dot(row, &weights))?;
-        }
-        if engine.solve(stop)? != Verdict::Optimal {
-            return Ok(weights);
-        }
-        let moved = weights.iter().zip(engine.weights()).map(|(w, v)| w + v);
-        Ok(moved.zip(&self.bounds.lower).zip(&self.bounds.upper).map(|((w, l), u)| w.clamp(*l, *u)).collect())
     }
 }
 
@@ -211,9 +197,12 @@ impl Dense {
         keep
     }
 
-    /// How far the worst row of targets is missed.
+    /// How far the worst row is missed.
     fn missed(&self, weights: &[f64]) -> f64 {
-        let rows = self.equal.chunks_exact(weights.len()).zip(&self.equal_to);
-        rows.map(|(row, to)| (super::dot(row, weights) - to).abs()).fold(0.0, f64::max)
+        let n = weights.len();
+        let equal =
+            self.equal.chunks_exact(n).zip(&self.equal_to).map(|(row, to)| (super::dot(row, weights) - to).abs());
+        let below = self.below.chunks_exact(n).zip(&self.limit).map(|(row, limit)| super::dot(row, weights) - limit);
+        equal.chain(below).fold(0.0, f64::max)
     }
 }

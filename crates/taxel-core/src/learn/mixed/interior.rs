@@ -396,12 +396,12 @@ impl<'a> Interior<'a> {
             let most = |v: &[f64]| v.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
             let primal = most(&r.equality).max(most(&r.inequality));
             let gap = (objective - self.bound(state, &r)).abs() / objective.abs().max(NOTHING);
-            let now = gap.max(primal);
-            if !now.is_finite() {
+            // `max` leaves NaN out.
+            if !(gap + primal + mu).is_finite() {
                 break;
             }
-            if now < merit {
-                merit = now;
+            if gap.max(primal) < merit {
+                merit = gap.max(primal);
                 best.clone_from(state);
             }
             idle = if mu.max(primal) < 0.9 * least { 0 } else { idle + 1 };

@@ -5,15 +5,18 @@
 
 use faer::Mat;
 
-use super::dense::{Cholesky, Lu, add_gram, add_sum, dot, outer, times};
+use super::dense::{Lu, add_gram, add_sum, dot, times};
 use super::{Place, Point, Program};
 use crate::Stop;
 use crate::learn::cone_r::Norm;
 
 const MOST_GUESSES: usize = 12;
 const MOST_REFINEMENTS: usize = 12;
-/// What makes a singular guess solvable; refinement takes its effect out again.
-const SOFT: f64 = 1e-11;
+/// What makes a singular guess solvable; refinement takes its effect out again, unless rows are nearer to parallel than
+/// this: then the next.
+const SOFT: [f64; 2] = [1e-11, 1e-15];
+/// What is off of the conditions of a guess in units of about 1 where that is solved.
+const SOLVED: f64 = 1e-13;
 /// Rows and bounds count as met within this, in units of rows of length 1.
 pub(super) const MET: f64 = 2e-14;
 /// The share of the tolerance at which the gap is small enough.
@@ -62,33 +65,6 @@ pub(super) fn polish(
         most = 2 * exchanged;
     }
     best.map(|(_, point, guess)| (point, guess))
-}
-
-/// The nearest point at which equality rows are met to rounding, weights moving the less the nearer they are to a wall.
-pub(super) fn meet(program: &Program, near: &Point) -> Option<Point> {
-    let n = program.width();
-    let mut w = near.weights.clone();
-    let walls = |k: usize| [program.lower[k], program.upper[k], if program.l1 > 0.0 { 0.0 } else { program.lower[k] }];
-    let room: Vec<f64> = (0..n).map(|k| walls(k).iter().map(|wall| (w[k] - wall).abs()).fold(1.0, f64::min)).collect();
-    let mut scaled = program.equal.clone();
-    scaled.chunks_exact_mut(n.max(1)).for_each(|row| row.iter_mut().zip(&room).for_each(|(v, r)| *v *= r));
-    let mut matrix = outer(&scaled, n);
-    let most = (0..matrix.nrows()).map(|i| matrix[(i, i)]).fold(0.0, f64::max);
-    (0..matrix.nrows()).for_each(|i| matrix[(i, i)] += 1e-13 * most);
-    if matrix.nrows() > 0 {
-        let factors = Cholesky::new(matrix)?;
-        for _ in 0..4 {
-            let mut off: Vec<f64> =
-                times(&program.equal, &w).iter().zip(&program.equal_to).map(|(u, e)| e - u).collect();
-            factors.solve(&mut off);
-            let mut step = vec![0.0; n];
-            add_sum(&scaled, &off, &mut step);
-            for k in 0..n {
-                w[k] = (w[k] + room[k] * step[k]).clamp(program.lower[k], program.upper[k]);
-            }
-        }
-    }
-    Some(Point { weights: w, ..near.clone() })
 }
 
 struct Polish<'a> {
@@ -204,13 +180,32 @@ impl<'a> Polish<'a> {
                 matrix[(j, f + i)] = row[k];
             }
         }
-        (0..f).for_each(|j| matrix[(j, j)] += SOFT);
-        (f..size).for_each(|j| matrix[(j, j)] -= SOFT);
-        let factors = Lu::new(matrix);
+        let mut least = f64::INFINITY;
+        for soft in SOFT {
+            let mut matrix = matrix.clone();
+            (0..f).for_each(|j| matrix[(j, j)] += soft);
+            (f..size).for_each(|j| matrix[(j, j)] -= soft);
+            let before = (self.w.clone(), self.equality.clone(), self.inequality.clone());
+            let off = self.refine(&Lu::new(matrix), &free, &binding);
+            if off.is_none_or(|off| off >= least) {
+                (self.w, self.equality, self.inequality) = before;
+            }
+            least = least.min(off.unwrap_or(f64::INFINITY));
+            if least <= SOLVED {
+                break;
+            }
+        }
+        least.is_finite().then_some(())
+    }
+
+    /// Newton steps with these factors until rounding stops them; gives what is off at last.
+    fn refine(&mut self, factors: &Lu, free: &[usize], binding: &[usize]) -> Option<f64> {
+        let program = self.program;
+        let (f, p) = (free.len(), program.equal_to.len());
         let mut least = f64::INFINITY;
         for _ in 0..MOST_REFINEMENTS {
             let gradient = self.gradient();
-            let mut right = Vec::with_capacity(size);
+            let mut right = Vec::with_capacity(f + p + binding.len());
             right.extend(free.iter().map(|&k| -gradient[k] - program.l1 * self.sign[k]));
             right.extend(times(&program.equal, &self.w).iter().zip(&program.equal_to).map(|(u, e)| e - u));
             let below = times(&program.below, &self.w);
@@ -219,16 +214,17 @@ impl<'a> Polish<'a> {
             if !off.is_finite() {
                 return None;
             }
-            if off <= 1e-16 || off > 0.7 * least {
+            let ended = off <= 1e-16 || off > 0.7 * least;
+            least = least.min(off);
+            if ended {
                 break;
             }
-            least = off;
             factors.solve(&mut right);
             free.iter().zip(&right).for_each(|(&k, d)| self.w[k] += d);
             self.equality.iter_mut().zip(&right[f..]).for_each(|(u, d)| *u += d);
             binding.iter().zip(&right[f + p..]).for_each(|(&i, d)| self.inequality[i] += d);
         }
-        Some(())
+        Some(least)
     }
 
     /// Exchanges what has the wrong sign; says how much that is.

@@ -280,6 +280,43 @@ fn rows_may_come_and_go_between_calls() {
     }
 }
 
+/// The last resort, which hardly any problem needs.
+#[test]
+fn from_what_clarabel_finds_the_same_objective_is_reached() {
+    let mut random = StdRng::seed_from_u64(13);
+    for (l1, l2, lift) in MIXES {
+        let problem = Problem::drawn(30, 3, 6, &mut random).with(l1, l2, lift);
+        let program = Program::new(&problem.terms(), &problem.rows(), &problem.lower, &problem.upper);
+        let point = program.clarabel(Stop::never()).unwrap();
+        let mut best = Best::new(&program);
+        best.improve(&point, program.guess(&point), 1e-8, Stop::never()).unwrap();
+        assert!(best.met && best.gap() <= 1e-8);
+        let native = problem.solve();
+        assert_eq!(native.engine, Engine::Native);
+        let (one, other) = (best.objective * program.cost, problem.objective(&native.weights));
+        assert!((one - other).abs() <= 2e-8 * other, "{one} and {other}");
+    }
+}
+
+#[test]
+fn weights_that_meet_rows_that_nearly_coincide_are_found_nearby() {
+    let mut random = StdRng::seed_from_u64(14);
+    for apart in [1e-2, 1e-4, 1e-6] {
+        let mut problem = Problem::drawn(40, 3, 4, &mut random);
+        let twin: Vec<f64> = problem.equal[..40].iter().map(|a| a + apart * random.random::<f64>()).collect();
+        problem.below.extend(twin);
+        problem.limit.push(problem.equal_to[0] - 1e-3 * apart);
+        let found = problem.solve();
+        let off: Vec<f64> = found.weights.iter().map(|w| w + 1e-10 * random.random::<f64>()).collect();
+        let near = nearest(&off, &problem.rows(), &problem.lower, &problem.upper, Stop::never()).unwrap().unwrap();
+        let program = Program::new(&problem.terms(), &problem.rows(), &problem.lower, &problem.upper);
+        let missing = |w: &[f64]| program.missing(&w.iter().map(|w| w / program.weight).collect::<Vec<_>>());
+        assert!(missing(&off) > 1e-12 && missing(&near) < 1e-14, "{} then {}", missing(&off), missing(&near));
+        let moved = near.iter().zip(&off).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(moved < 1e-8 / apart, "{apart}: moved {moved}");
+    }
+}
+
 #[test]
 fn rows_that_cannot_be_met_are_never_said_to_be() {
     let mut random = StdRng::seed_from_u64(10);

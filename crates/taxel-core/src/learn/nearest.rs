@@ -1,0 +1,38 @@
+//! The last projection: the nearest weights that meet hard rows to rounding.
+
+use super::cone_program::HardRows;
+use super::dual_active_set::{DualActiveSet, Verdict};
+use crate::{Result, Stop};
+
+/// The weights within the bounds that meet all rows and lie nearest to these; none where there are none, or on a stop.
+pub(super) fn nearest(
+    weights: &[f64],
+    rows: &HardRows<'_>,
+    lower: &[f64],
+    upper: &[f64],
+    stop: Stop<'_>,
+) -> Result<Option<Vec<f64>>> {
+    // The step is the shortest that meets what is left of each row; being short, it is rounded little. In units of what
+    // is missed at most, so that this is far above what counts as met.
+    let width = weights.len().max(1);
+    let left = |rows: &[f64], limits: &[f64]| -> Vec<f64> {
+        let dot = |row: &[f64]| row.iter().zip(weights).map(|(a, w)| a * w).sum::<f64>();
+        rows.chunks_exact(width).zip(limits).map(|(row, limit)| limit - dot(row)).collect()
+    };
+    let (equal, below) = (left(rows.equal, rows.equal_to), left(rows.below, rows.limit));
+    let most = equal.iter().map(|l| l.abs()).chain(below.iter().map(|l| -l)).fold(f64::MIN_POSITIVE, f64::max);
+    let unit = most.log2().ceil().exp2();
+    let room = |bounds: &[f64]| -> Vec<f64> { bounds.iter().zip(weights).map(|(b, w)| (b - w) / unit).collect() };
+    let mut engine = DualActiveSet::new(&room(lower), &room(upper))?;
+    for (row, left) in rows.equal.chunks_exact(width).zip(equal) {
+        engine.equality(row, left / unit)?;
+    }
+    for (row, left) in rows.below.chunks_exact(width).zip(below) {
+        engine.inequality(row, left / unit)?;
+    }
+    if engine.solve(stop)? != Verdict::Optimal {
+        return Ok(None);
+    }
+    let moved = weights.iter().zip(engine.weights()).map(|(w, step)| w + unit * step);
+    Ok(Some(moved.zip(lower.iter().zip(upper)).map(|(w, (l, u))| w.clamp(*l, *u)).collect()))
+}
