@@ -245,6 +245,45 @@ def test_a_shift_in_time_and_another_order_of_trains_change_nothing():
     assert moved.weights_ == pytest.approx(here.weights_[order], abs=1e-6)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"lambdas": (2, 2, 200), "after_spike": "reset"},
+        {"lambdas": (1, 1, 1), "divide_b_by": "targets"},
+        {"time": "continuous", "kernel": "double_exponential"},
+        {"time": "continuous", "kernel": "double_exponential", "theta_plus": 0.0, "after_spike": "reset"},
+    ],
+    ids=lambda o: ",".join(o) or "printed",
+)
+def test_a_problem_in_another_unit_of_potential_has_the_same_answer_in_that_unit(options):
+    times, said = 50.0, set()
+    for seed in range(16):
+        patterns, targets = examples(seed, trains=24, patterns=3 + seed % 6, targets=1)
+        parameters = {"time": "grid", "lb": -2.0, "ub": 2.0, "margin": 2e-3, **options}
+        cone = ConeX(**parameters)
+        names = ("theta_0", "theta_plus", "lb", "ub", "margin")
+        potentials = {name: times * getattr(cone, name) for name in names}
+        if cone.time == "continuous":
+            potentials["slope"] = times * 1e-3  # the default
+        if cone.divide_b_by == "targets":  # B is then a square of potentials, and no ratio
+            potentials["lambdas"] = (1, 1, 1 / times**2)
+        cone.fit(patterns, targets)
+        other = ConeX(**(parameters | potentials)).fit(patterns, targets)
+        said.add(cone.status_)
+        assert other.status_ == cone.status_
+        if cone.status_ == "infeasible":
+            assert check_certificate(other.problem_, other.certificate_)
+            assert other.certificate_.at_all == cone.certificate_.at_all
+            continue
+        assert sum(other.lambdas) * other.objective_ == pytest.approx(sum(cone.lambdas) * cone.objective_, rel=1e-7)
+        assert other.weights_ == pytest.approx(times * cone.weights_, rel=1e-3, abs=times * 1e-4)
+        assert other.margin_.mv == pytest.approx(times * cone.margin_.mv, rel=1e-3, abs=times * 1e-9)
+        again = ConeX(**(parameters | potentials)).fit(patterns, targets, start=other)
+        assert again.weights_ == pytest.approx(other.weights_, rel=1e-4, abs=times * 1e-5)
+    assert said == {"solved", "infeasible"}
+
+
 def test_a_pattern_without_targets_teaches_silence():
     (pattern,), targets = examples(11, trains=40, patterns=1, targets=1)
     # The same played faster: its potential comes higher, so the untaught neuron fires.

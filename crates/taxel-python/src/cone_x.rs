@@ -95,14 +95,13 @@ impl ConeXProblem {
     /// Least and largest weights.
     fn bounds<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
         let bounds = self.0.bounds();
-        (array(py, bounds.lower.clone()), array(py, bounds.upper.clone()))
+        (array(py, bounds.lower), array(py, bounds.upper))
     }
 
     /// A row, with or without its margin.
     fn row<'py>(&self, py: Python<'py>, name: Name, margin: bool) -> PyResult<RowOut<'py>> {
-        let (row, statement) = (to_row(&name)?, self.0.statement());
-        let Stated { coefficients, limit } = statement.state(row).map_err(core)?;
-        Ok((array(py, coefficients), if margin { limit } else { limit + statement.margin_of(row) }))
+        let Stated { coefficients, limit } = self.0.row(to_row(&name)?, margin).map_err(core)?;
+        Ok((array(py, coefficients), limit))
     }
 
     /// What B looks at behind a target, and what it shall reach.

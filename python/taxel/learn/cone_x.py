@@ -134,8 +134,9 @@ class ConeX:
     Attributes
     ----------
     status_ : {"solved", "infeasible", "stopped"}
-        "solved": every target is met to 1e-12 mV, silence keeps at least half its margin, and no weights have an
-        objective smaller by more than `tolerance`. "infeasible": `certificate_` proves it. "stopped": neither is known.
+        "solved": every target is met to 1e-12 mV (in proportion where theta_0 is not 0.3 mV), silence keeps at least
+        half its margin, and no weights have an objective smaller by more than `tolerance`. "infeasible":
+        `certificate_` proves it. "stopped": neither is known.
     weights_ : float64, shape (trains,), mV
         The best so far where stopped; NaN where infeasible.
     objective_ : float

@@ -24,6 +24,15 @@ impl Bound {
         }
     }
 
+    /// This bound, times a factor.
+    #[must_use]
+    pub fn times(&self, factor: f64) -> Self {
+        match self {
+            Self::All(value) => Self::All(factor * value),
+            Self::Each(values) => Self::Each(values.iter().map(|v| factor * v).collect()),
+        }
+    }
+
     fn len(&self) -> Option<usize> {
         match self {
             Self::All(_) => None,

@@ -93,6 +93,7 @@ fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) 
 }
 
 fn read(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: bool) -> Result<String> {
+    let mv = |potential: f64| short(potential * statement.unit);
     let mut text = match rows {
         [(row @ Row::Target { pattern, target }, _)] => {
             let stated = statement.state(*row)?;
@@ -101,19 +102,15 @@ fn read(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: boo
             let why = if stated.coefficients.iter().all(|&a| a == 0.0) {
                 "no input counts before it".to_owned()
             } else if most < stated.limit {
-                format!("full weights come to {} mV there, the threshold is {} mV", short(most), short(stated.limit))
+                format!("full weights come to {} mV there, the threshold is {} mV", mv(most), mv(stated.limit))
             } else {
-                format!(
-                    "the least weights come to {} mV there, the threshold is {} mV",
-                    short(least),
-                    short(stated.limit)
-                )
+                format!("the least weights come to {} mV there, the threshold is {} mV", mv(least), mv(stated.limit))
             };
             format!("no weights within the bounds fire at pattern {pattern} target {target} ({} ms): {why}", short(t))
         }
         _ => format!("no weights within the bounds meet these together: {}", list(statement, rows)?),
     };
-    let Margin { height, slope } = statement.margin;
+    let Margin { height, slope } = statement.margin.times(statement.unit);
     if at_all {
         text += ". Impossible at all: it needs no margin";
     } else if slope > 0.0 {

@@ -164,6 +164,16 @@ impl ConeX {
         let left_out = if self.neuron.time == Time::Continuous { MARGIN } else { 0.0 };
         Margin { height: self.margin.unwrap_or(left_out), slope: self.slope.unwrap_or(left_out) }
     }
+
+    /// The same with all potentials in units of this many mV.
+    fn in_units(&self, unit: f64) -> Self {
+        let Margin { height, slope } = self.margin().times(1.0 / unit);
+        let mut neuron = self.neuron.clone();
+        neuron.theta_0 /= unit;
+        neuron.theta_plus /= unit;
+        let (lb, ub) = (self.lb.times(1.0 / unit), self.ub.times(1.0 / unit));
+        Self { neuron, lb, ub, margin: Some(height), slope: Some(slope), ..self.clone() }
+    }
 }
 
 /// How a fit ended.
@@ -230,6 +240,9 @@ pub struct Fit {
 }
 
 /// A stated problem, ready to be solved.
+///
+/// Inside, potentials are in units in which the threshold is near the thesis' 0.3 mV, so that what counts as met does not
+/// depend on the scale; a power of 2, so that nothing is rounded on the way.
 #[derive(Debug, Clone)]
 pub struct Problem {
     parameters: ConeX,
@@ -273,7 +286,8 @@ impl Objective {
             },
             b: match parameters.divide_b_by {
                 Divisor::Largest => over(b, b_max),
-                Divisor::Targets => over(b, wanted.len() as f64),
+                // A sum of squares over a number: the one term that is no ratio of potentials.
+                Divisor::Targets => over(b, wanted.len() as f64) * statement.unit.powi(2),
             },
             norm: parameters.norm,
             behind,
@@ -311,8 +325,10 @@ impl Problem {
     /// `Problem` for parameters or examples that make no sense (names pattern and target); `Interrupted`.
     pub fn new(parameters: &ConeX, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Self> {
         parameters.check()?;
+        check_examples(&parameters.neuron, patterns, targets)?;
+        let unit = (parameters.neuron.theta_0 / Neuron::default().theta_0).log2().round().exp2();
+        let parameters = parameters.in_units(unit);
         let neuron = &parameters.neuron;
-        check_examples(neuron, patterns, targets)?;
         let trains = patterns[0].len();
         let (lower, upper) = bounds_of(&parameters.lb, &parameters.ub, trains)?;
         let bounds = Bounds { lower, upper };
@@ -330,23 +346,30 @@ impl Problem {
             }
         }
         stop.check()?;
-        let statement = Statement::new(neuron, parameters.margin(), patterns, targets, &ends);
-        let objective = Objective::new(parameters, &statement, &bounds)?;
+        let statement = Statement::new(neuron, parameters.margin(), unit, patterns, targets, &ends);
+        let objective = Objective::new(&parameters, &statement, &bounds)?;
         stop.check()?;
         let silence = Silence::new(&statement);
-        Ok(Self { parameters: parameters.clone(), statement, silence, bounds, objective })
+        Ok(Self { parameters, statement, silence, bounds, objective })
     }
 
-    /// The rows, to be stated when asked.
-    #[must_use]
-    pub fn statement(&self) -> &Statement {
-        &self.statement
+    /// A row, with or without its margin, mV (a slope row: mV/ms).
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where there is no such row.
+    pub fn row(&self, row: Row, margin: bool) -> Result<Stated> {
+        let mut stated = self.statement.state(row)?;
+        stated.limit += if margin { 0.0 } else { self.statement.margin_of(row) };
+        stated.limit *= self.statement.unit;
+        Ok(stated)
     }
 
-    /// The weights that are allowed.
+    /// The weights that are allowed, mV.
     #[must_use]
-    pub fn bounds(&self) -> &Bounds {
-        &self.bounds
+    pub fn bounds(&self) -> Bounds {
+        let times = |side: &[f64]| side.iter().map(|w| w * self.statement.unit).collect();
+        Bounds { lower: times(&self.bounds.lower), upper: times(&self.bounds.upper) }
     }
 
     /// What B looks at behind a target: coefficients, and `kappa` thresholds.
@@ -356,7 +379,7 @@ impl Problem {
     /// `Problem` where there is no such target.
     pub fn behind(&self, pattern: usize, target: usize) -> Result<Stated> {
         let mut stated = self.statement.behind(pattern, target, self.parameters.delta_t())?;
-        stated.limit *= self.parameters.kappa;
+        stated.limit *= self.parameters.kappa * self.statement.unit;
         Ok(stated)
     }
 
@@ -368,6 +391,20 @@ impl Problem {
     ///
     /// `Problem` for a start that makes no sense.
     pub fn fit(&self, start: &[(Row, f64)], progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<Fit> {
+        let unit = self.statement.unit;
+        let start: Vec<(Row, f64)> = start.iter().map(|&(row, multiplier)| (row, multiplier / unit)).collect();
+        let mut fit = self.solve(&start, progress, stop)?;
+        fit.weights.iter_mut().for_each(|w| *w *= unit);
+        fit.violation *= unit;
+        fit.margin = fit.margin.times(unit);
+        fit.held.iter_mut().for_each(|(_, multiplier)| *multiplier *= unit);
+        if let Some(certificate) = &mut fit.certificate {
+            certificate.gap *= unit;
+        }
+        Ok(fit)
+    }
+
+    fn solve(&self, start: &[(Row, f64)], progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<Fit> {
         if let Some(certificate) = Certificate::of_one_target(&self.statement, &self.bounds)? {
             return Ok(self.refuted(certificate, 0));
         }

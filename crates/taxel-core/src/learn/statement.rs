@@ -144,6 +144,8 @@ pub struct Statement {
     pub(super) neuron: Neuron,
     pub(super) shape: Shape,
     pub(super) margin: Margin,
+    /// What a potential of 1 in here is, mV.
+    pub(super) unit: f64,
     pub(super) taper: Taper,
     pub(super) trains: usize,
     pub(super) sheets: Vec<Sheet>,
@@ -154,6 +156,7 @@ impl Statement {
     pub(super) fn new(
         neuron: &Neuron,
         margin: Margin,
+        unit: f64,
         patterns: &[SpikeTrains],
         targets: &[Vec<f64>],
         ends: &[f64],
@@ -169,6 +172,7 @@ impl Statement {
             neuron: neuron.clone(),
             shape,
             margin,
+            unit,
             taper: Taper::new(shape, margin),
             trains: patterns[0].len(),
             sheets: patterns.iter().zip(targets).zip(ends).map(sheet).collect(),
