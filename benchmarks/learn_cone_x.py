@@ -29,10 +29,8 @@ from taxel import SpikeTrains
 from taxel.learn import ConeX, check_certificate
 
 TAU, THETA_0, THETA_PLUS, REFRACTORY, BOUND, END = 15.0, 0.3, 0.2, 3.0, 0.3, 200
-KAPPA, DELTA_T = 1.2, 1.5
 CASES = [(100, 24), (400, 99), (1000, 300), (400, 141), (1000, 360)]
 QUICK = [(100, 24), (400, 99), (400, 141)]
-MIXED = (2.0, 2.0, 200.0)
 LIMIT_S, QUICK_LIMIT_S = 900, 60
 PEERS = ("Clarabel", "CVXPY + Clarabel", "HiGHS, all rows", "HiGHS, rows on demand", "PIQP")
 GROWTH = [250, 500, 1000, 2000, 4000]
@@ -81,53 +79,17 @@ def state(n, p):
     return equal, np.full(p, THETA_0), unequal, limits
 
 
-def by_clarabel(n, p, mixed):
+def by_clarabel(n, p):
     """Solve it with Clarabel, handed the matrices."""
     equal, values, unequal, limits = state(n, p)
     identity = sp.eye_array(n)
-    if not mixed:
-        a = sp.vstack([sp.csc_array(equal), sp.csc_array(unequal), identity, -identity], format="csc")
-        b = np.concatenate([values, limits, np.full(2 * n, BOUND)])
-        cones = [clarabel.ZeroConeT(p), clarabel.NonnegativeConeT(len(limits) + 2 * n)]
-        return _clarabel(sp.eye_array(n, format="csc"), np.zeros(n), a, b, cones)
-    spikes, targets = draw(n, p)
-    behind = np.array([kernel(t + DELTA_T - row) for row, t in zip(spikes, targets, strict=True)])
-    wanted = KAPPA * values
-    share = np.array(MIXED) / sum(MIXED)
-    share /= [n * BOUND, math.sqrt(n) * BOUND, ((BOUND * behind.sum(1) + wanted) ** 2).sum()]
-    # Weights, their absolute values, their norm, what is missed behind the targets.
-    q = np.concatenate([np.zeros(n), np.full(n, share[0]), [share[1]], np.zeros(p)])
-    squares = sp.diags_array(np.concatenate([np.zeros(2 * n + 1), np.full(p, 2 * share[2])])).tocsc()
-    zero = sp.csc_array
-    a = sp.block_array(
-        [
-            [sp.csc_array(equal), None, None, None],
-            [sp.csc_array(behind), None, None, -sp.eye_array(p)],
-            [sp.csc_array(unequal), None, None, None],
-            [identity, -identity, None, None],
-            [-identity, -identity, None, None],
-            [identity, None, None, None],
-            [-identity, None, None, None],
-            [None, None, -sp.eye_array(1), None],
-            [-identity, None, zero((n, 1)), None],
-        ],
-        format="csc",
-    )
-    b = np.concatenate([values, wanted, limits, np.zeros(2 * n), np.full(2 * n, BOUND), np.zeros(n + 1)])
-    cones = [
-        clarabel.ZeroConeT(2 * p),
-        clarabel.NonnegativeConeT(len(limits) + 4 * n),
-        clarabel.SecondOrderConeT(n + 1),
-    ]
-    return _clarabel(squares, q, a, b, cones)
-
-
-def _clarabel(squares, q, a, b, cones):
-
+    a = sp.vstack([sp.csc_array(equal), sp.csc_array(unequal), identity, -identity], format="csc")
+    b = np.concatenate([values, limits, np.full(2 * n, BOUND)])
+    cones = [clarabel.ZeroConeT(p), clarabel.NonnegativeConeT(len(limits) + 2 * n)]
     settings = clarabel.DefaultSettings()
     settings.verbose, settings.max_threads = False, 1
     begun = time.process_time()
-    found = clarabel.DefaultSolver(squares, q, a, b, cones, settings).solve()
+    found = clarabel.DefaultSolver(sp.eye_array(n, format="csc"), np.zeros(n), a, b, cones, settings).solve()
     took = time.process_time() - begun
     verdict = {"Solved": "solved", "PrimalInfeasible": "infeasible"}.get(str(found.status), str(found.status))
     return took, verdict, found.obj_val
@@ -164,7 +126,6 @@ def by_highs(n, p):
 
 
 def _silent_highs():
-
     solver = highspy.Highs()
     solver.setOptionValue("output_flag", False)
     solver.setOptionValue("threads", 1)
@@ -173,7 +134,6 @@ def _silent_highs():
 
 
 def _said(solver):
-
     names = {highspy.HighsModelStatus.kOptimal: "solved", highspy.HighsModelStatus.kInfeasible: "infeasible"}
     return names.get(solver.getModelStatus(), solver.modelStatusToString(solver.getModelStatus()))
 
@@ -238,11 +198,11 @@ def by_piqp(n, p):
     return took, verdict, solver.result.info.primal_obj
 
 
-def peer(name, n, p, mixed):
+def peer(name, n, p):
     """Run one peer; say what it took and found."""
     warnings.simplefilter("ignore")
     run = {
-        "Clarabel": lambda: by_clarabel(n, p, mixed),
+        "Clarabel": lambda: by_clarabel(n, p),
         "CVXPY + Clarabel": lambda: by_cvxpy(n, p),
         "HiGHS, all rows": lambda: by_highs(n, p),
         "HiGHS, rows on demand": lambda: by_highs_on_demand(n, p),
@@ -252,14 +212,14 @@ def peer(name, n, p, mixed):
     return {"cpu_s": took, "verdict": verdict, "objective": objective}
 
 
-def ask(name, n, p, limit, mixed=False):
+def ask(name, n, p, limit):
     """Run a peer in a process of its own, stopped after `limit` seconds of CPU."""
 
     def cap():
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
 
     said = subprocess.run(
-        [sys.executable, __file__, name, str(n), str(p), *(["--mixed"] if mixed else [])],
+        [sys.executable, __file__, name, str(n), str(p)],
         preexec_fn=cap,
         capture_output=True,
         text=True,
@@ -298,21 +258,6 @@ def against(n, p, limit, rounds, peers):
         print(f"{n}/{p} {name}: {found}", file=sys.stderr)
     verdicts = {found["verdict"] for found in out.values() if "verdict" in found}
     return out | {"verdicts equal": len(verdicts) == 1}
-
-
-def mixed(n, p, limit, rounds):
-    """Measure the mixed objective, lambda (2, 2, 200), against Clarabel."""
-    patterns, targets = trains(*draw(n, p))
-    cone = ConeX(time="grid", horizon=float(END), lambdas=MIXED, kappa=KAPPA)
-    results = measure({"ConeX": lambda: cone.fit(patterns, targets)}, rounds=rounds)
-    ours = results["ConeX"]
-    out = {"ConeX": {**ours, "verdict": cone.status_, "objective": cone.objective_, "gap": cone.gap_}}
-    found = ask("Clarabel", n, p, limit, mixed=True)
-    ratio = round(float(found.get("cpu_s", limit) / ours["cpu_s"]["median"]), 1)
-    found["times ConeX, at least" if "stopped" in found else "times ConeX"] = ratio
-    if found.get("verdict") == "solved":
-        found["objective, relative difference"] = found["objective"] / cone.objective_ - 1
-    return out | {"Clarabel": found}
 
 
 def growth(most):
@@ -354,14 +299,12 @@ def run(*, quick):
     limit = QUICK_LIMIT_S if quick else LIMIT_S
     rounds = 3 if quick else 7
     cases = {f"{n}/{p}": against(n, p, limit, rounds, PEERS) for n, p in (QUICK if quick else CASES)}
-    n, p = (100, 24) if quick else (1000, 300)
     return {
         "question": __doc__.splitlines()[0],
         **stamp("clarabel", "cvxpy", "highspy", "piqp"),
         "unit": "N/p: trains and patterns; C = 3; CPU seconds, one thread",
         "peers are stopped after": f"{limit} s of CPU",
         "cases": cases,
-        "mixed objective, lambda (2, 2, 200)": {f"{n}/{p}": mixed(n, p, limit, 3)},
         "growth": {"table": growth(1000 if quick else 4000), "why": WHY},
         "stable": all(case["ConeX"]["stable"] for case in cases.values()),
         "widest": WIDEST,
@@ -373,6 +316,5 @@ if __name__ == "__main__":
     arguments.add_argument("peer", choices=PEERS)
     arguments.add_argument("trains", type=int)
     arguments.add_argument("patterns", type=int)
-    arguments.add_argument("--mixed", action="store_true")
     given = arguments.parse_args()
-    print(json.dumps(peer(given.peer, given.trains, given.patterns, given.mixed)))
+    print(json.dumps(peer(given.peer, given.trains, given.patterns)))
