@@ -219,7 +219,7 @@ def draw(p: Parameters, said: Said) -> Figure:
         right.plot([s["share"] for s in some], [s["by_weight"] for s in some], ".-", lw=1.2, label=line["arm"])
     left.set(xlabel="inputs N", ylabel="largest load p / N", ylim=(0, None))
     right.set(
-        xlabel="load p / N", ylabel="patterns a weight that l1 leaves", ylim=(0, None), title=f"N = {p['inputs'][-1]}"
+        xlabel="load p / N", ylabel="p over the weights that l1 leaves", ylim=(0, None), title=f"N = {p['inputs'][-1]}"
     )
     left.legend(fontsize="small", title="delays")
     return figure

@@ -155,11 +155,12 @@ def draw(p: Parameters, said: Said) -> Figure:
     dynamics.plot([], [], color="C1", lw=0.8, label="postsynaptic potentials")
     dynamics.plot(times, said["potential"], "k", lw=1.4, label="membrane potential U")
     dynamics.plot(times, thresholds(times, p["targets"]), "C2--", lw=1.2, label="threshold")
-    for target in p["targets"]:
-        dynamics.axvspan(target, target + TABLE["refractory"], color="0.85", zorder=0)
-        dynamics.vlines(target, 0, 0.62, "C3", lw=1.6)
+    for k, target in enumerate(p["targets"]):
+        spike, quiet = ("output spike", "absolute refractory period") if k == 0 else (None, None)
+        dynamics.vlines(target, 0, 0.62, "C3", lw=1.6, label=spike)
+        dynamics.axvspan(target, target + TABLE["refractory"], color="0.85", zorder=0, label=quiet)
     dynamics.set(xlabel="time, ms", ylabel="mV", ylim=(None, 0.65), xlim=(0, p["stop"]))
-    figure.legend(*dynamics.get_legend_handles_labels(), fontsize="small", loc="outside lower right", ncols=3)
+    figure.legend(*dynamics.get_legend_handles_labels(), fontsize="small", loc="outside lower right", ncols=5)
     return figure
 
 
@@ -172,8 +173,8 @@ STUDY = Study(
     title="input spikes, potential, threshold and refractory time, and the output spikes they make",
     where="thesis 6.3.1, figure 6.1",
     protocol=(
-        "60 Poisson inputs of 5 to 25 Hz, two targets; Table 6.1, weights by CONE-X (l1, continuous time). Drawn is "
-        "the exact neuron: grey bars are absolute refractory periods, red lines output spikes."
+        "60 Poisson inputs of 5 to 25 Hz, two targets; Table 6.1, weights by CONE-X (l1, continuous time). Drawn are "
+        "the exact neuron and the postsynaptic potentials of its twelve largest weights."
     ),
     parameters=PARAMETERS,
     sizes={"toy": {"step_ms": 0.5}},

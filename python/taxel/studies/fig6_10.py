@@ -34,6 +34,8 @@ TOY: dict[str, Any] = {
     "repetitions": 5,
 }
 
+#: Units of the levels.
+UNITS = {"jitter": "ms", "background": "Hz", "shunting": "%"}
 #: Levels of noise over which a statement is judged: above the first, up to the second.
 ANY, WEAK, STRONG = (0.0, 100.0), (0.0, 5.0), (15.0, 100.0)
 
@@ -53,16 +55,17 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
     found = []
     for reading in p["readings"]:
-        curves, why = said["curves"][reading], READINGS[reading]
+        curves = said["curves"][reading]
+        why = READINGS[reading] + (", which leaves kappa nearly powerless" if reading == "B_max" else "")
         clean = curves["clean"]
         claims = (
-            ("jitter", "dense is best against jitter", True, ANY),
-            ("background", "sparse is best against background", False, ANY),
+            ("jitter", "dense is better against jitter", True, ANY),
+            ("background", "sparse is better against background", False, ANY),
             ("shunting", "against weak shunting sparse is worse", True, WEAK),
             ("shunting", "against strong shunting sparse is better", False, STRONG),
         )
         found += [
-            _compared(f"Noise-free training: {says}.", clean[noise], dense_is_better, levels, why)
+            _compared(f"Noise-free training: {says}.", clean[noise], UNITS[noise], dense_is_better, levels, why)
             for noise, says, dense_is_better, levels in claims
             if noise in clean
         ]
@@ -81,7 +84,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
 
 
 def _compared(
-    says: str, curve: dict[str, Any], dense_is_better: bool, among: tuple[float, float], why: str
+    says: str, curve: dict[str, Any], unit: str, dense_is_better: bool, among: tuple[float, float], why: str
 ) -> Statement:
     levels, mean = np.array(curve["levels"], float), np.array(curve["mean"])
     dense, sparse = mean[0], mean[-1]
@@ -93,13 +96,16 @@ def _compared(
         for k in range(len(levels) - 1)
         if levels[k] > 0 and gain[k] * gain[k + 1] < 0
     ]
-    crossing = f"; they cross at {', '.join(f'{t:.1f}' for t in turns)}" if turns else "; they do not cross"
-    over = f"{levels[here].min():g} to {levels[here].max():g}"
+    crossing = f"; they cross at {', '.join(f'{t:.1f}' for t in turns)} {unit}" if turns else "; they do not cross"
+    over = " to ".join(f"{level:g}" for level in sorted({levels[here].min(), levels[here].max()}))
+    holds = bool(means[0] < means[1] if dense_is_better else means[1] < means[0])
+    if not holds and len(turns) == 1 and (gain[here][0] > 0) == dense_is_better:
+        why += f": it does below {turns[0]:.1f} {unit}, and above it the other way round"
     return Statement(
         says,
         "dense below sparse" if dense_is_better else "sparse below dense",
-        f"distance, mean over {over}: {means[0]:.2f} dense (0 : 4), {means[1]:.2f} sparse (4 : 0){crossing}",
-        bool(means[0] < means[1] if dense_is_better else means[1] < means[0]),
+        f"mean distance at {over} {unit}: {means[0]:.2f} dense (0 : 4), {means[1]:.2f} sparse (4 : 0){crossing}",
+        holds,
         why,
     )
 
@@ -129,11 +135,11 @@ def draw(p: Parameters, said: Said) -> Figure:
                     label = f"{ratio[0]:g} : {ratio[1]:g}"
                     axes[row, column].errorbar(curve["levels"], curve["mean"][k], curve["sem"][k], label=label, lw=1.2)
                 axes[row, column].set_xlabel(f"{noise}, {NOISES[noise]}")
-                axes[row, column].set_ylabel("distance")
+                axes[row, column].set_ylabel("VP distance")
                 axes[row, column].set_ylim(bottom=0)
         axes[0, 0].set_title("trained without noise")
         axes[0, 1].set_title("trained with noise")
-        axes[0, 0].legend(title="lambda 1 : lambda 2", fontsize="small")
+        axes[min(1, len(axes) - 1), 0].legend(title="lambda 1 : lambda 2", fontsize="small", loc="upper left")
     return figure
 
 

@@ -104,14 +104,18 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     for reading in p["readings"]:
         why = READINGS[reading]
         for training in p["trainings"]:
-            where = [float(centres[k]) for k in modes(np.array(said["shares"][reading][training]))]
-            ours = "modes at " + ", ".join(f"{w:+.3f}" for w in where) + " mV"
+            shares = np.array(said["shares"][reading][training])
+            where = [float(centres[k]) for k in modes(shares)]
+            ours = "modes at " + ", ".join(f"{w:.3f}" for w in where) + " mV"
             if training == "clean":
                 says, published = "Trained without noise, the weights have several modes.", "multi-modal"
                 holds = len(where) > 1
             else:
                 says = f"Trained with {training}, they have one mode, at zero, and fall off from it."
                 published, holds = "unimodal, maximum centred at zero", len(where) == 1 and abs(where[0]) <= p["bin_mv"]
+                behind = shares[centres > 0.5 * p["bin_mv"]]
+                back = 100 * float(np.max(behind - np.minimum.accumulate(behind)))
+                ours += f"; above zero the histogram rises again by {back:.1f} % of the weights at most"
             found.append(Statement(says, published, ours, holds, why))
     return found
 

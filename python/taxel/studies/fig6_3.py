@@ -211,7 +211,8 @@ def draw(p: Parameters, said: Said) -> Figure:
         ax.plot(*line.T, height, color="0.2", lw=1.0, ls="--", label="target met")
         ax.plot(*line[kept].T, height[kept], color="C3", lw=2.5, label="target met, silence kept")
         ax.scatter(*found["weights"], found["optimum"], color="k", s=40, label="optimum", depthshade=False)
-        ax.set(xlabel="w1, mV", ylabel="w2, mV", zlabel="objective", title=title)
+        ends = [-p["bound"], 0.0, p["bound"]]
+        ax.set(xlabel="w1, mV", ylabel="w2, mV", zlabel="objective", title=title, xticks=ends, yticks=ends)
         ax.view_init(30, -60)
         above = figure.add_subplot(2, 2, number + 2, aspect="equal")
         # Equal steps of rank, not of height: the floor is flat and the walls are steep.

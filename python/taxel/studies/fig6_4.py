@@ -144,6 +144,7 @@ def draw(p: Parameters, said: Said) -> Figure:
 
     figure = Figure(figsize=(11, 3.6 * len(p["readings"])), layout="constrained")
     axes = figure.subplots(len(p["readings"]), 2, squeeze=False)
+    weighed = f"lambda ({', '.join(f'{v:g}' for v in p['lambdas'])})"
     for row, (reading, all_) in enumerate(said["readings"].items()):
         left, right = axes[row]
         for c in all_:
@@ -153,7 +154,7 @@ def draw(p: Parameters, said: Said) -> Figure:
         left.axvline(p["target"], color="0.6", lw=0.8)
         left.set(xlabel="time, ms", ylabel="potential without spiking, mV", title=READINGS[reading])
         left.legend(title="kappa", fontsize="small")
-        right.set(xlabel="spike time of the synapse, ms", ylabel="weight, mV", title=f"lambda {tuple(p['lambdas'])}")
+        right.set(xlabel="spike time of the synapse, ms", ylabel="weight, mV", title=weighed)
     return figure
 
 

@@ -169,7 +169,7 @@ def draw(p: Parameters, said: Said) -> Figure:
     for ax in axes.ravel():
         for name, value in OTHERS.items():
             ax.axhline(value, color="0.75", lw=0.8, ls=":")
-            ax.annotate(name, (1.0, value), xycoords=("axes fraction", "data"), fontsize=7, ha="right", va="bottom")
+            ax.annotate(name, (0.99, value), xycoords=("axes fraction", "data"), fontsize=7, ha="right", va="bottom")
         ax.set_ylim(0, 0.4)
     for ax in axes[-1]:
         ax.set_xlabel("inputs N")

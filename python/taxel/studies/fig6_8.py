@@ -30,6 +30,15 @@ PARAMETERS: dict[str, Any] = {
     "seed": 1,
 }
 
+#: What each noise is, with its level, and what is drawn faint or grey.
+TITLES = {
+    "jitter": "jitter, sd {:g} ms (faint: before it)",
+    "background": "background, {:g} Hz an input (grey: added)",
+    "shunting": "shunting, {:g} % of the spikes (faint: deleted)",
+}
+#: A neuron is called robust whose distance is below this share of that of silence.
+ROBUST = 0.2
+
 
 def tasks(p: Parameters) -> list[Task]:
     """List the one neuron."""
@@ -124,8 +133,8 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "A robust solution produces the target train despite noise.",
             "the bottom panel",
             f"distance over {len(said['targets'])} targets: {said['clean_distance']:.2f} without noise, {listed}",
-            worst < 0.2 * len(said["targets"]),
-            f"kappa {p['kappa']:g}, B over the number of targets",
+            worst < ROBUST * len(said["targets"]),
+            f"kappa {p['kappa']:g}, B over the number of targets; robust: below {ROBUST:.0%} of silence",
         )
     )
     return found
@@ -152,7 +161,7 @@ def draw(p: Parameters, said: Said) -> Figure:
             gone = [[t for t in train if t not in kept[n]] for n, train in enumerate(clean)]
             ax.eventplot(gone, colors="C3", alpha=0.3, linewidths=1, linelengths=0.8)
             ax.eventplot(told["drawn"], colors="C3", linewidths=1, linelengths=0.8)
-        ax.set(ylabel="input", title=f"{noise} ({waves.NOISES[noise]}): {p['levels'][noise]:g}")
+        ax.set(ylabel="input", title=TITLES[noise].format(p["levels"][noise]))
     names = ["target", *said["noises"]]
     trains = [said["targets"], *(told["spikes"] for told in said["noises"].values())]
     trains = [[t for t in train if t <= said["end"]] for train in trains]
