@@ -19,7 +19,7 @@ use crate::{Result, Stop, problem};
 const TOLERANCE: f64 = 5e-13;
 /// What is asked of a long row, scaled to length 1, at most.
 const FINEST: f64 = 4e-14;
-/// Active rows are refined until they are met to this.
+/// Active rows are refined until they are met to this, as they were stated or scaled to length 1.
 const REFINED: f64 = 2e-14;
 /// A squared pivot below this is computed again from the vector itself: `1 - |d|^2` has lost its digits.
 const DOUBTFUL: f64 = 1e-5;
@@ -507,7 +507,8 @@ impl DualActiveSet {
         for round in 0..4 {
             self.weights = self.combined();
             self.price();
-            let now = self.active.iter().fold(0.0, |worst: f64, &slot| worst.max(self.excess[slot].abs()));
+            let off = |&slot: &usize| self.excess[slot].abs() * self.rows[slot].length.max(1.0);
+            let now = self.active.iter().map(off).fold(0.0, f64::max);
             if now <= enough || now > 0.5 * worst || round == 3 {
                 break;
             }
@@ -521,7 +522,8 @@ impl DualActiveSet {
 
     /// Moves the weights onto the active rows: with large multipliers their sum is rounded to more than the rows allow.
     fn project_weights(&mut self) {
-        let off = |residuals: &[f64]| residuals.iter().fold(0.0, |worst: f64, r| worst.max(r.abs()));
+        let lengths: Vec<f64> = self.active.iter().map(|&slot| self.rows[slot].length.max(1.0)).collect();
+        let off = |residuals: &[f64]| residuals.iter().zip(&lengths).map(|(r, l)| r.abs() * l).fold(0.0, f64::max);
         let mut change = self.residuals(&self.weights);
         let mut now = off(&change);
         for _ in 0..4 {

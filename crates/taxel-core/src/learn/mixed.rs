@@ -12,6 +12,7 @@ mod tests;
 
 use dense::{add_sum, dot, times};
 
+use super::certificate::Bounds;
 use super::cone_program::{ConeProgram, HardRows, Hinges};
 use super::cone_r::Norm;
 use super::cone_x::NOTHING;
@@ -89,6 +90,7 @@ pub(super) struct Point {
 
 /// Minimises the objective over these rows and bounds.
 ///
+/// `size` is that of the largest weight in any weights that will do: bounds may be far wider, and say nothing of the scale.
 /// With a `tolerance` of more than 1e-5 the weights are those of an interior point near the optimum: rows are met about as
 /// well, and the rows they break are worth adding. Below that, rows are met to rounding and the gap is `tolerance` where
 /// the bound says so.
@@ -99,13 +101,13 @@ pub(super) struct Point {
 pub(super) fn minimise(
     terms: &Terms<'_>,
     rows: &HardRows<'_>,
-    lower: &[f64],
-    upper: &[f64],
+    bounds: &Bounds,
+    size: f64,
     start: Option<&Start>,
     tolerance: f64,
     stop: Stop<'_>,
 ) -> Result<Found> {
-    let program = Program::new(terms, rows, lower, upper);
+    let program = Program::new(terms, rows, bounds, size);
     let interior = Interior::new(&program);
     let mut best = Best::new(&program);
     if let Some(Start { state, exact: Some((point, guess)) }) = start
@@ -268,9 +270,10 @@ fn power_of_2(x: f64) -> f64 {
 }
 
 impl Program {
-    fn new(terms: &Terms<'_>, rows: &HardRows<'_>, lower: &[f64], upper: &[f64]) -> Self {
+    fn new(terms: &Terms<'_>, rows: &HardRows<'_>, bounds: &Bounds, size: f64) -> Self {
+        let Bounds { lower, upper } = bounds;
         let n = lower.len();
-        let weight = power_of_2(lower.iter().chain(upper).fold(0.0_f64, |m, w| m.max(w.abs())));
+        let weight = power_of_2(size);
         let scaled = |rows: &[f64], limits: &[f64]| {
             let (mut rows, mut limits) = (rows.to_vec(), limits.to_vec());
             let mut scales = Vec::with_capacity(limits.len());

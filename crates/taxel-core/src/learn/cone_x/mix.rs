@@ -40,12 +40,13 @@ impl Problem {
             wanted: &objective.wanted,
         };
         let Bounds { lower, upper } = &self.bounds;
+        let size = best.weights.iter().fold(0.0_f64, |most, w| most.max(w.abs()));
         let mut rows = Dense::new(self, best.held.iter().chain(start).map(|r| r.0))?;
         let (mut going, mut near, begun) = (None, true, best.rounds);
         loop {
             best.rounds += 1;
             let tolerance = if near { NEAR } else { self.parameters.tolerance };
-            let found = mixed::minimise(&terms, &rows.hard(), lower, upper, going.as_ref(), tolerance, stop)?;
+            let found = mixed::minimise(&terms, &rows.hard(), &self.bounds, size, going.as_ref(), tolerance, stop)?;
             best.least = best.least.max(found.bound);
             if found.stopped || best.rounds >= MOST_ROUNDS {
                 return Ok(best);

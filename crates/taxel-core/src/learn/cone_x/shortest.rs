@@ -37,11 +37,11 @@ impl Problem {
         stop: Stop<'_>,
     ) -> Result<Shortest> {
         let mut working = Working::new(self, start)?;
-        let mut rounds = 0;
+        let (mut rounds, mut weights) = (0, vec![]);
         loop {
             rounds += 1;
             let verdict = working.engine.solve(stop)?;
-            let weights = working.engine.weights().to_vec();
+            let before = std::mem::replace(&mut weights, working.engine.weights().to_vec());
             let end = match verdict {
                 Verdict::Infeasible(ray) => {
                     self.refutation(working.named(&ray.multipliers), stop)?.map_or(End::Stopped, End::Infeasible)
@@ -53,10 +53,12 @@ impl Problem {
                     let objective = self.objective.parts(&weights).iter().sum();
                     progress(Round { round: rounds, rows, broken: broken.len(), objective });
                     let flat = working.flat(&weights, (1.0 - ASKED_SHARE) * self.statement.margin.slope);
-                    if rounds < MOST_ROUNDS && !stop.asked() && working.cut(&self.statement, &broken, &flat)? {
+                    let ended = rounds == MOST_ROUNDS || stop.asked();
+                    if !ended && weights != before && working.cut(&self.statement, &broken, &flat)? {
                         continue;
                     }
-                    if broken.is_empty() && flat.is_empty() { End::Met } else { End::Stopped }
+                    // What moves no weight is met as well as it can be; the report says whether that is enough.
+                    if !ended || (broken.is_empty() && flat.is_empty()) { End::Met } else { End::Stopped }
                 }
             };
             let held = working.named(&working.engine.multipliers());

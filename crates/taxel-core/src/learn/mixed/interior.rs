@@ -236,10 +236,12 @@ impl<'a> Interior<'a> {
         Self { program, parts, base, curvature, normed }
     }
 
-    /// The middle of the box, all multipliers 1.
+    /// The middle of the box, or of what a weight may well be where that is less; all multipliers 1.
     pub(super) fn start(&self) -> State {
         let (n, program) = (self.program.width(), self.program);
-        let x: Vec<f64> = self.parts.iter().map(|p| 0.5 * p.range).collect();
+        let split = |p: &Part| self.base[p.synapse] == 0.0;
+        let x: Vec<f64> =
+            self.parts.iter().map(|p| if split(p) { (0.5 * p.range).min(1.0) } else { 0.5 * p.range }).collect();
         let w = self.weights(&x);
         let below = times(&program.below, &w);
         State {

@@ -1,6 +1,9 @@
 use super::*;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
+/// Of the largest weight, about.
+const SIZE: f64 = 0.3;
+
 /// A problem of its own rows; `dense` keeps what [`Terms`] and [`HardRows`] borrow.
 #[derive(Clone, Default)]
 struct Problem {
@@ -49,6 +52,14 @@ impl Problem {
         self
     }
 
+    fn bounds(&self) -> Bounds {
+        Bounds { lower: self.lower.clone(), upper: self.upper.clone() }
+    }
+
+    fn program(&self) -> Program {
+        Program::new(&self.terms(), &self.rows(), &self.bounds(), SIZE)
+    }
+
     fn terms(&self) -> Terms<'_> {
         let Self { l1, l2, norm, lift, behind, wanted, .. } = self;
         Terms { l1: *l1, l2: *l2, norm: *norm, lift: *lift, behind, wanted }
@@ -63,7 +74,7 @@ impl Problem {
     }
 
     fn go_on(&self, start: Option<&Start>, tolerance: f64) -> Found {
-        minimise(&self.terms(), &self.rows(), &self.lower, &self.upper, start, tolerance, Stop::never()).unwrap()
+        minimise(&self.terms(), &self.rows(), &self.bounds(), SIZE, start, tolerance, Stop::never()).unwrap()
     }
 
     fn objective(&self, w: &[f64]) -> f64 {
@@ -80,7 +91,7 @@ impl Problem {
 
     /// Clarabel on the same rows, unscaled by us.
     fn oracle(&self) -> f64 {
-        let program = Program::new(&self.terms(), &self.rows(), &self.lower, &self.upper);
+        let program = self.program();
         let point = program.clarabel(Stop::never()).unwrap();
         program.objective(&point.weights) * program.cost
     }
@@ -236,7 +247,7 @@ fn the_bound_holds_for_any_multipliers() {
             let mut problem = Problem::drawn(30, 3, 6, &mut random).with(l1, l2, lift);
             problem.norm = norm;
             let found = problem.solve();
-            let program = Program::new(&problem.terms(), &problem.rows(), &problem.lower, &problem.upper);
+            let program = problem.program();
             let mut best = f64::NEG_INFINITY;
             let (exact, _) = found.start.exact.as_ref().unwrap();
             let objective = problem.objective(&found.weights);
@@ -286,7 +297,7 @@ fn from_what_clarabel_finds_the_same_objective_is_reached() {
     let mut random = StdRng::seed_from_u64(13);
     for (l1, l2, lift) in MIXES {
         let problem = Problem::drawn(30, 3, 6, &mut random).with(l1, l2, lift);
-        let program = Program::new(&problem.terms(), &problem.rows(), &problem.lower, &problem.upper);
+        let program = problem.program();
         let point = program.clarabel(Stop::never()).unwrap();
         let mut best = Best::new(&program);
         best.improve(&point, program.guess(&point), 1e-8, Stop::never()).unwrap();
@@ -309,7 +320,7 @@ fn weights_that_meet_rows_that_nearly_coincide_are_found_nearby() {
         let found = problem.solve();
         let off: Vec<f64> = found.weights.iter().map(|w| w + 1e-10 * random.random::<f64>()).collect();
         let near = nearest(&off, &problem.rows(), &problem.lower, &problem.upper, Stop::never()).unwrap().unwrap();
-        let program = Program::new(&problem.terms(), &problem.rows(), &problem.lower, &problem.upper);
+        let program = problem.program();
         let missing = |w: &[f64]| program.missing(&w.iter().map(|w| w / program.weight).collect::<Vec<_>>());
         assert!(missing(&off) > 1e-12 && missing(&near) < 1e-14, "{} then {}", missing(&off), missing(&near));
         let moved = near.iter().zip(&off).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
@@ -335,7 +346,7 @@ fn a_request_to_stop_ends_with_what_there_is() {
     let problem = Problem::drawn(40, 3, 4, &mut StdRng::seed_from_u64(11));
     let asked = || true;
     let stop = Stop::when(&asked);
-    let found = minimise(&problem.terms(), &problem.rows(), &problem.lower, &problem.upper, None, 1e-8, stop).unwrap();
+    let found = minimise(&problem.terms(), &problem.rows(), &problem.bounds(), SIZE, None, 1e-8, stop).unwrap();
     assert!(found.stopped);
     assert!(found.weights.iter().all(|w| w.abs() <= 0.3) && found.bound.is_finite());
 }
