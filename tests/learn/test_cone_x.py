@@ -356,10 +356,11 @@ def test_progress_is_told_round_by_round():
     [
         ({"tau": 0}, "tau is 0 ms: must be above 0"),
         ({"kernel": "exponential"}, 'kernel is "exponential" and time "continuous": its potential only jumps'),
-        ({"kernel": "box"}, "unknown variant `box`"),
+        ({"kernel": "box"}, "ConeX: kernel: unknown variant `box`, expected one of `alpha`"),
         ({"kappa": 0}, "kappa is 0"),
         ({"delta_t_ms": -1}, "delta_t_ms is -1"),
-        ({"lambdas": (1, 2)}, "length 2"),
+        ({"lambdas": (1, 2)}, "lambdas: invalid length 2, expected an array of length 3$"),
+        ({"lambdas": (1, 2, "3")}, r"lambdas\[2\]: invalid type: string \"3\", expected a number$"),
         ({"lambdas": (1, 2, -3)}, r"lambdas\[2\] is -3"),
         ({"ub": float("inf")}, "ub is inf: must be finite"),
         ({"lb": [0.0, float("nan")]}, r"lb\[1\] is nan: must be finite"),
@@ -370,7 +371,8 @@ def test_progress_is_told_round_by_round():
         ({"horizon": float("nan")}, "horizon is nan"),
         ({"tolerance": 0}, "tolerance is 0: must lie between"),
         ({"max_seconds": 0}, "max_seconds is 0: must be above 0"),
-        ({"norm": "max"}, "unknown variant `max`"),
+        ({"norm": "max"}, "norm: unknown variant `max`"),
+        ({"norm": 2}, "norm: invalid type: integer `2`, expected a name$"),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):

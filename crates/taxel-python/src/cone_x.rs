@@ -10,9 +10,10 @@ use taxel_core::problem;
 use crate::convert::{SpikesIn, array, slice, to_spikes};
 use crate::enter::{enter, enter_keeping};
 use crate::errors::core;
+use crate::parameters::parsed;
 
 fn to_cone_x(json: &str) -> PyResult<ConeX> {
-    let parameters: ConeX = serde_json::from_str(json).map_err(|e| core(problem!("ConeX: {e}")))?;
+    let parameters: ConeX = parsed("ConeX", json)?;
     parameters.check().map_err(core)?;
     Ok(parameters)
 }

@@ -6,11 +6,11 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::detect::{Detection, Readout, ReadoutStream as CoreStream, Reference, Spread, score as score_core};
 use taxel_core::encode::Tare;
-use taxel_core::problem;
 
 use crate::convert::{ArrayParts, EventsIn, array, slice, to_array, to_events};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core};
+use crate::parameters::parsed;
 
 /// Detections as Python hands them over: labels, t and known in us, slope in mV/ms.
 pub(crate) type DetectionsIn<'py> =
@@ -108,7 +108,7 @@ fn spread(values: PyReadonlyArray1<'_, f64>) -> PyResult<(f64, f64, f64, f64, f6
 /// Checks a readout's parts; gives the text of its file.
 #[pyfunction]
 fn make_readout(parts: &str) -> PyResult<String> {
-    let readout: Readout = serde_json::from_str(parts).map_err(|e| core(problem!("readout: {e}")))?;
+    let readout: Readout = parsed("readout", parts)?;
     readout.check().map_err(core)?;
     Ok(readout.to_json())
 }

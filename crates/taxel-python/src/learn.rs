@@ -12,9 +12,10 @@ use taxel_core::{Stop, problem};
 use crate::convert::{SpikesIn, array, slice, to_spikes};
 use crate::enter::{enter, enter_keeping};
 use crate::errors::core;
+use crate::parameters::parsed;
 
 fn to_cone_r(json: &str) -> PyResult<ConeR> {
-    let parameters: ConeR = serde_json::from_str(json).map_err(|e| core(problem!("ConeR: {e}")))?;
+    let parameters: ConeR = parsed("ConeR", json)?;
     parameters.check().map_err(core)?;
     Ok(parameters)
 }

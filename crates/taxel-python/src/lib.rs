@@ -13,6 +13,7 @@ mod live;
 mod metrics;
 mod neuron;
 mod nouns;
+mod parameters;
 mod recording;
 mod rivals;
 mod simulate;

@@ -19,6 +19,7 @@ use taxel_live::pipeline::{Ear, Lines, Live as Pipeline, Options, Record, Said, 
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core};
+use crate::parameters::parsed;
 
 /// How long a wait lasts before Ctrl-C is looked for.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -106,8 +107,7 @@ impl Live {
         say: Option<Py<PyAny>>,
         lines: bool,
     ) -> PyResult<Self> {
-        let chosen: Chosen =
-            serde_json::from_str(options).map_err(|e| ProblemError::new_err(format!("options: {e}")))?;
+        let chosen: Chosen = parsed("options", options)?;
         let record = match record {
             None => None,
             Some((path, compression, overwrite)) => {

@@ -10,6 +10,7 @@ use taxel_core::problem;
 use crate::convert::{array, slice};
 use crate::enter::enter;
 use crate::errors::core;
+use crate::parameters::parsed;
 
 /// Patterns as Python hands them over: name, count, trains, times, offsets, window, listed.
 type PatternsIn<'py> =
@@ -42,7 +43,7 @@ impl<'py> Held<'py> {
 }
 
 fn to_metric(json: &str) -> PyResult<Metric> {
-    serde_json::from_str(json).map_err(|e| core(problem!("metric: {e}")))
+    parsed("metric", json)
 }
 
 /// The distance of two patterns.

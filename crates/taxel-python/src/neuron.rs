@@ -8,9 +8,10 @@ use taxel_core::problem;
 use crate::convert::{SpikesIn, SpikesOut, array, from_spikes, slice, to_spikes};
 use crate::enter::enter;
 use crate::errors::core;
+use crate::parameters::parsed;
 
 pub(crate) fn to_neuron(json: &str) -> PyResult<Neuron> {
-    let neuron: Neuron = serde_json::from_str(json).map_err(|e| core(problem!("neuron: {e}")))?;
+    let neuron: Neuron = parsed("neuron", json)?;
     neuron.check().map_err(core)?;
     Ok(neuron)
 }

@@ -15,11 +15,7 @@ use taxel_live::recording::{Counts, Header, LsaWriter, Options, Reader, Topic, W
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core};
-
-/// A parameter object from its JSON.
-fn from_json<T: serde::de::DeserializeOwned>(what: &str, text: &str) -> PyResult<T> {
-    serde_json::from_str(text).map_err(|e| ProblemError::new_err(format!("{what}: {e}")))
-}
+use crate::parameters::parsed;
 
 /// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram.
 type DecodedOut<'py> =
@@ -63,7 +59,7 @@ impl RecordingReader {
 
     /// Decodes all datagrams.
     fn decode<'py>(&self, py: Python<'py>, pairing: &str) -> PyResult<DecodedOut<'py>> {
-        let pairing: wire::Pairing = from_json("pairing", &json!(pairing).to_string())?;
+        let pairing: wire::Pairing = parsed("pairing", &json!(pairing).to_string())?;
         let decoded = enter(py, |stop| self.reader.decode(pairing, stop))?;
         Ok((
             from_events(py, decoded.events),
@@ -116,7 +112,7 @@ impl RecordingWriter {
     /// Begins a recording; `header` is JSON.
     #[new]
     fn create(py: Python<'_>, path: PathBuf, header: &str, compression: &str, overwrite: bool) -> PyResult<Self> {
-        let header: Header = from_json("header", header)?;
+        let header: Header = parsed("header", header)?;
         let options = Options { compression: compression.parse().map_err(core)?, overwrite };
         let writer = enter(py, |_| Writer::create(&path, &header, options))?;
         Ok(Self { writer: Mutex::new(Some(writer)) })
@@ -182,13 +178,13 @@ impl RecordingWriter {
 
     /// Keeps registers, given as JSON.
     fn registers(&self, py: Python<'_>, at_ns: i64, registers: &str) -> PyResult<()> {
-        let registers: wire::Registers = from_json("registers", registers)?;
+        let registers: wire::Registers = parsed("registers", registers)?;
         self.with(py, |writer| writer.registers(at_ns, &registers))
     }
 
     /// Keeps what was received and lost so far, given as JSON.
     fn counts(&self, py: Python<'_>, at_ns: i64, counts: &str) -> PyResult<()> {
-        let counts: Counts = from_json("counts", counts)?;
+        let counts: Counts = parsed("counts", counts)?;
         self.with(py, |writer| writer.counts(at_ns, &counts))
     }
 
@@ -208,7 +204,7 @@ impl RecordingWriter {
 
     /// Ends the recording; counts in and out as JSON.
     fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<String> {
-        let counts: Counts = from_json("counts", counts)?;
+        let counts: Counts = parsed("counts", counts)?;
         let writer = self.writer.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
         let Some(writer) = writer else {
             return Err(ProblemError::new_err("the recording is finished: begin a new one"));
@@ -220,13 +216,13 @@ impl RecordingWriter {
 /// The verdict line of counts given as JSON.
 #[pyfunction]
 fn recording_verdict(counts: &str) -> PyResult<String> {
-    Ok(from_json::<Counts>("counts", counts)?.verdict())
+    Ok(parsed::<Counts>("counts", counts)?.verdict())
 }
 
 /// What of a decoder's counts is damage: JSON in and out.
 #[pyfunction]
 fn recording_damage(counts: &str) -> PyResult<String> {
-    Ok(json!(taxel_live::recording::damage(&from_json("counts", counts)?)).to_string())
+    Ok(json!(taxel_live::recording::damage(&parsed("counts", counts)?)).to_string())
 }
 
 /// Writes raw bytes as a complete `.lsa` with its `.lss`.
@@ -253,7 +249,7 @@ fn read_lsa<'py>(
     differences: bool,
 ) -> PyResult<LsaOut<'py>> {
     let sensor = to_array(sensor)?;
-    let pairing: wire::Pairing = from_json("pairing", &json!(pairing).to_string())?;
+    let pairing: wire::Pairing = parsed("pairing", &json!(pairing).to_string())?;
     let (bytes, events, counts, complete) = enter(py, |stop| -> taxel_live::Result<_> {
         let (bytes, complete) = taxel_live::recording::read_lsa(&path)?;
         let mut decoder = wire::Decoder::new(sensor.clone()).pairing(pairing).differences(differences);

@@ -5,17 +5,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use serde::de::DeserializeOwned;
 use taxel_core::learn::{Ended, Rival, Skim, SteppedNeuron, Tempotron, Trained};
 use taxel_core::{Result as CoreResult, SpikeTrains, Stop, problem};
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
 use crate::enter::{enter, enter_keeping};
 use crate::errors::core;
-
-fn parse<T: DeserializeOwned>(json: &str) -> PyResult<T> {
-    serde_json::from_str(json).map_err(|e| core(problem!("{e}")))
-}
+use crate::parameters::parsed;
 
 /// Training as Python gets it: weights, right, best epoch, how it ended, a pending KeyboardInterrupt.
 type TrainedOut<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, usize, &'static str, Option<Py<PyAny>>);
@@ -63,7 +59,7 @@ fn to_patterns(patterns: Vec<SpikesIn<'_>>) -> PyResult<Vec<SpikeTrains>> {
 /// Checks a rule with its neuron and its training.
 #[pyfunction]
 fn check_rival(parameters: &str) -> PyResult<()> {
-    parse::<Rival>(parameters)?.check().map_err(core)
+    parsed::<Rival>("rule", parameters)?.check().map_err(core)
 }
 
 /// Trains a rule's neuron.
@@ -78,7 +74,7 @@ fn fit_rival<'py>(
     max_seconds: Option<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<TrainedOut<'py>> {
-    let rival: Rival = parse(parameters)?;
+    let rival: Rival = parsed("rule", parameters)?;
     let patterns = to_patterns(patterns)?;
     let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
     let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
@@ -94,7 +90,7 @@ fn change_rival<'py>(
     pattern: SpikesIn<'py>,
     targets: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
-    let rival: Rival = parse(parameters)?;
+    let rival: Rival = parsed("rule", parameters)?;
     let pattern = to_spikes(pattern)?;
     let (weights, targets) = (slice("weights", &weights)?, slice("targets", &targets)?);
     let (change, fired) = enter(py, |_| rival.change(weights, &pattern, targets))?;
@@ -109,7 +105,7 @@ fn run_stepped<'py>(
     weights: PyReadonlyArray1<'py, f64>,
     pattern: SpikesIn<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let neuron: SteppedNeuron = parse(parameters)?;
+    let neuron: SteppedNeuron = parsed("neuron", parameters)?;
     let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
     let fired = enter(py, |_| neuron.run(weights, &pattern))?;
@@ -119,7 +115,7 @@ fn run_stepped<'py>(
 /// Checks parameters; gives them back with every default filled in.
 #[pyfunction]
 fn check_tempotron(parameters: &str) -> PyResult<String> {
-    let tempotron: Tempotron = parse(parameters)?;
+    let tempotron: Tempotron = parsed("Tempotron", parameters)?;
     tempotron.check().map_err(core)?;
     serde_json::to_string(&tempotron).map_err(|e| core(problem!("{e}")))
 }
@@ -136,7 +132,7 @@ fn fit_tempotron<'py>(
     max_seconds: Option<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<TrainedOut<'py>> {
-    let tempotron: Tempotron = parse(parameters)?;
+    let tempotron: Tempotron = parsed("Tempotron", parameters)?;
     let patterns = to_patterns(patterns)?;
     let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
     train(py, max_seconds, progress, |report, stop| tempotron.fit(&patterns, &labels, start, report, stop))
@@ -150,7 +146,7 @@ fn peak_tempotron(
     weights: PyReadonlyArray1<'_, f64>,
     pattern: SpikesIn<'_>,
 ) -> PyResult<(f64, f64, f64)> {
-    let tempotron: Tempotron = parse(parameters)?;
+    let tempotron: Tempotron = parsed("Tempotron", parameters)?;
     let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
     let peak = enter(py, |_| tempotron.peak(weights, &pattern))?;
@@ -166,7 +162,7 @@ fn change_tempotron<'py>(
     pattern: SpikesIn<'py>,
     label: bool,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let tempotron: Tempotron = parse(parameters)?;
+    let tempotron: Tempotron = parsed("Tempotron", parameters)?;
     let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
     let change = enter(py, |_| tempotron.change(weights, &pattern, label))?;
@@ -176,7 +172,7 @@ fn change_tempotron<'py>(
 /// Checks parameters.
 #[pyfunction]
 fn check_skim(parameters: &str) -> PyResult<()> {
-    parse::<Skim>(parameters)?.check().map_err(core)
+    parsed::<Skim>("SKIM", parameters)?.check().map_err(core)
 }
 
 /// A least-squares problem as Python gets it: R row after row, z, the sum of squares out of reach, rows.
@@ -190,7 +186,7 @@ fn reduce_skim<'py>(
     patterns: Vec<SpikesIn<'py>>,
     targets: Vec<PyReadonlyArray1<'py, f64>>,
 ) -> PyResult<NormalOut<'py>> {
-    let skim: Skim = parse(parameters)?;
+    let skim: Skim = parsed("SKIM", parameters)?;
     let patterns = to_patterns(patterns)?;
     let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
     let normal = enter(py, |stop| skim.reduce(&patterns, &targets, stop))?;
@@ -200,7 +196,7 @@ fn reduce_skim<'py>(
 /// The rows of one pattern, one after the other.
 #[pyfunction]
 fn rows_skim<'py>(py: Python<'py>, parameters: &str, pattern: SpikesIn<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let skim: Skim = parse(parameters)?;
+    let skim: Skim = parsed("SKIM", parameters)?;
     let pattern = to_spikes(pattern)?;
     let rows = enter(py, |stop| skim.rows(&pattern, stop))?;
     Ok(array(py, rows))
@@ -214,7 +210,7 @@ fn output_skim<'py>(
     weights: PyReadonlyArray1<'py, f64>,
     pattern: SpikesIn<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let skim: Skim = parse(parameters)?;
+    let skim: Skim = parsed("SKIM", parameters)?;
     let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
     let output = enter(py, |stop| skim.output(weights, &pattern, stop))?;

@@ -14,6 +14,7 @@ use taxel_live::emulate::{Emulator, Options, Report};
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
 use crate::enter::enter;
 use crate::errors::core;
+use crate::parameters::read;
 
 /// An act as Python hands it over: silence in ms, a scene as JSON, or pictures with their period in us.
 #[derive(FromPyObject)]
@@ -24,7 +25,7 @@ pub(crate) enum ActIn<'py> {
 }
 
 fn scene(json: &str) -> Result<Scene> {
-    serde_json::from_str(json).map_err(|error| Error::Scene(format!("scene: {error}")))
+    read(json).map_err(|said| Error::Scene(format!("scene: {said}")))
 }
 
 fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
@@ -43,7 +44,7 @@ fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
 
 /// Acts and board, ready to be played.
 fn ready(array: &Array, registers: Registers, sensor: &str, seed: u64, acts: &[Act]) -> Result<Stage> {
-    let sensor: Sensor = serde_json::from_str(sensor).map_err(|error| Error::Scene(format!("sensor: {error}")))?;
+    let sensor: Sensor = read(sensor).map_err(|said| Error::Scene(format!("sensor: {said}")))?;
     registers.check(array)?;
     Stage::new(array, Taxels::new(&sensor, array.len(), registers.ramp, seed)?, registers.frame_us(), acts)
 }

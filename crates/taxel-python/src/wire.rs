@@ -10,13 +10,10 @@ use taxel_core::{Error, Marker};
 use crate::convert::{ArrayParts, EventsIn, EventsOut, from_events, slice, to_array, to_events};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core};
+use crate::parameters::parsed;
 
 /// Bytes between two looks at Ctrl-C: some milliseconds of work.
 const PIECE: usize = 16 << 20;
-
-fn json<T: serde::de::DeserializeOwned>(name: &str, text: &str) -> PyResult<T> {
-    serde_json::from_str(text).map_err(|error| ProblemError::new_err(format!("{name}: {error}")))
-}
 
 fn to_json<T: serde::Serialize>(value: &T) -> PyResult<String> {
     serde_json::to_string(value).map_err(|error| ProblemError::new_err(error.to_string()))
@@ -43,7 +40,7 @@ struct WireDecoder(Decoder);
 impl WireDecoder {
     #[new]
     fn new(array: ArrayParts, pairing: &str, differences: bool) -> PyResult<Self> {
-        let pairing: Pairing = json("pairing", &format!("{pairing:?}"))?;
+        let pairing: Pairing = parsed("pairing", &format!("{pairing:?}"))?;
         Ok(Self(Decoder::new(to_array(array)?).pairing(pairing).differences(differences)))
     }
 
@@ -160,7 +157,7 @@ fn registers_preset(name: &str) -> PyResult<String> {
 /// All are set before the rules are checked, so that their order does not matter.
 #[pyfunction]
 fn registers_with(registers: &str, fields: Vec<(String, u32)>, array: ArrayParts) -> PyResult<String> {
-    let mut registers: Registers = json("registers", registers)?;
+    let mut registers: Registers = parsed("registers", registers)?;
     registers.set_all(&fields, &to_array(array)?).map_err(core)?;
     to_json(&registers)
 }
@@ -168,7 +165,7 @@ fn registers_with(registers: &str, fields: Vec<(String, u32)>, array: ArrayParts
 /// Checks all rules; returns the warnings.
 #[pyfunction]
 fn registers_check(registers: &str, array: ArrayParts) -> PyResult<Vec<String>> {
-    let registers: Registers = json("registers", registers)?;
+    let registers: Registers = parsed("registers", registers)?;
     registers.check(&to_array(array)?).map_err(core)?;
     Ok(registers.warnings())
 }
@@ -176,14 +173,14 @@ fn registers_check(registers: &str, array: ArrayParts) -> PyResult<Vec<String>> 
 /// The eight 32-bit registers, and a frame's length in us.
 #[pyfunction]
 fn registers_words(registers: &str) -> PyResult<(Vec<u32>, f64)> {
-    let registers: Registers = json("registers", registers)?;
+    let registers: Registers = parsed("registers", registers)?;
     Ok(((0..8).map(|n| registers.word(n)).collect(), registers.frame_us()))
 }
 
 /// The writes that lead from one set to another.
 #[pyfunction]
 fn registers_commands(source: &str, target: &str, array: ArrayParts) -> PyResult<Vec<(u8, u32)>> {
-    let (from, to): (Registers, Registers) = (json("registers", source)?, json("registers", target)?);
+    let (from, to): (Registers, Registers) = (parsed("registers", source)?, parsed("registers", target)?);
     let commands = from.commands_to(&to, &to_array(array)?).map_err(core)?;
     Ok(commands.into_iter().map(|c| (c.register, c.value)).collect())
 }
@@ -196,9 +193,9 @@ struct WireBoard(Board);
 impl WireBoard {
     #[new]
     fn new(registers: &str, array: ArrayParts, previous: &str, intensity: &str, queue: usize) -> PyResult<Self> {
-        let registers: Registers = json("registers", registers)?;
-        let previous: Previous = json("previous", &format!("{previous:?}"))?;
-        let intensity: IntensityWord = json("intensity", &format!("{intensity:?}"))?;
+        let registers: Registers = parsed("registers", registers)?;
+        let previous: Previous = parsed("previous", &format!("{previous:?}"))?;
+        let intensity: IntensityWord = parsed("intensity", &format!("{intensity:?}"))?;
         let board = Board::new(registers, &to_array(array)?).map_err(core)?;
         Ok(Self(board.previous(previous).intensity(intensity).queue(queue)))
     }

@@ -120,7 +120,9 @@ class ConeX:
     norm : {"norm", "square"}
         The l2 term as printed, or squared.
     margin : float, mV, optional
-        How far below the threshold silence shall stay; where left out 1e-3 in continuous time, 0 on the grid.
+        How far below the threshold silence shall stay; where left out 1e-3 in continuous time, 0 on the grid. There the
+        best weights touch the threshold at many points, and a neuron that is run on the grid fires where it is touched:
+        ask for 1e-9 or more.
     slope : float, mV/ms, optional
         How steeply that margin falls to 0 at a target, and how much steeper than the threshold the potential comes up
         there; 1e-3 where left out. Continuous time only.
