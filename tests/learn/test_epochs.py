@@ -34,11 +34,9 @@ def test_a_batch_epoch_adds_up_what_each_pattern_asks(name):
     trained = learner.fit(shown, wanted, start=start)
     asked = sum(learner.change(start, p, t)[0] for p, t in zip(shown, wanted, strict=True))
     eta = learner.eta if learner.eta is not None else 600 / (40 * 6)
-    after = RULES[name](updates="batch", epochs=0).fit(shown, wanted, start=start + eta * asked)
     assert np.any(asked != 0)
-    assert trained.right_[1] == after.right_[0]
-    if trained.best_epoch_ == 1:
-        assert trained.weights_ == pytest.approx(start + eta * asked, rel=1e-12)
+    assert trained.best_epoch_ == 1  # of weights that are right equally often the latest are kept
+    assert trained.weights_ == pytest.approx(start + eta * asked, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", RULES)
@@ -55,8 +53,8 @@ def test_a_pattern_epoch_adds_what_each_asks_of_the_weights_that_it_meets(name):
             weights = weights + eta * learner.change(weights, shown[p], wanted[p])[0]
         ends.append(weights)
     trained = learner.fit(shown, wanted, start=start)
-    if trained.best_epoch_ == 1:
-        assert any(trained.weights_ == pytest.approx(end, rel=1e-12) for end in ends)
+    assert trained.best_epoch_ == 1
+    assert any(trained.weights_ == pytest.approx(end, rel=1e-12) for end in ends)
 
 
 @pytest.mark.parametrize("name", RULES)
