@@ -33,8 +33,7 @@ def van_rossum_absolute(
     Raises
     ------
     ProblemError : times not ascending or not finite (names train and spike), a parameter out of range, another number
-        of
-        trains
+        of trains
 
     Notes
     -----
