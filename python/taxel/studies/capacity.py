@@ -8,6 +8,7 @@ not) ends where the realisation ends that holds least: one solve at that load fo
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from taxel.learn import ConeX
 from taxel.spikes import SpikeTrains
 from taxel.studies.mapping import LEARN, TABLE
 
-__all__ = ["DURATION_MS", "feasible", "largest", "patterns", "realise"]
+__all__ = ["DURATION_MS", "feasible", "largest", "met", "patterns", "realise", "weakest"]
 
 DURATION_MS = 200.0
 #: Where rounding keeps the solver from a proof either way, rows met to this count as met, mV.
@@ -41,8 +42,6 @@ def patterns(seed: int, inputs: int, count: int, classes: int) -> tuple[list[Spi
 def feasible(params: dict[str, Any], count: int, seed: int) -> bool:
     """Return whether one neuron can fire at the targets of `count` patterns and nowhere else.
 
-    At the very edge of capacity rounding may keep the solver from a proof either way: then rows met to 1e-9 mV decide.
-
     Parameters
     ----------
     params : dict
@@ -59,7 +58,11 @@ def feasible(params: dict[str, Any], count: int, seed: int) -> bool:
         horizon=DURATION_MS,
         **margins,
     )
-    cone.fit(*patterns(seed, params["inputs"], count, params["classes"]))
+    return met(cone.fit(*patterns(seed, params["inputs"], count, params["classes"])))
+
+
+def met(cone: ConeX) -> bool:
+    """Return whether a fit found weights; where rounding forbids a proof either way, rows met to 1e-9 mV decide."""
     return bool(cone.status_ == "solved" or (cone.status_ == "stopped" and cone.violation_ <= MET_TO))
 
 
@@ -96,6 +99,33 @@ def largest(holds: Callable[[int], bool], start: int, step: int, most: int | Non
     return low
 
 
+def weakest(bears: Callable[[int, int], bool], params: dict[str, Any], seed: int) -> list[list[int]]:
+    """Search the largest load that all realisations bear, from 0.2 N on.
+
+    Parameters
+    ----------
+    bears : function of (seed, p)
+        Whether a realisation bears a load.
+    params : dict
+        ``inputs``, ``classes``, ``realisations``.
+    seed : int
+        The first realisation's; the others follow.
+
+    Returns
+    -------
+    list of [seed, p]
+        Of each realisation that bore less than those before it; the last p is what all of them bear.
+    """
+    step = params["classes"]
+    most = largest(partial(bears, seed), max(round(0.2 * params["inputs"] / step), 1) * step, step)
+    limits = [[seed, most]]
+    for of in range(seed + 1, seed + params["realisations"]):
+        if most and not bears(of, most):
+            most = largest(partial(bears, of), most - step, step, most - step)
+            limits.append([of, most])
+    return limits
+
+
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     """Search the largest load that all realisations bear.
 
@@ -112,18 +142,13 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         ``p``, ``load`` (p by inputs), ``limits`` (seed and p of each realisation that bore less than those before it),
         ``solves``.
     """
-    step, solves, limits = params["classes"], 0, []
+    solves = 0
 
-    def holds(count: int) -> bool:
+    def bears(of: int, count: int) -> bool:
         nonlocal solves
         solves += 1
         return feasible(params, count, of)
 
-    of = seed
-    most = largest(holds, max(round(0.2 * params["inputs"] / step), 1) * step, step)
-    limits.append([of, most])
-    for of in range(seed + 1, seed + params["realisations"]):
-        if most and not holds(most):
-            most = largest(holds, most - step, step, most - step)
-            limits.append([of, most])
+    limits = weakest(bears, params, seed)
+    most = limits[-1][1]
     return {"p": most, "load": round(most / params["inputs"], 6), "limits": limits, "solves": solves}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,8 +10,9 @@ import numpy as np
 from taxel import learn
 from taxel.learn import ConeX
 from taxel.spikes import SpikeTrains
-from taxel.studies import capacity
-from taxel.studies.capacity import DURATION_MS, MET_TO, largest, patterns
+from taxel.studies import capacity, mapping
+from taxel.studies.capacity import DURATION_MS, met, patterns, weakest
+from taxel.studies.mapping import LEARN, TABLE
 from taxel.studies.runner import Task
 from taxel.studies.study import Parameters, Row, Said, Statement, Study
 
@@ -31,8 +31,6 @@ PARAMETERS: dict[str, Any] = {
     "time": "continuous",
 }
 TOY: dict[str, Any] = {"realisations": 2, "inputs": [40], "copies": [3], "shares": [0.1]}
-#: Table 6.1 and the bounds of 6.4.4.
-LEARN: dict[str, Any] = {"tau": 15.0, "theta_0": 0.3, "theta_plus": 0.2, "refractory": 3.0, "lb": -0.3, "ub": 0.3}
 #: A weight below it is none, mV: a millionth of the bound.
 NONE = 3e-7
 #: On gait, where nothing selects: feet off of gaitndd within 10 ms, % (the notes to the gait study).
@@ -74,7 +72,7 @@ def delayed(params: dict[str, Any], drawn: Sequence[SpikeTrains], seed: int) -> 
 def fit(params: dict[str, Any], count: int, seed: int, lambdas: tuple[float, float, float]) -> ConeX:
     """Learn so many patterns of a realisation as an arm hears them."""
     drawn, targets = patterns(seed, params["inputs"], count, params["classes"])
-    cone = ConeX(**LEARN, lambdas=lambdas, time=params["time"], horizon=DURATION_MS)
+    cone = ConeX(**TABLE, **LEARN, lambdas=lambdas, time=params["time"], horizon=DURATION_MS)
     return cone.fit(delayed(params, drawn, seed), targets)
 
 
@@ -95,18 +93,8 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         chosen = (np.abs(cone.weights_) > NONE).reshape(-1, inputs)
         return {"p": count, "solved": True, "weights": int(chosen.sum()), "heard": int(chosen.any(axis=0).sum())}
 
-    at = max(round(0.2 * inputs / step), 1) * step
-    most = largest(partial(bears, params, seed), at, step)
-    for other in range(seed + 1, seed + params["realisations"]):
-        if most and not bears(params, other, most):
-            most = largest(partial(bears, params, other), most - step, step, most - step)
-    return {"p": most}
-
-
-def bears(params: dict[str, Any], seed: int, count: int) -> bool:
-    """Return whether a realisation bears so many patterns; at the very edge as `capacity.feasible` decides."""
-    cone = fit(params, count, seed, (0.0, 1.0, 0.0))
-    return bool(cone.status_ == "solved" or (cone.status_ == "stopped" and cone.violation_ <= MET_TO))
+    limits = weakest(lambda of, count: met(fit(params, count, of, (0.0, 1.0, 0.0))), params, seed)
+    return {"p": limits[-1][1]}
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
@@ -244,5 +232,5 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, capacity),
+    code=(learn, capacity, mapping),
 )

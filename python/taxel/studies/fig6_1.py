@@ -12,7 +12,7 @@ from taxel import learn, neuron
 from taxel.learn import ConeX
 from taxel.spikes import SpikeTrains
 from taxel.studies import mapping
-from taxel.studies.mapping import LEARN, TABLE
+from taxel.studies.mapping import LEARN, TABLE, thresholds
 from taxel.studies.runner import Task
 from taxel.studies.study import Parameters, Row, Said, Statement, Study
 
@@ -69,15 +69,6 @@ def _sum_of_kernels(
             x = np.maximum(times - spike, 0.0) / TABLE["tau"]
             total += weight * x * np.exp(-x)
     return total
-
-
-def thresholds(times: NDArray[np.float64], targets: Sequence[float]) -> NDArray[np.float64]:
-    """Return 6.8: raised by each spike at the end of its refractory time."""
-    values = np.full(len(times), TABLE["theta_0"])
-    for target in targets:
-        since = times - target - TABLE["refractory"]
-        values[since >= 0] = TABLE["theta_0"] + TABLE["theta_plus"] * np.exp(-since[since >= 0] / (2 * TABLE["tau"]))
-    return values
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
@@ -156,7 +147,7 @@ def draw(p: Parameters, said: Said) -> Figure:
     dynamics.plot(times, said["potential"], "k", lw=1.4, label="membrane potential U")
     dynamics.plot(times, thresholds(times, p["targets"]), "C2--", lw=1.2, label="threshold")
     for k, target in enumerate(p["targets"]):
-        spike, quiet = ("output spike", "absolute refractory period") if k == 0 else (None, None)
+        spike, quiet = ("output spike", "absolute refractory period") if k == 0 else ("", "")
         dynamics.vlines(target, 0, 0.62, "C3", lw=1.6, label=spike)
         dynamics.axvspan(target, target + TABLE["refractory"], color="0.85", zorder=0, label=quiet)
     dynamics.set(xlabel="time, ms", ylabel="mV", ylim=(None, 0.65), xlim=(0, p["stop"]))

@@ -9,7 +9,7 @@ import numpy as np
 
 from taxel import learn, neuron
 from taxel.studies import mapping
-from taxel.studies.mapping import TABLE
+from taxel.studies.mapping import LEARN, TABLE
 from taxel.studies.runner import Task
 from taxel.studies.study import Parameters, Row, Said, Statement, Study
 
@@ -30,8 +30,8 @@ PARAMETERS: dict[str, Any] = {
     "drawn": [85.0, 112.0],
     "step_ms": 0.05,
 }
-#: The published delta t, ms.
-DELTA_T = 1.5
+#: Delta t of Table 6.1, ms.
+DELTA_T: float = LEARN["delta_t_ms"]
 
 
 def tasks(p: Parameters) -> list[Task]:

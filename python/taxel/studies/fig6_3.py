@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from taxel import learn
 from taxel.learn import ConeR, ConeX
 from taxel.spikes import SpikeTrains
-from taxel.studies.mapping import TABLE
+from taxel.studies import mapping
+from taxel.studies.mapping import LEARN, TABLE
 from taxel.studies.runner import Task
 from taxel.studies.study import Parameters, Row, Said, Statement, Study
 
@@ -29,7 +30,8 @@ PARAMETERS: dict[str, Any] = {
     "lambdas_r": [2.0, 2.0, 100.0, 100.0, 100.0],
     "points": 101,
 }
-DELTA_T = 1.5
+#: Delta t of Table 6.1, ms.
+DELTA_T: float = LEARN["delta_t_ms"]
 
 
 def tasks(p: Parameters) -> list[Task]:
@@ -248,5 +250,5 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn,),
+    code=(learn, mapping),
 )

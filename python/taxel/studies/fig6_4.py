@@ -9,7 +9,7 @@ import numpy as np
 
 from taxel import learn, neuron
 from taxel.studies import mapping
-from taxel.studies.mapping import TABLE, realise
+from taxel.studies.mapping import LEARN, TABLE, realise
 from taxel.studies.runner import Task
 from taxel.studies.study import Parameters, Row, Said, Statement, Study
 from taxel.studies.waves import READINGS
@@ -32,8 +32,8 @@ PARAMETERS: dict[str, Any] = {
     "drawn_to": 130.0,
 }
 TOY: dict[str, Any] = {"realisations": 2, "kappas": [1.0, 1.2]}
-#: The published delta t, at which B asks for kappa thetas, ms.
-DELTA_T = 1.5
+#: Delta t of Table 6.1, at which B asks for kappa thetas, ms.
+DELTA_T: float = LEARN["delta_t_ms"]
 
 
 def _times(p: Parameters) -> list[float]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from taxel import learn, neuron
 from taxel.studies import mapping
-from taxel.studies.mapping import TABLE, realise
+from taxel.studies.mapping import TABLE, realise, thresholds
 from taxel.studies.runner import Task
 from taxel.studies.study import Parameters, Row, Said, Statement, Study
 
@@ -121,18 +121,13 @@ def draw(p: Parameters, said: Said) -> Figure:
     axes = figure.subplots(len(p["readings"]), 1, sharex=True, squeeze=False)[:, 0]
     times = np.array(said["times"])
     fine = np.arange(0.0, p["stop"], 0.1)
-    threshold = np.full(len(fine), TABLE["theta_0"])
-    for target in p["targets"]:
-        after = fine > target + TABLE["refractory"]
-        decay = np.exp(-(fine[after] - target - TABLE["refractory"]) / (2 * TABLE["tau"]))
-        threshold[after] = TABLE["theta_0"] + TABLE["theta_plus"] * decay
     for ax, (reading, norms) in zip(axes, said["readings"].items(), strict=True):
         for norm, style in (("l2", "-"), ("l1", "-.")):
             if norm in norms and norms[norm]["potential"]:
                 ax.plot(
                     times, norms[norm]["potential"], style, color="C0" if norm == "l2" else "C3", label=norm, lw=1.4
                 )
-        ax.plot(fine, threshold, "k--", lw=0.9, label="threshold")
+        ax.plot(fine, thresholds(fine, p["targets"]), "k--", lw=0.9, label="threshold")
         for target in p["targets"]:
             ax.axvline(target, color="0.85", lw=0.8, zorder=0)
         ax.set(ylabel="mean potential, mV", title=f"after a spike “{reading}”")

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from taxel.learn import ConeX
 from taxel.spikes import SpikeTrains
 
-__all__ = ["LEARN", "TABLE", "poisson", "realise", "single_spikes", "timing", "told"]
+__all__ = ["LEARN", "TABLE", "poisson", "realise", "single_spikes", "thresholds", "timing", "told"]
 
 #: Table 6.1; what it does not hold is taxel's default.
 TABLE: dict[str, Any] = {"tau": 15.0, "theta_0": 0.3, "theta_plus": 0.2, "refractory": 3.0}
@@ -28,6 +29,15 @@ def poisson(seed: int, inputs: int, stop: float, low_hz: float, high_hz: float) 
     rng = np.random.default_rng(seed)
     counts = rng.poisson(rng.uniform(low_hz, high_hz, inputs) * stop / 1000.0)
     return SpikeTrains.from_lists([np.sort(rng.uniform(0.0, stop, n)) for n in counts], 0.0, stop)
+
+
+def thresholds(times: NDArray[np.float64], targets: Sequence[float]) -> NDArray[np.float64]:
+    """Return the threshold (6.8, mV) at these times (ms): raised by each spike at the end of its refractory time."""
+    values = np.full(len(times), TABLE["theta_0"])
+    for target in targets:
+        since = times - target - TABLE["refractory"]
+        values[since >= 0] = TABLE["theta_0"] + TABLE["theta_plus"] * np.exp(-since[since >= 0] / (2 * TABLE["tau"]))
+    return values
 
 
 def timing(results: Sequence[dict[str, Any]], targets: Sequence[float]) -> dict[str, Any]:
