@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -24,35 +25,59 @@ Updates = Literal["batch", "pattern"]
 _TRAINING = ("eta", "epochs", "updates", "initial", "within_ms", "until_right", "seed")
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class EpochLearner(ABC):
-    """Learn spike times by epochs: present each pattern, compare the output spikes with the targets, correct."""
+    """Learn spike times by epochs: present each pattern, compare the output spikes with the targets, correct.
 
-    weights_: NDArray[np.float64]
-    right_: NDArray[np.float64]
-    epochs_: int
-    best_epoch_: int
-    status_: Literal["right", "epochs", "stopped"]
-    neuron_: Neuron | None
+    What a rule's source gives is its default; `INST`, of which everything was published, says what each parameter is.
+    """
 
-    max_seconds: float | None
+    eta: float | None
+    initial: Sequence[float] | None
+    epochs: int
+    updates: Updates
+    tau: float
+    tau_s: float | None
+    theta_0: float
+    after_spike: AfterSpike | None
+    step_ms: float = 0.1
+    within_ms: float = 1.0
+    until_right: bool = True
+    seed: int = 0
+    max_seconds: float | None = None
+
+    weights_: NDArray[np.float64] = field(init=False)
+    right_: NDArray[np.float64] = field(init=False)
+    epochs_: int = field(init=False)
+    best_epoch_: int = field(init=False)
+    status_: Literal["right", "epochs", "stopped"] = field(init=False)
+    neuron_: Neuron | None = field(init=False)
+
     #: Entries of `right_` before the first epoch.
     _LOOKS_BEFORE_THE_FIRST = 1
+
+    def __post_init__(self) -> None:
+        seconds(self.max_seconds)
+        _core.check_rival(self._json())
 
     @abstractmethod
     def _law(self) -> dict[str, Any]:
         """Return the rule's own constants, by its name."""
 
-    @abstractmethod
     def _neuron(self) -> dict[str, Any]:
         """Return the stepped neuron."""
+        return {
+            "tau": self.tau,
+            "current": {"exponential": {"tau_s": self.tau_s}},
+            "theta_0": self.theta_0,
+            "after_spike": self.after_spike,
+            "refractory": 0.0,
+            "step_ms": self.step_ms,
+        }
 
     def _json(self) -> str:
         training = {name: getattr(self, name) for name in _TRAINING}
         return parameters({"law": self._law(), "neuron": self._neuron(), "training": training})
-
-    def _check(self) -> None:
-        seconds(self.max_seconds)
-        _core.check_rival(self._json())
 
     def fit(
         self,

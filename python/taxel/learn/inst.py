@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from taxel.learn._epochs import AfterSpike, EpochLearner, Updates
@@ -10,6 +11,7 @@ from taxel.learn._epochs import AfterSpike, EpochLearner, Updates
 __all__ = ["INST"]
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class INST(EpochLearner):
     """Learn spike times by INST: inputs count by the potential that they make at targets less that at output spikes.
 
@@ -29,8 +31,8 @@ class INST(EpochLearner):
     theta_0 : float, mV, above 0
         Threshold. (†)
     after_spike : {"subtract", "membrane", "reset"}
-        What an output spike does: the potential falls by ``theta_0 exp(-s/tau)``; it is put to 0 and currents go on; or
-        all inputs up to the spike are lost. (†: "subtract")
+        What an output spike does: the potential falls by ``theta_0 exp(-s/tau)`` (†); it is put to 0 and currents go on
+        (leaky integrate and fire); or all inputs up to the spike are lost.
     step_ms : float, ms, above 0
         The neuron is looked at every so often; inputs keep their true times.
     within_ms : float, ms, above 0
@@ -77,47 +79,14 @@ class INST(EpochLearner):
     1
     """
 
-    def __init__(
-        self,
-        *,
-        eta: float | None = None,
-        initial: Sequence[float] | None = None,
-        epochs: int = 500,
-        updates: Updates = "batch",
-        tau: float = 10.0,
-        tau_s: float = 5.0,
-        theta_0: float = 15.0,
-        after_spike: AfterSpike = "subtract",
-        step_ms: float = 0.1,
-        within_ms: float = 1.0,
-        until_right: bool = True,
-        seed: int = 0,
-        max_seconds: float | None = None,
-    ) -> None:
-        self.eta = eta
-        self.initial = initial
-        self.epochs = epochs
-        self.updates: Updates = updates
-        self.tau = tau
-        self.tau_s = tau_s
-        self.theta_0 = theta_0
-        self.after_spike: AfterSpike = after_spike
-        self.step_ms = step_ms
-        self.within_ms = within_ms
-        self.until_right = until_right
-        self.seed = seed
-        self.max_seconds = max_seconds
-        self._check()
+    eta: float | None = None
+    initial: Sequence[float] | None = None
+    epochs: int = 500
+    updates: Updates = "batch"
+    tau: float = 10.0
+    tau_s: float = 5.0
+    theta_0: float = 15.0
+    after_spike: AfterSpike = "subtract"
 
     def _law(self) -> dict[str, Any]:
         return {"inst": {}}
-
-    def _neuron(self) -> dict[str, Any]:
-        return {
-            "tau": self.tau,
-            "current": {"exponential": {"tau_s": self.tau_s}},
-            "theta_0": self.theta_0,
-            "after_spike": self.after_spike,
-            "refractory": 0.0,
-            "step_ms": self.step_ms,
-        }

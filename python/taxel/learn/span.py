@@ -2,60 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
-from taxel.learn._epochs import AfterSpike, EpochLearner, Updates
+from taxel.learn._epochs import AfterSpike, EpochLearner
 
 __all__ = ["SPAN"]
 
 
+@dataclass(kw_only=True, eq=False, repr=False)
 class SPAN(EpochLearner):
     """Learn spike times by SPAN: Widrow and Hoff's rule on trains that are all filtered by an alpha kernel.
 
     Parameters
     ----------
     tau_a : float, ms, above 0
-        Time constant of the filter.
-    eta : float, above 0
-        Learning rate, weight a unit of `change`.
-    initial : (float, float), mV
-        First weights are drawn evenly between these two.
-    epochs : int
-        Epochs at most.
-    updates : {"batch", "pattern"}
-        Whether weights change once an epoch, or after each pattern in an order drawn anew.
-    tau, tau_s : float, ms
-        Membrane and synapse: an input of weight 1 makes a potential ``V0 (exp(-s/tau) - exp(-s/tau_s))`` that peaks at
-        1 mV.
-    theta_0 : float, mV, above 0
-        Threshold.
+        Time constant of the filter; has no default.
+    eta, initial, epochs, updates, tau, tau_s, theta_0
+        Training and neuron, as in `INST`; none has a default.
     after_spike : {"subtract", "membrane", "reset"}
-        What an output spike does: the potential falls by ``theta_0 exp(-s/tau)``; it is put to 0 and currents go on; or
-        all inputs up to the spike are lost. Leaky integrate and fire ("membrane") was used.
-    step_ms : float, ms, above 0
-        The neuron is looked at every so often; inputs keep their true times.
-    within_ms : float, ms, above 0
-        A pattern is right where it has one output spike a target, each within this of its own.
-    until_right : bool
-        Whether to end as soon as every pattern is right.
-    seed : int, 0 or more
-        Of the first weights and the order of patterns.
-    max_seconds : float, above 0, optional
-        Ends the training with the best weights so far.
+        As in `INST`; leaky integrate and fire ("membrane") was used.
+    step_ms, within_ms, until_right, seed, max_seconds
+        As in `INST`.
 
     Attributes
     ----------
-    weights_ : float64, shape (trains,), mV
-        Those with most patterns right, the latest such.
-    right_ : float64, shape (epochs done + 1,)
-        The share of patterns right after 0, 1, 2 ... epochs.
-    epochs_, best_epoch_ : int
-        Epochs done; after how many the weights were those.
-    status_ : {"right", "epochs", "stopped"}
-        Every pattern was right; all epochs were used up; Ctrl-C or `max_seconds`.
-    neuron_ : Neuron or None
-        The neuron as `taxel.Neuron` has it, where it can (`after_spike` "reset").
+    weights_, right_, epochs_, best_epoch_, status_, neuron_
+        What was learnt, as `INST` has it.
 
     Raises
     ------
@@ -82,49 +55,8 @@ class SPAN(EpochLearner):
     1
     """
 
-    def __init__(
-        self,
-        *,
-        tau_a: float,
-        eta: float,
-        initial: Sequence[float],
-        epochs: int,
-        updates: Updates,
-        tau: float,
-        tau_s: float,
-        theta_0: float,
-        after_spike: AfterSpike = "membrane",
-        step_ms: float = 0.1,
-        within_ms: float = 1.0,
-        until_right: bool = True,
-        seed: int = 0,
-        max_seconds: float | None = None,
-    ) -> None:
-        self.tau_a = tau_a
-        self.eta = eta
-        self.initial = initial
-        self.epochs = epochs
-        self.updates: Updates = updates
-        self.tau = tau
-        self.tau_s = tau_s
-        self.theta_0 = theta_0
-        self.after_spike: AfterSpike = after_spike
-        self.step_ms = step_ms
-        self.within_ms = within_ms
-        self.until_right = until_right
-        self.seed = seed
-        self.max_seconds = max_seconds
-        self._check()
+    tau_a: float
+    after_spike: AfterSpike = "membrane"
 
     def _law(self) -> dict[str, Any]:
         return {"span": {"tau_a": self.tau_a}}
-
-    def _neuron(self) -> dict[str, Any]:
-        return {
-            "tau": self.tau,
-            "current": {"exponential": {"tau_s": self.tau_s}},
-            "theta_0": self.theta_0,
-            "after_spike": self.after_spike,
-            "refractory": 0.0,
-            "step_ms": self.step_ms,
-        }
