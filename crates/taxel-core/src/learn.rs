@@ -80,16 +80,7 @@ fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>
 
 /// Checks one pattern, number `p`, and its targets.
 fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<()> {
-    pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
-    if pattern.is_empty() {
-        return Err(problem!("pattern {p}: has no train"));
-    }
-    if pattern.times.is_empty() {
-        return Err(problem!("pattern {p}: has no spike, so no weight can matter in it"));
-    }
-    if pattern.values.is_some() {
-        return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
-    }
+    check_pattern(p, pattern)?;
     for (k, &t) in targets.iter().enumerate() {
         if !t.is_finite() {
             return Err(problem!("pattern {p}, target {k}: time is {t}, must be finite"));
@@ -118,6 +109,33 @@ fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, targets: &[f6
                 neuron.refractory
             ));
         }
+    }
+    Ok(())
+}
+
+/// Checks one pattern to learn from, number `p`.
+fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
+    pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
+    if pattern.is_empty() {
+        return Err(problem!("pattern {p}: has no train"));
+    }
+    if pattern.times.is_empty() {
+        return Err(problem!("pattern {p}: has no spike, so no weight can matter in it"));
+    }
+    if pattern.values.is_some() {
+        return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
+    }
+    Ok(())
+}
+
+/// Checks a pattern that is only heard.
+fn check_heard(pattern: &SpikeTrains) -> Result<()> {
+    pattern.check()?;
+    if pattern.values.is_some() {
+        return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
+    }
+    if pattern.is_empty() {
+        return Err(problem!("pattern: has no train"));
     }
     Ok(())
 }

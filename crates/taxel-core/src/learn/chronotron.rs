@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::epochs::{Correction, Presented, Rule, targets_less_fired};
+use super::epochs::{Correction, Presented, Rule};
 use super::rival::check_above_0;
 use super::stepped::{Shape, SteppedNeuron};
 use crate::Result;
@@ -73,10 +73,6 @@ impl Rule for IRule {
 
     fn by_sign(&self) -> bool {
         true
-    }
-
-    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        targets_less_fired(of.targets, fired, out);
     }
 }
 

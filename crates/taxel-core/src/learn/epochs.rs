@@ -90,8 +90,13 @@ pub(super) trait Rule {
         false
     }
 
-    /// How weights shall change after a presentation in which these spikes were fired (ms, ascending).
-    fn correct(&self, of: &Presented<'_>, weights: &[f64], fired: &[f64], out: &mut Vec<Correction>);
+    /// How weights shall change after a presentation in which these spikes were fired (ms, ascending); most rules, in the
+    /// form of Widrow and Hoff, add 1 at every target and take 1 off at every output spike.
+    fn correct(&self, of: &Presented<'_>, weights: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
+        let _ = weights;
+        out.extend(of.targets.iter().enumerate().map(|(k, &t)| Correction::at_target(k, t, 1.0)));
+        out.extend(fired.iter().map(|&t| Correction::new(t, -1.0)));
+    }
 
     /// The published learning rate, for `trains` synapses and `targets` targets in all.
     fn eta(&self, trains: usize, targets: usize) -> Option<f64> {
@@ -131,12 +136,6 @@ impl Correction {
     pub(super) fn at_target(k: usize, t: f64, amount: f64) -> Self {
         Self { target: Some(k), ..Self::new(t, amount) }
     }
-}
-
-/// `+1` at every target, `-1` at every output spike: the Widrow-Hoff form of most rules.
-pub(super) fn targets_less_fired(targets: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-    out.extend(targets.iter().enumerate().map(|(k, &t)| Correction::at_target(k, t, 1.0)));
-    out.extend(fired.iter().map(|&t| Correction::new(t, -1.0)));
 }
 
 /// Whether output spikes are as many as targets, each within `within` ms of its own.

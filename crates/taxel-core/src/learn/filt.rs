@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::epochs::{Correction, Presented, Rule, targets_less_fired};
+use super::epochs::Rule;
 use super::inst::{published_eta, published_initial};
 use super::rival::check_above_0;
 use super::stepped::{Current, SteppedNeuron, peak_factor};
@@ -47,10 +47,6 @@ impl Rule for FiltRule {
             } else {
                 (self.c_m - self.c_s) * (since / self.tau_q).exp()
             }
-    }
-
-    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        targets_less_fired(of.targets, fired, out);
     }
 
     fn eta(&self, trains: usize, targets: usize) -> Option<f64> {

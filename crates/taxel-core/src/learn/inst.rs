@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::epochs::{Correction, Presented, Rule, targets_less_fired};
+use super::epochs::Rule;
 use super::stepped::{Shape, SteppedNeuron};
 use crate::Result;
 
@@ -22,10 +22,6 @@ impl Inst {
 impl Rule for InstRule {
     fn factor(&self, since: f64) -> f64 {
         self.0.value(since)
-    }
-
-    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        targets_less_fired(of.targets, fired, out);
     }
 
     fn eta(&self, trains: usize, targets: usize) -> Option<f64> {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::epochs::{Correction, Presented, Rule, targets_less_fired};
+use super::epochs::Rule;
 use super::rival::check_above_0;
 use super::stepped::{SteppedNeuron, peak_factor};
 use crate::{Result, problem};
@@ -39,9 +39,5 @@ impl Psd {
 impl Rule for PsdRule {
     fn factor(&self, since: f64) -> f64 {
         if since > 0.0 { self.peak * ((-since / self.tau_1).exp() - (-since / self.tau_2).exp()) } else { 0.0 }
-    }
-
-    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        targets_less_fired(of.targets, fired, out);
     }
 }

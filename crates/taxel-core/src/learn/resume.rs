@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::epochs::{Correction, Presented, Rule, targets_less_fired};
+use super::epochs::Rule;
 use super::rival::check_above_0;
 use super::stepped::SteppedNeuron;
 use crate::{Result, problem};
@@ -44,9 +44,5 @@ impl Rule for ResumeRule {
 
     fn constant(&self) -> f64 {
         self.a
-    }
-
-    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        targets_less_fired(of.targets, fired, out);
     }
 }

@@ -126,10 +126,7 @@ impl SteppedNeuron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn run(&self, weights: &[f64], pattern: &SpikeTrains) -> Result<Vec<f64>> {
         self.check()?;
-        pattern.check()?;
-        if pattern.values.is_some() {
-            return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
-        }
+        super::check_heard(pattern)?;
         check_weights(weights, pattern.len())?;
         let mut fired = Vec::new();
         self.fire(weights, &self.lay_out(pattern), &mut fired);

@@ -270,7 +270,7 @@ impl Skim {
     /// `Problem` for parameters or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn rows(&self, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        check_pattern(pattern)?;
+        super::check_heard(pattern)?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {
             for row in 0..block[0].len() {
@@ -287,7 +287,7 @@ impl Skim {
     /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn output(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        check_pattern(pattern)?;
+        super::check_heard(pattern)?;
         check_weights(weights, self.columns(pattern.len()))?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {
@@ -301,15 +301,4 @@ impl Skim {
         })?;
         Ok(out)
     }
-}
-
-fn check_pattern(pattern: &SpikeTrains) -> Result<()> {
-    pattern.check()?;
-    if pattern.values.is_some() {
-        return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
-    }
-    if pattern.is_empty() {
-        return Err(problem!("pattern: has no train"));
-    }
-    Ok(())
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::epochs::{Correction, Presented, Rule, targets_less_fired};
+use super::epochs::Rule;
 use super::rival::check_above_0;
 use super::stepped::SteppedNeuron;
 use crate::Result;
@@ -31,9 +31,5 @@ impl Rule for SpanRule {
         let apart = since.abs();
         let half_e = std::f64::consts::E / 2.0;
         half_e * half_e * (apart + self.0) * (-apart / self.0).exp()
-    }
-
-    fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {
-        targets_less_fired(of.targets, fired, out);
     }
 }

@@ -167,7 +167,7 @@ impl Tempotron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn peak(&self, weights: &[f64], pattern: &SpikeTrains) -> Result<Peak> {
         self.check()?;
-        check_pattern(pattern)?;
+        super::check_heard(pattern)?;
         check_weights(weights, pattern.len())?;
         Ok(self.reach(&self.shape(), weights, &self.lay_out(pattern)).peak)
     }
@@ -180,7 +180,7 @@ impl Tempotron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn change(&self, weights: &[f64], pattern: &SpikeTrains, label: bool) -> Result<Vec<f64>> {
         self.check()?;
-        check_pattern(pattern)?;
+        super::check_heard(pattern)?;
         check_weights(weights, pattern.len())?;
         let (shape, events) = (self.shape(), self.lay_out(pattern));
         let mut change = vec![0.0; weights.len()];
@@ -301,14 +301,6 @@ fn crossing(shape: &Shape, state: State, end: f64, threshold: f64) -> f64 {
     high
 }
 
-fn check_pattern(pattern: &SpikeTrains) -> Result<()> {
-    pattern.check()?;
-    if pattern.values.is_some() {
-        return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
-    }
-    Ok(())
-}
-
 fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
     if patterns.is_empty() {
         return Err(problem!("patterns: there is none, at least one is needed"));
@@ -317,16 +309,8 @@ fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
         return Err(problem!("labels: {} for {} patterns, must be one a pattern", labels.len(), patterns.len()));
     }
     for (p, pattern) in patterns.iter().enumerate() {
-        check_pattern(pattern).map_err(|e| problem!("pattern {p}: {e}"))?;
-        if pattern.is_empty() {
-            return Err(problem!("pattern {p}: has no train"));
-        }
-        if pattern.len() != patterns[0].len() {
-            return Err(problem!("pattern {p}: {} trains, pattern 0 has {}", pattern.len(), patterns[0].len()));
-        }
-        if pattern.times.is_empty() {
-            return Err(problem!("pattern {p}: has no spike, so no weight can matter in it"));
-        }
+        super::check_pattern(p, pattern)?;
+        super::check_trains(p, pattern, patterns[0].len())?;
     }
     Ok(())
 }
