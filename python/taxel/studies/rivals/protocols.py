@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from taxel._core import ProblemError
 from taxel.spikes import SpikeTrains
 from taxel.studies.rivals.rules import RULES, learner
 
@@ -56,7 +57,7 @@ def share_right(params: dict[str, Any], count: int, seed: int) -> float:
     if name == "ConeX":
         cone = learner(name, protocol, inputs, count, seed).fit(patterns, targets)
         if cone.status_ == "stopped":
-            raise ArithmeticError(f"no verdict for {params}, {count} patterns, seed {seed}")
+            raise ProblemError(f"ConeX came to no verdict on {count} patterns, seed {seed}, of {params}")
         return 1.0 if cone.status_ == "solved" else 0.0
     fitted = learner(name, protocol, inputs, count, seed, **training).fit(patterns, targets)
     return float(fitted.right_[-1])
