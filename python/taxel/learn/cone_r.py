@@ -13,23 +13,11 @@ from taxel import _core
 from taxel._arguments import callback, floats, instance, parameters
 from taxel._core import ProblemError
 from taxel.learn._examples import examples
+from taxel.learn._neuron import split
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
 __all__ = ["ConeR", "ConeRProblem"]
-
-_NEURON = (
-    "tau",
-    "theta_0",
-    "theta_plus",
-    "tau_rec",
-    "refractory",
-    "after_spike",
-    "first_threshold",
-    "step_ms",
-    "kernel",
-    "tau_s",
-)
 
 
 class ConeR:
@@ -236,9 +224,8 @@ class ConeR:
         return {name: value for name, value in vars(self).items() if not (name.endswith("_") or name.startswith("_"))}
 
     def _json(self) -> str:
-        values = self._values()
-        neuron = {name: values.pop(name) for name in _NEURON}
-        return parameters({"neuron": {**neuron, "time": "grid"}, **values})
+        neuron, rest = split(self._values())
+        return parameters({"neuron": {"time": "grid", **neuron}, **rest})
 
     def __repr__(self) -> str:
         default = ConeR.__init__.__kwdefaults__ or {}
@@ -317,7 +304,7 @@ def _keep(cone: ConeR, found: Any, silent_rows: int, all_rows: int) -> None:
     cone.rounds_, cone.rows_, cone.silent_rows_ = rounds, rows, silent_rows
     cone.unreachable_ = unreachable
     cone.refires_ = refires
-    cone.neuron_ = Neuron(**{name: getattr(cone, name) for name in _NEURON}, time="grid")
+    cone.neuron_ = Neuron(**{"time": "grid", **split(vars(cone))[0]})
     cone._multipliers = (all_rows, multipliers)
 
 

@@ -13,24 +13,11 @@ from taxel import _core
 from taxel._arguments import callback, flag, floats, instance, number, parameters, shown, whole
 from taxel._core import ProblemError
 from taxel.learn._examples import examples, seconds
+from taxel.learn._neuron import split
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
 __all__ = ["Certificate", "ConeX", "ConeXProblem", "Margin", "Row"]
-
-_NEURON = (
-    "kernel",
-    "tau",
-    "tau_s",
-    "theta_0",
-    "theta_plus",
-    "tau_rec",
-    "refractory",
-    "after_spike",
-    "first_threshold",
-    "time",
-    "step_ms",
-)
 
 
 class Row(NamedTuple):
@@ -308,14 +295,13 @@ class ConeX:
             (rows, multipliers), proven, at_all, text = certificate
             self.certificate_ = Certificate([_row(row) for row in rows], multipliers, proven, at_all, text)
         self.problem_ = problem
-        self.neuron_ = Neuron(**{name: getattr(self, name) for name in _NEURON})
+        self.neuron_ = Neuron(**split(vars(self))[0])
         if signal is not None:
             raise signal
         return self
 
     def _json(self) -> str:
-        values = {name: value for name, value in vars(self).items() if not name.endswith("_")}
-        neuron = {name: values.pop(name) for name in _NEURON}
+        neuron, values = split({name: value for name, value in vars(self).items() if not name.endswith("_")})
         seconds(values.pop("max_seconds"))
         for name in ("lb", "ub", "horizon"):
             if not (values[name] is None and name == "horizon"):
