@@ -241,13 +241,75 @@ def test_a_fit_to_the_same_rows_hands_on_its_multipliers():
 
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_where_the_native_engine_cannot_prove_its_result_the_cone_solver_goes_on_and_the_report_says_so():
-    """Bounds ten thousand times what is needed hide the scale that Newton steps need."""
-    patterns, targets = examples(1, trains=40, patterns=1, duration=250.0)
-    options = {"tau": 40.0, "lambdas": (0.01, 0, 100, 100, 80), "lb": -1000.0, "ub": 1000.0}
+    """Without l1 and l2 much is flat, and bounds above 0 leave no weights of 0 to fall back on."""
+    patterns, targets = examples(24, trains=29, patterns=6)
+    options = {"tau": 40.0, "kernel": "double_exponential", "step_ms": 2.5, "after_spike": "reset"}
+    options |= {"lambdas": (0, 0, 1, 100, 80), "lb": 0.015, "ub": 0.6}
     cone, whole = (ConeR(**options, engine=engine).fit(patterns, targets) for engine in ("native", "cone solver"))
     assert cone.engine_ == whole.engine_ == "cone solver"
     assert cone.status_ == "solved"
     assert cone.objective_ == pytest.approx(whole.objective_, rel=1e-6)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("width", [30.0, 300.0, 3000.0])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"tau": 3.0, "kappa": 1.0, "lambdas": (0.1, 1, 100, 1, 80)},
+        {"tau": 3.0, "kernel": "double_exponential", "lambdas": (0.1, 1, 100, 1, 80)},
+        {"norm": "square", "lambdas": (1, 1, 0, 100, 80)},
+        {"after_spike": "reset", "lambdas": (0, 1, 100, 100, 80)},
+        {"tau": 40.0, "lambdas": (0.01, 0, 100, 100, 80)},
+    ],
+)
+def test_bounds_far_too_wide_neither_hang_the_native_engine_nor_ask_for_the_cone_solver(width, options):
+    for seed, shape in enumerate([(14, 2, 2), (36, 6, 2), (8, 4, 3)]):
+        patterns, targets = examples(seed, *shape)
+        native, whole = (
+            ConeR(**{"tau": 12.0} | options, lb=-width, ub=width, engine=engine).fit(patterns, targets)
+            for engine in ("native", "cone solver")
+        )
+        assert native.status_ == "solved"
+        assert native.engine_ == "native"
+        if whole.status_ == "solved":  # it can fail where bounds are that wide
+            assert native.objective_ == pytest.approx(whole.objective_, rel=2e-6)
+        else:
+            assert native.objective_ <= whole.objective_ * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("engine", ["native", "cone solver"])
+@pytest.mark.parametrize("options", [{}, {"after_spike": "reset", "margin": 0.05, "norm": "square"}, {"lb": 0.01}])
+def test_a_problem_in_another_unit_of_potential_has_the_same_answer_in_that_unit(engine, options):
+    patterns, targets = examples(3, trains=20)
+    parameters = {"tau": 12.0, "lb": -1.0, "ub": 1.0, "engine": engine, **options}
+    cone = fitted(ConeR(**parameters), patterns, targets)
+
+    def in_units(times, **more):
+        names = ("theta_0", "theta_plus", "lb", "ub", "margin")
+        potentials = {name: times * getattr(cone, name) for name in names}
+        return fitted(ConeR(**parameters | potentials | more), patterns, targets)
+
+    for times in (2.0**12, 2.0**-9):  # no bit is lost on the way
+        other = in_units(times)
+        assert list(other.weights_) == list(times * cone.weights_)
+        assert (other.objective_, other.gap_) == (cone.objective_, cone.gap_)
+        assert in_units(times, max_seconds=60.0).refires_ == cone.refires_
+    for times in (50.0, 0.01):
+        assert in_units(times).objective_ == pytest.approx(cone.objective_, rel=2e-6)
+    # B over the number of targets is a square of potentials, and no ratio.
+    printed = fitted(ConeR(**parameters, divide_b_by="targets", lambdas=(1, 1, 1, 1, 1)), patterns, targets)
+    other = in_units(50.0, divide_b_by="targets", lambdas=(1, 1, 1 / 50**2, 1, 1))
+    assert sum(other.lambdas) * other.objective_ == pytest.approx(5 * printed.objective_, rel=2e-6)
+
+
+def test_a_start_in_another_unit_of_potential_is_a_start_too():
+    patterns, targets = examples(3, trains=20)
+    options = {"tau": 12.0, "theta_0": 15.0, "theta_plus": 10.0, "lb": -15.0, "ub": 15.0}
+    cone = fitted(ConeR(**options), patterns, targets)
+    again = fitted(ConeR(**options), patterns, targets, start=cone)
+    assert again.rounds_ <= 1
+    assert again.objective_ == pytest.approx(cone.objective_, rel=1e-6)
 
 
 def test_one_layout_serves_many_parameters_and_refuses_those_that_need_other_rows():

@@ -151,6 +151,18 @@ impl Neuron {
         Ok(())
     }
 
+    /// In units of how many mV the threshold is near its default: so what counts as met need not depend on the scale.
+    ///
+    /// A power of 2, so that nothing is rounded on the way there and back.
+    pub(crate) fn unit(&self) -> f64 {
+        (self.theta_0 / Self::default().theta_0).log2().round().exp2()
+    }
+
+    /// The same with its thresholds in units of this many mV.
+    pub(crate) fn in_units(&self, unit: f64) -> Self {
+        Self { theta_0: self.theta_0 / unit, theta_plus: self.theta_plus / unit, ..self.clone() }
+    }
+
     /// The time constant by which the threshold recovers, ms.
     #[must_use]
     pub fn tau_rec(&self) -> f64 {

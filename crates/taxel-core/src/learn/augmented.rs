@@ -27,6 +27,10 @@ const SHARPEST: f64 = 1e-8;
 /// Newton steps of a round, and rounds, at most.
 const STEPS: usize = 12;
 const ROUNDS: usize = 60;
+/// Steps of a round beyond its accuracy, where bounds far wider than what targets need ask for more.
+const FINER: usize = 3;
+/// Bounds beyond so many times the weights that targets need say nothing about the scale of the weights.
+const FAR: f64 = 30.0;
 /// A step is taken whole where the slope along it has fallen to this share at its end; a search stops at that of `EXACT`.
 const WHOLE: f64 = 0.05;
 const EXACT: f64 = 1e-3;
@@ -54,6 +58,10 @@ struct Engine<'a> {
     centre: Vec<f64>,
     /// Over how many mV kinks are rounded: silence, targets.
     delta: [f64; 2],
+    /// The least 6.14 so far.
+    most: f64,
+    /// How far weights lie apart that matter, mV: the bounds, unless they are far wider than what targets need.
+    width: f64,
     /// Curvature of what holds a weight at 0 or a bound, and of the proximal term.
     sigma: f64,
     rho: f64,
@@ -89,12 +97,14 @@ impl Problem {
         let mut best = self.point(objective, zero);
         let mut engine = Engine::new(self, objective, start, &best);
         let mut bound = engine.bound_at_zero(&best).max(0.0);
+        engine.most = best.parts.sum();
         if engine.started {
             let candidate = self.point(objective, engine.weights.clone());
             bound = bound.max(engine.bound());
             if candidate.parts.sum() < best.parts.sum() {
                 best = candidate;
             }
+            engine.most = best.parts.sum();
         }
         let (mut rounds, mut rows, mut stalled) = (0, 0, 0);
         let mut gap = relative(&best, bound);
@@ -102,27 +112,29 @@ impl Problem {
         while gap > tolerance && rounds < ROUNDS && stalled < 12 {
             rounds += 1;
             let accuracy = 0.03 * (best.parts.sum() - bound);
-            let mut reached = false;
+            let (mut reached, mut finer) = (false, 0);
             for _ in 0..STEPS {
                 if stop.asked() {
                     stopped = true;
                     break;
                 }
-                if engine.slope() <= accuracy {
-                    reached = true;
+                let (near, anywhere) = engine.slope();
+                reached |= near <= accuracy;
+                finer += usize::from(reached);
+                if anywhere <= accuracy || finer > FINER || !engine.step() {
                     break;
                 }
-                engine.step();
             }
             rows = engine.inside.len();
             let candidate = self.point(objective, engine.candidate());
             bound = bound.max(engine.bound());
+            let before = (gap, best.parts.sum());
             if candidate.parts.sum() < best.parts.sum() {
                 best = candidate;
             }
-            let before = gap;
+            engine.most = best.parts.sum();
             gap = relative(&best, bound);
-            stalled = if gap > 0.9 * before { stalled + 1 } else { 0 };
+            stalled = if gap > 0.9 * before.0 && engine.most > 0.99 * before.1 { stalled + 1 } else { 0 };
             progress(rounds, rows, best.parts.sum(), gap);
             engine.sharpen(reached);
             if stopped {
@@ -133,10 +145,13 @@ impl Problem {
     }
 }
 
-/// The share of the objective that is not proven; none where everything is met.
+/// The share of the objective that is not proven; none where everything is met, all where it is no number.
 pub(super) fn relative(best: &Point, bound: f64) -> f64 {
-    let least = best.parts.sum();
-    if least <= NOTHING { 0.0 } else { (least - bound).max(0.0) / least }
+    match best.parts.sum() {
+        least if least <= NOTHING => 0.0,
+        least if least.is_finite() => (least - bound).max(0.0) / least,
+        _ => f64::INFINITY,
+    }
 }
 
 /// An objective below this share of that of no weights at all is 0: everything is met.
@@ -162,6 +177,7 @@ impl<'a> Engine<'a> {
         let mut shares = start.shares.unwrap_or_default();
         shares.resize(total, 0.0);
         let widest = objective.upper.iter().zip(&objective.lower).fold(0.0_f64, |m, (u, l)| m.max(u.max(-l)));
+        let width = widest.min(FAR * problem.needed()).max(zero.weights.iter().fold(0.0, |m, w| w.abs().max(m)));
         let scratch = cholesky_in_place_scratch::<f64>(n, Par::Seq, faer::Spec::default());
         let mut engine = Self {
             started,
@@ -174,6 +190,8 @@ impl<'a> Engine<'a> {
             shares,
             held: vec![0.0; n],
             delta,
+            most: f64::INFINITY,
+            width,
             sigma: 1.0,
             rho: 1.0,
             gradient: vec![0.0; n],
@@ -191,8 +209,8 @@ impl<'a> Engine<'a> {
         }
         let most = (dot(&pull, &pull) / n as f64).sqrt();
         let size = (objective.l1 + objective.l2 / (n as f64).sqrt()).max(1e-3 * most).max(1e-12);
-        engine.sigma = if warm { 500.0 } else { 1.0 } * size / widest;
-        engine.rho = if warm { 1e-3 } else { 0.1 } * size / widest;
+        engine.sigma = if warm { 500.0 } else { 1.0 } * size / width;
+        engine.rho = if warm { 1e-3 } else { 0.1 } * size / width;
         if warm {
             engine.hold_still();
         }
@@ -214,8 +232,8 @@ impl<'a> Engine<'a> {
         }
     }
 
-    /// Computes the slope in the weights; gives how much 6.14 could fall along it within the bounds.
-    fn slope(&mut self) -> f64 {
+    /// Computes the slope in the weights; gives how much 6.14 could fall along it, over weights that matter and anywhere.
+    fn slope(&mut self) -> (f64, f64) {
         let (problem, o) = (self.problem, self.objective);
         let silent = problem.silent.len();
         self.multipliers();
@@ -242,13 +260,15 @@ impl<'a> Engine<'a> {
                 add(&mut self.gradient, 1.0, &pull);
             }
         }
-        let mut could = 0.0;
+        let (mut near, mut anywhere) = (0.0, 0.0);
         for n in 0..self.weights.len() {
             let w = self.weights[n];
             self.gradient[n] += self.rho * (w - self.centre[n]) + self.hold(n, w).0;
-            could += self.gradient[n].abs() * (o.upper[n] - o.lower[n]);
+            let apart = o.upper[n] - o.lower[n];
+            near += self.gradient[n].abs() * apart.min(2.0 * self.width);
+            anywhere += self.gradient[n].abs() * apart;
         }
-        could
+        (near, anywhere)
     }
 
     /// The slope of the norm; none where all weights are 0.
@@ -272,7 +292,9 @@ impl<'a> Engine<'a> {
         };
         let at = soft.clamp(o.lower[n], o.upper[n]);
         let held = at != soft || (soft == 0.0 && shift > 0.0);
-        (self.sigma * (z - at), held, at)
+        // Not sigma (z - at): z, at and w may be close, and sigma large.
+        let slope = if held { self.held[n] + self.sigma * (w - at) } else { o.l1.copysign(z) };
+        (slope, held, at)
     }
 
     /// Has l1 and the bounds hold against all else where the weights are at 0 or at a bound.
@@ -296,8 +318,8 @@ impl<'a> Engine<'a> {
         (0..self.weights.len()).map(|n| self.hold(n, self.weights[n]).2).collect()
     }
 
-    /// One Newton step, as long as an exact search along it finds best.
-    fn step(&mut self) {
+    /// One Newton step, as long as an exact search along it finds best; false where rounding leaves none.
+    fn step(&mut self) -> bool {
         let (problem, o) = (self.problem, self.objective);
         let n = self.weights.len();
         let silent = problem.silent.len();
@@ -324,9 +346,11 @@ impl<'a> Engine<'a> {
                 }
                 Norm::Norm => 0.0,
             };
+            let mut steepest = 0.0_f64;
             for i in 0..n {
                 let holding = if self.hold(i, self.weights[i]).1 { self.sigma } else { 0.0 };
                 self.hessian[i * n + i] += ridge + self.rho + holding;
+                steepest = steepest.max(self.hessian[i * n + i]);
             }
             let mut h = MatMut::from_column_major_slice_mut(&mut self.hessian, n, n);
             if count > 0 {
@@ -340,16 +364,20 @@ impl<'a> Engine<'a> {
             {
                 break;
             }
-            self.rho = (self.rho * 100.0).max(1e-12);
+            self.rho = (self.rho * 100.0).max(f64::EPSILON * steepest);
+            // A Hessian that is no number never factors.
+            if !self.rho.is_normal() {
+                return false;
+            }
         }
         let mut direction: Vec<f64> = self.gradient.iter().map(|g| -g).collect();
         let h = MatRef::from_column_major_slice(&self.hessian, n, n);
         let stack = MemStack::new(&mut self.memory);
         solve_in_place(h, MatMut::from_column_major_slice_mut(&mut direction, n, 1), Par::Seq, stack);
-        self.move_along(&direction);
+        self.move_along(&direction)
     }
 
-    fn move_along(&mut self, direction: &[f64]) {
+    fn move_along(&mut self, direction: &[f64]) -> bool {
         let (problem, o) = (self.problem, self.objective);
         let silent = problem.silent.len();
         let mut rise = Vec::with_capacity(self.excess.len());
@@ -375,7 +403,7 @@ impl<'a> Engine<'a> {
         };
         let start = dot(&self.gradient, direction);
         let mut end = 1.0;
-        let mut t = loop {
+        let t = loop {
             let (passing, steady) = self.passing(&rise, end);
             let slope = |t: f64| self.slope_along(t, direction, smooth, steady, &passing);
             let (mut low, mut at_low, mut high, mut at_high) = (0.0, start, end, slope(end));
@@ -404,12 +432,14 @@ impl<'a> Engine<'a> {
             }
             break t;
         };
-        if !t.is_finite() {
-            t = 0.0;
+        // From an infinite direction not even a step of 0 leads to numbers.
+        if !(t.is_finite() && start.is_finite()) {
+            return false;
         }
         add(&mut self.weights, t, direction);
         self.excess.iter_mut().zip(&rise).for_each(|(x, r)| *x += t * r);
         add(&mut self.behind, t, &lift);
+        true
     }
 
     /// The kinks that a step as long as `end` passes, and the slope of all that lie beyond theirs throughout.
@@ -468,7 +498,7 @@ impl<'a> Engine<'a> {
             multipliers: &self.factors,
             pull,
         };
-        self.problem.bound(self.objective, &at)
+        self.problem.bound(self.objective, &at, self.most)
     }
 
     /// What no weights at all prove: the subgradient of the norm that lies nearest to all other slopes there.
@@ -517,7 +547,7 @@ impl<'a> Engine<'a> {
             multipliers: &multipliers,
             pull: &pull,
         };
-        problem.bound(o, &at)
+        problem.bound(o, &at, zero.parts.sum())
     }
 
     /// The multipliers move to the slopes found, kinks get sharper, the proximal term lets go.

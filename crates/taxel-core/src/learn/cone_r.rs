@@ -163,6 +163,12 @@ impl ConeR {
         Layout { neuron: &self.neuron, horizon: self.horizon, margin: self.margin, near_ms: START_NEAR_MS }
     }
 
+    /// The same with all potentials in units of this many mV.
+    fn in_units(&self, unit: f64) -> Self {
+        let (lb, ub) = (self.lb.times(1.0 / unit), self.ub.times(1.0 / unit));
+        Self { neuron: self.neuron.in_units(unit), lb, ub, margin: self.margin / unit, ..self.clone() }
+    }
+
     /// `lambda` over its sum, as in 6.3.3.
     fn shares(&self) -> [f64; 5] {
         let sum: f64 = self.lambdas.iter().sum();
@@ -254,9 +260,12 @@ pub struct Fit {
 }
 
 /// The rows of one set of examples: made once, solved for many `lambdas`, `kappa`, bounds and divisors.
+///
+/// Inside, potentials are in units of `unit` mV, see [`Neuron::unit`].
 #[derive(Debug, Clone)]
 pub struct Problem {
     pub(super) base: ConeR,
+    unit: f64,
     patterns: Vec<SpikeTrains>,
     pub(super) trains: usize,
     pub(super) targets: Arc<Vec<TargetRow>>,
@@ -287,6 +296,24 @@ impl Objective {
         let (l1, l2, b, c, d) = (self.l1 * scale, self.l2 * scale, self.b * scale, self.c * scale, self.d * scale);
         Self { l1, l2, b, c, d, ..self.clone() }
     }
+
+    /// No weights whose 6.14 is `most` or less hold one larger than this: l1 and l2 alone would come to more.
+    pub(super) fn reach(&self, most: f64) -> f64 {
+        let reach = match self.norm {
+            Norm::Norm => most / (self.l1 + self.l2),
+            Norm::Square => (most / self.l1).min((most / self.l2).sqrt()),
+        };
+        // Nothing is lost by rounding; where there is neither, nothing is said.
+        if reach.is_nan() { f64::INFINITY } else { reach * (1.0 + 1e-9) }
+    }
+
+    /// The same within bounds as narrow as that: the least lies within them too.
+    pub(super) fn within_reach(&self, most: f64) -> Self {
+        let reach = self.reach(most);
+        let lower = self.lower.iter().map(|l| l.max(-reach)).collect();
+        let upper = self.upper.iter().map(|u| u.min(reach)).collect();
+        Self { lower, upper, ..self.clone() }
+    }
 }
 
 impl Problem {
@@ -311,13 +338,16 @@ impl Problem {
     }
 
     fn laid_out(parameters: &ConeR, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Self> {
+        let unit = parameters.neuron.unit();
+        let parameters = parameters.in_units(unit);
         let neuron = &parameters.neuron;
         let rows = target_rows(neuron, parameters.delta_t(), patterns, targets);
         stop.check()?;
         let silent = SilentRows::new(parameters.layout(), patterns, targets, stop)?;
         let trains = patterns[0].len();
         let mut problem = Self {
-            base: parameters.clone(),
+            base: parameters,
+            unit,
             patterns: patterns.to_vec(),
             trains,
             targets: Arc::new(rows),
@@ -378,6 +408,7 @@ impl Problem {
     pub(super) fn of_rows(&self, rows: &[usize]) -> Self {
         Self {
             base: self.base.clone(),
+            unit: self.unit,
             patterns: vec![],
             trains: self.trains,
             targets: Arc::clone(&self.targets),
@@ -411,6 +442,14 @@ impl Problem {
         self.silent.limit.iter().filter(|l| l.is_finite()).count()
     }
 
+    /// How large weights must be for targets to be met, mV.
+    pub(super) fn needed(&self) -> f64 {
+        let length = |row: &TargetRow| dot(&row.at, &row.at).sqrt();
+        let (thresholds, lengths) =
+            self.targets.iter().fold((0.0, 0.0), |sum, row| (sum.0 + row.threshold, sum.1 + length(row)));
+        if lengths > 0.0 { thresholds / lengths } else { f64::INFINITY }
+    }
+
     /// The five normalised weights of 6.14.
     ///
     /// Reading: 6.3.2 takes each term's largest value over the bounds, which lie at -ub and ub; where they do not, over
@@ -439,7 +478,8 @@ impl Problem {
             },
             b: match parameters.divide_b_by {
                 Divisor::Largest => over(b, b_max),
-                Divisor::Targets => b / self.targets.len().max(1) as f64,
+                // A sum of squares over a number: the one term that is no ratio of potentials.
+                Divisor::Targets => b / self.targets.len().max(1) as f64 * self.unit.powi(2),
             },
             c: over(c, c_max),
             d: over(d, d_max),
@@ -478,10 +518,13 @@ impl Problem {
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
     ) -> Result<Fit> {
+        parameters.check()?;
+        let parameters = &parameters.in_units(self.unit);
         self.check_same_rows(parameters)?;
         let objective = self.objective(parameters)?;
         let start = self.start_from(&objective, start)?;
         let found = self.minimise(&objective, parameters.tolerance, parameters.engine, start, progress, stop)?;
+        let weights: Vec<f64> = found.weights.iter().map(|w| w * self.unit).collect();
         let kept = || found.shares.iter().enumerate().filter(|s| *s.1 != 0.0);
         Ok(Fit {
             objective: found.objective,
@@ -493,8 +536,8 @@ impl Problem {
             engine: found.engine,
             multipliers: Shares { rows: kept().map(|s| s.0).collect(), values: kept().map(|s| *s.1).collect() },
             unreachable: self.unreachable(&objective),
-            refires: self.refires(&found.weights, pattern)?,
-            weights: found.weights,
+            refires: self.refires(&weights, pattern)?,
+            weights,
         })
     }
 
@@ -502,7 +545,7 @@ impl Problem {
         let Some((weights, multipliers)) = start else { return Ok(Start::default()) };
         self.base.neuron.check_weights(weights, self.trains)?;
         let within = weights.iter().zip(objective.lower.iter().zip(&objective.upper));
-        let weights = Some(within.map(|(w, (&low, &high))| w.clamp(low, high)).collect());
+        let weights = Some(within.map(|(w, (&low, &high))| (w / self.unit).clamp(low, high)).collect());
         let Some(multipliers) = multipliers else { return Ok(Start { weights, shares: None }) };
         let silent = self.silent.len();
         let mut shares = vec![0.0; silent + self.targets.len()];
@@ -526,7 +569,6 @@ impl Problem {
     }
 
     fn check_same_rows(&self, parameters: &ConeR) -> Result<()> {
-        parameters.check()?;
         let base = &self.base;
         let same = parameters.neuron == base.neuron
             && parameters.delta_t() == base.delta_t()
@@ -547,10 +589,11 @@ impl Problem {
 
     fn refires(&self, weights: &[f64], only: Option<usize>) -> Result<usize> {
         let mut refires = 0;
+        let neuron = self.base.neuron.in_units(1.0 / self.unit);
         for (p, pattern) in self.patterns.iter().enumerate().filter(|(p, _)| only.is_none_or(|one| one == *p)) {
-            let spikes = self.base.neuron.run(weights, pattern, 1.0, Stop::never())?;
+            let spikes = neuron.run(weights, pattern, 1.0, Stop::never())?;
             let targets: Vec<f64> = self.targets.iter().filter(|r| r.pattern == p).map(|r| r.t).collect();
-            let again = |a: f64, b: f64| b - a <= self.base.neuron.tau && !targets.iter().any(|&t| a < t && t <= b);
+            let again = |a: f64, b: f64| b - a <= neuron.tau && !targets.iter().any(|&t| a < t && t <= b);
             refires += spikes.windows(2).filter(|w| again(w[0].t, w[1].t)).count();
         }
         Ok(refires)

@@ -168,9 +168,7 @@ impl ConeX {
     /// The same with all potentials in units of this many mV.
     fn in_units(&self, unit: f64) -> Self {
         let Margin { height, slope } = self.margin().times(1.0 / unit);
-        let mut neuron = self.neuron.clone();
-        neuron.theta_0 /= unit;
-        neuron.theta_plus /= unit;
+        let neuron = self.neuron.in_units(unit);
         let (lb, ub) = (self.lb.times(1.0 / unit), self.ub.times(1.0 / unit));
         Self { neuron, lb, ub, margin: Some(height), slope: Some(slope), ..self.clone() }
     }
@@ -241,8 +239,7 @@ pub struct Fit {
 
 /// A stated problem, ready to be solved.
 ///
-/// Inside, potentials are in units in which the threshold is near the thesis' 0.3 mV, so that what counts as met does not
-/// depend on the scale; a power of 2, so that nothing is rounded on the way.
+/// Inside, potentials are in units of `Neuron::unit` mV.
 #[derive(Debug, Clone)]
 pub struct Problem {
     parameters: ConeX,
@@ -326,7 +323,7 @@ impl Problem {
     pub fn new(parameters: &ConeX, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Self> {
         parameters.check()?;
         check_examples(&parameters.neuron, patterns, targets)?;
-        let unit = (parameters.neuron.theta_0 / Neuron::default().theta_0).log2().round().exp2();
+        let unit = parameters.neuron.unit();
         let parameters = parameters.in_units(unit);
         let neuron = &parameters.neuron;
         let trains = patterns[0].len();

@@ -36,9 +36,9 @@ impl Problem {
     ) -> Result<Found> {
         let limits = objective.lower.iter().zip(&objective.upper);
         let zero: Vec<f64> = limits.map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
-        let at_zero = self.point(objective, zero).parts.sum();
+        let at_zero = self.point(objective, zero.clone()).parts.sum();
         let scale = if at_zero > 0.0 { 1.0 / at_zero } else { 1.0 };
-        let objective = &objective.scaled(scale);
+        let objective = &objective.scaled(scale).within_reach(at_zero * scale);
         let mut before = 0;
         let mut told = |round: usize, rows, least: f64, gap| {
             progress(Round { round, rows, objective: least / scale, gap });
@@ -52,7 +52,7 @@ impl Problem {
             }
         } else {
             let near = weights.is_some();
-            let from = self.point(objective, weights.unwrap_or_else(|| vec![0.0; self.trains]));
+            let from = self.point(objective, weights.unwrap_or(zero));
             self.by_rounds(objective, tolerance, (from, 0.0, near), &mut told, stop)?
         };
         let open = |best, bound| relative(best, bound) > tolerance;

@@ -34,13 +34,14 @@ impl Problem {
         Point { weights, excess, behind, parts }
     }
 
-    /// A value that 6.14 cannot fall below, whatever the weights within the bounds.
+    /// A value that 6.14 cannot fall below, whatever the weights within the bounds, given that it can be `most` or less.
     ///
     /// Every term is replaced by a tangent below it, taken at some weights (which need not lie within the bounds): silence by
     /// multipliers between 0 and D's weight, targets by multipliers between minus and plus C's, the norm by a `pull` no
     /// longer than its factor, a square by its slope. What is left is linear and l1 over the box, and has its least value
     /// synapse by synapse. So the bound holds whoever found the multipliers, and however.
-    pub(super) fn bound(&self, objective: &Objective, at: &Tangents<'_>) -> f64 {
+    pub(super) fn bound(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> f64 {
+        let reach = objective.reach(most);
         let silent = self.silent.len();
         let mut gradient = vec![0.0; self.trains];
         self.silent.add_sum(&at.multipliers[..silent], &mut gradient);
@@ -67,7 +68,7 @@ impl Problem {
         }
         for (n, (&g, &w)) in gradient.iter().zip(at.weights).enumerate() {
             let cost = |v: f64| g * (v - w) + objective.l1 * v.abs();
-            let (lower, upper) = (objective.lower[n], objective.upper[n]);
+            let (lower, upper) = (objective.lower[n].max(-reach), objective.upper[n].min(reach));
             let ends = cost(lower).min(cost(upper));
             bound += if lower < 0.0 && upper > 0.0 { ends.min(cost(0.0)) } else { ends };
         }

@@ -70,6 +70,7 @@ impl Problem {
     ) -> Result<Rounds> {
         let mut accuracy = (0.001 * tolerance).min(1e-7);
         let (mut best, mut bound, near_best) = start;
+        let objective = &objective.within_reach(best.parts.sum());
         let (mut rounds, mut rows, near) = (0, 0, NEAR * self.base.neuron.theta_0);
         let mut shares = vec![0.0; best.excess.len()];
         let solve = |kept: &Kept, accuracy| match self.program(objective, kept).solve(1.0, accuracy, stop) {
@@ -100,7 +101,7 @@ impl Problem {
                 multipliers: &multipliers,
                 pull: &answer.pull,
             };
-            let proven = self.bound(objective, &at);
+            let proven = self.bound(objective, &at, best.parts.sum());
             if proven > bound {
                 bound = proven;
                 shares = multipliers;
