@@ -261,7 +261,7 @@ pub struct Fit {
 
 /// The rows of one set of examples: made once, solved for many `lambdas`, `kappa`, bounds and divisors.
 ///
-/// Inside, potentials are in units of `unit` mV, a power of 2 near the threshold.
+/// Inside, potentials are in units of `unit` mV, a power of 2 near theta_0 over 0.3.
 #[derive(Debug, Clone)]
 pub struct Problem {
     pub(super) base: ConeR,
