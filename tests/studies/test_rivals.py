@@ -97,3 +97,21 @@ def test_the_tempotrons_toy_run_solves_small_loads(tmp_path):
     (line,) = section["said"]["lines"]
     assert line["solved"] == line["runs"] == 3
     assert all(share == 1.0 for share in line["right"])
+
+
+def test_no_curve_leaves_its_panel():
+    lines = [
+        {"protocol": protocol, "rule": rule, "updates": "batch", "published": 0.1, "inputs": [200, 400], "load": load}
+        for protocol, rule, load in [
+            ("a", "FILT", [0.1, 0.12]),
+            ("a", "ConeX", [0.2, 0.21]),
+            ("b", "FILT", [0.05, 0.06]),
+            ("b", "ConeX", [0.25, 0.3]),
+        ]
+    ]
+    figure = load("rivals").draw({"protocols": ["a", "b"], "rules": ["FILT", "ConeX"]}, {"lines": lines})
+    for ax in figure.axes:
+        low, high = ax.get_ylim()
+        for line in ax.lines:
+            assert low <= min(line.get_ydata())
+            assert max(line.get_ydata()) <= high

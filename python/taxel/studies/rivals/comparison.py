@@ -164,7 +164,8 @@ def draw(p: Parameters, said: Said) -> Figure:
                 ax.axhline(line["published"], color=f"C{k}", lw=0.8, ls=":")
         ax.set_title(titles[protocol], fontsize="medium")
         ax.set_xlabel("inputs N")
-        ax.set_ylim(bottom=0)
+    # Once all is drawn: a limit set before would keep what the first panel needs.
+    axes[0].set_ylim(bottom=0)
     axes[0].set_ylabel("largest load p / N; dotted: published, other criteria")
     axes[-1].legend(fontsize="x-small", loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
