@@ -9,13 +9,9 @@ not counted; for ConeX it is the whole `fit`.
 import argparse
 import json
 import math
-import os
-import resource
-import subprocess
 import sys
 import time
 import warnings
-from pathlib import Path
 
 import clarabel
 import cvxpy as cp
@@ -23,6 +19,7 @@ import highspy
 import numpy as np
 import piqp
 import scipy.sparse as sp
+from _peer import ask
 from _rounds import WIDEST, measure, stamp
 
 from taxel import SpikeTrains
@@ -212,28 +209,6 @@ def peer(name, n, p):
     return {"cpu_s": took, "verdict": verdict, "objective": objective}
 
 
-def ask(name, n, p, limit):
-    """Run a peer in a process of its own, stopped after `limit` seconds of CPU."""
-
-    def cap():
-        resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
-
-    said = subprocess.run(
-        [sys.executable, __file__, name, str(n), str(p)],
-        preexec_fn=cap,
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1"),
-        cwd=Path(__file__).parent,
-    )
-    if said.returncode == 0:
-        return json.loads(said.stdout.splitlines()[-1])
-    if said.returncode in (-9, -24):
-        return {"stopped": f"after {limit} s of CPU, without a verdict"}
-    return {"failed": said.stderr.strip().splitlines()[-1:] or [f"exit status {said.returncode}"]}
-
-
 def against(n, p, limit, rounds, peers):
     """Measure one case: ConeX in rounds, then each peer once."""
     patterns, targets = trains(*draw(n, p))
@@ -247,7 +222,7 @@ def against(n, p, limit, rounds, peers):
     else:
         out["ConeX"]["certificate checked"] = bool(check_certificate(cone.problem_, cone.certificate_))
     for name in peers:
-        found = ask(name, n, p, limit)
+        found = ask(__file__, name, n, p, limit=limit)
         seconds = found.get("cpu_s", limit)
         found["times ConeX"] = round(float(seconds / ours["cpu_s"]["median"]), 1)
         if "stopped" in found:

@@ -6,16 +6,13 @@ CPU (quick: 1 minute); its time is that of `solve`, the rows having been stated;
 
 import argparse
 import json
-import os
-import resource
-import subprocess
 import sys
 import time
 import warnings
-from pathlib import Path
 
 import cvxpy as cp
 import numpy as np
+from _peer import ask
 from _rounds import WIDEST, measure, stamp
 
 from taxel import SpikeTrains
@@ -67,24 +64,6 @@ def peer(trains, patterns, lambdas):
     return {"cpu_s": time.process_time() - begun, "verdict": problem.status, "objective": float(problem.value)}
 
 
-def ask(trains, patterns, lambdas, limit):
-    """Run the peer in a process of its own, stopped after `limit` seconds of CPU."""
-    said = subprocess.run(
-        [sys.executable, __file__, *map(str, (trains, patterns, *lambdas))],
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (limit, limit)),
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "RAYON_NUM_THREADS"), "1"),
-        cwd=Path(__file__).parent,
-    )
-    if said.returncode == 0:
-        return json.loads(said.stdout.splitlines()[-1])
-    if said.returncode in (-9, -24):
-        return {"stopped": f"after {limit} s of CPU, without a verdict"}
-    return {"failed": said.stderr.strip().splitlines()[-1:] or [f"exit status {said.returncode}"]}
-
-
 def case(trains, patterns, lambdas, rounds, limit):
     """One size and mix: ConeX, then the peer once (a limit of 0: not at all)."""
     spikes, targets = draw(trains, patterns)
@@ -102,7 +81,7 @@ def case(trains, patterns, lambdas, rounds, limit):
     }
     out = {"ConeX": ours | said}
     if limit:
-        found = ask(trains, patterns, lambdas, limit)
+        found = ask(__file__, trains, patterns, *lambdas, limit=limit)
         ratio = round(found.get("cpu_s", limit) / ours["cpu_s"]["median"], 1)
         found["times ConeX, at least" if "stopped" in found else "times ConeX"] = ratio
         if found.get("verdict") == "optimal":
