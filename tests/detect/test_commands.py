@@ -159,17 +159,23 @@ def test_notes_can_be_the_labels_and_registers_give_the_frame(folder: Path, tmp_
         assert np.abs(frames - np.round(frames)).max() * frame_us < 1.0
 
 
-def test_without_a_recipe_it_starts_from_the_gait_recipe_of_the_unit(tmp_path: Path, capsys) -> None:
-    random = np.random.default_rng(0)
-    values = np.zeros((900, 1, 4))
-    steps = np.arange(50, 850, 100) + random.integers(-10, 10, 8)
+def walk(folder: Path, seconds: int) -> Path:
+    """Leave a footfall a second on 4 sensors as ``walk.npz``; give the table of its labels."""
+    values = np.zeros((100 * seconds, 1, 4))
+    steps = np.arange(50, 100 * seconds - 50, 100)
+    steps += np.random.default_rng(0).integers(-10, 10, len(steps))
     for k in steps:
         for n in range(4):
             values[k + 3 * n : k + 50 + 3 * n, 0, n] = 60.0
-    taxel.convert(taxel.Frames(values, np.arange(900) * 10_000, unit="N"), tmp_path / "walk.npz")
-    labels = tmp_path / "labels.csv"
+    frames = taxel.Frames(values, np.arange(len(values)) * 10_000, unit="N")
+    taxel.convert(frames, folder / "walk.npz", overwrite=True)
     rows = [f"contact,{k * 10_000}\nfoot-off,{(k + 59) * 10_000}\n" for k in steps]
-    labels.write_text("label,t_us\n" + "".join(rows))
+    (folder / "labels.csv").write_text("label,t_us\n" + "".join(rows))
+    return folder / "labels.csv"
+
+
+def test_without_a_recipe_it_starts_from_the_gait_recipe_of_the_unit(tmp_path: Path, capsys) -> None:
+    labels = walk(tmp_path, 9)
     out = tmp_path / "gait.json"
     arguments = ("train", tmp_path / "walk.npz", "--labels", labels, "--out", out, "--overwrite")
     code, said, _ = call(capsys, *arguments, "--json")
@@ -184,6 +190,9 @@ def test_without_a_recipe_it_starts_from_the_gait_recipe_of_the_unit(tmp_path: P
     readout = taxel.Readout.load(out)
     assert (readout.encoder.levels, readout.neurons["contact"].delay_ms) == ([5.0, 50.0], 10.0)
     assert {trained.neuron.tau for trained in readout.neurons.values()} == {20.0}
+    walk(tmp_path, 15)  # its running range wants 10 s
+    assert call(capsys, *arguments, "--recipe", "gaitndd", "--json")[0] == 0
+    assert taxel.Readout.load(out).encoder.running_range is not None
 
 
 def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:

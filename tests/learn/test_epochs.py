@@ -34,7 +34,9 @@ def test_a_batch_epoch_adds_up_what_each_pattern_asks(name):
     trained = learner.fit(shown, wanted, start=start)
     asked = sum(learner.change(start, p, t)[0] for p, t in zip(shown, wanted, strict=True))
     eta = learner.eta if learner.eta is not None else 600 / (40 * 6)
+    after = RULES[name](updates="batch", epochs=0).fit(shown, wanted, start=start + eta * asked)
     assert np.any(asked != 0)
+    assert trained.right_[1] == after.right_[0]
     assert trained.best_epoch_ == 1  # of weights that are right equally often the latest are kept
     assert trained.weights_ == pytest.approx(start + eta * asked, rel=1e-12)
 

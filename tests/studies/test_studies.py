@@ -47,6 +47,7 @@ def test_a_study_of_toy_size_gives_its_statements_and_a_picture(report, name):
         assert statement["says"].endswith(".")
         assert statement["published"]
         assert statement["ours"]
+        assert statement["holds"] in (True, False, None)
         assert statement["holds"] is not False or statement["why"]
     assert (report / name / "summary.json").exists()
     for picture in json.loads((report / name / "summary.json").read_text())["pictures"]:
