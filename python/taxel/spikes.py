@@ -96,16 +96,17 @@ class SpikeTrains:
         ------
         ProblemError : times that make no sense (names train and spike)
         """
-        arrays = _by_train("times", times, np.float64)
-        signed = None if values is None else _by_train("values", values, np.float32)
-        if signed is not None and [len(v) for v in signed] != [len(a) for a in arrays]:
-            raise ProblemError("values: must have the lengths of the trains, one value a spike")
-        flat = np.concatenate(arrays) if arrays else np.empty(0)
-        offsets = np.concatenate([[0], np.cumsum([len(a) for a in arrays])]).astype(np.int64)
+        flat, counts = _by_train("times", times, np.float64)
+        signed = None
+        if values is not None:
+            signed, valued = _by_train("values", values, np.float32)
+            if valued != counts:
+                raise ProblemError("values: must have the lengths of the trains, one value a spike")
+        offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # What is not finite is refused below, by its place.
-            stop = max(number("start", start), *flat[np.isfinite(flat)].tolist(), -np.inf)
-        return cls(flat, offsets, start, stop, np.concatenate(signed) if signed else None)
+            stop = float(max(number("start", start), np.max(flat[np.isfinite(flat)], initial=-np.inf)))
+        return cls(flat, offsets, start, stop, signed)
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -418,12 +419,23 @@ class SpikeTrains:
         return f"SpikeTrains({len(self)} trains, {len(self.times)} spikes{signed}, {self.start:g} to {self.stop:g} ms)"
 
 
-def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> list[NDArray[Any]]:
+def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[NDArray[Any], list[int]]:
+    """Return all entries, train after train, and how many each train has."""
     try:
         entries = list(lists)
     except TypeError:
         raise ProblemError(f"{name} is {shown(lists)}: must be one list a train") from None
-    return [column(f"{name}[{n}]", np.atleast_1d(np.asarray(entry, object)), dtype) for n, entry in enumerate(entries)]
+    if not entries:
+        return np.empty(0, dtype), []
+    try:
+        # All trains at once: a thousand of one spike each cost little more than one of a thousand.
+        arrays = [np.asarray(entry, object) for entry in entries]
+        return column(name, np.concatenate(arrays), dtype), [len(array) for array in arrays]
+    except (ProblemError, TypeError, ValueError):
+        # One by one, which names the train.
+        each = [np.atleast_1d(np.asarray(entry, object)) for entry in entries]
+        columns = [column(f"{name}[{n}]", array, dtype) for n, array in enumerate(each)]
+        return np.concatenate(columns), [len(values) for values in columns]
 
 
 @contextmanager

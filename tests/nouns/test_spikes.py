@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from taxel import SpikeTrains
+from taxel._arguments import column
 from taxel._core import FormatError, ProblemError
 
 mpl.use("Agg")
@@ -232,6 +233,17 @@ def test_nonsense_in_an_argument_is_one_error_with_its_place(arguments: tuple, s
     with pytest.raises(ProblemError, match=said) as caught:
         SpikeTrains.from_lists(*arguments)
     assert "\n" not in str(caught.value)
+
+
+def test_trains_are_converted_together_and_not_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    monkeypatch.setattr("taxel.spikes.column", lambda name, *rest: seen.append(name) or column(name, *rest))
+    for lists in ([[0.5]] * 1000, np.full((1000, 1), 0.5), [np.array([0.5])] * 1000, [(1,), [], [True, 2.5]] * 333):
+        trains = SpikeTrains.from_lists(lists, stop=3.0, values=[[1.0] * len(entry) for entry in lists])
+        assert list(map(list, trains)) == [list(map(float, entry)) for entry in lists]
+    assert set(seen) == {"times", "values", "offsets"}
+    with pytest.raises(ProblemError, match=r"times\[700\]: "):
+        SpikeTrains.from_lists([[0.5]] * 700 + [["soon"]] + [[0.5]] * 300)
 
 
 @pytest.mark.parametrize(
