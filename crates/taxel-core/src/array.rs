@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::allowed::above_0;
 use crate::{Result, problem};
 
 /// The geometry of a sensor: rows, columns, the pitch between taxels, and which taxels exist.
@@ -32,9 +33,7 @@ impl Array {
         if rows == 0 || columns == 0 {
             return Err(problem!("array of {rows} x {columns} taxels: needs 1 row and 1 column or more"));
         }
-        if !(pitch_mm.is_finite() && pitch_mm > 0.0) {
-            return Err(problem!("pitch_mm is {pitch_mm}: must be above 0 and finite"));
-        }
+        above_0("pitch_mm", pitch_mm, "")?;
         Ok(Self { rows, columns, pitch_mm, name: name.to_owned(), exists: None })
     }
 

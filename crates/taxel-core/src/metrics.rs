@@ -176,15 +176,6 @@ fn summed(
     Ok(sum)
 }
 
-/// Refuses a parameter that is not above 0 and finite.
-fn above_0(name: &str, value: f64, unit: &str) -> Result<()> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(problem!("{name} is {value} {unit}: must be above 0 and finite"))
-    }
-}
-
 /// Refuses a cost below 0.
 fn cost(name: &str, value: f64, unit: &str) -> Result<()> {
     if value >= 0.0 { Ok(()) } else { Err(problem!("{name} is {value}{unit}: must be 0 or more")) }

@@ -16,6 +16,7 @@ pub use streaming::{NeuronStream, OutputSpike};
 
 use serde::{Deserialize, Serialize};
 
+use crate::allowed::{above_0, at_least_0, one_weight_a_train};
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// What remains of the inputs after the neuron's own spike.
@@ -117,22 +118,18 @@ impl Neuron {
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        let above_0 = [
+        let all = [
             ("tau", self.tau, "ms"),
             ("theta_0", self.theta_0, "mV"),
             ("tau_rec", self.tau_rec(), "ms"),
             ("tau_s", self.tau_s(), "ms"),
             ("step_ms", self.step_ms, "ms"),
         ];
-        for (name, value, unit) in above_0 {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(problem!("{name} is {value} {unit}: must be above 0 and finite"));
-            }
+        for (name, value, unit) in all {
+            above_0(name, value, unit)?;
         }
         for (name, value, unit) in [("theta_plus", self.theta_plus, "mV"), ("refractory", self.refractory, "ms")] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(problem!("{name} is {value} {unit}: must be 0 or more and finite"));
-            }
+            at_least_0(name, value, unit)?;
         }
         if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
             return Err(problem!("tau_s is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
@@ -260,17 +257,7 @@ impl Neuron {
         if trains.values.is_some() {
             return Err(problem!("trains: spikes are signed, split them into ON and OFF trains first"));
         }
-        self.check_weights(weights, trains.len())
-    }
-
-    pub(crate) fn check_weights(&self, weights: &[f64], trains: usize) -> Result<()> {
-        if weights.len() != trains {
-            return Err(problem!("weights: {} for {trains} trains, must be one a train", weights.len()));
-        }
-        if let Some(n) = weights.iter().position(|w| !w.is_finite()) {
-            return Err(problem!("weights[{n}] is {}: must be finite", weights[n]));
-        }
-        Ok(())
+        one_weight_a_train(weights, trains.len())
     }
 
     /// Whether an input at `t` is lost, given the last output spike before it.

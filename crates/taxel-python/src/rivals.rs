@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::learn::{Ended, Rival, Skim, SteppedNeuron, Tempotron, Trained};
+use taxel_core::learn::rivals::{Ended, Rival, Skim, SteppedNeuron, Tempotron, Trained};
 use taxel_core::{Result as CoreResult, SpikeTrains, Stop, problem};
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};

@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
+use crate::allowed::{is_above_0, is_at_least_0};
 use crate::{Error, Result};
 
 /// Open-cell foam: elastic, then collapsing, then dense (Gibson and Ashby, *Cellular Solids*, chapter 5).
@@ -59,29 +60,28 @@ impl Foam {
     pub fn check(&self) -> Result<()> {
         let wrong =
             |name: &str, value: f64, right: &str| Err(Error::Scene(format!("foam: {name} is {value}: {right}")));
-        let above_0 = |x: f64| x.is_finite() && x > 0.0;
-        if !above_0(self.modulus_kpa) {
+        if !is_above_0(self.modulus_kpa) {
             return wrong("modulus_kpa", self.modulus_kpa, "must be above 0");
         }
-        if !above_0(self.thickness_mm) {
+        if !is_above_0(self.thickness_mm) {
             return wrong("thickness_mm", self.thickness_mm, "must be above 0");
         }
         if !(0.0..0.5).contains(&self.poisson) {
             return wrong("poisson", self.poisson, "must be from 0 to below 0.5");
         }
-        if !(above_0(self.yield_strain) && self.yield_strain < self.densification_strain - SOLID) {
+        if !(is_above_0(self.yield_strain) && self.yield_strain < self.densification_strain - SOLID) {
             return wrong("yield_strain", self.yield_strain, "must be above 0 and well below densification_strain");
         }
-        if !(above_0(self.densification_strain) && self.densification_strain <= 1.0) {
+        if !(is_above_0(self.densification_strain) && self.densification_strain <= 1.0) {
             return wrong("densification_strain", self.densification_strain, "must be above 0, at most 1");
         }
         if !(self.exponent > 1.0 && self.exponent < 2.0) {
             return wrong("exponent", self.exponent, "must be above 1 and below 2");
         }
-        if !(self.damping_s_m.is_finite() && self.damping_s_m >= 0.0) {
+        if !is_at_least_0(self.damping_s_m) {
             return wrong("damping_s_m", self.damping_s_m, "must be 0 or more");
         }
-        if !(self.dashpot_ms.is_finite() && self.dashpot_ms >= 0.0) {
+        if !is_at_least_0(self.dashpot_ms) {
             return wrong("dashpot_ms", self.dashpot_ms, "must be 0 or more");
         }
         Ok(())

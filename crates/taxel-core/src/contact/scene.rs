@@ -6,6 +6,7 @@ use rand::rngs::StdRng;
 use serde::{Deserialize, Serialize};
 
 use super::Foam;
+use crate::allowed::is_above_0;
 use crate::{Array, Error, Result};
 
 /// How far from the array's edge drawn scenes stay, mm: within it the layer's influence would be cut off.
@@ -134,14 +135,13 @@ impl Scene {
     pub fn check(&self) -> Result<()> {
         self.foam.check()?;
         check_radius(self.ball.radius_mm, &self.foam)?;
-        let above_0 = |x: f64| x.is_finite() && x > 0.0;
         let waits = |x: f64| (0.0..=60_000.0).contains(&x);
         let wrong =
             |name: &str, value: f64, right: &str| Err(Error::Scene(format!("scene: {name} is {value}: {right}")));
-        if !above_0(self.ball.mass_g) {
+        if !is_above_0(self.ball.mass_g) {
             return wrong("mass_g", self.ball.mass_g, "must be above 0");
         }
-        if !(above_0(self.drop_mm) && self.drop_mm <= 2_000.0) {
+        if !(is_above_0(self.drop_mm) && self.drop_mm <= 2_000.0) {
             return wrong("drop_mm", self.drop_mm, "must be above 0, at most 2000");
         }
         for (name, place) in [("x_mm", self.x_mm), ("y_mm", self.y_mm)] {
@@ -159,7 +159,7 @@ impl Scene {
                 if *after == 0 {
                     return wrong("after", 0.0, "must be 1 impact or more");
                 }
-                if !(above_0(press.peak_n) && press.peak_n <= 100.0) {
+                if !(is_above_0(press.peak_n) && press.peak_n <= 100.0) {
                     return wrong("peak_n", press.peak_n, "must be above 0, at most 100");
                 }
                 if !(press.speed_mm_s >= 1.0 && press.speed_mm_s <= 2_000.0) {

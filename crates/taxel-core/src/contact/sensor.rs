@@ -5,6 +5,7 @@ use rand::{Rng, RngCore, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
+use crate::allowed::{is_above_0, is_at_least_0};
 use crate::{Error, Result};
 
 /// The supply that the ramp charges towards, and the input at which it ends, V.
@@ -64,23 +65,21 @@ impl Sensor {
     ///
     /// `Scene`, naming the parameter.
     pub fn check(&self) -> Result<()> {
-        let above_0 = |x: f64| x.is_finite() && x > 0.0;
-        let at_least_0 = |x: f64| x.is_finite() && x >= 0.0;
         for (name, value, right, sound) in [
             (
                 "v_trans",
                 self.v_trans,
                 "must be above 0 and below 3 V",
-                above_0(self.v_trans) && self.v_trans < RAMP_END_V,
+                is_above_0(self.v_trans) && self.v_trans < RAMP_END_V,
             ),
-            ("feedback_kohm", self.feedback_kohm, "must be above 0", above_0(self.feedback_kohm)),
-            ("rest_us", self.rest_us, "must be 0 or more", at_least_0(self.rest_us)),
-            ("touch_us", self.touch_us, "must be above 0", above_0(self.touch_us)),
+            ("feedback_kohm", self.feedback_kohm, "must be above 0", is_above_0(self.feedback_kohm)),
+            ("rest_us", self.rest_us, "must be 0 or more", is_at_least_0(self.rest_us)),
+            ("touch_us", self.touch_us, "must be above 0", is_above_0(self.touch_us)),
             ("exponent", self.exponent, "must be from 0.5 to 1", (0.5..=1.0).contains(&self.exponent)),
-            ("side_mm", self.side_mm, "must be above 0", above_0(self.side_mm)),
-            ("gain_spread", self.gain_spread, "must be 0 or more", at_least_0(self.gain_spread)),
-            ("offset_mv", self.offset_mv, "must be 0 or more", at_least_0(self.offset_mv)),
-            ("noise_ticks", self.noise_ticks, "must be 0 or more", at_least_0(self.noise_ticks)),
+            ("side_mm", self.side_mm, "must be above 0", is_above_0(self.side_mm)),
+            ("gain_spread", self.gain_spread, "must be 0 or more", is_at_least_0(self.gain_spread)),
+            ("offset_mv", self.offset_mv, "must be 0 or more", is_at_least_0(self.offset_mv)),
+            ("noise_ticks", self.noise_ticks, "must be 0 or more", is_at_least_0(self.noise_ticks)),
         ] {
             if !sound {
                 return Err(Error::Scene(format!("sensor: {name} is {value}: {right}")));

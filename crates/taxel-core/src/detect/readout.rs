@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use crate::allowed::above_0;
 use crate::detect::{Detection, FrameClock, ReadoutStream};
 use crate::encode::{Encoder, Tare};
 use crate::neuron::{AfterSpike, Neuron, Time};
@@ -83,9 +84,7 @@ impl Readout {
     /// `Problem`, naming the part.
     pub fn check(&self) -> Result<()> {
         self.encoder.check()?;
-        if !(self.run_threshold.is_finite() && self.run_threshold > 0.0) {
-            return Err(problem!("run_threshold is {}: must be above 0 and finite", self.run_threshold));
-        }
+        above_0("run_threshold", self.run_threshold, "")?;
         self.check_delays()?;
         if self.neurons.is_empty() {
             return Err(problem!("readout without a neuron: needs one or more"));

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sampled::{BLOCK, Block, Channels, Source, blocks};
 use super::{Stream, Tare, ms};
+use crate::allowed::at_least_0;
 use crate::wide::wide;
 use crate::{Array, Events, Result, Spike, problem};
 
@@ -43,9 +44,7 @@ impl Default for ContactArea {
 
 impl ContactArea {
     pub(super) fn check(&self) -> Result<()> {
-        if !(self.noise_floor.is_finite() && self.noise_floor >= 0.0) {
-            return Err(problem!("noise_floor is {}: must be 0 or more and finite", self.noise_floor));
-        }
+        at_least_0("noise_floor", self.noise_floor, "")?;
         if self.levels.is_empty() {
             return Err(problem!("levels: must hold one number of taxels or more"));
         }

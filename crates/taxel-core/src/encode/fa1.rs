@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::power::power;
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
 use super::{Stream, micros, ms};
+use crate::allowed::{above_0, at_least_0};
 use crate::{Array, Result, Spike, problem};
 
 /// The FA-1 afferent exactly as equations 5.1 to 5.5, polarity kept.
@@ -103,17 +104,13 @@ impl Fa1 {
             return Err(problem!("alpha is {}: must be above 0 and at most 4", self.alpha));
         }
         for (name, value) in [("a", self.a), ("b", self.b), ("theta_0", self.theta_0.unwrap_or(0.0))] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(problem!("{name} is {value}: must be 0 or more and finite"));
-            }
+            at_least_0(name, value, "")?;
         }
         if let Some(range) = self.range {
             if self.theta_0.is_some() {
                 return Err(problem!("theta_0 and range: give one of them"));
             }
-            if !(range.is_finite() && range > 0.0) {
-                return Err(problem!("range is {range}: must be above 0 and finite"));
-            }
+            above_0("range", range, "")?;
         }
         micros("period_ms", self.period_ms).map(drop)
     }

@@ -543,7 +543,7 @@ impl Problem {
 
     fn start_from(&self, objective: &Objective, start: Option<(&[f64], Option<&Shares>)>) -> Result<Start> {
         let Some((weights, multipliers)) = start else { return Ok(Start::default()) };
-        self.base.neuron.check_weights(weights, self.trains)?;
+        crate::allowed::one_weight_a_train(weights, self.trains)?;
         let within = weights.iter().zip(objective.lower.iter().zip(&objective.upper));
         let weights = Some(within.map(|(w, (&low, &high))| (w / self.unit).clamp(low, high)).collect());
         let Some(multipliers) = multipliers else { return Ok(Start { weights, shares: None }) };

@@ -4,9 +4,9 @@ mod matrix;
 
 use serde::{Deserialize, Serialize};
 
-use super::above_0;
 use super::merged::merged;
 use crate::Result;
+use crate::allowed::above_0;
 
 /// The Euclidean distance of two trains, each spike of which becomes `exp(-(t - t_i) / tau)` from its time on.
 ///

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::above_0;
 use super::merged::merged;
+use crate::allowed::above_0;
 use crate::{Result, problem};
 
 /// The absolute difference of two trains, smoothed as in 5.8, integrated over time, or summed over the points of a grid.

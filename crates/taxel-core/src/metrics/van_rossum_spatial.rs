@@ -5,7 +5,8 @@ mod matrix;
 use serde::{Deserialize, Serialize};
 
 use super::van_rossum::Normalisation;
-use super::{One, Patterns, above_0};
+use super::{One, Patterns};
+use crate::allowed::above_0;
 use crate::{Array, Result, Stop, problem};
 
 /// Smoothing in time and over the array (5.8, 5.11).

@@ -3,6 +3,7 @@
 use super::grid::GridStream;
 use super::srm0::{TOUCH, next_crossing};
 use super::{AT_EDGE, AfterSpike, FirstThreshold, Neuron, Shape, State, Time};
+use crate::allowed::{above_0, one_weight_a_train};
 use crate::{Result, problem};
 
 /// A spike of the neuron.
@@ -34,10 +35,8 @@ enum Clock {
 impl NeuronStream {
     pub(super) fn new(neuron: &Neuron, weights: &[f64], threshold: f64, start: f64) -> Result<Self> {
         neuron.check()?;
-        neuron.check_weights(weights, weights.len())?;
-        if !(threshold.is_finite() && threshold > 0.0) {
-            return Err(problem!("threshold factor is {threshold}: must be above 0 and finite"));
-        }
+        one_weight_a_train(weights, weights.len())?;
+        above_0("threshold factor", threshold, "")?;
         if !start.is_finite() {
             return Err(problem!("start is {start} ms: must be finite"));
         }

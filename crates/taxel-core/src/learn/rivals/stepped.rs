@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::allowed::{above_0, at_least_0};
 use crate::{Result, SpikeTrains, problem};
 
 /// What drives the membrane after an input.
@@ -160,18 +161,24 @@ impl SteppedNeuron {
             ("step_ms", self.step_ms, "ms"),
         ];
         for (name, value, unit) in all {
-            if !(value.is_finite() && value > 0.0) {
-                return Err(problem!("{name} is {value} {unit}: must be above 0 and finite"));
-            }
+            above_0(name, value, unit)?;
         }
         if values[1] >= values[0] {
             return Err(problem!("{} is {} ms: must lie below {}, {} ms", names[1], values[1], names[0], values[0]));
         }
-        if !(self.refractory.is_finite() && self.refractory >= 0.0) {
-            return Err(problem!("refractory is {} ms: must be 0 or more and finite", self.refractory));
-        }
+        at_least_0("refractory", self.refractory, "ms")?;
         if self.refractory > 0.0 && self.after_spike != Reset::Membrane {
             return Err(problem!("refractory is {} ms: must be 0 unless after_spike is \"membrane\"", self.refractory));
+        }
+        Ok(())
+    }
+
+    /// Refuses a potential that is not linear in the weights once the spikes are known: FP and HTP need one.
+    pub(super) fn check_linear(&self, rule: &str) -> Result<()> {
+        if self.after_spike == Reset::Membrane {
+            return Err(problem!(
+                "after_spike is \"membrane\": {rule} needs a potential linear in the weights, \"reset\" or \"subtract\""
+            ));
         }
         Ok(())
     }

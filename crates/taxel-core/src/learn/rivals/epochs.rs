@@ -6,6 +6,7 @@ use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
 use super::stepped::{Laid, SteppedNeuron};
+use crate::allowed::{above_0, one_weight_a_train};
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// When weights change.
@@ -215,9 +216,7 @@ impl Training {
         {
             return Err(problem!("initial is {low} to {high} mV: must be two finite weights, the lower first"));
         }
-        if !(self.within_ms.is_finite() && self.within_ms > 0.0) {
-            return Err(problem!("within_ms is {} ms: must be above 0 and finite", self.within_ms));
-        }
+        above_0("within_ms", self.within_ms, "ms")?;
         Ok(())
     }
 
@@ -238,7 +237,7 @@ impl Training {
             .ok_or_else(|| problem!("eta: no learning rate was published for this rule, give one"))?;
         let mut weights = match start {
             Some(start) => {
-                super::rival::check_weights(start, trains)?;
+                one_weight_a_train(start, trains)?;
                 start.to_vec()
             }
             None => {

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::epochs::Rule;
-use super::rival::check_above_0;
 use super::stepped::SteppedNeuron;
 use crate::Result;
+use crate::allowed::above_0;
 
 /// Widrow-Hoff on inputs, targets and outputs that are all filtered by `(e / tau_a) s e^{-s/tau_a}`:
 /// `eta` times the integral of `x_i (y_d - y_o)`, in closed form
@@ -21,7 +21,7 @@ pub(super) struct SpanRule(f64);
 
 impl Span {
     pub(super) fn rule(&self, _: &SteppedNeuron) -> Result<SpanRule> {
-        check_above_0("tau_a", self.tau_a, " ms")?;
+        above_0("tau_a", self.tau_a, "ms")?;
         Ok(SpanRule(self.tau_a))
     }
 }

@@ -11,9 +11,10 @@ use super::inst::Inst;
 use super::psd::Psd;
 use super::resume::Resume;
 use super::span::Span;
-use super::stepped::{Reset, SteppedNeuron};
+use super::stepped::SteppedNeuron;
+use crate::allowed::one_weight_a_train;
 use crate::neuron::Neuron;
-use crate::{Result, SpikeTrains, Stop, problem};
+use crate::{Result, SpikeTrains, Stop};
 
 /// Which rule, with its own constants.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -95,7 +96,11 @@ impl Rival {
         stop: Stop<'_>,
     ) -> Result<Trained> {
         self.check()?;
-        super::check_examples(&Neuron { refractory: self.neuron.refractory, ..Neuron::default() }, patterns, targets)?;
+        crate::learn::check_examples(
+            &Neuron { refractory: self.neuron.refractory, ..Neuron::default() },
+            patterns,
+            targets,
+        )?;
         let Self { neuron, training, .. } = self;
         with_rule!(self, |rule| training.train(&rule, neuron, Examples { patterns, targets, start }, report, stop))
     }
@@ -111,9 +116,9 @@ impl Rival {
             pattern.check()?;
         } else {
             let neuron = Neuron { refractory: self.neuron.refractory, ..Neuron::default() };
-            super::check_examples(&neuron, std::slice::from_ref(pattern), &[targets.to_vec()])?;
+            crate::learn::check_examples(&neuron, std::slice::from_ref(pattern), &[targets.to_vec()])?;
         }
-        check_weights(weights, pattern.len())?;
+        one_weight_a_train(weights, pattern.len())?;
         with_rule!(self, |rule| Ok(change_of(&rule, &self.neuron, weights, pattern, targets)))
     }
 }
@@ -126,39 +131,10 @@ impl SteppedNeuron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn run(&self, weights: &[f64], pattern: &SpikeTrains) -> Result<Vec<f64>> {
         self.check()?;
-        super::check_heard(pattern)?;
-        check_weights(weights, pattern.len())?;
+        crate::learn::check_heard(pattern)?;
+        one_weight_a_train(weights, pattern.len())?;
         let mut fired = Vec::new();
         self.fire(weights, &self.lay_out(pattern), &mut fired);
         Ok(fired)
     }
-}
-
-/// One finite weight a train.
-pub(super) fn check_weights(weights: &[f64], trains: usize) -> Result<()> {
-    if weights.len() != trains {
-        return Err(problem!("weights: {} for {trains} trains, must be one a train", weights.len()));
-    }
-    if let Some(n) = weights.iter().position(|w| !w.is_finite()) {
-        return Err(problem!("weights[{n}] is {}: must be finite", weights[n]));
-    }
-    Ok(())
-}
-
-/// A constant of a rule: above 0 and finite.
-pub(super) fn check_above_0(name: &str, value: f64, unit: &str) -> Result<()> {
-    if value.is_finite() && value > 0.0 {
-        return Ok(());
-    }
-    Err(problem!("{name} is {value}{unit}: must be above 0 and finite"))
-}
-
-/// FP and HTP need a potential that is linear in the weights once the spikes are known.
-pub(super) fn check_linear(rule: &str, neuron: &SteppedNeuron) -> Result<()> {
-    if neuron.after_spike == Reset::Membrane {
-        return Err(problem!(
-            "after_spike is \"membrane\": {rule} needs a potential linear in the weights, \"reset\" or \"subtract\""
-        ));
-    }
-    Ok(())
 }

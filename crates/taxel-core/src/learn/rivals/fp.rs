@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::epochs::{Correction, Presented, Rule};
-use super::rival::{check_above_0, check_linear};
 use super::stepped::{Reset, Shape, SteppedNeuron};
 use crate::Result;
+use crate::allowed::above_0;
 
 /// Only the *first* error of a trial changes weights, by the potential that each input makes there; the trial then ends.
 ///
@@ -26,8 +26,8 @@ pub(super) struct FpRule {
 
 impl Fp {
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<FpRule> {
-        check_above_0("window_ms", self.window_ms, " ms")?;
-        check_linear("FP", neuron)?;
+        above_0("window_ms", self.window_ms, "ms")?;
+        neuron.check_linear("FP")?;
         Ok(FpRule { shape: neuron.shape(), window: self.window_ms, forgets: neuron.after_spike == Reset::Reset })
     }
 }

@@ -5,7 +5,7 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use super::rival::{check_above_0, check_weights};
+use crate::allowed::{above_0, at_least_0, one_weight_a_train};
 use crate::neuron::{Kernel, Neuron, Shape, State};
 use crate::{Result, SpikeTrains, Stop, problem};
 
@@ -141,24 +141,20 @@ impl Skim {
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        check_above_0("tau", self.tau, " ms")?;
-        check_above_0("tau_s", self.tau_s(), " ms")?;
+        above_0("tau", self.tau, "ms")?;
+        above_0("tau_s", self.tau_s(), "ms")?;
         if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
             return Err(problem!("tau_s is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
         }
-        check_above_0("step_ms", self.step_ms, " ms")?;
-        check_above_0("pulse_ms", self.pulse_ms, " ms")?;
-        if !(self.ridge.is_finite() && self.ridge >= 0.0) {
-            return Err(problem!("ridge is {}: must be 0 or more and finite", self.ridge));
-        }
+        above_0("step_ms", self.step_ms, "ms")?;
+        above_0("pulse_ms", self.pulse_ms, "ms")?;
+        at_least_0("ridge", self.ridge, "")?;
         if let Some(branches) = &self.branches {
             if !(1..=100_000).contains(&branches.count) {
                 return Err(problem!("branches is {}: must lie between 1 and 100000", branches.count));
             }
-            check_above_0("spread", branches.spread, "")?;
-            if !(branches.delay_ms.is_finite() && branches.delay_ms >= 0.0) {
-                return Err(problem!("delay_ms is {} ms: must be 0 or more and finite", branches.delay_ms));
-            }
+            above_0("spread", branches.spread, "")?;
+            at_least_0("delay_ms", branches.delay_ms, "ms")?;
         }
         Ok(())
     }
@@ -234,7 +230,7 @@ impl Skim {
     /// `Problem` for parameters, patterns or targets that make no sense; `Interrupted` where the caller stops it.
     pub fn reduce(&self, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Normal> {
         self.check()?;
-        super::check_examples(&Neuron { refractory: 0.0, ..Neuron::default() }, patterns, targets)?;
+        crate::learn::check_examples(&Neuron { refractory: 0.0, ..Neuron::default() }, patterns, targets)?;
         let columns = self.columns(patterns[0].len());
         let mut normal = Normal::new(columns);
         for (pattern, targets) in patterns.iter().zip(targets) {
@@ -270,7 +266,7 @@ impl Skim {
     /// `Problem` for parameters or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn rows(&self, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        super::check_heard(pattern)?;
+        crate::learn::check_heard(pattern)?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {
             for row in 0..block[0].len() {
@@ -287,8 +283,8 @@ impl Skim {
     /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn output(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        super::check_heard(pattern)?;
-        check_weights(weights, self.columns(pattern.len()))?;
+        crate::learn::check_heard(pattern)?;
+        one_weight_a_train(weights, self.columns(pattern.len()))?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {
             let first = out.len();

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::epochs::Rule;
 use super::inst::{published_eta, published_initial};
-use super::rival::check_above_0;
 use super::stepped::{Current, SteppedNeuron, peak_factor};
+use crate::allowed::above_0;
 use crate::{Result, problem};
 
 /// INST with both spike trains filtered by `e^{-s/tau_q}`: an input counts by
@@ -29,7 +29,7 @@ pub(super) struct FiltRule {
 
 impl Filt {
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<FiltRule> {
-        check_above_0("tau_q", self.tau_q, " ms")?;
+        above_0("tau_q", self.tau_q, "ms")?;
         let (tau, tau_q) = (neuron.tau, self.tau_q);
         let Current::Exponential { tau_s } = neuron.current else {
             return Err(problem!("current is a double exponential: FILT is stated for an exponential one"));

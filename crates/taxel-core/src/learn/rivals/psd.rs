@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::epochs::Rule;
-use super::rival::check_above_0;
 use super::stepped::{SteppedNeuron, peak_factor};
+use crate::allowed::above_0;
 use crate::{Result, problem};
 
 /// `eta [sum over targets of PSC - sum over output spikes of PSC]`, PSC being the *current*
@@ -27,8 +27,8 @@ pub(super) struct PsdRule {
 impl Psd {
     pub(super) fn rule(&self, _: &SteppedNeuron) -> Result<PsdRule> {
         let (tau_1, tau_2) = (self.tau_1, self.tau_2);
-        check_above_0("tau_1", tau_1, " ms")?;
-        check_above_0("tau_2", tau_2, " ms")?;
+        above_0("tau_1", tau_1, "ms")?;
+        above_0("tau_2", tau_2, "ms")?;
         if tau_2 >= tau_1 {
             return Err(problem!("tau_2 is {tau_2} ms: must lie below tau_1, {tau_1} ms"));
         }

@@ -3,8 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::epochs::Rule;
-use super::rival::check_above_0;
 use super::stepped::SteppedNeuron;
+use crate::allowed::above_0;
 use crate::{Result, problem};
 
 /// `eta [S_d - S_o] [a + sum over earlier inputs of amplitude e^{-s/tau_w}]` (equation 2.10, summed over whole spikes).
@@ -28,8 +28,8 @@ pub(super) struct ResumeRule {
 impl Resume {
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<ResumeRule> {
         let tau_w = self.tau_w.unwrap_or(neuron.tau);
-        check_above_0("tau_w", tau_w, " ms")?;
-        check_above_0("amplitude", self.amplitude, "")?;
+        above_0("tau_w", tau_w, "ms")?;
+        above_0("amplitude", self.amplitude, "")?;
         if !self.a.is_finite() {
             return Err(problem!("a is {}: must be finite", self.a));
         }

@@ -7,7 +7,7 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use super::epochs::{Ended, Trained};
-use super::rival::{check_above_0, check_weights};
+use crate::allowed::{above_0, at_least_0, one_weight_a_train};
 use crate::neuron::{Kernel, Shape, State, Step};
 use crate::{Result, SpikeTrains, Stop, problem};
 
@@ -81,21 +81,19 @@ impl Tempotron {
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        check_above_0("tau", self.tau, " ms")?;
-        check_above_0("tau_s", self.tau_s(), " ms")?;
-        check_above_0("theta_0", self.theta_0, "")?;
+        above_0("tau", self.tau, "ms")?;
+        above_0("tau_s", self.tau_s(), "ms")?;
+        above_0("theta_0", self.theta_0, "")?;
         if self.tau_s() >= self.tau {
             return Err(problem!("tau_s is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
         }
         if let Some(eta) = self.eta {
-            check_above_0("eta", eta, "")?;
+            above_0("eta", eta, "")?;
         }
         if !(0.0..1.0).contains(&self.momentum) {
             return Err(problem!("momentum is {}: must lie from 0 up to, but not at, 1", self.momentum));
         }
-        if !(self.initial_sd.is_finite() && self.initial_sd >= 0.0) {
-            return Err(problem!("initial_sd is {}: must be 0 or more and finite", self.initial_sd));
-        }
+        at_least_0("initial_sd", self.initial_sd, "")?;
         Ok(())
     }
 
@@ -167,8 +165,8 @@ impl Tempotron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn peak(&self, weights: &[f64], pattern: &SpikeTrains) -> Result<Peak> {
         self.check()?;
-        super::check_heard(pattern)?;
-        check_weights(weights, pattern.len())?;
+        crate::learn::check_heard(pattern)?;
+        one_weight_a_train(weights, pattern.len())?;
         Ok(self.reach(&self.shape(), weights, &self.lay_out(pattern)).peak)
     }
 
@@ -180,8 +178,8 @@ impl Tempotron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn change(&self, weights: &[f64], pattern: &SpikeTrains, label: bool) -> Result<Vec<f64>> {
         self.check()?;
-        super::check_heard(pattern)?;
-        check_weights(weights, pattern.len())?;
+        crate::learn::check_heard(pattern)?;
+        one_weight_a_train(weights, pattern.len())?;
         let (shape, events) = (self.shape(), self.lay_out(pattern));
         let mut change = vec![0.0; weights.len()];
         let reached = self.reach(&shape, weights, &events);
@@ -230,7 +228,7 @@ impl Tempotron {
         let mut random = StdRng::seed_from_u64(self.seed);
         let mut weights: Vec<f64> = match start {
             Some(start) => {
-                check_weights(start, trains)?;
+                one_weight_a_train(start, trains)?;
                 start.to_vec()
             }
             None => (0..trains).map(|_| self.initial_sd * random.sample::<f64, _>(StandardNormal)).collect(),
@@ -309,8 +307,8 @@ fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
         return Err(problem!("labels: {} for {} patterns, must be one a pattern", labels.len(), patterns.len()));
     }
     for (p, pattern) in patterns.iter().enumerate() {
-        super::check_pattern(p, pattern)?;
-        super::check_trains(p, pattern, patterns[0].len())?;
+        crate::learn::check_pattern(p, pattern)?;
+        crate::learn::check_trains(p, pattern, patterns[0].len())?;
     }
     Ok(())
 }

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::epochs::{Correction, Presented, Rule};
-use super::rival::check_above_0;
 use super::stepped::{Shape, SteppedNeuron};
 use crate::Result;
+use crate::allowed::above_0;
 
 /// E-learning: down the gradient of a Victor-Purpura distance whose moves cost `(dt / tau_q)^2 / 2`.
 ///
@@ -35,8 +35,8 @@ pub(super) struct IRule(Shape);
 
 impl ELearning {
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<ERule> {
-        check_above_0("tau_q", self.tau_q, " ms")?;
-        check_above_0("gamma_r", self.gamma_r, " ms")?;
+        above_0("tau_q", self.tau_q, "ms")?;
+        above_0("gamma_r", self.gamma_r, "ms")?;
         Ok(ERule { shape: neuron.shape(), tau_q: self.tau_q, gamma_r: self.gamma_r })
     }
 }

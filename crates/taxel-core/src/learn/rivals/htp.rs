@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::epochs::{Correction, Presented, Rule};
-use super::rival::check_linear;
 use super::stepped::{Reset, Shape, SteppedNeuron};
-use crate::{Result, problem};
+use crate::Result;
+use crate::allowed::at_least_0;
 
 /// Output spikes are forced at the targets, so resets are known and each demand is linear in the weights: the potential
 /// reaches the threshold at every target, and stays below it at every other grid point, but for the last `window_ms`
@@ -30,10 +30,8 @@ pub(super) struct HtpRule {
 
 impl Htp {
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<HtpRule> {
-        if !(self.window_ms.is_finite() && self.window_ms >= 0.0) {
-            return Err(problem!("window_ms is {} ms: must be 0 or more and finite", self.window_ms));
-        }
-        check_linear("HTP", neuron)?;
+        at_least_0("window_ms", self.window_ms, "ms")?;
+        neuron.check_linear("HTP")?;
         Ok(HtpRule {
             shape: neuron.shape(),
             window: self.window_ms,
