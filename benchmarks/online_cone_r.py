@@ -27,10 +27,11 @@ def recorded(event):
         return None
     point = NOTES["plate"][event]
     data = encoded(folder, "plate", point["encoder"])
-    later = data.latency_ms + point["delay_ms"]
+    learner = dict(point["learner"])
+    later = data.latency_ms + learner.pop("delay_ms")
     pieces = [p for p in data.pieces.values() if len(p.spikes.times) and len(p.truth[event])]
     order = np.random.default_rng(0).permutation(len(pieces))
-    return point["neuron"] | point["learn"], [(pieces[k].spikes, pieces[k].truth[event] + later) for k in order]
+    return learner, [(pieces[k].spikes, pieces[k].truth[event] + later) for k in order]
 
 
 def drawn():

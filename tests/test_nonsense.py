@@ -206,11 +206,19 @@ SOUND: dict[str, Sound] = {
     "taxel.detect.score": plain(taxel.detect.score, found=FOUND, truth={"a": [10], "b": [25]}, window_ms=50.0),
     "taxel.detect.Spread.of": plain(taxel.detect.Spread.of, values=[1.0, 2.0]),
     "taxel.detect.Recipe": plain(
-        taxel.detect.Recipe, encoder=LEVELS, learner={"tau": 5.0}, neurons={"a": {"ub": 1.0}}, run_threshold=1.0
+        taxel.detect.Recipe,
+        encoder=LEVELS,
+        learner={"tau": 5.0},
+        neurons={"a": {"ub": 1.0}},
+        run_threshold=1.0,
+        about="a touch",
+        source="made here",
     ),
     "taxel.detect.Recipe.learner_of": method(RECIPE, "learner_of", label="a"),
     "taxel.detect.Recipe.from_dict": plain(taxel.detect.Recipe.from_dict, values={"encoder": {"name": "fa1"}}),
-    "taxel.detect.Recipe.load": plain(taxel.detect.Recipe.load, path="here.toml", changes={"learner.tau": 5.0}),
+    "taxel.detect.Recipe.load": plain(
+        taxel.detect.Recipe.load, recipe="here.toml", changes={"learner.tau": 5.0}, labels=["a"]
+    ),
     "taxel.detect.train": plain(taxel.detect.train, examples=[EXAMPLE], recipe=RECIPE, progress=lambda _: None),
     "taxel.detect.read_labels": plain(taxel.detect.read_labels, path="here_labels.csv"),
     "taxel.encode.ChangeEvents": plain(

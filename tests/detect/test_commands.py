@@ -174,24 +174,24 @@ def walk(folder: Path, seconds: int) -> Path:
     return folder / "labels.csv"
 
 
-def test_without_a_recipe_it_starts_from_the_gait_recipe_of_the_unit(tmp_path: Path, capsys) -> None:
+def test_without_a_recipe_it_starts_from_the_recipe_of_the_unit(tmp_path: Path, capsys) -> None:
     labels = walk(tmp_path, 9)
     out = tmp_path / "gait.json"
     arguments = ("train", tmp_path / "walk.npz", "--labels", labels, "--out", out, "--overwrite")
     code, said, _ = call(capsys, *arguments, "--json")
-    assert (code, json.loads(said)["recipe"]) == (0, "gaitpdb")
+    assert (code, json.loads(said)["recipe"]) == (0, "gait_insole")
     assert json.loads(said)["recordings"][0]["score_on_itself"]["missed"] == 0
     readout = taxel.Readout.load(out)
     assert readout.encoder == taxel.encode.LevelCrossing([5, 10, 20, 30, 40, 50], release_share=0.7)
     assert {n.delay_ms for n in readout.neurons.values()} == {8.0}
     changes = ("--set", "learner.tau=20", "--set", "neurons.contact.delay_ms=10", "--set", "encoder.levels=[5, 50]")
     code, said, _ = call(capsys, *arguments, *changes)
-    assert (code, "gait recipe gaitpdb" in said) == (0, True)
+    assert (code, "recipe gait_insole: few force sensors" in said) == (0, True)
     readout = taxel.Readout.load(out)
     assert (readout.encoder.levels, readout.neurons["contact"].delay_ms) == ([5.0, 50.0], 10.0)
     assert {trained.neuron.tau for trained in readout.neurons.values()} == {20.0}
     walk(tmp_path, 15)  # its running range wants 10 s
-    assert call(capsys, *arguments, "--recipe", "gaitndd", "--json")[0] == 0
+    assert call(capsys, *arguments, "--recipe", "gait_channel", "--json")[0] == 0
     assert taxel.Readout.load(out).encoder.running_range is not None
 
 
@@ -228,7 +228,11 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
         (("encode", "1.npz", "out.npz", "--encoder", "fa2"), "encoder fa2: must be one of"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings=2"), "wings"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings"), "--set wings: must be KEY=VALUE"),
-        (("train", "1.npz", "--labels", "labels.csv", "--recipe", "gait", "-o", "new.json"), "gait: no such file"),
+        (
+            ("train", "1.npz", "--labels", "labels.csv", "--recipe", "gaitpdb", "-o", "new.json"),
+            "recipe 'gaitpdb': there are",
+        ),
+        (("train", "1.npz", "--labels", "labels.csv", "--recipe", "./gait", "-o", "new.json"), "gait: no such file"),
         (("train", "1.npz", "--labels", "none.csv", "--encoder", "fa1", "-o", "new.json"), "none.csv: no such file"),
         (
             ("train", "1.npz", "2.npz", "--labels", "truth.csv", "--encoder", "fa1", "-o", "new.json"),

@@ -16,6 +16,7 @@ import pytest
 from tests.formats.test_loaders import interpolated
 
 from taxel import FormatError, ProblemError
+from taxel.cli import main
 from taxel.studies import load
 from taxel.studies.gait import report, study
 from taxel.studies.gait.protocols import PROTOCOLS
@@ -112,7 +113,7 @@ def test_errors_take_off_the_delay_that_known_keeps(ran):
             for units in row["result"]["tested"].values():
                 for unit in units.values():
                     late = np.subtract(unit["delays"], unit["errors"])
-                    assert np.allclose(late, row["params"]["point"]["delay_ms"], atol=0.2)
+                    assert np.allclose(late, row["params"]["point"]["learner"]["delay_ms"], atol=0.2)
 
 
 def test_the_report_lies_beside_its_figures_and_folds(ran):
@@ -213,7 +214,7 @@ def test_no_list_of_points_is_longer_than_24():
 
 def test_no_delay_is_longer_than_12_ms():
     points = [p for events in [*SEARCH.values(), *ENCODERS.values()] for points in events.values() for p in points]
-    assert max(p["delay_ms"] for p in points) <= 12
+    assert max(p["learner"]["delay_ms"] for p in points) <= 12
 
 
 def test_a_goal_is_met_only_where_every_part_of_it_is():
@@ -270,3 +271,50 @@ def test_one_person_alone_is_said(data, tmp_path):
     said = study(tmp_path, size="toy", report=tmp_path / "report", quiet=True)
     assert said["skipped"][-1] == "plate (too few people or recordings)"
     assert said["sources"] == []
+
+
+@pytest.fixture
+def damaged(data, tmp_path) -> Path:
+    """The walkers' folder with a file cut short, one that may not be read, and a folder with nothing readable."""
+    folder = tmp_path / "damaged"
+    (folder / "insole_gaitpdb").mkdir(parents=True)
+    (folder / "pressure_formats").mkdir()
+    for file in (data / "insole_gaitpdb").iterdir():
+        (folder / "insole_gaitpdb" / file.name).symlink_to(file)
+    whole = (data / "insole_gaitpdb" / "GaCo90_01.txt").read_text()
+    (folder / "insole_gaitpdb" / "GaPt99_01.txt").write_text(whole[:5000])
+    (folder / "pressure_formats" / "pliance.asc").write_text("pressure values in kPa\n")
+    return folder
+
+
+def test_a_file_that_cannot_be_read_is_left_out_and_said(ran, damaged, tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["study", "gait", "--data", str(damaged), "--size", "toy", "--report", str(tmp_path / "report")])
+    assert not ended.value.code
+    out = capsys.readouterr().out
+    assert "left out: insole_gaitpdb/GaPt99_01.txt: line" in out
+    assert "left out: pressure_formats/pliance.asc: no line of column names" in out
+    said = json.loads((tmp_path / "report" / "gait.json").read_text())
+    assert list(said["unread"]) == ["insole_gaitpdb/GaPt99_01.txt", "pressure_formats/pliance.asc"]
+    assert "pliance.asc" in (tmp_path / "report" / "gait.html").read_text()
+    found, whole = (rows(s, "gaitpdb", "contact")["notes"]["figures"] for s in (said, ran[1]))
+    assert found == whole, "the people that can be read are judged as if the others were not there"
+
+
+def test_strict_ends_at_a_file_that_cannot_be_read_before_anything_is_reckoned(damaged, tmp_path):
+    report = tmp_path / "report"
+    with pytest.raises(FormatError, match=r"^insole_gaitpdb/GaPt99_01\.txt: line .* \(1 more cannot be read\)$"):
+        study(damaged, size="toy", report=report, strict=True, quiet=True)
+    with pytest.raises(FormatError, match="GaPt99"):
+        load("fig6.15").run(report, size="toy", data=damaged, strict=True, quiet=True)
+    assert not report.exists()
+
+
+def test_a_folder_in_which_nothing_can_be_read_is_refused(damaged, tmp_path):
+    with pytest.raises(FormatError, match=r"pressure_formats/pliance\.asc: no line of column names"):
+        study(damaged, size="toy", report=tmp_path / "report", only=["pedar"], quiet=True)
+    (damaged / "insole_gaitpdb").rename(damaged / "elsewhere")
+    (damaged / "insole_gaitpdb").mkdir()
+    (damaged / "insole_gaitpdb" / "GaPt99_01.txt").write_text("no numbers\n")
+    with pytest.raises(FormatError, match=r"GaPt99_01\.txt"):
+        load("fig6.15").run(tmp_path / "report", size="toy", data=damaged, quiet=True)

@@ -30,6 +30,7 @@ Changes = Annotated[
 Data = Annotated[
     Path | None, typer.Option(help="Folder of recordings, for the studies that need some (or TAXEL_DATA names it).")
 ]
+Strict = Annotated[bool, typer.Option("--strict", help="A recording that cannot be read ends it; else it is left out.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and no progress.")]
 
 REPORT = Path("taxel-studies")
@@ -49,6 +50,7 @@ def every(
     backend: Backend = "loky",
     scheduler: Scheduler = None,
     report: Report = REPORT,
+    strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
     """Run every study and make one page of them.
@@ -73,6 +75,7 @@ def every(
                 changes=own,
                 data=where,
                 workers=_workers(jobs, backend, scheduler),
+                strict=strict,
                 quiet=as_json,
             )
     finally:
@@ -96,6 +99,7 @@ def _add(name: str, title: str) -> None:
         backend: Backend = "loky",
         scheduler: Scheduler = None,
         report: Report = REPORT,
+        strict: Strict = False,
         as_json: AsJson = False,
     ) -> None:
         study = load(name)
@@ -105,6 +109,7 @@ def _add(name: str, title: str) -> None:
             changes=_changes(changes or [], realisations),
             data=_data(data),
             workers=_workers(jobs, backend, scheduler),
+            strict=strict,
             quiet=as_json,
         )
         page = _page(report)
@@ -154,6 +159,7 @@ def _tell(section: dict[str, Any]) -> None:
         holds = {True: "holds", False: "does not hold", None: "not judged"}[s["holds"]]
         typer.echo(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
         typer.echo(f"    published: {s['published']}\n    ours: {s['ours']}")
+    _left_out(section)
 
 
 @studies.command()
@@ -180,6 +186,7 @@ def gait(
     only: Annotated[
         list[str] | None, typer.Option(help="One source (plate, gaitpdb, gaitndd, moticon, pedar); may be repeated.")
     ] = None,
+    strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
     """Find gait events in walking recordings with one neuron an event (thesis 6.5, figures 6.12 to 6.14).
@@ -189,7 +196,14 @@ def gait(
     from taxel.studies.gait import study  # noqa: PLC0415  the learner and its libraries load slowly
 
     workers = _workers(jobs, backend, scheduler)
-    options = {"size": size, "search": search, "workers": workers, "report": report, "only": only or ()}
+    options = {
+        "size": size,
+        "search": search,
+        "workers": workers,
+        "report": report,
+        "only": only or (),
+        "strict": strict,
+    }
     said = study(data, test, **options, quiet=as_json)
     if as_json:
         typer.echo(json.dumps(said))
@@ -203,8 +217,6 @@ def _show(said: dict[str, Any]) -> None:
     from rich.table import Table  # noqa: PLC0415
 
     console = Console()
-    if said["skipped"]:
-        console.print(f"not here, so skipped: {', '.join(said['skipped'])}")
     for source in said["sources"]:
         for protocol in source["protocols"]:
             table = Table(title=f"{source['source']}: {protocol['protocol']}", title_justify="left")
@@ -235,6 +247,14 @@ def _show(said: dict[str, Any]) -> None:
                     {True: "met", False: "below"}.get(row.get("goal_met"), ""),
                 )
             console.print(table)
+    if said["skipped"]:
+        console.print(f"not here, so skipped: {', '.join(said['skipped'])}")
+    _left_out(said)
+
+
+def _left_out(said: dict[str, Any]) -> None:
+    for file, why in said["unread"].items():
+        typer.echo(f"could not be read, so left out: {file}: {why}")
 
 
 def _number(value: float | None) -> str:

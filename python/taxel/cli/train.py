@@ -24,8 +24,9 @@ def train(
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="A TOML or JSON file: [encoder], [learner], [neurons.LABEL], run_threshold. Or a gait recipe: plate "
-            "(counts), gaitpdb (N), gaitndd (any other unit). Without it and --encoder: the one that fits the unit."
+            help="A known recipe: gait_plate (counts), gait_insole (N), gait_channel (any other); or a TOML or JSON "
+            "file (its path holds a dot or a slash): [encoder], [learner], [neurons.LABEL], run_threshold. Without it "
+            "and --encoder: the one that fits the recording."
         ),
     ] = None,
     encoder: Annotated[str | None, typer.Option(help="The encoder's name, short for --set encoder.name=NAME.")] = None,
@@ -38,27 +39,26 @@ def train(
 ) -> None:
     """Train neurons to say when labelled events happen, and save them as a readout.
 
-    It starts from the gait recipe that fits the recordings; --recipe, --encoder and --set change that.
+    It starts from the recipe that fits the recordings; --recipe, --encoder and --set change that.
 
     Example: taxel train walk.npz --labels events.csv --set neurons.contact.kappa=1.5 -o gait.json
 
     Example: taxel train a.mcap b.mcap --labels events.csv --encoder contact_area --tare 0.05
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
-    from taxel.detect import Example, Recipe, run, score  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import recipes as known  # noqa: PLC0415
+    from taxel.detect import Example, Recipe, recipes, run, score  # noqa: PLC0415  the command line starts quickly
     from taxel.detect import train as train_readout  # noqa: PLC0415
     from taxel.detect.training import changed  # noqa: PLC0415
-    from taxel.frames import Frames  # noqa: PLC0415
 
     if out.exists() and not overwrite:
         raise FileExistsError(17, "exists already; say --overwrite or another --out", str(out))
     changes = assignments(values or [])
     if encoder is not None:
         changes["encoder.name"] = encoder
-    ours = recipe in known.GAIT or (recipe is None and "encoder.name" not in changes)
-    if not ours:
-        plan = Recipe.from_dict(changed({}, changes)) if recipe is None else Recipe.load(recipe, changes)
+    if recipe is not None:
+        Recipe.load(recipe, changes)  # what is wrong with it is said before the recordings are read
+    elif "encoder.name" in changes:
+        plan = Recipe.from_dict(changed({}, changes))
     opened = [open_recording(path) for path in recordings]
     with told(as_json) as tell:
         examples = []
@@ -68,16 +68,11 @@ def train(
             examples.append(Example(source, reference(labels, one, len(opened)), tare_of(tare, one)))
         if not any(example.labels for example in examples):
             raise ProblemError(f"--labels {labels}: names no event in {', '.join(str(one.path) for one in opened)}")
-        if ours:
-            unit = examples[0].source.unit if isinstance(examples[0].source, Frames) else ""
-            name = recipe or known.fitting(unit)
-            tell(f"starting from the gait recipe {name}: {known.GAIT[name]}")
-            labels_there = sorted({label for example in examples for label in example.labels})
-            values_of = known.gait(name, labels_there)
-            for key in changes:  # what is said for all neurons comes before what the recipe has for one
-                for neuron in values_of["neurons"].values() if key.startswith("learner.") else ():
-                    neuron.pop(key.removeprefix("learner."), None)
-            plan = Recipe.from_dict(changed(values_of, changes))
+        if recipe is None and "encoder.name" not in changes:
+            recipe = recipes.fitting(examples[0].source)
+        if recipe is not None:
+            plan = Recipe.load(recipe, changes, sorted({label for example in examples for label in example.labels}))
+            tell(f"starting from the recipe {recipe}")
         readout = train_readout(examples, plan, progress=tell)
         scores = []
         for one, example in zip(opened, examples, strict=True):
@@ -88,7 +83,7 @@ def train(
     result: dict[str, Any] = {
         "readout": str(out),
         "labels": list(readout.labels),
-        "recipe": name if ours else None,
+        "recipe": recipe,
         "recordings": [
             {"recording": str(one.path), "score_on_itself": each.to_dict()}
             for one, each in zip(opened, scores, strict=True)
@@ -97,8 +92,8 @@ def train(
     if as_json:
         typer.echo(json.dumps(result))
         return
-    if ours:
-        typer.echo(f"gait recipe {name}: {known.GAIT[name]}")
+    if recipe is not None:
+        typer.echo(f"recipe {recipe}" + (f": {plan.about}" if plan.about else ""))
     typer.echo(repr(readout))
     for one, each in zip(opened, scores, strict=True):
         typer.echo(f"\n{one.path}, on which it was trained (window {window_ms:g} ms):\n{each!r}")

@@ -6,18 +6,17 @@ import csv
 import inspect
 import json
 import os
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import callback, column, instance, number, parameters, shown, text
+from taxel._arguments import callback, column, instance, number, parameters, several, shown, text
 from taxel._arguments import path as checked_path
 from taxel._core import FormatError, ProblemError
+from taxel.detect import recipes
 from taxel.detect.readout import Readout
 from taxel.encode import Encoder
 from taxel.events import Events
@@ -55,6 +54,8 @@ class Recipe:
         The same by label, before those for all. Where there are any, only these labels are learnt.
     run_threshold : float, above 0
         See `taxel.Readout`.
+    about, source : str
+        What it is for, and where its values come from.
 
     Raises
     ------
@@ -72,13 +73,17 @@ class Recipe:
     learner: Mapping[str, Any] = field(default_factory=dict)
     neurons: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     run_threshold: float = 1.0
+    about: str = ""
+    source: str = ""
 
     def __post_init__(self) -> None:
         instance("encoder", self.encoder, Encoder)
         number("run_threshold", self.run_threshold)
+        text("about", self.about)
+        text("source", self.source)
         if not isinstance(self.neurons, Mapping):
             raise ProblemError(f"neurons is {shown(self.neurons)}: must be parameters by label")
-        _learner("learner", self.learner)
+        learner_from("learner", self.learner)
         for label in self.neurons:
             self.learner_of(text("label", label))
 
@@ -87,13 +92,14 @@ class Recipe:
         own = self.neurons.get(text("label", label), {})
         if not isinstance(own, Mapping):
             raise ProblemError(f"neurons.{label} is {shown(own)}: must be parameters by name")
-        return _learner(f"neurons.{label}", {**self.learner, **own})
+        return learner_from(f"neurons.{label}", {**self.learner, **own})
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Recipe:
-        """Build a recipe from plain values with the keys ``encoder learner neurons run_threshold``.
+        """Build a recipe from plain values with the keys ``encoder learner neurons run_threshold about source``.
 
-        The encoder is a table with its `name` and parameters.
+        The encoder is a table with its `name` and parameters. What a recipe's file says of the recordings that it
+        `fits` and of any `other` label is for `load`.
 
         Raises
         ------
@@ -103,35 +109,65 @@ class Recipe:
             raise ProblemError(f"recipe is {shown(values)}: must be values by name")
         known = tuple(inspect.signature(cls).parameters)
         for key in values:
-            if key not in known:
+            if key not in (*known, "fits", "other"):
                 raise ProblemError(f"recipe: no key {shown(key)}: there are {', '.join(known)}")
         encoder = values.get("encoder")
         if not isinstance(encoder, Mapping):
             raise ProblemError(
                 "recipe: says no encoder: name one, as --encoder contact_area or [encoder] in the recipe"
             )
-        return cls(**{**values, "encoder": Encoder.from_json(parameters(encoder))})
+        own = {key: value for key, value in values.items() if key in known}
+        return cls(**{**own, "encoder": Encoder.from_json(parameters(encoder))})
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str], changes: Mapping[str, Any] | None = None) -> Recipe:
-        """Read a recipe from a TOML or JSON file; `changes` by dotted key, as ``learner.tau``, come on top.
+    def load(
+        cls,
+        recipe: str | os.PathLike[str],
+        changes: Mapping[str, Any] | None = None,
+        labels: Sequence[str] | None = None,
+    ) -> Recipe:
+        """Load one of `taxel.detect.recipes.names`, or a TOML or JSON file, whose path holds a dot or a slash.
+
+        Parameters
+        ----------
+        recipe : str or path
+        changes : mapping, optional
+            Other values by dotted key, as ``learner.tau``: those of ``learner`` come before what the recipe has for
+            one neuron, those of ``neurons.LABEL`` before all.
+        labels : sequence of str, optional
+            What is to be learnt: a recipe that has parameters for any `other` label gets a neuron for each.
 
         Raises
         ------
         FormatError : neither TOML nor JSON
-        ProblemError : a key that is not known, or a value that makes no sense
+        ProblemError : a name or key that is not known, or a value that makes no sense
         FileNotFoundError : no such file
+
+        Examples
+        --------
+        >>> recipe = Recipe.load("gait_insole", {"learner.tau": 20.0}, labels=["contact", "foot off"])
+        >>> recipe.learner_of("foot off")[1], sorted(recipe.neurons)
+        (8.0, ['contact', 'foot off'])
         """
-        return cls.from_dict(changed(_read_tables(path), {} if changes is None else changes))
+        values = recipes.read(recipe)
+        if labels is not None:
+            values = recipes.for_labels(values, several("labels", labels))
+        return cls.from_dict(changed(values, {} if changes is None else changes))
 
 
 def changed(values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values with others put in at dotted keys."""
+    """Return values with others put in at dotted keys; what is said for all neurons comes before what one has."""
     if not isinstance(changes, Mapping):
         raise ProblemError(f"changes is {shown(changes)}: must be values by dotted key")
     values = json.loads(json.dumps(values))
+    for key in changes:
+        table, _, name = text("key", key).partition(".")
+        own = values.get("neurons")
+        for neuron in own.values() if table == "learner" and isinstance(own, dict) else ():
+            if isinstance(neuron, dict):
+                neuron.pop(name, None)
     for key, value in changes.items():
-        *tables, last = text("key", key).split(".")
+        *tables, last = key.split(".")
         place = values
         for table in tables:
             place = place.setdefault(table, {})
@@ -269,7 +305,8 @@ def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:
     return SpikeTrains(trains.times, trains.offsets, trains.start, stop, trains.values)
 
 
-def _learner(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
+def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
+    """Return the learner that plain values describe, and the delay it is trained with (ms); `name` is for errors."""
     if not isinstance(values, Mapping):
         raise ProblemError(f"{name} is {shown(values)}: must be parameters by name")
     values = dict(values)
@@ -296,16 +333,3 @@ def _examples(examples: Sequence[Example]) -> list[Example]:
         tare = rest[0] if rest else None
         checked.append(Example(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
     return checked
-
-
-def _read_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
-    place = Path(checked_path("path", path))
-    try:
-        said = place.read_text(encoding="utf-8")
-        values = json.loads(said) if place.suffix.lower() == ".json" else tomllib.loads(said)
-    except (UnicodeDecodeError, json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
-        kind = "JSON" if place.suffix.lower() == ".json" else "TOML"
-        raise FormatError(f"{place}: not {kind}: {error}") from None
-    if not isinstance(values, dict):
-        raise FormatError(f"{place}: holds no recipe, which is values by name")
-    return values

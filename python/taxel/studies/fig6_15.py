@@ -20,9 +20,9 @@ from taxel.studies.gait.realise import Setting
 from taxel.studies.gait.recipes import NOTES, PRINTED
 from taxel.studies.gait.report import EVENTS
 from taxel.studies.gait.section import STANDS_FOR
-from taxel.studies.gait.sources import SOURCES, encoded, fingerprint, present
+from taxel.studies.gait.sources import SOURCES, encoded, fingerprint, present, readings
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, refuse
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +55,8 @@ def _setting(data: Path, source: str) -> tuple[Protocol, Setting]:
 
 def tasks(p: Parameters, *, data: Path) -> list[Task]:
     """List a fit of each learner a source, recipe, event and fold; 0 scopes or folds stand for all of them."""
-    here = [name for name in p["sources"] if name in present(data)]
+    folders = present(data)
+    here = [name for name in p["sources"] if name in folders and readings(folders[name], name).trials]
     if not here:
         raise ProblemError(f"{data}: holds none of the recordings {', '.join(p['sources'])}")
     listed = []
@@ -80,6 +81,14 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
                         listed.append(Task(both | {"kind": "neuron"}, 1))
                         listed.append(Task(both | {"kind": "skim", "skim": skim}, 1))
     return listed
+
+
+def unread(p: Parameters, data: Path) -> dict[str, str]:
+    """Return which files of the sources cannot be read, and why."""
+    here = {name: place for name, place in present(data).items() if name in p["sources"]}
+    found = sources.unread(here.items())
+    refuse(found, strict=not any(readings(place, name).trials for name, place in here.items()))
+    return found
 
 
 def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
@@ -221,4 +230,5 @@ STUDY = Study(
     draw=draw,
     code=(sources, insole, pieces, folds, realisation, formats, encode, learn),
     data=tuple(SOURCES[name].folder for name in STANDS_FOR),
+    unread=unread,
 )

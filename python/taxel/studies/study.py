@@ -34,6 +34,7 @@ __all__ = [
     "Study",
     "machine",
     "read_section",
+    "refuse",
     "write_section",
 ]
 
@@ -76,6 +77,7 @@ class Runs(Protocol):
         changes: Parameters | None = None,
         data: Path | None = None,
         workers: Workers = HERE,
+        strict: bool = False,
         quiet: bool = False,
     ) -> Section:
         """Run, judge, draw; leave a summary in ``report``."""
@@ -141,6 +143,8 @@ class Study:
         What a realisation uses beside its own file: when they change, results are reckoned anew.
     data : tuple of str
         Folders of recordings that it needs.
+    unread : function of (parameters, data)
+        Which of their files cannot be read, and why. It raises `FormatError` where none can.
     """
 
     name: str
@@ -156,6 +160,7 @@ class Study:
     draw: Callable[[Parameters, Said], Figure]
     code: tuple[ModuleType, ...] = ()
     data: tuple[str, ...] = field(default=())
+    unread: Callable[[Parameters, Path], Mapping[str, str]] = lambda _parameters, _data: {}
 
     def set(self, size: str = "full", **changes: Any) -> dict[str, Any]:
         """Return the parameters of a size, with changes.
@@ -186,6 +191,7 @@ class Study:
         changes: Mapping[str, Any] | None = None,
         data: Path | None = None,
         workers: Workers = HERE,
+        strict: bool = False,
         quiet: bool = False,
     ) -> Section:
         """Run what is not in `report` yet, draw, judge; leave ``summary.json`` and the picture there.
@@ -201,6 +207,8 @@ class Study:
         data : Path, optional
             Where the recordings lie, for the studies that need some.
         workers : Workers
+        strict : bool
+            A file of recordings that cannot be read ends it before it begins; else it is left out, and said.
         quiet : bool
             No progress line.
 
@@ -211,12 +219,15 @@ class Study:
         Raises
         ------
         ProblemError : a size or parameter that is none
-        FormatError : recordings that it needs are not there
+        FormatError : recordings that it needs are not there, or cannot be read (none of them; one, with `strict`)
         """
         parameters = self.set(size, **(changes or {}))
         tasks, realise = self.tasks, self.realise
+        unread: Mapping[str, str] = {}
         if self.data:
             folder = self._recordings(data)
+            unread = self.unread(parameters, folder)
+            refuse(unread, strict=strict)
             tasks, realise = partial(tasks, data=folder), partial(realise, data=folder)
         folder = report / self.name
         folder.mkdir(parents=True, exist_ok=True)
@@ -233,6 +244,7 @@ class Study:
             "size": size,
             "parameters": parameters,
             "changed": sorted(changes or {}),
+            "unread": dict(unread),
             "realisations": len(wanted),
             "statements": [asdict(s) for s in self.statements(parameters, said)],
             "said": said,
@@ -251,6 +263,14 @@ class Study:
                 f"{data or self.name}: holds no recordings; name a folder with any of {', '.join(self.data)} by --data"
             )
         return data
+
+
+def refuse(unread: Mapping[str, str], *, strict: bool) -> None:
+    """Raise `FormatError` for the first file that cannot be read, where that ends a study."""
+    if strict and unread:
+        file, why = next(iter(unread.items()))
+        more = f" ({len(unread) - 1} more cannot be read)" if len(unread) > 1 else ""
+        raise FormatError(f"{file}: {why}{more}")
 
 
 def _alike(value: Any, other: Any) -> bool:

@@ -35,6 +35,7 @@ from taxel.studies.gait.recipes import (
 from taxel.studies.gait.rules import RULES
 from taxel.studies.gait.sources import SOURCES, encoded, fingerprint, present
 from taxel.studies.runner import HERE, Results, Task, Workers, code_digest, run
+from taxel.studies.study import refuse
 
 __all__ = ["PROTOCOLS", "ROWS", "Outcome", "Protocol", "Unit", "study"]
 
@@ -290,6 +291,7 @@ def study(
     workers: Workers = HERE,
     report: Path,
     only: Sequence[str] = (),
+    strict: bool = False,
     quiet: bool = False,
 ) -> dict[str, Any]:
     """Run the gait study on a folder of recordings; what is in `report` from before is not run again.
@@ -310,6 +312,8 @@ def study(
         Folder for results (JSON lines), folds, and the report.
     only : sequence of str
         Sources to run; all that are there where it is empty.
+    strict : bool
+        A file that cannot be read ends the study before it begins; else it is left out, and said.
     quiet : bool
         No progress lines.
 
@@ -320,7 +324,7 @@ def study(
 
     Raises
     ------
-    FormatError : `data` or `test` holds no source
+    FormatError : `data` or `test` holds no source, or none that can be read (one that cannot, with `strict`)
     ProblemError : a size or source that is none
     """
     from taxel.studies.gait.report import figures, summary, write_report  # noqa: PLC0415  jinja2 and matplotlib load slowly
@@ -330,8 +334,11 @@ def study(
     arguments.text("size", size, ("full", "toy"))
     arguments.text("search", search, ("listed", "full"))
     only = [arguments.text("only", name, SOURCES) for name in arguments.several("only", only)]
-    folders = _sources(data, only)
-    tests = {} if test is None else _sources(test, only)
+    folders, unread = _sources(data, only, strict)
+    tests: dict[str, Path] = {}
+    if test is not None:
+        tests, others = _sources(test, only, strict)
+        unread |= others
     wanted = [name for name in SOURCES if name in folders and (test is None or name in tests)]
     report.mkdir(parents=True, exist_ok=True)
     plans = [plan for name in wanted for plan in _plans(name, folders[name], tests.get(name), size, search)]
@@ -364,6 +371,7 @@ def study(
         plans=[(p.source, p.protocol) for p in plans],
         full_search=full,
         skipped=skipped,
+        unread=unread,
         size=size,
         test=test is not None,
         cpu_seconds=seconds,
@@ -372,14 +380,18 @@ def study(
     return said
 
 
-def _sources(folder: Path, only: Sequence[str]) -> dict[str, Path]:
+def _sources(folder: Path, only: Sequence[str], strict: bool) -> tuple[dict[str, Path], dict[str, str]]:
+    """Return the sources of a folder that can be read, and the files that cannot."""
     if not folder.is_dir():
         raise FileNotFoundError(2, "No such folder", str(folder))
     found = {name: place for name, place in present(folder).items() if not only or name in only}
     if not found:
         names = ", ".join(SOURCES[name].folder for name in (only or SOURCES))
         raise FormatError(f"{folder}: holds no recordings; must have one or more of the folders {names}")
-    return found
+    unread = sources.unread(found.items())
+    readable = {name: place for name, place in found.items() if sources.readings(place, name).trials}
+    refuse(unread, strict=strict or not readable)
+    return readable, unread
 
 
 def _plans(name: str, folder: Path, test: Path | None, size: str, search: str) -> Iterator[_Plan]:
@@ -540,10 +552,10 @@ def _full_search(plan: _Plan, size: str, results: Results, figures: Any) -> Iter
                 "event": event,
                 "all_else": row.removeprefix("528: "),
                 "left_out": ", ".join(sorted({u.person for u in units})),
-                "tau": point["neuron"]["tau"],
-                "kappa": point["learn"]["kappa"],
-                "lambda_1": point["learn"]["lambdas"][0],
-                "lambda_2": point["learn"]["lambdas"][1],
+                "tau": point["learner"]["tau"],
+                "kappa": point["learner"]["kappa"],
+                "lambda_1": point["learner"]["lambdas"][0],
+                "lambda_2": point["learner"]["lambdas"][1],
                 "inside": inside,
                 **{name: found[name] for name in ("missed", "false", "error_ms")},
             }

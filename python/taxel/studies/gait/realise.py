@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from taxel._core import ProblemError
 from taxel.detect import score
+from taxel.detect.training import learner_from
 from taxel.detections import Detections
 from taxel.learn import SKIM, ConeR
 from taxel.studies.gait import insole, rules
@@ -22,8 +23,6 @@ from taxel.studies.gait.sources import SOURCES, Encoded, encoded
 
 __all__ = ["TEST", "Setting", "realise"]
 
-#: Of the neuron's grid and of the rows of silence, ms.
-STEP_MS = 1.0
 #: Detections count up to so far from a reference event, ms (thesis 6.5.2).
 WINDOW_MS = 50.0
 #: A plain rule says nothing for so long after an event, ms.
@@ -125,9 +124,9 @@ def _neuron(
     params: Mapping[str, Any], data: Encoded, training: list[Piece], rows: dict[str, list[Piece]], seed: int
 ) -> dict[str, Any]:
     point, event = params["point"], params["event"]
-    later = data.latency_ms + point["delay_ms"]
+    cone, delay_ms = learner_from("point", point["learner"])
+    later = data.latency_ms + delay_ms
     patterns = _patterns(params, training, seed)
-    cone = ConeR(**point["neuron"], **point["learn"], step_ms=STEP_MS)
     with warnings.catch_warnings():  # what the learner warns of is kept in the result
         warnings.simplefilter("ignore", UserWarning)
         cone.fit([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
@@ -143,12 +142,12 @@ def _search(
 ) -> dict[str, Any]:
     """Try lambda_1 : lambda_2 one after the other on the same rows, each from the fit before."""
     point, event = params["point"], params["event"]
-    later = data.latency_ms + point["delay_ms"]
+    later = data.latency_ms + point["learner"]["delay_ms"]
     patterns = _patterns(params, training, seed)
     rows, before, tried = None, None, []
     for l1 in params["lambda_1"]:
-        learn = point["learn"] | {"lambdas": [l1, round(4 - l1, 1), *point["learn"]["lambdas"][2:]]}
-        cone = ConeR(**point["neuron"], **learn, step_ms=STEP_MS)
+        lambdas = [l1, round(4 - l1, 1), *point["learner"]["lambdas"][2:]]
+        cone, _ = learner_from("point", point["learner"] | {"lambdas": lambdas})
         if rows is None:
             rows = cone.prepare([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
         with warnings.catch_warnings():
@@ -158,7 +157,7 @@ def _search(
         errors = np.concatenate([np.empty(0), *(f["errors"] for f in found)])
         tried.append(
             {
-                "lambdas": learn["lambdas"],
+                "lambdas": lambdas,
                 "missed": sum(f["events"] - len(f["errors"]) for f in found),
                 "false": sum(f["false"] for f in found),
                 "rms_ms": round(float(np.sqrt(np.mean(errors**2))), 3) if len(errors) else None,
@@ -186,9 +185,10 @@ def _skim(
 ) -> dict[str, Any]:
     """Train SKIM as 6.5.4 does: the neuron's kernel, and every threshold tested."""
     point, event = params["point"], params["event"]
-    later = data.latency_ms + point["delay_ms"]
+    later = data.latency_ms + point["learner"]["delay_ms"]
     patterns = _patterns(params, training, seed)
-    skim = SKIM(tau=point["neuron"]["tau"], step_ms=STEP_MS, within_ms=WINDOW_MS, **params["skim"])
+    neuron = {name: point["learner"][name] for name in ("tau", "step_ms")}
+    skim = SKIM(**neuron, within_ms=WINDOW_MS, **params["skim"])
     skim.fit([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
     tested = {
         f"{threshold:g}": {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +97,7 @@ def summary(
     plans: Sequence[tuple[str, Protocol]],
     full_search: Sequence[dict[str, Any]],
     skipped: Sequence[str],
+    unread: Mapping[str, str],
     size: str,
     test: bool,
     cpu_seconds: float,
@@ -133,6 +134,7 @@ def summary(
         "size": size,
         "judged": "on another folder" if test else "by folds",
         "skipped": list(skipped),
+        "unread": dict(unread),
         "taxel": __version__,
         "python": platform.python_version(),
         "machine": platform.machine(),

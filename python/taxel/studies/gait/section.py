@@ -54,13 +54,14 @@ class GaitStudy:
         changes: Mapping[str, Any] | None = None,
         data: Path | None = None,
         workers: Workers = HERE,
+        strict: bool = False,
         quiet: bool = False,
     ) -> Section:
         """Run it into ``report/gait``; leave its own page there too.
 
         Parameters
         ----------
-        report, size, changes, data, workers, quiet
+        report, size, changes, data, workers, strict, quiet
             As in `taxel.studies.study.Study.run`; nothing can be changed.
 
         Returns
@@ -76,7 +77,7 @@ class GaitStudy:
             raise ProblemError(f"{self.name} has no parameter {next(iter(changes))!r}: its points are in its recipes")
         folder = report / self.name
         data = Path(arguments.path("data", data))
-        said = study(data, size=size, workers=workers, report=folder, quiet=quiet)
+        said = study(data, size=size, workers=workers, report=folder, strict=strict, quiet=quiet)
         section = {
             "name": self.name,
             "title": self.title,
@@ -89,6 +90,7 @@ class GaitStudy:
             ),
             "size": size,
             "parameters": {"skipped": said["skipped"], "search_points": said["search_points"]},
+            "unread": said["unread"],
             "realisations": sum(len(p["rows"]) for s in said["sources"] for p in s["protocols"]),
             "statements": [asdict(s) for s in statements(said)],
             "said": {"rows": _rows(said)},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -13,15 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import taxel.encode
 from taxel import formats
+from taxel._arguments import parameters
+from taxel._core import FormatError
 from taxel.array import Array
+from taxel.encode import Encoder
 from taxel.formats import Trial
 from taxel.frames import Frames
 from taxel.studies.gait import insole
 from taxel.studies.gait.pieces import Piece
 
-__all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "encoder_of", "fingerprint", "present", "trials_of"]
+__all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "present", "readings", "unread"]
 
 #: Silence before each footfall of the plate, ms: random, so that no cut marks time.
 SILENCE_MS = (300, 900)
@@ -130,20 +132,53 @@ def present(folder: Path) -> dict[str, Path]:
     return found
 
 
+@dataclass(frozen=True)
+class Readings:
+    """Hold what a source's files gave.
+
+    Attributes
+    ----------
+    trials : tuple of Trial
+    files : tuple of Path
+        That were read.
+    unread : mapping from file (its folder before it) to why it could not be read
+    """
+
+    trials: tuple[Trial, ...]
+    files: tuple[Path, ...]
+    unread: Mapping[str, str]
+
+
+@lru_cache(maxsize=8)
+def readings(folder: Path, name: str) -> Readings:
+    """Read all of a source's files, once; one that cannot be read is left out, and the others are read."""
+    kind = formats.FORMATS[name]
+    trials: list[Trial] = []
+    read, unread = [], {}
+    for file in kind.files(folder):
+        try:
+            found = list(kind.trials(file))
+        except (FormatError, OSError) as error:
+            why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            unread[f"{folder.name}/{file.name}"] = why.removeprefix(f"{file.name}: ").removeprefix(f"{file.name}, ")
+        else:
+            trials += map(_boxed, found) if name == "plate" else found
+            read.append(file)
+    return Readings(tuple(trials), tuple(read), unread)
+
+
+def unread(folders: Iterable[tuple[str, Path]]) -> dict[str, str]:
+    """Return which files of sources and their folders cannot be read, and why."""
+    return {file: why for name, folder in folders for file, why in readings(folder, name).unread.items()}
+
+
 def fingerprint(folder: Path, name: str) -> str:
-    """Return a short digest of a source's files: names, sizes and contents."""
+    """Return a short digest of a source's files that can be read: names, sizes and contents."""
     digest = hashlib.sha256()
-    files = formats.FORMATS[name].files(folder)
     beside = [f for f in sorted(folder.iterdir()) if f.suffix in {".csv", ".let", ".ts"}]
-    for file in [*files, *beside]:
+    for file in [*readings(folder, name).files, *beside]:
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()[:16]
-
-
-def encoder_of(said: Mapping[str, Any]) -> Any:
-    """Build an encoder from its class name and parameters: ``{"class": "LevelCrossing", "levels": [5.0]}``."""
-    parameters = dict(said)
-    return getattr(taxel.encode, parameters.pop("class"))(**parameters)
 
 
 @dataclass(frozen=True)
@@ -172,31 +207,26 @@ def encoded(folder: Path, name: str, encoder: Mapping[str, Any], placed: str = "
     name : str
         Of `SOURCES`.
     encoder : mapping
-        As `encoder_of` takes it.
+        Its `name` and parameters.
     placed : {"own", "others"}
         Whose footfalls tell the insole's size and toe-out on the plate: the person's other ones, or other people's.
     """
-    return _encoded(folder, name, json.dumps(encoder, sort_keys=True), placed)
+    return _encoded(folder, name, parameters(dict(sorted(encoder.items()))), placed)
 
 
 @lru_cache(maxsize=12)
 def _encoded(folder: Path, name: str, encoder: str, placed: str) -> Encoded:
-    said = json.loads(encoder)
-    built = encoder_of(said)
+    built = Encoder.from_json(encoder)
     make = _footfalls if name == "plate" else _walks
     pieces = {p.name: p for p in make(folder, name, built, placed)}
-    return Encoded(pieces, float(built.latency_ms), len(said.get("levels", [0])))
+    return Encoded(pieces, float(built.latency_ms), len(json.loads(encoder).get("levels", [0])))
 
 
-@lru_cache(maxsize=4)
-def trials_of(folder: Path, name: str) -> tuple[Trial, ...]:
-    """Read a source's trials that have a truth, once."""
-    return tuple(t for t in formats.FORMATS[name].trials(folder) if any(len(times) for times in t.truth.values()))
-
-
-def _walks(folder: Path, name: str, encoder: Any, _placed: str) -> list[Piece]:
+def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piece]:
     found = []
-    for trial in trials_of(folder, name):
+    for trial in readings(folder, name).trials:
+        if not any(len(times) for times in trial.truth.values()):
+            continue
         start, stop = (float(t) / 1000 for t in (trial.frames.t[0], trial.frames.t[-1]))
         spikes = encoder.encode(trial.frames).split_by_sign()
         spikes = _moved(spikes, -start, stop - start)
@@ -216,7 +246,7 @@ def _walks(folder: Path, name: str, encoder: Any, _placed: str) -> list[Piece]:
     return found
 
 
-def _footfalls(folder: Path, name: str, encoder: Any, placed: str) -> list[Piece]:
+def _footfalls(folder: Path, name: str, encoder: Encoder, placed: str) -> list[Piece]:
     all_cuts = cuts(folder, name, placed)
     found = []
     for person in dict.fromkeys(c.person for c in all_cuts):
@@ -224,7 +254,7 @@ def _footfalls(folder: Path, name: str, encoder: Any, placed: str) -> list[Piece
     return found
 
 
-def _row(cuts: list[Cut], encoder: Any) -> list[Piece]:
+def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
     """Encode a person's footfalls as one row with random silences, and take it apart again into pieces."""
     rng = np.random.default_rng([int.from_bytes(hashlib.sha256(cuts[0].person.encode()).digest()[:4])])
     order = rng.permutation(len(cuts))
@@ -275,7 +305,7 @@ class Cut:
 @lru_cache(maxsize=4)
 def cuts(folder: Path, name: str, placed: str) -> tuple[Cut, ...]:
     """Cut every footfall, once all footprints are known."""
-    feet = [_boxed(t) for t in formats.FORMATS[name].trials(folder)]
+    feet = readings(folder, name).trials
     prints = [insole.footprint(t) for t in feet]
     found = []
     for k, trial in enumerate(feet):

@@ -1,0 +1,94 @@
+"""Recipes: those that taxel ships say what they said when they were tuned, and files kept from then still load."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from taxel import Array, Events, FormatError, Frames, ProblemError
+from taxel.detect import Recipe, recipes
+from taxel.encode import ContactArea
+
+#: What each recipe came to when version 0.1 was cut, as files of then.
+KEPT = Path(__file__).parents[1] / "data" / "recipes"
+FILES = sorted(KEPT.glob("*.json"))
+
+
+def said(recipe: Recipe, label: str) -> tuple[str, float]:
+    """Return a label's learner in full, and its delay."""
+    learner, delay_ms = recipe.learner_of(label)
+    return repr(learner), delay_ms
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_a_shipped_recipe_is_what_it_was(file: Path) -> None:
+    then = Recipe.load(file)
+    now = Recipe.load(file.stem, labels=list(then.neurons))
+    assert now.encoder == then.encoder
+    assert {label: said(now, label) for label in then.neurons} == {label: said(then, label) for label in then.neurons}
+    assert now.run_threshold == then.run_threshold == 1.0
+
+
+def test_a_recipe_file_kept_from_0_1_loads_unchanged() -> None:
+    kept = Recipe.load(KEPT / "kept.toml")
+    assert kept.encoder == ContactArea(levels=[2, 4, 8], noise_floor=3.0)
+    assert (said(kept, "contact")[1], said(kept, "lift")[1]) == (2.0, 1.0)
+    assert "1.5" in said(kept, "contact")[0]
+    assert "15" in said(kept, "lift")[0]
+    assert kept.run_threshold == 0.9
+
+
+@pytest.mark.parametrize("name", recipes.names())
+def test_every_recipe_names_its_source_and_makes_learners(name: str) -> None:
+    recipe = Recipe.load(name)
+    assert min(len(recipe.about), len(recipe.source)) > 20
+    for label in recipe.neurons:
+        recipe.learner_of(label)
+
+
+def test_every_kind_of_recording_has_one_recipe() -> None:
+    kinds = [kind for name in recipes.names() for kind in recipes.read(name).get("fits", ())]
+    assert len(kinds) == len(set(kinds))
+    frames = np.zeros((2, 1, 1))
+    found = {unit: recipes.fitting(Frames(frames, [0, 1000], unit=unit)) for unit in ("counts", "N", "kPa")}
+    assert found == {"counts": "gait_plate", "N": "gait_insole", "kPa": "gait_channel"}
+    assert recipes.fitting(Events([0], [0], [0], [True], array=Array(1, 1))) in recipes.names()
+
+
+def test_any_other_label_has_the_parameters_that_the_recipe_says() -> None:
+    recipe = Recipe.load("gait_plate", labels=["Foot-off", "step"])
+    assert sorted(recipe.neurons) == ["Foot-off", "step"]
+    own = Recipe.load("gait_plate")
+    assert said(recipe, "Foot-off") == said(own, "foot_off")
+    assert said(recipe, "step") == said(own, "contact")
+
+
+def test_what_is_said_for_all_neurons_comes_before_what_one_has_and_what_is_said_for_one_before_all() -> None:
+    changes = {"learner.tau": 20.0, "neurons.step.tau": 7.0}
+    recipe = Recipe.load("gait_plate", changes, labels=["foot_off", "step"])
+    assert (recipe.learner_of("foot_off")[1], recipe.learner_of("step")[1]) == (8.0, 12.0)
+    assert ("20.0" in said(recipe, "foot_off")[0], "7.0" in said(recipe, "step")[0]) == (True, True)
+    assert "190" not in said(recipe, "foot_off")[0]
+
+
+@pytest.mark.parametrize(
+    ("recipe", "error", "text"),
+    [
+        ("gaitpdb", ProblemError, r"recipe 'gaitpdb': there are gait_channel, .*; the path of a file holds a dot"),
+        ("./gaitpdb", FileNotFoundError, "No such file"),
+        (3, ProblemError, "recipe is 3: must be a path"),
+        (KEPT / "nothing.toml", FileNotFoundError, "No such file"),
+        (Path(__file__), FormatError, "not TOML"),
+    ],
+)
+def test_what_is_no_recipe_is_refused(recipe: object, error: type[Exception], text: str) -> None:
+    with pytest.raises(error, match=text):
+        Recipe.load(recipe)  # type: ignore[arg-type]
+
+
+def test_another_label_has_to_be_one_of_the_recipe(tmp_path: Path) -> None:
+    (tmp_path / "odd.toml").write_text('other = "lift"\n[encoder]\nname = "fa1"\n[neurons.contact]\ntau = 2.0\n')
+    with pytest.raises(ProblemError, match="recipe: other is 'lift': must be one of 'contact'"):
+        Recipe.load(tmp_path / "odd.toml", labels=["contact"])
