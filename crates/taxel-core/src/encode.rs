@@ -39,7 +39,7 @@ pub trait Stream: Send {
     /// How much later than the touch itself a spike comes, ms: what the encoder's own rule costs.
     fn latency_ms(&self) -> f64;
 
-    /// Takes the next events; one behind the latest stamp counts as of that stamp.
+    /// Takes the next events; one behind the time come to counts as of that time, far behind it also as [`Stream::late`].
     ///
     /// # Errors
     ///
@@ -62,6 +62,9 @@ pub trait Stream: Send {
 
     /// A copy that goes on by itself: to see what would be said if nothing came.
     fn fork(&self) -> Box<dyn Stream>;
+
+    /// How many events came farther than [`FARTHEST_BACK_US`](crate::events::FARTHEST_BACK_US) behind the time come to.
+    fn late(&self) -> u64;
 }
 
 impl Clone for Box<dyn Stream> {
@@ -186,11 +189,13 @@ impl Encoder {
     ///
     /// # Errors
     ///
-    /// As [`Encoder::stream`] and [`Stream::push_events`]; `Interrupted` where asked to stop.
+    /// As [`Encoder::stream`] and [`Stream::push_events`]; `Problem` too where an event lies too far behind one before
+    /// it ([`Events::check_order`]); `Interrupted` where asked to stop.
     pub fn encode_events(&self, events: &Events, stop: Stop<'_>) -> Result<SpikeTrains> {
         /// Events between two looks at `stop`.
         const PIECE: usize = 65_536;
         let mut stream = self.stream(&events.array)?;
+        events.check_order()?;
         let mut out = vec![];
         if events.len() <= PIECE {
             stream.push_events(events, &mut out)?;

@@ -2,6 +2,9 @@
 
 use crate::{Array, Result, problem};
 
+/// How far an event may lie behind one before it and still be heard, us: datagrams overtake each other.
+pub const FARTHEST_BACK_US: i64 = 100_000;
+
 /// The intensity words that belong to events.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Intensities {
@@ -73,6 +76,26 @@ impl Events {
                 .map(|i| Intensities { ticks: i.ticks[range.clone()].to_vec(), present: i.present[range].to_vec() }),
             markers: vec![],
         }
+    }
+
+    /// Checks that the events of a whole recording came in order, but for what [`FARTHEST_BACK_US`] allows.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the first event that lies farther back.
+    pub fn check_order(&self) -> Result<()> {
+        let (mut latest, mut row) = (i64::MIN, 0);
+        for (k, &t) in self.t.iter().enumerate() {
+            if t >= latest {
+                (latest, row) = (t, k);
+            } else if latest.abs_diff(t) > FARTHEST_BACK_US.unsigned_abs() {
+                return Err(problem!(
+                    "event {k} at {t} us: lies more than 0.1 s behind event {row} at {latest} us; put them in order of \
+                     time with Events.sorted()"
+                ));
+            }
+        }
+        Ok(())
     }
 
     /// Forgets all events and markers but keeps the columns' memory, to be filled again.

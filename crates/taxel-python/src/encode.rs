@@ -140,6 +140,12 @@ impl EncoderStream {
         Ok(from_spikes(py, trains))
     }
 
+    /// How many events came too far behind the time come to.
+    #[getter]
+    fn late(&self) -> u64 {
+        self.lock().stream.late()
+    }
+
     fn advance<'py>(&self, py: Python<'py>, t: i64) -> PyResult<SpikesOut<'py>> {
         let trains = enter(py, |_| {
             let (mut at_work, mut out) = (self.lock(), vec![]);
@@ -170,6 +176,7 @@ fn tare_of_events(
 ) -> PyResult<String> {
     let events = to_events(events)?;
     enter(py, |_| {
+        events.check_order()?;
         let stop = stop.or(events.t.iter().max().copied());
         let kept = events.t.iter().position(|&t| stop.is_some_and(|stop| t >= stop)).unwrap_or(events.len());
         let mut tare = TareBuilder::new(&events.array, start);

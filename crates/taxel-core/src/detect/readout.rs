@@ -235,7 +235,8 @@ impl Readout {
     ///
     /// # Errors
     ///
-    /// As [`Readout::stream`] and [`ReadoutStream::push_events`]; `Interrupted` where asked to stop.
+    /// As [`Readout::stream`], [`ReadoutStream::push_events`] and [`Events::check_order`]; `Interrupted` where asked to
+    /// stop.
     pub fn run_events(
         &self,
         events: &Events,
@@ -245,6 +246,7 @@ impl Readout {
     ) -> Result<Vec<Detection>> {
         let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
         let mut stream = self.stream(&events.array, frame_us, tare)?;
+        events.check_order()?;
         let mut found = stream.push_recording(events, stop)?;
         stream.advance(last.saturating_add(self.silence_us()), &mut found)?;
         Ok(found)

@@ -287,6 +287,9 @@ mod tests {
         fn fork(&self) -> Box<dyn Stream> {
             Box::new(self.clone())
         }
+        fn late(&self) -> u64 {
+            0
+        }
         fn trains(&self) -> usize {
             4
         }

@@ -193,6 +193,10 @@ impl Stream for Area {
         Box::new(self.clone())
     }
 
+    fn late(&self) -> u64 {
+        self.source.late()
+    }
+
     fn trains(&self) -> usize {
         2 * self.levels.len()
     }
@@ -210,12 +214,7 @@ impl Stream for Area {
         let Some(intensity) = &events.intensity else {
             return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
         };
-        let Some(&first) = events.t.first() else { return Ok(()) };
-        let mut present = match self.source {
-            Source::Frames { .. } => return Err(problem!("event at {first} us: this stream was begun with frames")),
-            Source::Events { present } => present,
-            Source::Unknown => first,
-        };
+        let Some(mut present) = self.source.events(&events.t)? else { return Ok(()) };
         for k in 0..events.len() {
             if events.t[k] > present {
                 self.say(present, out);
@@ -229,7 +228,6 @@ impl Stream for Area {
                 }
             }
         }
-        self.source = Source::Events { present };
         Ok(())
     }
 
@@ -257,7 +255,7 @@ impl Stream for Area {
         match &mut self.source {
             Source::Unknown => {}
             Source::Frames { open } => *open = t.max(*open),
-            Source::Events { present } => {
+            Source::Events { present, .. } => {
                 let stamp = *present;
                 if t > stamp {
                     *present = t;
@@ -270,7 +268,7 @@ impl Stream for Area {
     fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64> {
         let end = match self.source {
             Source::Unknown => return None,
-            Source::Events { present } => present,
+            Source::Events { present, .. } => present,
             Source::Frames { open } => open - 1,
         };
         self.advance(end + 1, out);

@@ -4,6 +4,7 @@
 //! did not change since the last sample is known by block, so a rule need not look at it.
 
 use super::{Stream, micros, ms};
+use crate::events::FARTHEST_BACK_US;
 use crate::wide::wide;
 use crate::{Array, Events, Result, Spike, problem};
 
@@ -172,17 +173,41 @@ pub(super) fn blocks(channels: usize) -> usize {
 #[derive(Clone)]
 pub(super) enum Source {
     Unknown,
-    /// `present`: nothing comes before it any more.
     Events {
+        /// The time come to: nothing counts as of before it any more.
         present: i64,
+        /// How many came too far behind it.
+        late: u64,
     },
-    /// `open`: the first time at which a frame may still come.
     Frames {
+        /// The first time at which a frame may still come.
         open: i64,
     },
 }
 
 impl Source {
+    /// Takes the times of events; gives the time come to before them, `None` where there is no event.
+    pub(super) fn events(&mut self, times: &[i64]) -> Result<Option<i64>> {
+        let Some(&first) = times.first() else { return Ok(None) };
+        let (before, mut late) = match *self {
+            Source::Frames { .. } => return Err(problem!("event at {first} us: this stream was begun with frames")),
+            Source::Events { present, late } => (present, late),
+            Source::Unknown => (first, 0),
+        };
+        let mut present = before;
+        for &t in times {
+            present = present.max(t);
+            late += u64::from(present - t > FARTHEST_BACK_US);
+        }
+        *self = Source::Events { present, late };
+        Ok(Some(before))
+    }
+
+    /// How many events came too far behind the time come to.
+    pub(super) fn late(&self) -> u64 {
+        if let Source::Events { late, .. } = self { *late } else { 0 }
+    }
+
     /// Takes the time of a frame.
     pub(super) fn frame(&mut self, t: i64) -> Result<()> {
         match *self {
@@ -277,6 +302,10 @@ impl<R: Rule> Stream for Sampled<R> {
         Box::new(self.clone())
     }
 
+    fn late(&self) -> u64 {
+        self.source.late()
+    }
+
     fn trains(&self) -> usize {
         self.rule.trains()
     }
@@ -294,15 +323,11 @@ impl<R: Rule> Stream for Sampled<R> {
         let Some(intensity) = &events.intensity else {
             return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
         };
-        let Some(&first) = events.t.first() else { return Ok(()) };
-        let mut present = match self.source {
-            Source::Frames { .. } => return Err(problem!("event at {first} us: this stream was begun with frames")),
-            Source::Events { present } => present,
-            Source::Unknown => {
-                self.next = first;
-                first
-            }
-        };
+        let fresh = matches!(self.source, Source::Unknown);
+        let Some(mut present) = self.source.events(&events.t)? else { return Ok(()) };
+        if fresh {
+            self.next = present;
+        }
         for k in 0..events.len() {
             if events.t[k] > present {
                 present = events.t[k];
@@ -318,7 +343,6 @@ impl<R: Rule> Stream for Sampled<R> {
                 self.quiet = false;
             }
         }
-        self.source = Source::Events { present };
         if self.begun {
             pass(&mut self.rule, present, out);
         }
@@ -340,7 +364,7 @@ impl<R: Rule> Stream for Sampled<R> {
         let t = t.clamp(-(FARTHEST as i64), FARTHEST as i64);
         match &mut self.source {
             Source::Unknown => return,
-            Source::Events { present } => {
+            Source::Events { present, .. } => {
                 *present = t.max(*present);
                 self.sample_until(t, out);
             }
@@ -356,7 +380,7 @@ impl<R: Rule> Stream for Sampled<R> {
         let latency = (self.latency_ms * 1000.0).ceil() as i64;
         let end = match self.source {
             Source::Unknown => return None,
-            Source::Events { present } => present + self.period + latency,
+            Source::Events { present, .. } => present + self.period + latency,
             Source::Frames { open } => open - 1 + latency,
         };
         self.advance(end + 1, out);

@@ -9,12 +9,13 @@ use serde::{Deserialize, Serialize};
 pub use blocks::Instructions;
 use blocks::State;
 
+use crate::events::FARTHEST_BACK_US;
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
 use crate::{Array, Events, Intensities, Marker, Result, problem};
 
 /// How far a stamp may lie behind the latest time and still be a step back (reordered datagrams), in stamps: 0.1 s.
 /// Reading: any other lies ahead, so silences up to 6.45 s are right from the stamps alone.
-pub const FARTHEST_BACK: i64 = 1000;
+pub const FARTHEST_BACK: i64 = FARTHEST_BACK_US / STAMP_US;
 
 /// Stamps to a turn of the 16-bit counter: 6.5536 s.
 const TURN: i64 = 65_536;

@@ -1,10 +1,8 @@
 //! A readout that looks ahead in silence, and takes nothing back that the board's own time would say.
 
 use taxel_core::detect::{Detection, ReadoutStream};
+use taxel_core::events::FARTHEST_BACK_US;
 use taxel_core::{Events, Result};
-
-/// A silence that has lasted this long is settled, us: as far back as the decoder believes a stamp to be late.
-const SETTLED_US: i64 = 100_000;
 
 /// Two copies of a readout. One hears what came and nothing else, so it says what the recording will say. The other runs
 /// ahead of it where the host's clock says that nothing comes; it is thrown away when something does. So an event that
@@ -43,7 +41,8 @@ impl Ahead {
                 out.push(detection);
             }
         }
-        self.advance(t - SETTLED_US, out)
+        // A silence is settled once nothing that is still believed to be late can fall into it.
+        self.advance(t - FARTHEST_BACK_US, out)
     }
 
     /// Knows that nothing comes before `t` us.
