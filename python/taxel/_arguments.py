@@ -6,6 +6,7 @@ import json
 import math
 import os
 from collections.abc import Collection, Mapping
+from itertools import chain
 from typing import Any, TypeVar
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._core import ProblemError
 
 __all__ = [
+    "bare",
     "callback",
     "column",
     "fields",
@@ -71,8 +73,74 @@ def mapping(name: str, value: object) -> dict[str, Any]:
     return {text(f"a name in {name}", key): entry for key, entry in value.items()}
 
 
-def number(name: str, value: object) -> float:
-    """Return a float; refuse what is none, by name."""
+#: So deep lists may lie in lists: more than NumPy's dimensions.
+DEPTH = 65
+
+
+def bare(name: str, values: Any, unit: str | None = None) -> Any:
+    """Return plain numbers: quantities (of neo, quantities, pint, astropy ...) are converted to `unit` or refused.
+
+    Without a `unit`, one that has no dimension passes. What holds no quantity comes back as it is.
+
+    Raises
+    ------
+    ProblemError : a quantity that does not convert to `unit`, or quantities among plain numbers
+    """
+    level = [values]
+    for _ in range(DEPTH):
+        kinds = set(map(type, level))
+        if any(map(_has_unit, kinds)):
+            return _converted(name, values, unit)
+        level = list(chain.from_iterable(filter(_is_nested, level))) if any(map(_may_nest, kinds)) else []
+        if not level:
+            break
+    return values
+
+
+def _has_unit(kind: type[Any]) -> bool:
+    """Tell whether values of a class say what they are in; `dimensions` is Brian's word."""
+    return any(hasattr(kind, word) for word in ("units", "unit", "dimensions"))
+
+
+def _may_nest(kind: type[Any]) -> bool:
+    return issubclass(kind, list | tuple | np.ndarray)
+
+
+def _is_nested(value: object) -> bool:
+    return isinstance(value, list | tuple) or (
+        isinstance(value, np.ndarray) and value.dtype == object and value.ndim > 0
+    )
+
+
+def _converted(name: str, values: Any, unit: str | None) -> Any:
+    """Return the values of a quantity, or of a list of them, in `unit`."""
+    if not _has_unit(type(values)):
+        if not _is_nested(values):
+            return values
+        if {_has_unit(kind) for kind in map(type, values) if not _may_nest(kind) or _has_unit(kind)} == {True, False}:
+            raise ProblemError(f"{name} is {shown(values)}: mixes quantities and numbers without a unit")
+        return [_converted(f"{name}[{k}]", value, unit) for k, value in enumerate(values)]
+    try:
+        convert = values.rescale if hasattr(values, "rescale") else values.to
+        given = convert(unit or "dimensionless")
+        plain = np.asarray(given.magnitude if hasattr(given, "magnitude") else given.value, np.float64)
+        # 7 ms in s and back is 7.000000000000001 ms; whole numbers stay whole, so that stamps stay stamps.
+        rounded = np.rint(plain)
+        return np.where(np.abs(plain - rounded) <= 1e-15 * np.abs(plain), rounded, plain)
+    except Exception:  # each library has errors of its own for units that do not fit
+        right = "a plain number" if unit is None else f"a number of {unit}, or a quantity that converts to it"
+        raise ProblemError(f"{name} is {shown(values)}: must be {right}") from None
+
+
+def _one(values: NDArray[np.float64]) -> object:
+    """Return the number that an array without dimensions holds; another stays what it is."""
+    return values.item() if values.ndim == 0 else values
+
+
+def number(name: str, value: object, unit: str | None = None) -> float:
+    """Return a float, of a quantity the one in `unit`; refuse what is none, by name."""
+    if _has_unit(type(value)):
+        value = _one(bare(name, value, unit))
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         raise ProblemError(f"{name} is {shown(value)}: must be a number")
     try:
@@ -81,8 +149,10 @@ def number(name: str, value: object) -> float:
         raise ProblemError(f"{name} is {shown(value)}: must fit a float") from None
 
 
-def whole(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1) -> int:
-    """Return a whole number within limits; a float without a fraction will do."""
+def whole(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1, unit: str | None = None) -> int:
+    """Return a whole number within limits, of a quantity the one in `unit`; a float without a fraction will do."""
+    if _has_unit(type(value)):
+        value = _one(bare(name, value, unit))
     real = isinstance(value, float | np.floating) and float(value).is_integer()
     if isinstance(value, bool) or not (real or isinstance(value, int | np.integer)) or not least <= value <= most:  # type: ignore[operator]
         raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {least} to {most}")
@@ -114,16 +184,20 @@ def path(name: str, value: object) -> str:
 
 def window(unit: str, start: object, stop: object) -> tuple[float, float]:
     """Return a stretch of time whose start does not lie after its stop; either may be infinite."""
-    first, last = number("start", start), number("stop", stop)
+    first, last = number("start", start, unit), number("stop", stop, unit)
     if not first <= last:
         raise ProblemError(f"window {first} to {last} {unit}: start must not lie after stop")
     return first, last
 
 
-def numbers(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
-    """Return a contiguous array of any shape; refuse what is no number, or would change its value on the way."""
+def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
+    """Return a contiguous array of any shape; refuse what is no number, or would change its value on the way.
+
+    Quantities are converted to `unit` (`bare`).
+    """
+    plain = bare(name, values, unit)
     try:
-        given = np.asarray(values)
+        given = np.asarray(plain)
         if given.size == 0 and given.dtype.kind not in "biuf":
             given = given.astype(dtype)
         if given.dtype.kind not in "biufO":
@@ -149,17 +223,17 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
     return array
 
 
-def column(name: str, values: ArrayLike, dtype: type[Any]) -> NDArray[Any]:
+def column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
     """Return a contiguous array of one dimension; refuse what would change its value on the way."""
-    array = numbers(name, values, dtype)
+    array = numbers(name, values, dtype, unit)
     if array.ndim != 1:
         raise ProblemError(f"{name} has {array.ndim} dimensions: must have one")
     return array
 
 
-def floats(name: str, values: ArrayLike) -> NDArray[np.float64]:
+def floats(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.float64]:
     """Return a contiguous float64 array of one dimension; refuse what is none, by name."""
-    return column(name, values, np.float64)
+    return column(name, values, np.float64, unit)
 
 
 def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
@@ -192,6 +266,7 @@ def parameters(values: Mapping[str, object]) -> str:
     """Return parameters as JSON for the compiled part, which checks them; JSON has no NaN, so those end here."""
 
     def plain(name: str, value: object) -> object:
+        value = bare(name, value)
         if isinstance(value, Mapping):
             return {str(key): plain(str(key), entry) for key, entry in value.items()}
         if isinstance(value, list | tuple | np.ndarray):

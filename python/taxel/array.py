@@ -48,7 +48,7 @@ class Array:
     def __post_init__(self) -> None:
         for field in ("rows", "columns"):
             object.__setattr__(self, field, whole(field, getattr(self, field), 1, 65_535))
-        pitch = number("pitch_mm", self.pitch_mm)
+        pitch = number("pitch_mm", self.pitch_mm, "mm")
         if not (np.isfinite(pitch) and pitch > 0):
             raise ProblemError(f"pitch_mm is {shown(self.pitch_mm)}: must be above 0 and finite")
         object.__setattr__(self, "pitch_mm", pitch)

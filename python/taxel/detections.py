@@ -74,10 +74,10 @@ class Detections:
         if labels.ndim != 1 or labels.dtype.kind != "U":
             raise ProblemError(f"label is {shown(label)}: must be a list of texts")
         self.label: NDArray[np.str_] = labels
-        self.t: NDArray[np.int64] = column("t", t, np.int64)
-        self.known: NDArray[np.int64] = column("known", known, np.int64)
+        self.t: NDArray[np.int64] = column("t", t, np.int64, "us")
+        self.known: NDArray[np.int64] = column("known", known, np.int64, "us")
         self.slope: NDArray[np.float64] = floats("slope", np.full(len(labels), np.nan) if slope is None else slope)
-        self.said: NDArray[np.int64] | None = None if said is None else column("said", said, np.int64)
+        self.said: NDArray[np.int64] | None = None if said is None else column("said", said, np.int64, "us")
         if self.said is not None and len(self.said) != len(labels):
             raise ProblemError(f"said has {len(self.said)} entries: must be {len(labels)}, one a detection")
         _core.check_detections(self._parts())

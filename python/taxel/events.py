@@ -67,7 +67,7 @@ class Events:
         markers: Sequence[tuple[int, bool]] = (),
     ) -> None:
         self.array = instance("array", array, Array)
-        self.t: NDArray[np.int64] = column("t", t, np.int64)
+        self.t: NDArray[np.int64] = column("t", t, np.int64, "us")
         self.x: NDArray[np.uint16] = column("x", x, np.uint16)
         self.y: NDArray[np.uint16] = column("y", y, np.uint16)
         self.p: NDArray[np.bool_] = column("p", p, np.bool_)
@@ -106,8 +106,21 @@ class Events:
         inside = (self.x >= columns[0]) & (self.x < columns[1]) & (self.y >= rows[0]) & (self.y < rows[1])
         return self[inside]
 
+    def sorted(self) -> Events:
+        """Return the same events and markers in order of time; what has equal times keeps its order.
+
+        Encoders and readouts take a whole recording in order, with up to 0.1 s of datagrams that overtook each other.
+        """
+        kept = self[np.argsort(self.t, kind="stable")]
+        kept.markers = tuple(sorted(self.markers, key=lambda marker: marker[0]))
+        return kept
+
     def __getitem__(self, chosen: slice | NDArray[Any]) -> Events:
-        """Return the chosen events (slice, mask or numbers); markers stay."""
+        """Return the chosen events (slice, mask or numbers), with the markers of their time.
+
+        That time goes from the first chosen event to the one that follows the last; it has no end where none follows,
+        and no beginning where the very first event is chosen. So slices that make the whole hold each marker once.
+        """
         places = chosen if isinstance(chosen, slice) else rows("events", chosen, len(self))
         try:
             t = self.t[places]
@@ -121,8 +134,20 @@ class Events:
             self.array,
             None if self.intensity is None else self.intensity[places],
             None if self.present is None else self.present[places],
-            self.markers,
+            self._markers_of(places),
         )
+
+    def _markers_of(self, places: slice | NDArray[Any]) -> tuple[tuple[int, bool], ...]:
+        """Return the markers of the time of chosen events."""
+        if not self.markers or not len(self):
+            return self.markers
+        chosen = np.arange(len(self))[places]
+        if not len(chosen):
+            return ()
+        first, last = int(chosen.min()), int(chosen.max())
+        start = self.t[first] if first > 0 else -np.inf
+        stop = self.t[last + 1] if last + 1 < len(self) else np.inf
+        return tuple(marker for marker in self.markers if start <= marker[0] < stop)
 
     def to_numpy(self) -> NDArray[np.void]:
         """Return one record an event with the fields ``t x y p``, and ``intensity present`` where there are any."""
@@ -275,7 +300,7 @@ def region(array: Array, x: slice, y: slice) -> tuple[tuple[int, int], tuple[int
 def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...]:
     try:
         pairs = [(at, start) for at, start in markers]
-        t = column("markers", [at for at, _ in pairs], np.int64)
+        t = column("markers", [at for at, _ in pairs], np.int64, "us")
         starts = column("markers", [start for _, start in pairs], np.bool_)
     except (TypeError, ValueError):
         raise ProblemError(

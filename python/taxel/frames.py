@@ -48,7 +48,7 @@ class Frames:
 
     def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
         self.values: NDArray[np.float32] = numbers("values", values, np.float32)
-        self.t: NDArray[np.int64] = column("t", t, np.int64)
+        self.t: NDArray[np.int64] = column("t", t, np.int64, "us")
         if self.values.ndim != 3:
             raise ProblemError(f"values have {self.values.ndim} dimensions: must have three (n, rows, columns)")
         if len(self.t) != len(self.values):
@@ -86,11 +86,11 @@ class Frames:
             raise ProblemError(f"events is {shown(events)}: must be taxel.Events")
         if events.intensity is None or events.present is None:
             raise ProblemError("events without intensities: pictures need the held values")
-        period, array = whole("period_us", period_us, 1), events.array
+        period, array = whole("period_us", period_us, 1, unit="us"), events.array
         first = int(events.t.min()) if len(events) else 0
-        first = first if start is None else whole("start", start)
+        first = first if start is None else whole("start", start, unit="us")
         end = int(events.t.max()) + 1 if len(events) else first
-        end = end if stop is None else whole("stop", stop)
+        end = end if stop is None else whole("stop", stop, unit="us")
         pictures = max(0, -((first - end) // period))
         if pictures * array.rows * array.columns > MOST_VALUES:
             raise ProblemError(

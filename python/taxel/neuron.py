@@ -193,8 +193,8 @@ class Neuron:
             self._json(),
             floats("weights", weights),
             _trains(trains)._parts(),
-            floats("times", times),
-            floats("spikes", spikes),
+            floats("times", times, "ms"),
+            floats("spikes", spikes, "ms"),
         )
 
     def _run(

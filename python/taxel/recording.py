@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from taxel import _arguments as arguments
 from taxel import _core
-from taxel._arguments import flag, instance, number, text, window
+from taxel._arguments import flag, instance, number, shown, text, window
 from taxel._core import FormatError, ProblemError
 from taxel._tables import read_csv, read_npz
 from taxel.array import Array
@@ -189,6 +189,8 @@ class Recording:
     """
 
     def __init__(self, source: _Source, window: tuple[float, float] | None = None) -> None:
+        if not isinstance(source, _Source):
+            raise ProblemError(f"source is {shown(source)}: a recording is opened by taxel.open(path), not built")
         self._source = source
         self._window = window
         self.path, self.kind, self.array, self.source = source.path, source.kind, source.array, source.origin
@@ -392,7 +394,7 @@ def open_recording(
 
 def period_us(name: str, rate_hz: float) -> int:
     """Return the whole us of a rate."""
-    rate = number(name, rate_hz)
+    rate = number(name, rate_hz, "Hz")
     if not 0 < rate <= 1e6:
         raise ProblemError(f"{name} is {rate}: must be above 0, at most 1000000")
     return round(1e6 / rate)

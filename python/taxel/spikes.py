@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import column, floats, number, shown, text, window
+from taxel._arguments import bare, column, floats, number, shown, text, window
 from taxel._arguments import path as checked_path
 from taxel._core import FormatError, ProblemError
 from taxel._files import whole_file, write_whole
@@ -62,10 +62,10 @@ class SpikeTrains:
         stop: float,
         values: ArrayLike | None = None,
     ) -> None:
-        self.times: NDArray[np.float64] = floats("times", times)
+        self.times: NDArray[np.float64] = floats("times", times, "ms")
         self.offsets: NDArray[np.int64] = column("offsets", offsets, np.int64)
         self.values: NDArray[np.float32] | None = None if values is None else column("values", values, np.float32)
-        self.start, self.stop = number("start", start), number("stop", stop)
+        self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
         _core.check_spikes(self._parts())
 
     @classmethod
@@ -96,16 +96,16 @@ class SpikeTrains:
         ------
         ProblemError : times that make no sense (names train and spike)
         """
-        flat, counts = _by_train("times", times, np.float64)
+        flat, counts = _by_train("times", bare("times", times, "ms"), np.float64)
         signed = None
         if values is not None:
-            signed, valued = _by_train("values", values, np.float32)
+            signed, valued = _by_train("values", bare("values", values), np.float32)
             if valued != counts:
                 raise ProblemError("values: must have the lengths of the trains, one value a spike")
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # What is not finite is refused below, by its place.
-            stop = float(max(number("start", start), np.max(flat[np.isfinite(flat)], initial=-np.inf)))
+            stop = float(max(number("start", start, "ms"), np.max(flat[np.isfinite(flat)], initial=-np.inf)))
         return cls(flat, offsets, start, stop, signed)
 
     def __len__(self) -> int:
@@ -196,7 +196,7 @@ class SpikeTrains:
         >>> list(trains.delayed([0.0, 2.5]))
         [array([1.]), array([4.]), array([3.5]), array([6.5])]
         """
-        delays = floats("delays_ms", delays_ms)
+        delays = floats("delays_ms", delays_ms, "ms")
         wrong = np.flatnonzero(~(np.isfinite(delays) & (delays >= 0)))
         if len(wrong):
             raise ProblemError(f"delays_ms[{wrong[0]}] is {delays[wrong[0]]}: must be 0 or more and finite")
@@ -327,7 +327,9 @@ class SpikeTrains:
         from pynwb import NWBHDF5IO  # noqa: PLC0415  heavy, and an extra
 
         place = checked_path("path", path)
-        window_ms = [None if edge is None else number(name, edge) for name, edge in (("start", start), ("stop", stop))]
+        window_ms = [
+            None if edge is None else number(name, edge, "ms") for name, edge in (("start", start), ("stop", stop))
+        ]
         open(place, "rb").close()  # a missing file is Python's own error
         try:
             with _quiet_about_names(), NWBHDF5IO(place, "r") as io:

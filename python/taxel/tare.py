@@ -81,8 +81,8 @@ class Tare:
         """
         note = checked_text("note", note)
         window = (
-            None if start_us is None else whole("start_us", start_us),
-            None if stop_us is None else whole("stop_us", stop_us),
+            None if start_us is None else whole("start_us", start_us, unit="us"),
+            None if stop_us is None else whole("stop_us", stop_us, unit="us"),
         )
         if isinstance(x, Events):
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))

@@ -36,6 +36,13 @@ def touch(rng, array, n=300, absent=0.3, late=0.0):
     return Events(t, x, y, rng.random(n) > 0.5, array=array, intensity=ticks, present=rng.random(n) > absent)
 
 
+def at_times(events, t):
+    """The same events at other times."""
+    return Events(
+        t, events.x, events.y, events.p, array=events.array, intensity=events.intensity, present=events.present
+    )
+
+
 def rest(array, ticks=55):
     """A tare of an array whose taxels all rest at the same value."""
     pictures = np.full((2, array.rows, array.columns), ticks, np.float32)

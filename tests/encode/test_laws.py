@@ -21,7 +21,7 @@ from taxel.encode import (
     ThresholdIzhikevich,
 )
 
-from .scenes import frames_of, rest, spikes_of, touch, wander
+from .scenes import at_times, frames_of, rest, spikes_of, touch, wander
 
 ARRAY = Array(3, 4)
 
@@ -78,6 +78,54 @@ def test_events_in_pieces_give_the_spikes_of_the_whole(encoder, seed, cuts, late
     }
     whole = encoder.encode(events)
     assert sorted(in_pieces(encoder, pieces, moves)) == spikes_of(whole)
+
+
+@each_encoder
+@settings(max_examples=20, deadline=None)
+@given(
+    seed=seeds,
+    cuts=st.sets(st.integers(1, 299), max_size=8),
+    share=st.sampled_from([0.01, 0.2]),
+    back=st.sampled_from([1, 300, 99_999, 100_000, 100_001, 10**6]),
+)
+def test_events_out_of_order_are_heard_as_a_stream_hears_them_or_refused(encoder, seed, cuts, share, back):
+    """0.1 s is the farthest that one datagram overtakes another; what is far behind is no recording in order."""
+    rng = np.random.default_rng(seed)
+    ordered = touch(rng, ARRAY)
+    behind = rng.random(len(ordered)) < share
+    t = ordered.t - behind * rng.choice([back, rng.integers(0, back + 1)], len(ordered))
+    events, heard = at_times(ordered, t), at_times(ordered, np.maximum.accumulate(t))
+    far = np.flatnonzero(heard.t - t > 100_000)
+    stream, spikes = encoder.stream(), []
+    for a, b in pairwise([0, *sorted(cuts), len(t)]):
+        spikes += spikes_of(stream.push(events[a:b]))
+        assert stream.late == np.count_nonzero(far < b)
+    wanted = spikes_of(encoder.encode(heard))
+    assert sorted(spikes + spikes_of(stream.finish())) == wanted
+    if len(far):
+        with pytest.raises(taxel.ProblemError, match=rf"event {far[0]} at .* behind event .*Events\.sorted\(\)"):
+            encoder.encode(events)
+    else:
+        assert spikes_of(encoder.encode(events)) == wanted
+    encoder.encode(events.sorted())
+
+
+@each_encoder
+def test_events_backwards_are_refused_by_whoever_takes_a_whole_recording(encoder):
+    events = touch(np.random.default_rng(18), ARRAY)[::-1]
+    readout = taxel.Readout(encoder, {"a": (taxel.Neuron(), np.ones(encoder.trains(ARRAY) * (1 + encoder.signed)))})
+    for take in (encoder.encode, taxel.Tare.take, lambda x: taxel.detect.run(readout, x, tare=rest(ARRAY))):
+        with pytest.raises(taxel.ProblemError, match=r"event \d+ at \d+ us: lies more than 0.1 s behind event"):
+            take(events)
+        take(events.sorted())
+
+
+def test_time_moved_on_makes_what_comes_behind_it_late():
+    stream = ENCODERS["change"].stream(ARRAY)
+    for t, late in ((0, 0), (900_000, 0), (800_000, 0), (899_999, 1), (1_000_000, 1)):
+        stream.push(Events([t], [0], [0], [1], array=ARRAY, intensity=[5]))
+        stream.advance(10**6 if t == 800_000 else 0)
+        assert stream.late == late
 
 
 @each_encoder

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import matplotlib as mpl
 import numpy as np
 import pytest
@@ -109,6 +111,40 @@ def test_slices_masks_and_numbers_choose_the_same(events: Events) -> None:
     assert events[n // 2 :] == events[np.arange(n) >= n // 2] == events[np.arange(n // 2, n)]
     assert events[::-1][::-1] == events
     assert events[[]] == events[:0]
+
+
+@given(some(), st.sets(st.integers(0, 40), max_size=4))
+def test_slices_of_the_whole_hold_each_marker_once_and_in_its_time(events: Events, cuts: set[int]) -> None:
+    events = events.sorted()
+    edges = [0, *sorted(cut for cut in cuts if 0 < cut < len(events)), len(events)]
+    parts = [events[a:b] for a, b in pairwise(edges)]
+    assert sum((part.markers for part in parts), ()) == events.markers
+    for part, (a, b) in zip(parts, pairwise(edges), strict=True):
+        for t, _ in part.markers:
+            assert a == 0 or t >= events.t[a]
+            assert b == len(events) or t < events.t[b]
+
+
+def test_a_slice_has_the_markers_of_its_time_and_no_other() -> None:
+    markers = [(-50, True), (150, False), (160, True), (900, False)]
+    events = Events([0, 100, 200, 300], [0, 1, 2, 3], [0] * 4, [True, False] * 2, array=GRID, markers=markers)
+    assert events[:].markers == tuple(markers)
+    assert events[:2].markers == tuple(markers[:3])
+    assert events[2:].markers == (markers[3],)
+    assert events[1:3].markers == tuple(markers[1:3])
+    assert events[2:3].markers == events[:0].markers == ()
+    assert events[events.p].markers == tuple(markers[:3])
+    assert events.region(slice(1, 3), slice(None)).markers == tuple(markers[1:3])
+
+
+@given(some())
+def test_sorted_events_are_the_same_in_order(events: Events) -> None:
+    ordered = events.sorted()
+    assert (np.diff(ordered.t) >= 0).all()
+    assert ordered.markers == tuple(sorted(events.markers, key=lambda marker: marker[0]))
+    rows = np.argsort(events.t, kind="stable")
+    assert np.array_equal(ordered.to_numpy(), events.to_numpy()[rows])
+    assert ordered.sorted() == ordered
 
 
 @given(some())

@@ -113,7 +113,7 @@ class Readout:
                     "time": first.time,
                     "after_spike": first.after_spike,
                     "run_threshold": number("run_threshold", run_threshold),
-                    "delays_ms": floats("delays_ms", delays_ms),
+                    "delays_ms": floats("delays_ms", delays_ms, "ms"),
                     "neurons": {
                         label: {
                             "neuron": json.loads(one.neuron._json()),
@@ -348,7 +348,7 @@ class ReadoutStream:
         self, readout: Readout, array: Array | None = None, *, frame_us: float = FRAME_US, tare: Tare | None = None
     ) -> None:
         self._text = instance("readout", readout, Readout).to_json()
-        self._frame_us = number("frame_us", frame_us)
+        self._frame_us = number("frame_us", frame_us, "us")
         self._tare = _tare(tare)
         self._core: _core.ReadoutStream | None = None
         array = readout.array if array is None else array
@@ -440,7 +440,7 @@ def run(
     (array([10479]), array([20000]))
     """
     text = instance("readout", readout, Readout).to_json()
-    period = None if frame_us is None else number("frame_us", frame_us)
+    period = None if frame_us is None else number("frame_us", frame_us, "us")
     rest = _tare(tare)
     if isinstance(source, Recording):
         if period is None and source.registers is not None:
@@ -474,4 +474,4 @@ def _trained(label: str, one: Any, delay_ms: float | Mapping[str, float]) -> Tra
         said = "is not fitted" if hasattr(one, "fit") else "must be a fitted learner, or (Neuron, weights)"
         raise ProblemError(f"{label}: {shown(one)} {said}")
     instance(f"{label}: neuron", neuron, Neuron)
-    return TrainedNeuron(neuron, floats(f"{label}: weights", weights), number(f"{label}: delay_ms", delay))
+    return TrainedNeuron(neuron, floats(f"{label}: weights", weights), number(f"{label}: delay_ms", delay, "ms"))

@@ -211,10 +211,10 @@ def _truth(found: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -> tup
         wrong = [label for label in truth if not isinstance(label, str)]
         if wrong:
             raise ProblemError(f"truth: {shown(wrong[0])} is not a label, which must be a text")
-        columns = {label: column(f"truth[{label!r}]", times, np.int64) for label, times in truth.items()}
+        columns = {label: column(f"truth[{label!r}]", times, np.int64, "us") for label, times in truth.items()}
         labels = [label for label, times in columns.items() for _ in range(len(times))]
         return labels, np.concatenate([*columns.values(), np.empty(0, np.int64)])
-    times = column("truth", truth, np.int64)
+    times = column("truth", truth, np.int64, "us")
     if len(found.labels) > 1:
         raise ProblemError(f"truth has no labels, found has {', '.join(found.labels)}: give times by label")
     return [(found.labels or ("event",))[0]] * len(times), times
@@ -230,7 +230,7 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
             mine = np.array([other == label for other in labels])
             windows[mine] = _windows([label] * int(mine.sum()), window_ms[label])
         return windows
-    given = numbers("window_ms", window_ms, np.float64)
+    given = numbers("window_ms", window_ms, np.float64, "ms")
     if given.ndim > 1 or (given.ndim == 1 and len(given) != len(labels)):
         raise ProblemError(
             f"window_ms has shape {given.shape}: must be one number, or one each of {len(labels)} events"

@@ -310,7 +310,7 @@ def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
     if not isinstance(values, Mapping):
         raise ProblemError(f"{name} is {shown(values)}: must be parameters by name")
     values = dict(values)
-    delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0))
+    delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0), "ms")
     known = inspect.signature(ConeR).parameters
     for key in values:
         if key not in known:
@@ -329,7 +329,7 @@ def _examples(examples: Sequence[Example]) -> list[Example]:
         source, labels, *rest = example
         if not isinstance(labels, Mapping):
             raise ProblemError(f"example {k}: labels is {shown(labels)}: must be times (us) by label")
-        times = {text("label", label): column(f"labels[{label!r}]", t, np.int64) for label, t in labels.items()}
+        times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
         tare = rest[0] if rest else None
         checked.append(Example(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
     return checked

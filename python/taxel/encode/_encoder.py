@@ -96,8 +96,9 @@ class Encoder:
         Parameters
         ----------
         x : Events or Frames
-            Events need their intensities: they are read as held values. Channels are the existing taxels, in the order
-            of their index.
+            Events need their intensities: they are read as held values. One up to 0.1 s behind another (datagrams that
+            overtook each other) counts as of that later time, as in a stream. Channels are the existing taxels, in the
+            order of their index.
 
         Returns
         -------
@@ -107,7 +108,8 @@ class Encoder:
 
         Raises
         ------
-        ProblemError : neither events nor frames, or events without intensities
+        ProblemError : neither events nor frames, events without intensities, or one more than 0.1 s behind another
+            (names it; `Events.sorted` puts them in order)
         """
         if isinstance(x, Events):
             return SpikeTrains._from_parts(_core.encode_events(self._json(), x._parts()))
@@ -166,8 +168,15 @@ class EncoderStream:
             self._core = _core.EncoderStream(self._parameters, _array(array)._parts())
         return self._core
 
+    @property
+    def late(self) -> int:
+        """How many events came more than 0.1 s behind the time come to, and were taken as of that time."""
+        return 0 if self._core is None else self._core.late
+
     def push(self, x: Events | Frames) -> SpikeTrains:
         """Take the next events or frames; one stream takes either, never both.
+
+        An event behind the time come to counts as of that time.
 
         Raises
         ------

@@ -151,7 +151,7 @@ class EpochLearner(ABC):
         """
         trains = instance("pattern", pattern, SpikeTrains)._parts()
         change, spikes = _core.change_rival(
-            self._json(), floats("weights", weights), trains, floats("targets", targets)
+            self._json(), floats("weights", weights), trains, floats("targets", targets, "ms")
         )
         return change, spikes
 

@@ -355,7 +355,7 @@ class ConeXProblem:
             raise ProblemError(f"row is {shown(row)}: must be kind, pattern and target or time") from None
         if not isinstance(kind, str):
             raise ProblemError(f"row is {shown(row)}: its kind must be a text")
-        name = (kind, whole("pattern", pattern, 0), number("target or time", at))
+        name = (kind, whole("pattern", pattern, 0), number("target or time", at, "ms"))
         return self._problem.row(name, flag("margin", margin))
 
     def target(self, pattern: int, target: int) -> tuple[NDArray[np.float64], float]:

@@ -134,7 +134,7 @@ class OnlineConeR(ConeR):
         return self._fit()
 
     def _add(self, pattern: SpikeTrains, targets: ArrayLike, name: str, wanted: str) -> None:
-        self._stream.add(instance(name, pattern, SpikeTrains)._parts(), floats(wanted, targets))
+        self._stream.add(instance(name, pattern, SpikeTrains)._parts(), floats(wanted, targets, "ms"))
 
     def _fit(self) -> Self:
         found, signal = self._stream.fit()

@@ -146,7 +146,7 @@ class SKIM:
         return levels
 
     def _window(self) -> float:
-        window = number("within_ms", self.within_ms)
+        window = number("within_ms", self.within_ms, "ms")
         if not window > 0:
             raise ProblemError(f"within_ms is {window} ms: must be above 0")
         return window

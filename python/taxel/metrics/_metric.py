@@ -20,6 +20,7 @@ __all__ = ["Pattern", "distance", "listed", "stated"]
 Pattern = ArrayLike | SpikeTrains
 
 _NUMBERS = ("tau", "sigma", "step_ms")
+_UNITS = {"q": "1/ms", "tau": "ms", "sigma": "mm", "step_ms": "ms"}
 _WORDS = {"normalisation": ("spike", "tau", "none"), "own_train": ("twice", "once")}
 
 #: What each metric takes, as the compiled part has it.
@@ -43,7 +44,7 @@ def stated(metric: str, given: dict[str, Any]) -> str:
             raise ProblemError(f"{name}: {metric} takes {', '.join(sorted(TAKES[metric]))}")
         if name in ("q", "k"):
             # JSON has no number for what is not finite.
-            cost = number(name, value)
+            cost = number(name, value, _UNITS.get(name))
             values[name] = cost if math.isfinite(cost) else str(cost)
         elif name in _WORDS:
             values[name] = text(name, value, _WORDS[name])
@@ -51,9 +52,9 @@ def stated(metric: str, given: dict[str, Any]) -> str:
             values[name] = instance(name, value, Array)._geometry()
         elif name in _NUMBERS:
             if value is not None or name != "step_ms":
-                values[name] = number(name, value)
+                values[name] = number(name, value, _UNITS.get(name))
         elif value is not None:
-            ends = floats(name, value)
+            ends = floats(name, value, "ms")
             if len(ends) != 2:
                 raise ProblemError(f"{name} has {len(ends)} entries: must be start and stop, ms")
             values[name] = ends.tolist()
@@ -72,7 +73,7 @@ def _one(name: str, x: Pattern) -> tuple[Any, ...]:
     if isinstance(x, SpikeTrains):
         trains = x.split_by_sign() if x.signed else x
         return name, 1, len(trains), trains.times, trains.offsets, (x.start, x.stop), False
-    times = floats(name, x)
+    times = floats(name, x, "ms")
     return name, 1, 1, times, np.array([0, len(times)]), None, False
 
 
@@ -84,7 +85,7 @@ def listed(name: str, x: SpikeTrains | Sequence[Pattern]) -> tuple[Any, ...]:
         return name, len(x), 1, x.times, x.offsets, (x.start, x.stop), True
     entries = several(name, x)
     if not any(isinstance(entry, SpikeTrains) for entry in entries):
-        times = [floats(f"{name}[{p}]", entry) for p, entry in enumerate(entries)]
+        times = [floats(f"{name}[{p}]", entry, "ms") for p, entry in enumerate(entries)]
         return name, len(times), 1, _joined(times), _offsets([len(t) for t in times]), None, True
     patterns = [instance(f"{name}[{p}]", entry, SpikeTrains) for p, entry in enumerate(entries)]
     window = (min(p.start for p in patterns), max(p.stop for p in patterns))

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from taxel._arguments import instance
 from taxel.plot.nouns import axes
 
 if TYPE_CHECKING:
@@ -23,6 +24,9 @@ _COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}
 def overview(recording: Recording) -> Figure:
     """Draw events a second (or the sum of pressure) over time, and the activity of each taxel."""
     from taxel._health import health  # noqa: PLC0415  health draws itself here
+    from taxel.recording import Recording  # noqa: PLC0415  a recording draws itself here
+
+    instance("recording", recording, Recording)
 
     figure, (over, where) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(2, 1), layout="constrained")
     if recording.has_events:
@@ -54,6 +58,9 @@ def overview(recording: Recording) -> Figure:
 
 def health_map(health: Health, ax: Axes | None = None) -> Axes:
     """Draw the activity of each taxel, with those marked that are dead, stuck or noisy."""
+    from taxel._health import Health  # noqa: PLC0415  health draws itself here
+
+    instance("health", health, Health)
     ax = axes(ax, (5, 4.4))
     image = ax.imshow(np.log10(1.0 + health.activity), origin="upper", cmap="Greys", interpolation="nearest")
     ax.figure.colorbar(image, ax=ax, label="log10 (1 + events)")

@@ -48,7 +48,7 @@ class Silence:
     ms: float
 
     def _part(self) -> Any:
-        return number("ms", self.ms)
+        return number("ms", self.ms, "ms")
 
 
 class Scene:
@@ -115,7 +115,7 @@ class Scene:
 
     def motion(self, step_us: float = 48.0) -> Motion:
         """Work the scene out; by default in quarters of a frame of 5208 Hz."""
-        depth, force, contacts = _core.motion(self._part(), number("step_us", step_us))
+        depth, force, contacts = _core.motion(self._part(), number("step_us", step_us, "us"))
         return Motion(float(step_us), depth, force, [Contact(*contact) for contact in contacts])
 
     def _part(self) -> str:
@@ -154,7 +154,7 @@ class Pictures:
             raise ProblemError(f"values have shape {self.values.shape}: must be (n, rows, columns)")
         if not (np.all(self.values >= 0) and np.all(self.values <= 1)):
             raise ProblemError("values: must be shares of the ramp, 0 to 1")
-        self.period_us = number("period_us", period_us)
+        self.period_us = number("period_us", period_us, "us")
 
     def _part(self) -> Any:
         return self.values.reshape(-1), self.period_us
