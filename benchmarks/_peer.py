@@ -2,13 +2,29 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
 import os
 import resource
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+
+def missing(peers: Mapping[str, str]) -> dict[str, str]:
+    """Return the peers that cannot be measured here, and why.
+
+    Parameters
+    ----------
+    peers : by name, the modules that each needs, with spaces between them
+    """
+    lacks = {
+        name: [module for module in modules.split() if importlib.util.find_spec(module) is None]
+        for name, modules in peers.items()
+    }
+    return {name: f"{' and '.join(modules)} not installed" for name, modules in lacks.items() if modules}
 
 
 def ask(script: str, *arguments: object, limit: int) -> dict[str, Any]:

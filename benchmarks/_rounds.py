@@ -64,7 +64,7 @@ def ratio(results: Mapping[str, Mapping[str, Any]], ours: str, peer: str) -> flo
 
 
 def stamp(*packages: str) -> dict[str, Any]:
-    """Return machine, versions and commit."""
+    """Return machine, versions and commit; `taxel bench` writes a result only where that is all that ran."""
     cpu = next(
         (line.split(":", 1)[1].strip() for line in _read("/proc/cpuinfo") if line.startswith("model name")),
         platform.processor(),
@@ -76,7 +76,7 @@ def stamp(*packages: str) -> dict[str, Any]:
         except metadata.PackageNotFoundError:
             versions[package] = "in the checkout" if package == "taxel" else "absent"
     said = subprocess.run(
-        ["git", "describe", "--always", "--dirty"],
+        ["git", "rev-parse", "--short", "HEAD"],
         capture_output=True,
         text=True,
         check=False,

@@ -11,11 +11,8 @@ import time
 import warnings
 
 import numpy as np
-import pyspike
-import quantities as pq
+from _peer import missing
 from _rounds import measure, ratio, stamp
-from elephant.spike_train_dissimilarity import van_rossum_distance, victor_purpura_distance
-from neo import SpikeTrain
 
 from taxel import Array, SpikeTrains, _core
 from taxel.metrics import pairwise
@@ -23,6 +20,9 @@ from taxel.metrics._metric import listed, stated
 
 Q, TAU = 0.05, 20.0
 MATRIX, TAXELS, SPIKES = 1800, 256, 100
+
+#: What each peer needs.
+PEERS = {"elephant": "elephant neo quantities", "PySpike": "pyspike"}
 
 
 def trains(random, count, spikes, stop=1000.0):
@@ -39,14 +39,42 @@ def off(ours, theirs):
     return float(np.abs(ours - theirs).max())
 
 
-def against_peers(spikes, *, quick):
+def by_elephant(lists):
+    """Return elephant's matrices of these trains."""
+    import quantities as pq  # noqa: PLC0415  a peer need not be there
+    from elephant.spike_train_dissimilarity import (  # noqa: PLC0415
+        van_rossum_distance,
+        victor_purpura_distance,
+    )
+    from neo import SpikeTrain  # noqa: PLC0415
+
+    neo = [SpikeTrain(t, units="ms", t_start=0, t_stop=1000) for t in lists]
+    return {
+        "elephant victor_purpura": lambda: victor_purpura_distance(neo, Q / pq.ms),
+        "elephant van_rossum": lambda: van_rossum_distance(neo, TAU * pq.ms),
+    }
+
+
+def by_pyspike(lists):
+    """Return PySpike's matrices of these trains."""
+    import pyspike  # noqa: PLC0415  a peer need not be there
+
+    spy = [pyspike.SpikeTrain(t, (0.0, 1000.0)) for t in lists]
+    return {
+        "PySpike isi_distance": lambda: pyspike.isi_distance_matrix(spy),
+        "PySpike spike_distance": lambda: pyspike.spike_distance_matrix(spy),
+    }
+
+
+CALLS = {"elephant": by_elephant, "PySpike": by_pyspike}
+
+
+def against_peers(spikes, absent, *, quick):
     """Measure a pair of so many spikes a train, ours and the peers'."""
     random = np.random.default_rng(spikes)
     count = 10 if quick else 60
     lists = trains(random, count, spikes)
     ours = SpikeTrains.from_lists(lists, 0.0, 1000.0)
-    neo = [SpikeTrain(t, units="ms", t_start=0, t_stop=1000) for t in lists]
-    spy = [pyspike.SpikeTrain(t, (0.0, 1000.0)) for t in lists]
     pairs = count * (count - 1) / 2
     # The fast ones are called often enough to be measured.
     often = 5 if quick else 50
@@ -56,12 +84,7 @@ def against_peers(spikes, *, quick):
         "taxel isi_distance": lambda: pairwise("isi_distance", ours, threads=1),
         "taxel spike_distance": lambda: pairwise("spike_distance", ours, threads=1),
     }
-    peers = {
-        "elephant victor_purpura": lambda: victor_purpura_distance(neo, Q / pq.ms),
-        "elephant van_rossum": lambda: van_rossum_distance(neo, TAU * pq.ms),
-        "PySpike isi_distance": lambda: pyspike.isi_distance_matrix(spy),
-        "PySpike spike_distance": lambda: pyspike.spike_distance_matrix(spy),
-    }
+    peers = {name: run for peer in PEERS if peer not in absent for name, run in CALLS[peer](lists).items()}
     mine = {name: (lambda run=run: [run() for _ in range(often)]) for name, run in repeated.items()}
     results = measure({**mine, **peers}, rounds=1 if quick else 3, work=pairs)
     for name in mine:
@@ -131,10 +154,12 @@ def large(*, quick):
 def run(*, quick):
     """Measure; quick: few trains, one round."""
     warnings.simplefilter("ignore")
-    small = {f"{spikes} spikes": against_peers(spikes, quick=quick) for spikes in (20, 200)}
+    absent = missing(PEERS)
+    small = {f"{spikes} spikes": against_peers(spikes, absent, quick=quick) for spikes in (20, 200)}
     return {
         "question": __doc__.splitlines()[0],
         **stamp("elephant", "pyspike", "neo"),
+        "left out": absent,
         "against peers": small,
         "large matrices": large(quick=quick),
         "ratios": {name: value for part in small.values() for name, value in part["ratios"].items()},

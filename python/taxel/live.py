@@ -24,7 +24,7 @@ from taxel.detections import Detections
 from taxel.tare import Tare
 from taxel.wire import _THESIS, Registers
 
-__all__ = ["PORT", "Live", "Said", "Summary", "heard", "send"]
+__all__ = ["PORT", "Live", "Said", "Summary", "delays", "heard", "send"]
 
 #: Where the board's datagrams go (reading: the thesis names no port).
 PORT = 5208
@@ -68,9 +68,9 @@ class Summary:
     counters : dict
         As `Live.counters`; its sums are closed.
     verdict : str
-        One line: nothing lost after arrival, or what was lost where.
+        One line: nothing lost after arrival, what was lost where, or that nothing came.
     path : Path or None
-        The recording.
+        The recording; none where nothing came: then an empty one is not kept, and an earlier one is not replaced.
     """
 
     counters: dict[str, Any]
@@ -82,6 +82,12 @@ class Summary:
         """How much was lost after it had arrived: messages in the kernel, datagrams in our queue; 0 is nothing."""
         capture = self.counters["capture"]
         return int(capture["dropped_by_kernel"] + capture["dropped_by_queue"])
+
+    @property
+    def nothing_came(self) -> bool:
+        """Whether not even a datagram that was lost has come."""
+        capture = self.counters["capture"]
+        return not capture["messages"] + capture["dropped_by_kernel"]
 
 
 class Live:
@@ -241,8 +247,8 @@ class Live:
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `events`, `read_out`, `events_dropped`,
         `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence
         that was none, because events came later than the guard), `detections_dropped`, `decode_latency` and
-        `said_latency` (count, p50_us, p99_us, max_us), `offset` (board_us, host_ns, drift_ppm, or None), `board_us`,
-        `markers`, `marked_start`, `seconds`, `taring`.
+        `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
+        drift_ppm, or None), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
 
         Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
         `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +
@@ -322,6 +328,21 @@ def _stretch_us(seconds: float) -> int:
     if not 1e-6 <= stretch <= 3600:
         raise ProblemError(f"tare is {stretch} s: must lie between 1 us and an hour, or be a taxel.Tare")
     return round(stretch * 1e6)
+
+
+def delays(measured: dict[str, Any]) -> str:
+    """Return median and 99 % of a latency of `Live.counters` in words, or that nothing was measured.
+
+    Examples
+    --------
+    >>> delays({"count": 5, "p50_us": 41.2, "p99_us": 1300.0, "max_us": 1300.0})
+    'p50 41 us, p99 1,300 us'
+    >>> delays({"count": 0, "p50_us": None, "p99_us": None, "max_us": None})
+    'nothing measured'
+    """
+    if not measured["count"]:
+        return "nothing measured"
+    return f"p50 {measured['p50_us']:,.0f} us, p99 {measured['p99_us']:,.0f} us"
 
 
 def heard(said: Sequence[Said]) -> Detections:

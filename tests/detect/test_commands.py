@@ -109,6 +109,16 @@ def test_a_tare_may_be_the_beginning_of_the_recording(folder: Path, trained: Pat
     assert (code, json.loads(out)["score"]["found"]) == (0, 12)
 
 
+def test_a_tare_longer_than_half_of_the_recording_is_refused(folder: Path, trained: Path, capsys) -> None:
+    events = taxel.open(folder / "9.npz").events
+    half = (int(events.t[-1]) - int(events.t[0])) / 2e6
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare")
+    code, _, error = call(capsys, *arguments, half + 0.001)
+    assert (code, error.count("\n")) == (2, 1)
+    assert f"--tare {half + 0.001}: more than half of {folder / '9.npz'}" in error
+    assert call(capsys, *arguments, half - 0.001)[0] == 0
+
+
 def test_spikes_are_written_and_read_back(folder: Path, capsys) -> None:
     out = folder / "spikes.npz"
     arguments = ("encode", folder / "1.npz", out, "--encoder", "level_crossing", "--set", "levels=[70.0, 80]")

@@ -313,11 +313,20 @@ def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:
 
 
 def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> None:
-    automatic = ["--length", 0.2, "--countdown", 0, "--start-index", 7, "--trials", 2]
-    arguments = command("record", tmp_path / "step.lsa", "--host", LOOPBACK, "--port", free_port(), *automatic)
-    done = subprocess.run(arguments, capture_output=True, text=True, check=True)
+    port = free_port()
+    automatic = ["--length", 0.3, "--countdown", 0, "--start-index", 7, "--trials", 2]
+    arguments = command("record", tmp_path / "step.lsa", "--host", LOOPBACK, "--port", port, *automatic)
+    with (
+        subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+        while process.poll() is None:
+            link.sendto(wire.encode(presses(1)), (LOOPBACK, port))
+            time.sleep(0.01)
+        said, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["step7.lsa", "step7.lss", "step8.lsa", "step8.lss"]
-    assert done.stdout.count("nothing lost after arrival") == 2
+    assert said.count("nothing lost after arrival") == 2
     again = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert (again.returncode, again.stderr.strip()) == (2, f"taxel: {tmp_path / 'step7.lsa'}: file exists")
 
@@ -374,3 +383,70 @@ def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:
     done = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stderr == "taxel: save_tare without a fresh tare: give --tare SECONDS\n"
+
+
+@pytest.mark.parametrize("kind", ["mcap", "lsa"])
+def test_a_recording_to_which_nothing_came_is_not_kept(tmp_path: Path, kind: str) -> None:
+    port, file = free_port(), tmp_path / f"walk.{kind}"
+    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--seconds", 0.2)
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    assert done.stdout.startswith(f"nothing arrived at UDP {LOOPBACK}:{port} in 0.")
+    assert "nothing lost" not in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("kind", ["mcap", "lsa"])
+def test_an_earlier_recording_stays_where_nothing_came_to_replace_it(tmp_path: Path, kind: str) -> None:
+    file = tmp_path / f"walk.{kind}"
+    with Live(0, host=LOOPBACK, array=SMALL, record=file) as live:
+        wait_for(live, play(presses(2), live.address[1]))
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    with Live(0, host=LOOPBACK, array=SMALL, record=file, overwrite=True) as live:
+        pass
+    summary = live.stop()
+    assert summary.nothing_came
+    assert summary.path is None
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+    with Live(0, host=LOOPBACK, array=SMALL, record=file, overwrite=True) as live:
+        wait_for(live, play(presses(1), live.address[1]))
+    assert live.stop().path == file
+    assert len(taxel.open(file, array=SMALL).events if kind == "lsa" else taxel.open(file).events) == len(presses(1))
+
+
+def test_what_was_noted_is_kept_though_nothing_came(tmp_path: Path) -> None:
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "noted.mcap") as live:
+        live.note("the cable is out")
+    assert live.stop().path == tmp_path / "noted.mcap"
+    assert [note.text for note in taxel.open(tmp_path / "noted.mcap").notes] == ["the cable is out"]
+
+
+def test_taxel_live_to_which_nothing_came_names_no_latency(tmp_path: Path) -> None:
+    touch().save(tmp_path / "touch.json")
+    port = free_port()
+    here = ["--host", LOOPBACK, "--port", port, "--array", "4x4", "--seconds", 0.2]
+    arguments = command("live", "--readout", tmp_path / "touch.json", *here)
+    done = subprocess.run(arguments, capture_output=True, text=True, check=False)
+    assert done.returncode == 3
+    assert f"nothing arrived at UDP {LOOPBACK}:{port}" in done.stdout
+    assert "p50" not in done.stdout
+    with Live(0, host=LOOPBACK) as live:
+        assert live.counters["decode_latency"] == {"count": 0, "p50_us": None, "p99_us": None, "max_us": None}
+
+
+def test_a_board_with_more_taxels_than_the_array_is_said_while_it_runs(tmp_path: Path) -> None:
+    port, file = free_port(), tmp_path / "walk.mcap"
+    n = 500
+    far = Events(np.arange(n) * 100, np.full(n, 40), np.full(n, 2), np.ones(n, bool), array=Array(64, 64))
+    arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--array", "8x8")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        listening(process)
+        assert process.stderr is not None
+        play(far, port)
+        said = next(line for line in process.stderr if line.startswith("taxel: "))
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+    assert "words name taxels outside 8 x 8" in said
+    assert "--array" in said
+    assert process.returncode == 2
+    assert file.exists(), "the bytes are kept"

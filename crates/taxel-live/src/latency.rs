@@ -14,17 +14,17 @@ pub struct Latencies {
     max_ns: u64,
 }
 
-/// Quantiles of [`Latencies`], us; 0 where nothing was measured.
+/// Quantiles of [`Latencies`], us; none where nothing was measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Quantiles {
     /// How many were measured.
     pub count: u64,
     /// Median.
-    pub p50_us: f64,
+    pub p50_us: Option<f64>,
     /// 99 of 100 were no longer.
-    pub p99_us: f64,
+    pub p99_us: Option<f64>,
     /// The longest.
-    pub max_us: f64,
+    pub max_us: Option<f64>,
 }
 
 impl Default for Latencies {
@@ -61,7 +61,7 @@ impl Latencies {
     #[must_use]
     #[allow(clippy::cast_precision_loss)]
     pub fn quantiles(&self) -> Quantiles {
-        let us = |ns: u64| ns as f64 / 1e3;
+        let us = |ns: u64| (self.count > 0).then(|| ns as f64 / 1e3);
         Quantiles {
             count: self.count,
             p50_us: us(self.quantile(0.5)),
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_measured_is_zero() {
+    fn nothing_measured_is_no_latency() {
         assert_eq!(Latencies::default().quantiles(), Quantiles::default());
     }
 }

@@ -170,14 +170,22 @@ pub struct Counters {
     pub taring: bool,
 }
 
+impl Counters {
+    /// Whether not even a datagram that was lost has come.
+    #[must_use]
+    pub fn nothing_came(&self) -> bool {
+        self.capture.messages + self.capture.dropped_by_kernel == 0
+    }
+}
+
 /// How a [`Live`] ended.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// All of them, closed.
     pub counters: Counters,
-    /// One line: nothing lost after arrival, or what was lost where.
+    /// One line: nothing lost after arrival, what was lost where, or that nothing came.
     pub verdict: String,
-    /// The file, where something was recorded.
+    /// The file, where something was recorded: one to which nothing came is not kept, and none is replaced by it.
     pub path: Option<PathBuf>,
 }
 
@@ -371,12 +379,16 @@ impl Live {
         let counters = self.counters();
         // All other holders were threads that have ended.
         let recorder = Arc::get_mut(&mut self.shared).and_then(|shared| shared.recorder.take());
-        let (verdict, path) = match recorder {
-            Some(recorder) => {
-                let path = recorder.path().to_owned();
-                (recorder.finish(&counters)?, Some(path))
-            }
-            None => (recorder::losses(&counters).verdict(), None),
+        let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
+        let verdict = if counters.nothing_came() {
+            let address = self.address();
+            format!(
+                "nothing arrived at UDP {address} in {:.1} s: does the board send to this machine, and to port {}?",
+                counters.seconds,
+                address.port()
+            )
+        } else {
+            recorder::losses(&counters).verdict()
         };
         joined?;
         self.check()?;

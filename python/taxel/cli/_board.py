@@ -10,8 +10,17 @@ from rich.table import Table
 
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.live import delays
 
-__all__ = ["ArrayOption", "HostOption", "PortOption", "PresetOption", "counters_table", "geometry"]
+__all__ = [
+    "ArrayOption",
+    "HostOption",
+    "PortOption",
+    "PresetOption",
+    "counters_table",
+    "geometry",
+    "outside",
+]
 
 PortOption = Annotated[int, typer.Option(help="The UDP port that the board sends to.")]
 HostOption = Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: every one.")]
@@ -27,6 +36,22 @@ def geometry(said: str) -> Array:
     return Array(int(match[1]), int(match[2]), pitch_mm=2.67, name=f"thesis {said}" if said == "64x64" else said)
 
 
+#: From so many words outside the array, and from this share of all on, they are no damage: it is another array.
+_OUTSIDE, _OUTSIDE_SHARE = 100, 0.01
+
+
+def outside(counters: dict[str, Any], array: Array) -> str | None:
+    """Return what to say where the board has more taxels than `array`; None where it has not."""
+    wire = counters["wire"]
+    if wire["outside"] < max(_OUTSIDE, _OUTSIDE_SHARE * wire["words"]):
+        return None
+    size = f"{array.rows} x {array.columns}"
+    return (
+        f"{wire['outside']:,} of {wire['words']:,} words name taxels outside {size}, and are dropped: "
+        "give the board's own --array"
+    )
+
+
 def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
     """Return rates since `before`, totals and losses, as rows that do not move about."""
     passed = max(now["seconds"] - before["seconds"], 1e-9)
@@ -38,7 +63,6 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
     damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
     board = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
     drift = "" if now["offset"] is None else f", drift {now['offset']['drift_ppm']:+.1f} ppm"
-    delay = now["decode_latency"]
     table = Table.grid(padding=(0, 2))
     for name, total, per_second in (
         ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),
@@ -46,7 +70,7 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         ("events", f"{now['events']:,}", rate(now["events"], before["events"])),
         ("lost", f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue", ""),
         ("damaged", f"{damaged:,} bytes and words, {wire['back']:,} steps back in time", ""),
-        ("arrival to decoded", f"p50 {delay['p50_us']:,.0f} us, p99 {delay['p99_us']:,.0f} us", ""),
+        ("arrival to decoded", delays(now["decode_latency"]), ""),
         ("board's clock", f"{board}{drift}", ""),
     ):
         table.add_row(name, total, per_second)

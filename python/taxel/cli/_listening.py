@@ -50,9 +50,11 @@ def encoder_of(name: str | None, said: list[str]) -> Encoder:
 def tare_of(said: str | None, recording: Recording) -> Tare | None:
     """Return the tare that ``--tare`` names: a file, or so many seconds at the beginning of the recording.
 
-    The stretch ends early where the board marked the start of the recording, as a board that was tared does.
+    The stretch ends early where the board marked the start of the recording, as a board that was tared does. One
+    longer than half of the recording is refused: hardly all of that was rest.
     """
-    from taxel.tare import Tare  # noqa: PLC0415  the command line starts quickly
+    from taxel.events import Events  # noqa: PLC0415  the command line starts quickly
+    from taxel.tare import Tare  # noqa: PLC0415
 
     if said is None:
         return None
@@ -62,16 +64,19 @@ def tare_of(said: str | None, recording: Recording) -> Tare | None:
         return Tare.load(said)
     if not 0 < seconds < 1e6:
         raise ProblemError(f"--tare {said}: must be seconds above 0, or a file")
-    if not recording.has_events:
-        frames = recording.frames()
-        stop = int(frames.t[0] + seconds * 1e6) if len(frames) else 0
-        return Tare.take(frames, stop_us=stop, note=str(recording.path))
-    events = recording.events
-    if not len(events):
-        raise ProblemError(f"{recording.path}: holds no event to take a tare from")
-    first = int(events.t[0])
-    marked = [t for t, start in events.markers if start and t > first]
-    return Tare.take(events, stop_us=min([first + int(seconds * 1e6), *marked]), note=str(recording.path))
+    source = recording.events if recording.has_events else recording.frames()
+    if not len(source):
+        raise ProblemError(f"{recording.path}: holds nothing to take a tare from")
+    first, last = int(source.t[0]), int(source.t[-1])
+    if seconds * 2e6 > last - first:
+        raise ProblemError(
+            f"--tare {said}: more than half of {recording.path}, which lasts {(last - first) / 1e6:g} s; "
+            "give the seconds at its beginning in which nothing was touched"
+        )
+    stop = first + int(seconds * 1e6)
+    if isinstance(source, Events):
+        stop = min([stop, *(t for t, start in source.markers if start and t > first)])
+    return Tare.take(source, stop_us=stop, note=str(recording.path))
 
 
 def reference(said: str | None, recording: Recording, among: int = 1) -> dict[str, NDArray[np.int64]]:

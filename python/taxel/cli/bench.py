@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import subprocess
 import sys
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,6 +35,12 @@ def bench(
         )
     if name != "all" and name not in files:
         raise ProblemError(f"no benchmark {name!r}: there are {', '.join(files)} and all")
+    changed = [] if quick else _changed(folder)
+    if changed:
+        raise ProblemError(
+            f"{', '.join(changed[:3])}{' ...' * (len(changed) > 3)}: changed since the last commit, "
+            "which a result names; commit first, or say --quick"
+        )
     # What benchmarks share lies beside them, in files that begin with an underscore.
     sys.path.insert(0, str(folder))
     for stem in files if name == "all" else [name]:
@@ -52,6 +59,17 @@ def bench(
             typer.echo(_table(stem, result))
 
 
+def _changed(folder: Path) -> list[str]:
+    """Return the files of the checkout that differ from its last commit, but for results."""
+    said = subprocess.run(
+        ["git", "status", "--porcelain", "--untracked-files=no", "--", ":/", f":!{folder}/results"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return [line[3:] for line in said.stdout.splitlines()]
+
+
 def _load(path: Path) -> Any:
     spec = importlib.util.spec_from_file_location(f"taxel_benchmark_{path.stem}", path)
     if spec is None or spec.loader is None:
@@ -68,4 +86,5 @@ def _table(stem: str, result: dict[str, Any]) -> str:
     rows = [
         f"  {key}: {value:.3g}" if isinstance(value, float) else f"  {key}: {value}" for key, value in ratios.items()
     ]
-    return "\n".join([f"{stem}: ratios (ours over the peer's, above 1 is faster)", *rows])
+    left_out = [f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()]
+    return "\n".join([f"{stem}: ratios (ours over the peer's, above 1 is faster)", *rows, *left_out])

@@ -26,7 +26,9 @@ def emulate(
     host: Annotated[str, typer.Option(help="To which machine, as an IP address.")] = "127.0.0.1",
     scenes: Annotated[int, typer.Option(min=0, help="How many scenes.")] = 10,
     seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Draws scenes, taxels, noise.")] = None,
-    tare: Annotated[float, typer.Option(help="How long the noise floor is 0 before the start marker, ms.")] = 50.0,
+    tare: Annotated[
+        float, typer.Option(min=0, max=60, help="How long the noise floor is 0 before the start marker, s.")
+    ] = 0.05,
     preset: Annotated[str, typer.Option(help='The registers: "5.2 kHz", "2 kHz", "20.8 kHz".')] = "5.2 kHz",
     control: Annotated[
         int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")
@@ -44,7 +46,8 @@ def emulate(
     if not 1 <= port <= 65_535:
         raise ProblemError(f"port is {port}: must be 1 to 65535")
     seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
-    acts = script(seed, scenes, tare_ms=tare, left_to_rest=rest)
+    tare_ms = 1e3 * tare
+    acts = script(seed, scenes, tare_ms=tare_ms, left_to_rest=rest)
     # Drawn anew from the seed: what is played can be told before it is.
     contacts, force = truth(acts, preset=preset)
     console = Console(stderr=True, quiet=as_json)
@@ -70,7 +73,7 @@ def emulate(
             acts,
             seed=seed,
             preset=preset,
-            tare_ms=tare,
+            tare_ms=tare_ms,
             control=listens,
             begun=begun,
             watch=watch,

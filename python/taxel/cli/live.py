@@ -15,10 +15,10 @@ from rich.text import Text
 
 from taxel._core import ProblemError
 from taxel.cable import Cable
-from taxel.cli import app
-from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, geometry
+from taxel.cli import OUTSIDE, WRONG_INPUT, app
+from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, geometry, outside
 from taxel.detect import Readout
-from taxel.live import Live, Said
+from taxel.live import Live, Said, Summary, delays
 from taxel.tare import Tare
 
 __all__ = ["live"]
@@ -55,8 +55,8 @@ def live(
     """Listen to a board and say what a readout detects, while it happens.
 
     Shows rates, losses and latency. With --json each detection is one line, written by the thread that made it: label;
-    t, known and said in us of the board's clock; slope in mV/ms; said_ns by the host's. Exit code 3 where something was
-    lost after it had arrived.
+    t, known and said in us of the board's clock; slope in mV/ms; said_ns by the host's. Exit code 3 where nothing
+    came or something was lost after it had arrived, 2 where the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     """
@@ -92,23 +92,31 @@ def live(
         taken.save(save_tare)
         console.print(f"tare written to {save_tare}")
     if not as_json:
-        counters = summary.counters
-        delay = counters["said_latency"]
-        typer.echo(f"{counters['detections']} detections, {counters['events']} events in {counters['seconds']:.1f} s")
-        typer.echo(f"from known to said: p50 {delay['p50_us']:.0f} us, p99 {delay['p99_us']:.0f} us")
-        if counters["wrong"]:
-            typer.echo(f"{counters['wrong']} were said too early: events came more than {guard_frames:g} frames late")
-        if counters["late"]:
-            typer.echo(f"{counters['late']} events came out of order, or more than 0.1 s late")
-        if counters["events_dropped"]:
-            typer.echo(f"{counters['events_dropped']} events were dropped because the readout was too slow")
-        if summary.path is not None:
-            typer.echo(f"recorded to {summary.path}")
-        typer.echo(summary.verdict)
-    if save_tare is not None and taken is None:
+        _say(summary, guard_frames)
+    elif summary.nothing_came or summary.lost:
+        typer.echo(f"taxel: {summary.verdict}", err=True)
+    if save_tare is not None and taken is None and not summary.nothing_came:
         raise ProblemError(f"tare: not complete after {summary.counters['seconds']:.1f} s; {save_tare} was not written")
-    if summary.lost or summary.counters["events_dropped"]:
-        raise typer.Exit(3)
+    if summary.nothing_came or summary.lost or summary.counters["events_dropped"]:
+        raise typer.Exit(OUTSIDE)
+    if outside(summary.counters, pipeline.array):
+        raise typer.Exit(WRONG_INPUT)
+
+
+def _say(summary: Summary, guard_frames: float) -> None:
+    counters = summary.counters
+    typer.echo(f"{counters['detections']} detections, {counters['events']} events in {counters['seconds']:.1f} s")
+    if counters["detections"]:
+        typer.echo(f"from known to said: {delays(counters['said_latency'])}")
+    if counters["wrong"]:
+        typer.echo(f"{counters['wrong']} were said too early: events came more than {guard_frames:g} frames late")
+    if counters["late"]:
+        typer.echo(f"{counters['late']} events came out of order, or more than 0.1 s late")
+    if counters["events_dropped"]:
+        typer.echo(f"{counters['events_dropped']} events were dropped because the readout was too slow")
+    if summary.path is not None:
+        typer.echo(f"recorded to {summary.path}")
+    typer.echo(summary.verdict)
 
 
 def _watch(pipeline: Live, seconds: float | None, console: Console, at_rest: contextlib.ExitStack) -> None:
@@ -116,7 +124,7 @@ def _watch(pipeline: Live, seconds: float | None, console: Console, at_rest: con
     shown: deque[Said] = deque(maxlen=_SHOWN)
     console.print(f"listening on UDP {pipeline.address[0]}:{pipeline.address[1]}; Ctrl-C ends")
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
-        before = pipeline.counters
+        before, told = pipeline.counters, False
         while seconds is None or before["seconds"] < seconds:
             said = pipeline.next(_REDRAW)
             while said is not None:
@@ -125,6 +133,9 @@ def _watch(pipeline: Live, seconds: float | None, console: Console, at_rest: con
             now = pipeline.counters
             if not now["taring"]:
                 at_rest.close()
+            if not told and (wrong := outside(now, pipeline.array)):
+                typer.echo(f"taxel: {wrong}", err=True)
+                told = True
             if now["seconds"] - before["seconds"] >= _REDRAW:
                 display.update(Group(counters_table(before, now), _state(now, shown)))
                 before = now

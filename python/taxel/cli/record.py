@@ -15,8 +15,9 @@ from rich.live import Live as Display
 
 from taxel import _core
 from taxel._core import ProblemError
-from taxel.cli import app
-from taxel.cli._board import ArrayOption, HostOption, PortOption, PresetOption, counters_table, geometry
+from taxel.array import Array
+from taxel.cli import OUTSIDE, WRONG_INPUT, app
+from taxel.cli._board import ArrayOption, HostOption, PortOption, PresetOption, counters_table, geometry, outside
 from taxel.live import Live, Summary
 
 __all__ = ["record"]
@@ -50,8 +51,8 @@ def record(
     """Record what a board sends by UDP, and say what was lost.
 
     Ends with Ctrl-C, after --seconds, or with the board's stop marker (--markers). With --length it records one trial
-    after the other, the index appended to the name, a countdown with beeps before each. Exit code 3 where something was
-    lost after it had arrived.
+    after the other, the index appended to the name, a countdown with beeps before each. Exit code 3 where nothing came
+    or something was lost after it had arrived, 2 where the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap
     """
@@ -72,11 +73,18 @@ def record(
     if length is None:
         summary, _ = _one(file, live, seconds, markers, console)
         _say(summary, as_json)
-        lost = summary.lost
+        code = _code(summary, live["array"])
     else:
-        lost = _automatic(file, live, length, countdown, start_index, trials, markers, console, as_json)
-    if lost:
-        raise typer.Exit(3)
+        code = _automatic(file, live, length, countdown, start_index, trials, markers, console, as_json)
+    if code:
+        raise typer.Exit(code)
+
+
+def _code(summary: Summary, array: Array) -> int:
+    """Return the exit code that a recording deserves."""
+    if summary.nothing_came or summary.lost:
+        return OUTSIDE
+    return WRONG_INPUT if outside(summary.counters, array) else 0
 
 
 def _automatic(
@@ -90,8 +98,8 @@ def _automatic(
     console: Console,
     as_json: bool,
 ) -> int:
-    """Record trial after trial until Ctrl-C, which ends the one that runs well; return what was lost in all."""
-    lost = done = 0
+    """Record trial after trial until Ctrl-C, which ends the one that runs well; return the worst exit code."""
+    code = done = 0
     while trials is None or done < trials:
         name = Path(_core.numbered_path(file, index + done))
         if name.exists() and not live["overwrite"]:
@@ -102,10 +110,10 @@ def _automatic(
             break
         summary, stopped = _one(name, live, length, markers, console)
         _say(summary, as_json)
-        lost, done = lost + summary.lost, done + 1
+        code, done = max(code, _code(summary, live["array"])), done + 1
         if stopped:
             break
-    return lost
+    return code
 
 
 def _count_down(name: Path, seconds: int, console: Console) -> None:
@@ -135,7 +143,7 @@ def _one(
 def _watch(live: Live, seconds: float | None, markers: bool, console: Console) -> None:
     """Show what comes until the time is over or, if `markers` count, a stop was marked."""
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
-        before = live.counters
+        before, told = live.counters, False
         while seconds is None or before["seconds"] < seconds:
             live.next(_REDRAW)
             for t, start in live.take_markers():
@@ -143,18 +151,23 @@ def _watch(live: Live, seconds: float | None, markers: bool, console: Console) -
                 if markers and not start:
                     return
             now = live.counters
+            if not told and (said := outside(now, live.array)):
+                typer.echo(f"taxel: {said}", err=True)
+                told = True
             display.update(counters_table(before, now))
             before = now
 
 
 def _say(summary: Summary, as_json: bool) -> None:
     if as_json:
-        typer.echo(json.dumps(asdict(summary) | {"path": str(summary.path)}))
+        path = None if summary.path is None else str(summary.path)
+        typer.echo(json.dumps(asdict(summary) | {"path": path}))
         return
     counters = summary.counters
     wire = counters["wire"]
-    typer.echo(
-        f"{summary.path}: {counters['seconds']:.1f} s, {counters['decoded']} datagrams, {wire['bytes']} bytes, "
-        f"{counters['events']} events, {wire['markers']} markers"
-    )
+    if summary.path is not None:
+        typer.echo(
+            f"{summary.path}: {counters['seconds']:.1f} s, {counters['decoded']} datagrams, {wire['bytes']} bytes, "
+            f"{counters['events']} events, {wire['markers']} markers"
+        )
     typer.echo(summary.verdict)

@@ -21,6 +21,7 @@ import taxel
 from taxel.demo import pictures
 from taxel.demo.hearing import FRAME_US, Hearing
 from taxel.demo.judging import GOALS, LABELS, Judged, Row
+from taxel.live import delays
 
 __all__ = ["GUESSES", "Material", "figures", "write"]
 
@@ -148,6 +149,7 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
         within={label: _share(hearing.judged.within_goal(label)) for label in LABELS},
         guesses=GUESSES,
         losses=_losses(material),
+        delays=delays,
         live=material.live,
         footfall_note=material.footfall_note,
         written=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),

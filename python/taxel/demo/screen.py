@@ -17,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from taxel.demo.judging import LABELS
-from taxel.live import Said
+from taxel.live import Said, delays
 from taxel.simulate import Contact
 
 __all__ = ["Screen"]
@@ -49,15 +49,14 @@ class Screen:
         capture = counters["capture"]
         lost = capture["dropped_by_kernel"] + capture["dropped_by_queue"] + counters["events_dropped"]
         rows = Table.grid(padding=(0, 2))
-        decoded, told = counters["decode_latency"], counters["said_latency"]
         for name, value in (
             ("events/s", f"{self._rate:,.0f}"),
             ("on the wire", f"{self._rate * 80 / 1e3:,.0f} kbit/s"),
             ("as frames", "213,333 kbit/s"),
             ("events", f"{counters['events']:,}"),
             ("datagrams", f"{capture['datagrams']:,}, lost {lost}"),
-            ("arrived to decoded", f"{decoded['p50_us']:.0f} us, 99 %: {decoded['p99_us']:.0f}"),
-            ("known to said", f"{told['p50_us'] / 1e3:.2f} ms, 99 %: {told['p99_us'] / 1e3:.2f}"),
+            ("arrived to decoded", delays(counters["decode_latency"])),
+            ("known to said", delays(counters["said_latency"])),
             *((label, str(sum(one.label == label for one in said))) for label in LABELS),
         ):
             rows.add_row(Text(name, style="dim"), value)

@@ -1,6 +1,6 @@
 //! A board from reset to stop, as the demo and `taxel emulate` use it: it arms, is tared, starts, and stops.
 
-use super::Board;
+use super::{Board, BoardCounts};
 use crate::wire::{Command, Registers};
 use crate::{Result, Stop, problem};
 
@@ -32,13 +32,18 @@ pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(
 }
 
 impl Board {
-    /// Scans the first frame for nobody: at reset all previous values are 0, and every taxel would be sent.
+    /// Scans the first frame for nobody: at reset all previous values are 0, and every taxel would be sent. It counts as
+    /// a frame, what nobody gets does not count.
     ///
     /// # Errors
     ///
     /// As [`Board::frame`].
     pub fn arm(&mut self, ticks: &[u16]) -> Result<()> {
-        self.frame(ticks, |_| true)
+        let before = self.counts;
+        self.frame(ticks, |_| true)?;
+        let BoardCounts { frames, not_returned, .. } = self.counts;
+        self.counts = BoardCounts { frames, not_returned, ..before };
+        Ok(())
     }
 
     /// Scans frame after frame as fast as it goes, until `touch` has no more of them.
@@ -96,6 +101,8 @@ mod tests {
         board.play(touch, &commands, sink, Stop::never()).unwrap();
         // Six frames of 192 us for the tare; then a start, silence, a stop.
         assert_eq!(words, [0, 2, 2, 2, 2, 2, 2, 1, 0, 0, 0, 1]);
+        let counts = board.counts();
+        assert_eq!((counts.frames, counts.changes, counts.sent), (12, 6, words.iter().sum::<usize>() as u64));
         assert_eq!(board.registers().noise_floor, 3);
         assert!(!board.registers().record);
     }

@@ -1,20 +1,31 @@
 //! The two kinds of file that a [`Live`](super::Live) records to.
 
+use std::fs::OpenOptions;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 use taxel_core::{Marker, problem};
 
 use super::{Counters, Options, Record, Said};
-use crate::Result;
 use crate::capture::Batch;
 use crate::recording::{self, Header, LsaWriter, Writer, now_ns};
+use crate::{Error, Result};
 
 /// A recording being written. Raw `.lsa` holds bytes and nothing else: what else there is to keep is left out of it.
+///
+/// A file that is to be replaced is touched when there is something to replace it with, and not before: where nothing
+/// comes, it stays.
 pub(super) struct Recorder {
-    path: PathBuf,
-    kind: Kind,
+    record: Record,
+    header: Header,
+    /// Whether there was no such file.
+    new: bool,
+    noted: AtomicBool,
+    kind: OnceLock<Kind>,
+    /// Held by the one who opens the file.
+    opening: Mutex<()>,
 }
 
 enum Kind {
@@ -25,37 +36,52 @@ enum Kind {
 
 impl Recorder {
     pub(super) fn create(record: &Record, options: &Options, address: SocketAddr) -> Result<Self> {
-        let path = record.path.clone();
-        let kind = match path.extension().and_then(|e| e.to_str()) {
-            Some("mcap") => {
-                let header = Header {
-                    array: options.array.clone(),
-                    registers: Some(options.registers),
-                    difference: options.differences,
-                    origin_us: 0,
-                    source: format!("udp {address}"),
-                    started_ns: now_ns(),
-                };
-                let how = recording::Options { compression: record.compression, overwrite: record.overwrite };
-                Kind::Mcap(Writer::create(&path, &header, how)?)
-            }
-            Some("lsa") => Kind::Lsa(Mutex::new(LsaWriter::create(&path, record.overwrite)?)),
-            _ => {
-                let name = path.display();
-                return Err(
-                    problem!("{name}: a recording is named .mcap (all that is known) or .lsa (raw bytes)").into()
-                );
-            }
+        let header = Header {
+            array: options.array.clone(),
+            registers: Some(options.registers),
+            difference: options.differences,
+            origin_us: 0,
+            source: format!("udp {address}"),
+            started_ns: now_ns(),
         };
-        Ok(Self { path, kind })
+        let path = &record.path;
+        let new = !(record.overwrite && path.exists());
+        let recorder = Self {
+            record: record.clone(),
+            header,
+            new,
+            noted: AtomicBool::new(false),
+            kind: OnceLock::new(),
+            opening: Mutex::new(()),
+        };
+        if new {
+            recorder.kind()?;
+        } else {
+            named(path)?;
+            OpenOptions::new().write(true).open(path).map_err(Error::file(path))?;
+        }
+        Ok(recorder)
     }
 
-    pub(super) fn path(&self) -> &Path {
-        &self.path
+    /// The open file.
+    fn kind(&self) -> Result<&Kind> {
+        let _one = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kind) = self.kind.get() {
+            return Ok(kind);
+        }
+        let Record { path, compression, overwrite } = &self.record;
+        let kind = match named(path)? {
+            "mcap" => {
+                let how = recording::Options { compression: *compression, overwrite: *overwrite };
+                Kind::Mcap(Writer::create(path, &self.header, how)?)
+            }
+            _ => Kind::Lsa(Mutex::new(LsaWriter::create(path, *overwrite)?)),
+        };
+        Ok(self.kind.get_or_init(|| kind))
     }
 
     pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
-        match &self.kind {
+        match self.kind()? {
             Kind::Mcap(writer) => {
                 batch.iter().try_for_each(|(d, bytes)| writer.datagram(d.arrived_ns, d.number, bytes))
             }
@@ -67,21 +93,21 @@ impl Recorder {
     }
 
     pub(super) fn marker(&self, marker: Marker) -> Result<()> {
-        match &self.kind {
+        match self.kind()? {
             Kind::Mcap(writer) => writer.marker(now_ns(), marker),
             Kind::Lsa(_) => Ok(()),
         }
     }
 
     pub(super) fn detection(&self, said: &Said) -> Result<()> {
-        match &self.kind {
+        match self.kind()? {
             Kind::Mcap(writer) => writer.detection(said.said_ns, &said.detection),
             Kind::Lsa(_) => Ok(()),
         }
     }
 
     pub(super) fn picture(&self, board_us: i64, columns: u16, held: &[u16], ramp: u16) -> Result<()> {
-        match &self.kind {
+        match self.kind()? {
             Kind::Mcap(writer) => writer.picture(now_ns(), board_us, columns, held, ramp),
             Kind::Lsa(_) => Ok(()),
         }
@@ -89,36 +115,57 @@ impl Recorder {
 
     /// What an unfinished recording will know of its losses; a raw one knows nothing, but its bytes reach the system.
     pub(super) fn so_far(&self, counters: &Counters) -> Result<()> {
-        match &self.kind {
-            Kind::Mcap(writer) => writer.counts(now_ns(), &losses(counters)),
-            Kind::Lsa(_) => Ok(()),
+        match self.kind.get() {
+            Some(Kind::Mcap(writer)) => writer.counts(now_ns(), &losses(counters)),
+            Some(Kind::Lsa(_)) | None => Ok(()),
         }
     }
 
     /// Bytes must not wait in memory for long: `.mcap` sees to that itself.
     pub(super) fn flush(&self) -> Result<()> {
-        match &self.kind {
-            Kind::Mcap(_) => Ok(()),
-            Kind::Lsa(writer) => writer.lock().unwrap_or_else(PoisonError::into_inner).flush(),
+        match self.kind.get() {
+            Some(Kind::Mcap(_)) | None => Ok(()),
+            Some(Kind::Lsa(writer)) => writer.lock().unwrap_or_else(PoisonError::into_inner).flush(),
         }
     }
 
     pub(super) fn note(&self, board_us: Option<i64>, text: &str) -> Result<()> {
-        match &self.kind {
+        if named(&self.record.path)? == "lsa" {
+            return Err(problem!("a .lsa holds raw bytes and no notes: record to a .mcap file").into());
+        }
+        self.noted.store(true, Ordering::Relaxed);
+        match self.kind()? {
             Kind::Mcap(writer) => writer.note(now_ns(), board_us, text),
-            Kind::Lsa(_) => Err(problem!("a .lsa holds raw bytes and no notes: record to a .mcap file").into()),
+            Kind::Lsa(_) => Ok(()),
         }
     }
 
-    /// Closes the file and gives the verdict.
-    pub(super) fn finish(self, counters: &Counters) -> Result<String> {
-        let losses = losses(counters);
-        match self.kind {
-            Kind::Mcap(writer) => Ok(writer.finish(losses)?.verdict()),
-            Kind::Lsa(writer) => {
-                writer.into_inner().unwrap_or_else(PoisonError::into_inner).finish()?;
-                Ok(losses.verdict())
+    /// Closes the file and says where it is; a file that would hold nothing is not kept.
+    pub(super) fn finish(self, counters: &Counters) -> Result<Option<PathBuf>> {
+        let path = self.record.path;
+        if counters.nothing_came() && !self.noted.into_inner() {
+            drop(self.kind);
+            if self.new {
+                std::fs::remove_file(&path).map_err(Error::file(&path))?;
             }
+            return Ok(None);
+        }
+        match self.kind.into_inner() {
+            Some(Kind::Mcap(writer)) => drop(writer.finish(losses(counters))?),
+            Some(Kind::Lsa(writer)) => writer.into_inner().unwrap_or_else(PoisonError::into_inner).finish()?,
+            None => {}
+        }
+        Ok(Some(path))
+    }
+}
+
+/// What kind of file a name says.
+fn named(path: &Path) -> Result<&str> {
+    match path.extension().and_then(|e| e.to_str()) {
+        Some(kind @ ("mcap" | "lsa")) => Ok(kind),
+        _ => {
+            let name = path.display();
+            Err(problem!("{name}: a recording is named .mcap (all that is known) or .lsa (raw bytes)").into())
         }
     }
 }

@@ -1,0 +1,44 @@
+"""Benchmarks load where no peer is installed, and leave it out."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+BENCHMARKS = sorted((ROOT / "benchmarks").glob("[!_]*.py"))
+
+
+def peers() -> list[str]:
+    """Return the modules of the extras that only tests and benchmarks want."""
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    names = {re.split(r"[<>=!~]", wanted)[0] for extra in ("bench", "peers", "test") for wanted in extras[extra]}
+    return sorted(names - {"numpy", "pytest", "pytest-timeout", "hypothesis"} | {"neo", "quantities", "torch"})
+
+
+def without_peers(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the command line where no peer can be imported."""
+    script = (
+        f"import sys; sys.modules.update(dict.fromkeys({peers()!r})); from taxel.cli import main; main(sys.argv[1:])"
+    )
+    return subprocess.run(
+        [sys.executable, "-c", script, *arguments], capture_output=True, text=True, check=False, cwd=ROOT
+    )
+
+
+@pytest.mark.parametrize("path", BENCHMARKS, ids=lambda path: path.stem)
+def test_a_benchmark_loads_where_no_peer_is_installed(path: Path) -> None:
+    script = f"import sys; sys.modules.update(dict.fromkeys({peers()!r})); sys.path.insert(0, 'benchmarks'); "
+    script += f"import {path.stem}; {path.stem}.run"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=False, cwd=ROOT)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_a_peer_that_is_not_installed_is_left_out_and_said() -> None:
+    done = without_peers("bench", "recording_write", "--quick")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "left out: mcap (Python): mcap not installed" in done.stdout
+    assert "taxel, lz4, MB per CPU second" in done.stdout
