@@ -9,7 +9,7 @@ SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
 	@echo "make test   all tests but the slow ones     make slow   the slow ones"
-	@echo "make lint   format, lint, types, stubs      make bench  ratios against peers, to benchmarks/results/"
+	@echo "make lint   format, lint, types, floors     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 
 check:
@@ -51,6 +51,8 @@ lint: build
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-cache
+	$(BIN)/python -m pytest -q tests/test_floors.py
 	$(BIN)/python -m mypy.stubtest taxel._core --allowlist tests/stubtest-allowed.txt
 
 format:

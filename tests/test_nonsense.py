@@ -120,6 +120,7 @@ def read_out() -> taxel.detect.ReadoutStream:
 SOUND: dict[str, Sound] = {
     "taxel.Array": plain(taxel.Array, rows=4, columns=4, pitch_mm=1.0, exists=np.ones((4, 4)), name="small"),
     "taxel.Array.index": method(ARRAY, "index", x=1, y=2),
+    "taxel.Array.region": method(ARRAY, "region", x=slice(0, 2), y=slice(0, 2)),
     "taxel.Events": plain(
         taxel.Events, t=[1], x=[1], y=[1], p=[True], array=ARRAY, intensity=[5], present=[True], markers=[(0, True)]
     ),
@@ -128,7 +129,6 @@ SOUND: dict[str, Sound] = {
     "taxel.Events.from_numpy": plain(taxel.Events.from_numpy, records=EVENTS.to_numpy(), array=ARRAY),
     "taxel.Events.from_tonic": plain(taxel.Events.from_tonic, records=EVENTS.to_tonic(), array=ARRAY),
     "taxel.Events.from_faery": plain(taxel.Events.from_faery, records=EVENTS.to_faery(), array=ARRAY),
-    "taxel.Events.held": method(EVENTS, "held", period_us=100, start=0, stop=500),
     "taxel.Frames": plain(taxel.Frames, values=np.ones((2, 4, 4)), t=[0, 5], unit="N", array=ARRAY),
     "taxel.Frames.from_events": plain(taxel.Frames.from_events, events=EVENTS, period_us=100, start=0, stop=500),
     "taxel.Frames.between": method(FRAMES, "between", start=0, stop=200),

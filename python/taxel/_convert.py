@@ -120,7 +120,7 @@ def _table(source: Recording | Events | Frames, frames_hz: float | None) -> Even
         return source
     if isinstance(source, Frames):
         raise ProblemError("frames_hz: pictures keep their own times; open the file and ask it for frames(rate_hz)")
-    return source.held(period_us("frames_hz", frames_hz))
+    return Frames.from_events(source, period_us("frames_hz", frames_hz))
 
 
 def _about(recording: Recording | None) -> tuple[dict[str, Any], list[str]]:
@@ -227,7 +227,7 @@ def _add_remarks(writer: Any, events: Events, recording: Recording | None, regis
         writer.marker(max(0, at_ns(t)), t, start)
     if events.intensity is not None and len(events):
         ramp = int(registers["ramp"]) if registers else int(events.intensity.max()) or 1
-        pictures = events.held(1_000_000 // _PICTURES_HZ)
+        pictures = Frames.from_events(events, 1_000_000 // _PICTURES_HZ)
         for t, picture in zip(pictures.t.tolist(), pictures.values, strict=True):
             ticks = picture.astype(np.uint16).ravel()
             writer.picture(max(0, at_ns(t)), t, events.array.columns, ticks, ramp)

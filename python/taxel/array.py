@@ -106,6 +106,31 @@ class Array:
         except ValueError:
             raise ProblemError(f"x has shape {column.shape}, y {row.shape}: must be equal") from None
 
+    def region(self, x: slice, y: slice) -> tuple[tuple[int, int], tuple[int, int]]:
+        """Return first and last (exclusive) column and row of a rectangle of columns `x` and rows `y`.
+
+        Raises
+        ------
+        ProblemError : no slices of whole numbers, or one with a step
+
+        Examples
+        --------
+        >>> Array(8, 8).region(slice(2, 6), slice(None))
+        ((2, 6), (0, 8))
+        """
+        limits = []
+        for name, chosen, size in (("x", x, self.columns), ("y", y, self.rows)):
+            if not isinstance(chosen, slice) or chosen.step not in (None, 1):
+                raise ProblemError(f"{name} is {shown(chosen)}: must be a slice without a step, as slice(8, 16)")
+            try:
+                first, last, _ = chosen.indices(size)
+            except TypeError:
+                raise ProblemError(
+                    f"{name} is {shown(chosen)}: a slice goes from one whole number to another"
+                ) from None
+            limits.append((first, last))
+        return limits[0], limits[1]
+
     def _parts(self) -> tuple[int, int, float, str, list[bool] | None]:
         """Return what the compiled part wants."""
         exists = None if self.exists is None else [bool(e) for e in self.exists.ravel()]

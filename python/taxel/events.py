@@ -16,8 +16,6 @@ from taxel.array import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from taxel.frames import Frames
-
 __all__ = ["Events"]
 
 
@@ -102,7 +100,7 @@ class Events:
 
     def region(self, x: slice, y: slice) -> Events:
         """Return the events of a rectangle of columns `x` and rows `y` (slices without a step); the array stays."""
-        columns, rows = region(self.array, x, y)
+        columns, rows = self.array.region(x, y)
         inside = (self.x >= columns[0]) & (self.x < columns[1]) & (self.y >= rows[0]) & (self.y < rows[1])
         return self[inside]
 
@@ -220,19 +218,6 @@ class Events:
 
         return event_picture(self, ax)
 
-    def held(self, period_us: int, start: int | None = None, stop: int | None = None) -> Frames:
-        """Return the held intensities as pictures, every `period_us`.
-
-        A taxel reads 0 until its first event, then the last intensity that came.
-
-        Raises
-        ------
-        ProblemError : events without intensities, or a period below 1 us
-        """
-        from taxel.frames import Frames  # noqa: PLC0415  frames know events
-
-        return Frames.from_events(self, period_us, start, stop)
-
     @classmethod
     def _unchecked(
         cls,
@@ -281,20 +266,6 @@ class Events:
         said = "no intensities" if self.present is None else f"{int(self.present.sum())} intensities"
         marks = f", {len(self.markers)} markers" if self.markers else ""
         return f"Events({len(self)} events, {time}, {self.array.rows} x {self.array.columns} taxels, {said}{marks})"
-
-
-def region(array: Array, x: slice, y: slice) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Return first and last (exclusive) column and row of a rectangle."""
-    limits = []
-    for name, chosen, size in (("x", x, array.columns), ("y", y, array.rows)):
-        if not isinstance(chosen, slice) or chosen.step not in (None, 1):
-            raise ProblemError(f"{name} is {shown(chosen)}: must be a slice without a step, as slice(8, 16)")
-        try:
-            first, last, _ = chosen.indices(size)
-        except TypeError:
-            raise ProblemError(f"{name} is {shown(chosen)}: a slice goes from one whole number to another") from None
-        limits.append((first, last))
-    return limits[0], limits[1]
 
 
 def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...]:

@@ -10,11 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._arguments import column, instance, numbers, shown, text, whole, window
 from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.events import Events
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from taxel.events import Events
 
 __all__ = ["Frames"]
 
@@ -82,8 +81,7 @@ class Frames:
         ------
         ProblemError : events without intensities, or a period below 1 us
         """
-        if not hasattr(events, "intensity"):
-            raise ProblemError(f"events is {shown(events)}: must be taxel.Events")
+        instance("events", events, Events)
         if events.intensity is None or events.present is None:
             raise ProblemError("events without intensities: pictures need the held values")
         period, array = whole("period_us", period_us, 1, unit="us"), events.array
@@ -127,9 +125,7 @@ class Frames:
 
     def region(self, x: slice, y: slice) -> Frames:
         """Return the pictures of a rectangle of columns `x` and rows `y`, as a smaller array."""
-        from taxel.events import region  # noqa: PLC0415  events know frames
-
-        columns, rows = region(self.array, x, y)
+        columns, rows = self.array.region(x, y)
         values = self.values[:, slice(*rows), slice(*columns)]
         exists = None if self.array.exists is None else self.array.exists[slice(*rows), slice(*columns)]
         if 0 in values.shape[1:]:

@@ -232,11 +232,11 @@ class Recording:
             whole = self._source.events
             assert whole is not None  # a file holds one of the two
             if self._window is None:
-                return whole.held(period)
+                return Frames.from_events(whole, period)
             # A picture needs what came before the window, too.
             t = whole.t if len(whole) else np.zeros(1, np.int64)
             first, last = max(int(t.min()), _whole(self._window[0])), min(int(t.max()) + 1, _whole(self._window[1]))
-            return whole.held(period, first, max(first, last))
+            return Frames.from_events(whole, period, first, max(first, last))
         if period is not None and len(own):
             t = np.arange(own.t[0], own.t[-1] + 1, period, dtype=np.int64)
             held = own.values[np.searchsorted(own.t, t, side="right") - 1]

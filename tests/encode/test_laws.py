@@ -176,8 +176,8 @@ def test_events_read_as_held_values_are_frames_of_these(encoder):
     events = touch(np.random.default_rng(11), ARRAY)
     spikes = encoder.encode(events)
     period = round(encoder.period_ms * 1000)
-    frames = events.held(period, stop=int(spikes.stop * 1000 - 1000 * encoder.latency_ms) + 1)
-    frames.values[0] = events[events.t == events.t[0]].held(1).values[0]
+    frames = Frames.from_events(events, period, stop=int(spikes.stop * 1000 - 1000 * encoder.latency_ms) + 1)
+    frames.values[0] = Frames.from_events(events[events.t == events.t[0]], 1).values[0]
     assert spikes_of(encoder.encode(frames)) == [
         s for s in spikes_of(spikes) if s[0] <= frames.t[-1] + 1000 * encoder.latency_ms
     ]

@@ -36,7 +36,7 @@ def test_frames_and_events_of_the_same_values_have_the_same_rest():
     events = touch(np.random.default_rng(1), array, 200, absent=0.0)
     first = max(int(events.t[(events.x == x) & (events.y == y)][0]) for x in (0, 1) for y in (0, 1))
     stop = int(events.t[-1])
-    frames = events.held(100, stop=stop)
+    frames = Frames.from_events(events, 100, stop=stop)
     by_events = Tare.take(events, start_us=first, stop_us=stop)
     by_frames = Tare.take(frames, start_us=first, stop_us=stop)
     assert np.allclose(by_events.rest, by_frames.rest, rtol=1e-12)

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import taxel
-from taxel import Array, Events
+from taxel import Array, Events, Frames
 from taxel._core import ProblemError
 
 mpl.use("Agg")
@@ -180,11 +180,11 @@ def test_held_intensities_are_the_last_that_came_at_each_time() -> None:
         [0, 100, 100, 250], [1, 1, 2, 1], [0, 0, 0, 0], [1, 1, 1, 0], array=GRID, intensity=[5, 6, 7, 0],
         present=[True, True, True, False],
     )  # fmt: skip
-    frames = events.held(100)
+    frames = Frames.from_events(events, 100)
     assert frames.t.tolist() == [0, 100, 200]
     assert frames.values[:, 0, 1].tolist() == [5, 6, 6]
     assert frames.values[:, 0, 2].tolist() == [0, 7, 7]
-    assert events.held(100, 50, 350).t.tolist() == [50, 150, 250]
+    assert Frames.from_events(events, 100, 50, 350).t.tolist() == [50, 150, 250]
 
 
 @given(some())
@@ -264,13 +264,13 @@ def test_nonsense_in_a_column_is_one_error_that_names_it(name: str, value: objec
         lambda e: e[[0, 9]],
         lambda e: e[np.array([True])],
         lambda e: e[[[0, 1]]],
-        lambda e: e.held(0),
-        lambda e: e.held(-5),
-        lambda e: e.held("fast"),
-        lambda e: e.held(100, "a"),
-        lambda e: e.held(100, 0, float("nan")),
-        lambda e: e.held(1, 0, 10**15),
-        lambda e: Events([0], [1], [2], [1], array=GRID).held(100),
+        lambda e: Frames.from_events(e, 0),
+        lambda e: Frames.from_events(e, -5),
+        lambda e: Frames.from_events(e, "fast"),
+        lambda e: Frames.from_events(e, 100, "a"),
+        lambda e: Frames.from_events(e, 100, 0, float("nan")),
+        lambda e: Frames.from_events(e, 1, 0, 10**15),
+        lambda e: Frames.from_events(Events([0], [1], [2], [1], array=GRID), 100),
         lambda e: Events.from_numpy(np.zeros(3), GRID),
         lambda e: Events.from_numpy("abc", GRID),
         lambda e: Events.from_numpy(e.to_numpy(), None),

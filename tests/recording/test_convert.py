@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import taxel
+from taxel import Frames
 from taxel._core import FormatError, ProblemError
 
 from .making import record, some_events
@@ -161,7 +162,7 @@ def test_pictures_of_events_are_written_where_a_rate_is_asked_for(tmp_path: Path
     events = some_events()
     taxel.convert(events, tmp_path / "a.csv", frames_hz=1000)
     back = taxel.open(tmp_path / "a.csv").frames()
-    assert np.array_equal(back.values, events.held(1000).values)
+    assert np.array_equal(back.values, Frames.from_events(events, 1000).values)
 
 
 @pytest.mark.parametrize("kind", [".mcap", ".lsa"])

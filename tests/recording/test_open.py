@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import taxel
+from taxel import Frames
 from taxel._core import FormatError, ProblemError
 
 from .making import HEADER, record, some_events
@@ -204,11 +205,11 @@ def test_slicing_by_time_cuts_events_notes_and_detections(rec: taxel.Recording) 
 def test_frames_hold_what_came_and_a_slice_knows_what_came_before_it(rec: taxel.Recording) -> None:
     frames = rec.frames(1000)
     assert np.array_equal(np.diff(frames.t), np.full(len(frames) - 1, 1000))
-    assert frames == rec.events.held(1000)
+    assert frames == Frames.from_events(rec.events, 1000)
     start = int(frames.t[10])
     part = rec.between(start, start + 5000).frames(1000)
     assert np.array_equal(part.values, frames.values[10:15])
-    assert len(rec.frames()) == len(rec.events.held(10_000))
+    assert len(rec.frames()) == len(Frames.from_events(rec.events, 10_000))
     for rate in (0, -1, "fast", float("nan"), True, 2e6):
         with pytest.raises(ProblemError, match="rate_hz is"):
             rec.frames(rate)

@@ -12,21 +12,9 @@ from typing import NoReturn
 import typer
 
 from taxel._core import DeviceError, Error
+from taxel.cli._app import OUTSIDE, WRONG_INPUT, app
 
 __all__ = ["app", "main"]
-
-app = typer.Typer(
-    name="taxel",
-    help="Touch as events: from the bytes of a tactile array to decisions that say when.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-WRONG_INPUT, OUTSIDE = 2, 3
-
 
 @app.callback(invoke_without_command=True)
 def _root(version: bool = typer.Option(False, "--version", help="Print the version and end.")) -> None:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from taxel._core import ProblemError
-from taxel.cli import app
+from taxel.cli._app import app
 
 __all__ = ["bench"]
 

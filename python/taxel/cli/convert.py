@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from taxel.cli import app
+from taxel.cli._app import app
 
 __all__ = ["convert"]
 

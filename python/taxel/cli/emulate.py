@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from taxel._core import ProblemError
-from taxel.cli import app
+from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.simulate import EmulatorReport, truth
 from taxel.simulate import emulate as run

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from taxel._core import ProblemError
-from taxel.cli import app
+from taxel.cli._app import app
 from taxel.cli._listening import SET_HELP, TARE_HELP, encoder_of, open_recording, tare_of, told
 
 __all__ = ["encode"]

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from taxel.cli import app
+from taxel.cli._app import app
 
 __all__ = ["nir"]
 

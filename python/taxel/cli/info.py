@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from taxel._core import ProblemError
-from taxel.cli import app
+from taxel.cli._app import app
 
 if TYPE_CHECKING:
     from taxel.recording import Recording

@@ -15,7 +15,7 @@ from rich.text import Text
 
 from taxel._core import ProblemError
 from taxel.cable import Cable
-from taxel.cli import OUTSIDE, WRONG_INPUT, app
+from taxel.cli._app import OUTSIDE, WRONG_INPUT, app
 from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, geometry, outside
 from taxel.detect import Readout
 from taxel.live import Live, Said, Summary, delays

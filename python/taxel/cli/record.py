@@ -16,7 +16,7 @@ from rich.live import Live as Display
 from taxel import _core
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.cli import OUTSIDE, WRONG_INPUT, app
+from taxel.cli._app import OUTSIDE, WRONG_INPUT, app
 from taxel.cli._board import ArrayOption, HostOption, PortOption, PresetOption, counters_table, geometry, outside
 from taxel.live import Live, Summary
 

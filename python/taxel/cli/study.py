@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from taxel._core import ProblemError
-from taxel.cli import app
+from taxel.cli._app import app
 from taxel.studies import STUDIES, load
 
 studies = typer.Typer(help="Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.")

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from taxel._core import ProblemError
-from taxel.cli import app
+from taxel.cli._app import app
 from taxel.cli._listening import SET_HELP, TARE_HELP, assignments, open_recording, reference, tare_of, told
 
 __all__ = ["train"]

@@ -1,7 +1,8 @@
 """Spikes to detections, live and from recordings, and their score."""
 
-from taxel.detect.readout import Learner, Readout, ReadoutStream, TrainedNeuron, run
+from taxel.detect.readout import Learner, Readout, ReadoutStream, run
 from taxel.detect.scoring import Score, Spread, score
+from taxel.detect.trained import TrainedNeuron
 from taxel.detect.training import Example, Recipe, read_labels, train
 
 __all__ = [

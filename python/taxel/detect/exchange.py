@@ -14,7 +14,8 @@ What NIR has no words for stands in the graph's metadata, so that taxel reads ba
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,13 +24,13 @@ from taxel._arguments import instance, number, shown
 from taxel._arguments import path as checked_path
 from taxel._core import FormatError, ProblemError
 from taxel._files import whole_file
+from taxel.array import Array
+from taxel.detect.trained import TrainedNeuron
 from taxel.encode import Encoder
 from taxel.neuron import Neuron
 
 if TYPE_CHECKING:
     from nir import NIRGraph
-
-    from taxel.detect.readout import Readout, TrainedNeuron
 
 __all__ = ["lost", "read_nir", "write_nir"]
 
@@ -37,7 +38,43 @@ __all__ = ["lost", "read_nir", "write_nir"]
 READOUT, SPIKE = "taxel_readout", "taxel_spike_s"
 
 
-def write_nir(readout: Readout, path: str | os.PathLike[str], *, spike_ms: float | None, overwrite: bool) -> list[str]:
+class Holds(Protocol):
+    """What is asked of a readout here: its parts, and to be built from them."""
+
+    def __init__(
+        self,
+        encoder: Encoder,
+        neurons: Mapping[str, TrainedNeuron],
+        *,
+        array: Array | None = None,
+        delays_ms: list[float],
+    ) -> None: ...
+
+    @property
+    def encoder(self) -> Encoder: ...
+    @property
+    def array(self) -> Array | None: ...
+    @property
+    def neurons(self) -> dict[str, TrainedNeuron]: ...
+    @property
+    def labels(self) -> tuple[str, ...]: ...
+    @property
+    def time(self) -> str: ...
+    @property
+    def after_spike(self) -> str: ...
+    @property
+    def run_threshold(self) -> float: ...
+    @property
+    def delays_ms(self) -> NDArray[np.float64]: ...
+    def to_json(self) -> str: ...
+    @classmethod
+    def from_json(cls, text: str) -> Self: ...
+
+
+R = TypeVar("R", bound=Holds)
+
+
+def write_nir(readout: Holds, path: str | os.PathLike[str], *, spike_ms: float | None, overwrite: bool) -> list[str]:
     """Write the graph of a readout to a file; return what NIR cannot hold."""
     import nir  # noqa: PLC0415  an extra
 
@@ -47,7 +84,7 @@ def write_nir(readout: Readout, path: str | os.PathLike[str], *, spike_ms: float
     return lost(readout)
 
 
-def lost(readout: Readout) -> list[str]:
+def lost(readout: Holds) -> list[str]:
     """Return what NIR's nodes cannot say of a readout, one line each."""
     neurons = [one.neuron for one in readout.neurons.values()]
     said = [
@@ -68,12 +105,15 @@ def lost(readout: Readout) -> list[str]:
 
 
 def read_nir(
-    path: str | os.PathLike[str], *, encoder: Encoder | None, neuron: Neuron | None, spike_ms: float | None
-) -> Readout:
-    """Read a readout from a file; what the nodes say wins over the metadata."""
+    kind: type[R],
+    path: str | os.PathLike[str],
+    *,
+    encoder: Encoder | None,
+    neuron: Neuron | None,
+    spike_ms: float | None,
+) -> R:
+    """Read a readout, of this `kind`, from a file; what the nodes say wins over the metadata."""
     import nir  # noqa: PLC0415  an extra
-
-    from taxel.detect.readout import Readout  # noqa: PLC0415  which imports this file
 
     place, spike_ms = checked_path("path", path), _spike(spike_ms)
     encoder = None if encoder is None else instance("encoder", encoder, Encoder)
@@ -85,12 +125,12 @@ def read_nir(
         raise FormatError(f"{place}: no NIR graph that can be read: {shown(str(error))}") from None
     held = graph.metadata.get(READOUT)
     try:
-        own = None if held is None else Readout.from_json(held if isinstance(held, str) else bytes(held).decode())
+        own = None if held is None else kind.from_json(held if isinstance(held, str) else bytes(held).decode())
         if spike_ms is None and SPIKE in graph.metadata:
             spike_ms = _spike(1000.0 * float(graph.metadata[SPIKE]) or None)
         if own is not None and encoder is None and neuron is None and _same(graph, _graph(own, spike_ms)):
             return own
-        return _readout(graph, own, encoder, neuron, spike_ms)
+        return _readout(kind, graph, own, encoder, neuron, spike_ms)
     except (FormatError, ProblemError) as error:
         raise type(error)(f"{place}: {error}") from None
 
@@ -132,7 +172,7 @@ def _peak_one(tau: float, tau_s: float) -> float:
     return float(1.0 / (ratio ** (ratio / (1.0 - ratio)) - ratio ** (1.0 / (1.0 - ratio))))
 
 
-def _graph(readout: Readout, spike_ms: float | None) -> NIRGraph:
+def _graph(readout: Holds, spike_ms: float | None) -> NIRGraph:
     import nir  # noqa: PLC0415  an extra
 
     spike_s = None if spike_ms is None else spike_ms / 1000.0
@@ -184,11 +224,14 @@ def _same(a: NIRGraph, b: NIRGraph) -> bool:
 
 
 def _readout(
-    graph: NIRGraph, own: Readout | None, encoder: Encoder | None, neuron: Neuron | None, spike_ms: float | None
-) -> Readout:
+    kind: type[R],
+    graph: NIRGraph,
+    own: R | None,
+    encoder: Encoder | None,
+    neuron: Neuron | None,
+    spike_ms: float | None,
+) -> R:
     """Build a readout from nodes; what they do not say comes from the caller, the metadata, or by default."""
-    from taxel.detect.readout import Readout, TrainedNeuron  # noqa: PLC0415  which imports this file
-
     encoder = encoder or (own.encoder if own is not None else None)
     if encoder is None:
         raise ProblemError("NIR holds no encoder: say which with encoder=")
@@ -209,7 +252,7 @@ def _readout(
         one = Neuron(**{**rest._parameters(), **said})
         trained[label] = TrainedNeuron(one, 1000.0 * row * factor, 0.0 if template is None else template.delay_ms)
     array = None if own is None else own.array
-    return Readout(encoder, trained, array=array, delays_ms=delays_ms)
+    return kind(encoder, trained, array=array, delays_ms=delays_ms)
 
 
 def _kernel(cells: Any, k: int, spike_s: float | None) -> tuple[dict[str, Any], float]:

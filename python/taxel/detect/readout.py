@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,8 @@ from taxel._arguments import path as checked_path
 from taxel._core import FormatError, ProblemError
 from taxel._files import write_whole
 from taxel.array import Array
+from taxel.detect.exchange import read_nir, write_nir
+from taxel.detect.trained import TrainedNeuron
 from taxel.detections import Detections
 from taxel.encode import Encoder
 from taxel.events import Events
@@ -25,7 +27,7 @@ from taxel.neuron import Neuron
 from taxel.recording import Recording
 from taxel.tare import Tare
 
-__all__ = ["Learner", "Readout", "ReadoutStream", "TrainedNeuron", "run"]
+__all__ = ["Learner", "Readout", "ReadoutStream", "run"]
 
 #: The length of the board's frames at reset, us (its 5.2 kHz preset).
 FRAME_US = 192.0
@@ -36,14 +38,6 @@ class Learner(Protocol):
 
     neuron_: Neuron
     weights_: NDArray[np.float64]
-
-
-class TrainedNeuron(NamedTuple):
-    """A neuron with the weights (mV) it was trained to, and how much later than the event it fires (ms)."""
-
-    neuron: Neuron
-    weights: NDArray[np.float64]
-    delay_ms: float = 0.0
 
 
 class Readout:
@@ -248,8 +242,6 @@ class Readout:
         Input, for each delay a `Delay` (where above 0) and a `Linear`, then `CubaLIF` (alpha kernel: both time
         constants equal) or `LIF` (exponential kernel).
         """
-        from taxel.detect.exchange import write_nir  # noqa: PLC0415  nir is an extra
-
         return write_nir(self, path, spike_ms=spike_ms, overwrite=overwrite)
 
     @classmethod
@@ -287,9 +279,7 @@ class Readout:
         ProblemError : no encoder is known
         ImportError : nir is not installed (``pip install taxel[nir]``)
         """
-        from taxel.detect.exchange import read_nir  # noqa: PLC0415  nir is an extra
-
-        return read_nir(path, encoder=encoder, neuron=neuron, spike_ms=spike_ms)
+        return read_nir(cls, path, encoder=encoder, neuron=neuron, spike_ms=spike_ms)
 
     def stream(
         self, array: Array | None = None, *, frame_us: float = FRAME_US, tare: Tare | None = None

@@ -16,6 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
+from taxel import __version__
 from taxel import _arguments as arguments
 from taxel._core import FormatError, ProblemError
 from taxel._files import write_whole
@@ -290,8 +291,6 @@ def machine() -> dict[str, Any]:
     except OSError:
         lines = []
     cpu = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.processor())
-    from taxel import __version__  # noqa: PLC0415  the package imports its rooms
-
     return {
         "machine": f"{platform.machine()}, {cpu}",
         "versions": {

@@ -2,10 +2,11 @@
 
 The files in the order of the way: `sources` (recordings, their truth, their spikes), `insole` (a plate's footfall as an
 insole feels it), `pieces`, `folds`, `recipes` (all parameters, as data), `realise` (one fit and its test), `rules` (the
-plain rules beside it), `protocols` (what is run), `report`, `section` (its part of the page of all studies).
+plain rules beside it), `protocols` (in which folds), `plans` (what is run), `report`, `section` (its part of the page
+of all studies).
 """
 
-from taxel.studies.gait.protocols import study
+from taxel.studies.gait.plans import study
 from taxel.studies.gait.section import GaitStudy
 
 __all__ = ["STUDY", "study"]

@@ -12,7 +12,7 @@ import numpy as np
 from taxel import _arguments as arguments
 from taxel._core import ProblemError
 from taxel.studies.gait import insole, sources
-from taxel.studies.gait.protocols import study
+from taxel.studies.gait.plans import study
 from taxel.studies.gait.recipes import NOTES
 from taxel.studies.gait.report import EVENTS
 from taxel.studies.gait.sources import SOURCES
