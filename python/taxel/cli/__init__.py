@@ -16,6 +16,7 @@ from taxel.cli._app import OUTSIDE, WRONG_INPUT, app
 
 __all__ = ["app", "main"]
 
+
 @app.callback(invoke_without_command=True)
 def _root(version: bool = typer.Option(False, "--version", help="Print the version and end.")) -> None:
     if version:
