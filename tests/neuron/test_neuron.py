@@ -286,3 +286,35 @@ def test_the_defaults_that_python_shows_are_those_of_the_core():
 def test_neurons_compare_and_print_by_their_parameters():
     assert Neuron(tau=10.0) == Neuron(tau=10.0) != Neuron(tau=11.0)
     assert repr(Neuron(tau=10.0, after_spike="reset")) == "Neuron(tau=10.0, after_spike='reset')"
+
+
+@pytest.mark.parametrize("time", ["grid", "continuous"])
+def test_what_counts_as_touching_the_threshold_is_in_proportion_to_it(time: str) -> None:
+    trains = SpikeTrains.from_lists([[0.0]], stop=50.0)
+    fired = {}
+    for relative in (2e-12, 1e-10):
+        weight = 0.3 * np.e * (1 - relative)
+        fired[relative] = [
+            len(Neuron(tau=10.0, time=time, theta_0=0.3 * unit, theta_plus=0.2 * unit).run([weight * unit], trains))
+            for unit in (2.0**-40, 2.0**-10, 1.0, 2.0**10, 2.0**40)
+        ]
+    assert fired == {2e-12: [1] * 5, 1e-10: [0] * 5}
+
+
+@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
+@pytest.mark.parametrize("kernel", ["alpha", "double_exponential"])
+def test_an_input_within_1e_6_ms_before_a_crossing_comes_too_late_to_stop_it(kernel: str, after_spike: str) -> None:
+    neuron = Neuron(kernel=kernel, tau=10.0, after_spike=after_spike, theta_plus=0.0)
+    (crossing,) = neuron.run([1.2], SpikeTrains.from_lists([[0.0]], stop=12.0))[:1]
+    for early in (1e-10, 1e-8, 9e-7):
+        trains = SpikeTrains.from_lists([[0.0], [crossing - early], [crossing - early / 2]], stop=60.0)
+        for weights in ([1.2, -3.0, -3.0], [1.2, 3.0, -6.0]):
+            assert neuron.run(weights, trains)[0] == pytest.approx(crossing, abs=1e-12)
+            later = neuron.run([1.2, 0.0, 0.6], trains)
+            both = neuron.run_many([weights, [1.2, 0.0, 0.6]], trains)
+            assert both[0] == pytest.approx(neuron.run(weights, trains), abs=1e-9)
+            assert both[1] == pytest.approx(later, abs=1e-9)
+            # What came too late for this spike counts for the next one, unless a reset lost it.
+            assert (len(later) > 1) == (after_spike != "reset")
+    early = SpikeTrains.from_lists([[0.0], [crossing - 1e-5]], stop=60.0)
+    assert len(neuron.run([1.2, -3.0], early)) == 0

@@ -83,7 +83,7 @@ def test_a_touch_at_an_input_that_turns_the_potential_down_counts_too() -> None:
     neuron = Neuron(tau=10.0, theta_0=0.3, after_spike="reset")
     trains = SpikeTrains.from_lists([[0.0], [9.9]], stop=50.0)
     slope = 9.9 / 10.0 * np.exp(-0.99)
-    weights = [[0.3 / slope * (1 + relative), -2.0] for relative in (-1e-13, 0.0, 1e-13, -1e-10)]
+    weights = [[0.3 / slope * (1 + relative), -2.0] for relative in (-1e-13, 0.0, 1e-13, -1e-8)]
     many = neuron.run_many(weights, trains)
     for row, fired in zip(weights, many, strict=True):
         assert np.array_equal(fired, neuron.run(row, trains))

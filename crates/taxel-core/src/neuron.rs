@@ -89,9 +89,12 @@ pub struct Neuron {
     pub step_ms: f64,
 }
 
-/// An input so near an end of a refractory time counts as at it, ms: trained neurons fire within 1e-6 ms of their targets, and
-/// inputs at whole ms often lie just there.
-const AT_EDGE: f64 = 1e-6;
+/// An input so near an end of a refractory time counts as at it, and one so short a time before the neuron's own spike as at
+/// the spike, ms: trained neurons fire within 1e-6 ms of their targets, and inputs at whole ms often lie just there.
+pub(crate) const AT_EDGE: f64 = 1e-6;
+/// How far below the threshold a potential may end and still count as reaching it, mV where `theta_0` is 0.3 mV and in
+/// proportion elsewhere: rounding of a potential that was trained to touch the threshold.
+const TOUCH: f64 = 1e-12;
 
 impl Default for Neuron {
     fn default() -> Self {
@@ -183,12 +186,21 @@ impl Neuron {
     /// In the refractory time the potential is 0 and the threshold does not matter.
     #[must_use]
     pub fn threshold(&self, since: Option<f64>) -> f64 {
-        let rise = since.map_or(0.0, |s| {
+        self.theta_0 + self.rise(since)
+    }
+
+    /// What is left of the threshold's rise `since` ms after the last spike, mV.
+    pub(crate) fn rise(&self, since: Option<f64>) -> f64 {
+        since.map_or(0.0, |s| {
             let recovering = s - self.refractory;
             // A rise that rounding puts a hair before its time must still be there (an input can lie just on the edge).
             if recovering < -1e-9 { 0.0 } else { self.theta_plus * (-recovering / self.tau_rec()).exp() }
-        });
-        self.theta_0 + rise
+        })
+    }
+
+    /// How far below the threshold a potential may end and still count as reaching it, mV.
+    pub(crate) fn touch(&self) -> f64 {
+        TOUCH * self.unit()
     }
 
     /// Starts the neuron at `start` ms with its threshold multiplied by `threshold`.

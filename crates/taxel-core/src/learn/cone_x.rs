@@ -456,7 +456,7 @@ impl Problem {
             objective,
             parts,
             gap,
-            violation: missed.max(broken).max(0.0),
+            violation: largest([missed, broken, 0.0]),
             engine,
             rounds,
             held,
@@ -470,8 +470,7 @@ impl Problem {
         let mut worst: f64 = 0.0;
         for (pattern, target) in self.statement.targets() {
             let limit = self.statement.state_into(Row::Target { pattern, target }, &mut row)?;
-            let off = (dot(&row, weights) - limit).abs();
-            worst = if off > worst || off.is_nan() { off } else { worst };
+            worst = largest([worst, (dot(&row, weights) - limit).abs()]);
         }
         Ok(worst)
     }
@@ -484,7 +483,7 @@ impl Problem {
 
     /// By how much silence is broken at worst, mV; below 0 where it is kept.
     fn worst(&self, weights: &[f64]) -> f64 {
-        self.broken(weights, KEPT_SHARE, f64::NEG_INFINITY).iter().fold(f64::NEG_INFINITY, |m, p| m.max(p.excess))
+        largest(self.broken(weights, KEPT_SHARE, f64::NEG_INFINITY).iter().map(|peak| peak.excess))
     }
 
     fn rounding(&self, weights: &[f64]) -> f64 {
@@ -496,24 +495,20 @@ impl Problem {
     /// The largest share of the margin that holds, 0 where silence is broken; on the grid the least threshold - potential.
     fn margin(&self, weights: &[f64]) -> Margin {
         if self.parameters.neuron.time == Time::Grid {
-            let worst = self
-                .silence
-                .broken(weights, 0.0, f64::NEG_INFINITY)
-                .iter()
-                .fold(f64::NEG_INFINITY, |m, p| m.max(p.excess));
-            return Margin { height: -worst, slope: 0.0 };
+            let peaks = self.silence.broken(weights, 0.0, f64::NEG_INFINITY);
+            return Margin { height: -largest(peaks.iter().map(|peak| peak.excess)), slope: 0.0 };
         }
         // At the worst instants potential + share margin = threshold gives the next share; the shares only fall.
         let mut share = 1.0;
         loop {
             let broken = self.silence.broken(weights, share, self.rounding(weights));
-            let next = broken.iter().map(|peak| {
+            let less = broken.iter().map(|peak| {
                 let sheet = &self.statement.sheets[peak.pattern];
-                share - peak.excess / self.statement.margin_at(sheet, peak.t)
+                peak.excess / self.statement.margin_at(sheet, peak.t)
             });
-            let next = next.fold(share, f64::min);
+            let next = share - largest(less.chain([0.0]));
             // Weights of a fit that was stopped may keep none at all.
-            if next <= 0.0 || next.is_nan() {
+            if next.is_nan() || next <= 0.0 {
                 return self.statement.margin.times(0.0);
             }
             if next >= share {
@@ -537,11 +532,16 @@ impl Slopes {
         Ok(Self(rows.map(|row| Ok((row, statement.state(row)?))).collect::<Result<_>>()?))
     }
 
-    /// Those that are broken with this share of the slope that is asked for.
+    /// Those that are broken even with so much less slope.
     fn broken(&self, weights: &[f64], left_out: f64) -> Vec<usize> {
-        let broken = |row: &Stated| dot(&row.coefficients, weights) > row.limit + left_out;
-        (0..self.0.len()).filter(|&k| broken(&self.0[k].1)).collect()
+        let kept = |row: &Stated| dot(&row.coefficients, weights) <= row.limit + left_out;
+        (0..self.0.len()).filter(|&k| !kept(&self.0[k].1)).collect()
     }
+}
+
+/// The largest value, or no number where one is none.
+fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
+    values.into_iter().fold(f64::NEG_INFINITY, |most, x| if x <= most || most.is_nan() { most } else { x })
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

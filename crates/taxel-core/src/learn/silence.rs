@@ -100,7 +100,7 @@ impl Silence {
                     state.a += sum * one.a;
                     state.b += sum * one.b;
                 }
-                let bound = if self.grid { before } else { state.b.max(0.0) + state.a.max(0.0) * node.reach };
+                let bound = if self.grid { before } else { positive(state.b) + positive(state.a) * node.reach };
                 if bound - node.least <= tolerance {
                     found.extend(worst.take());
                     continue;
@@ -111,7 +111,7 @@ impl Silence {
                 } else {
                     self.largest(asked, state, share)
                 };
-                if excess > tolerance && worst.is_none_or(|w| excess > w.excess) {
+                if exceeds(excess, tolerance) && worst.is_none_or(|w| exceeds(excess, w.excess)) {
                     worst = Some(Peak { pattern, t, excess });
                 }
                 if last <= tolerance {
@@ -132,17 +132,27 @@ impl Silence {
         let length = asked.to - asked.t;
         let last = excess(length);
         let mut worst = (asked.t, state.b - limit - asked.rise);
-        if last > worst.1 {
+        if exceeds(last, worst.1) {
             worst = (asked.to, last);
         }
         if let Some(top) = peak(&self.shape, state, asked.rise, self.tau_rec).filter(|p| p.at < length) {
             let excess = excess(top.at);
-            if excess > worst.1 {
+            if exceeds(excess, worst.1) {
                 worst = (asked.t + top.at, excess);
             }
         }
         (worst.0, worst.1, last)
     }
+}
+
+/// Whether `x` lies above, or is no number: that is never fine.
+fn exceeds(x: f64, limit: f64) -> bool {
+    x > limit || x.is_nan()
+}
+
+/// What lies above 0, and what is no number.
+fn positive(x: f64) -> f64 {
+    if x <= 0.0 { 0.0 } else { x }
 }
 
 /// Whether an input at `t` never counts behind it, the neuron firing at the targets.
@@ -190,9 +200,8 @@ fn strip(statement: &Statement, sheet: &Sheet) -> Strip {
         let (mut reach, mut least) = (0.0, f64::INFINITY);
         if let Some(to) = to.filter(|&to| asks(statement, sheet, t, to)) {
             here.to = to;
-            // The threshold just behind the node: a target at the node itself has fired.
-            here.rise = statement.threshold(sheet, f64::midpoint(t, to)) - neuron.theta_0;
-            here.rise *= (0.5 * (to - t) / neuron.tau_rec()).exp();
+            // Just behind the node: a target at the node itself has fired.
+            here.rise = statement.rise(sheet, t, to);
             reach = shape.value((to - t).min(shape.peak()));
             match sheet.next(to).filter(|target| target - f64::midpoint(t, to) < taper.length) {
                 Some(target) => here.taper = taper.before(target - t),

@@ -11,14 +11,15 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::neuron::{AfterSpike, FirstThreshold, Neuron, Shape, State, Time};
+use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Neuron, Shape, State, Time};
 use crate::{Result, SpikeTrains, problem};
 
 /// Rounding of a grid point on the very edge of a refractory time, ms.
 const EDGE: f64 = 1e-9;
 
-/// From so near a target on the target's row and its slope row stand for silence, ms.
-pub(super) const AT_TARGET: f64 = 1e-9;
+/// From so near a target on the target's row and its slope row stand for silence, ms; an input so near before it is at it and
+/// adds nothing there. A hair less than in the neuron, so that a crossing that is met to rounding falls on the same side.
+pub(super) const AT_TARGET: f64 = 0.99 * AT_EDGE;
 
 /// The name of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -123,6 +124,11 @@ pub(super) struct Sheet {
 }
 
 impl Sheet {
+    /// The inputs before `t`, by time.
+    fn before(&self, t: f64) -> &[(f64, u32)] {
+        &self.inputs[..self.inputs.partition_point(|i| i.0 < t)]
+    }
+
     /// The last target before `t`.
     pub(super) fn fired(&self, t: f64) -> Option<f64> {
         last_before(&self.targets, t)
@@ -219,7 +225,8 @@ impl Statement {
         match row {
             Row::Target { pattern, target } => {
                 let (sheet, t) = self.target(pattern, target)?;
-                self.sum(sheet, t, &sheet.targets[..target], |state| state.b, coefficients);
+                let heard = self.heard_at(sheet, t);
+                self.sum(heard, t, &sheet.targets[..target], |state| state.b, coefficients);
                 Ok(self.threshold(sheet, t))
             }
             Row::Slope { pattern, target } => {
@@ -229,7 +236,8 @@ impl Statement {
                     ));
                 }
                 let (sheet, t) = self.target(pattern, target)?;
-                self.sum(sheet, t, &sheet.targets[..target], |state| -self.shape.slope(state), coefficients);
+                let (heard, slope) = (self.heard_at(sheet, t), |state| -self.shape.slope(state));
+                self.sum(heard, t, &sheet.targets[..target], slope, coefficients);
                 let falls = (self.threshold(sheet, t) - self.neuron.theta_0) / self.neuron.tau_rec();
                 Ok(falls - self.margin.slope)
             }
@@ -237,7 +245,7 @@ impl Statement {
                 let sheet = self.sheet(pattern)?;
                 self.check_silent(pattern, t)?;
                 let fired = sheet.targets.partition_point(|&target| target < t);
-                self.sum(sheet, t, &sheet.targets[..fired], |state| state.b, coefficients);
+                self.sum(sheet.before(t), t, &sheet.targets[..fired], |state| state.b, coefficients);
                 Ok(self.threshold(sheet, t) - self.margin_at(sheet, t))
             }
         }
@@ -253,7 +261,9 @@ impl Statement {
     pub fn behind(&self, pattern: usize, target: usize, delta_t: f64) -> Result<Stated> {
         let (sheet, t) = self.target(pattern, target)?;
         let mut coefficients = vec![0.0; self.trains];
-        self.sum(sheet, t + delta_t, &sheet.targets[..target], |state| state.b, &mut coefficients);
+        let t_behind = t + delta_t;
+        let earlier = &sheet.targets[..target];
+        self.sum(sheet.before(t_behind), t_behind, earlier, |state| state.b, &mut coefficients);
         Ok(Stated { coefficients, limit: self.threshold(sheet, t) })
     }
 
@@ -314,8 +324,13 @@ impl Statement {
 
     /// The threshold at `t`, the neuron having fired at the targets before, mV.
     pub(super) fn threshold(&self, sheet: &Sheet, t: f64) -> f64 {
+        self.neuron.theta_0 + self.rise(sheet, t, t)
+    }
+
+    /// What is left at `t` of the threshold's rise, the neuron having fired at the targets before `to`, mV.
+    pub(super) fn rise(&self, sheet: &Sheet, t: f64, to: f64) -> f64 {
         let printed = (self.neuron.first_threshold == FirstThreshold::Printed).then_some(sheet.start);
-        self.neuron.threshold(sheet.fired(t).or(printed).map(|spike| t - spike))
+        self.neuron.rise(sheet.fired(to).or(printed).map(|spike| t - spike))
     }
 
     /// The margin at `t`, mV.
@@ -326,14 +341,22 @@ impl Statement {
         }
     }
 
-    /// Adds up, by train, what `part` sees of each input before `t`, the neuron having fired at `earlier` targets only.
-    fn sum(&self, sheet: &Sheet, t: f64, earlier: &[f64], part: impl Fn(State) -> f64, out: &mut [f64]) {
+    /// The inputs that count at a target, by time.
+    fn heard_at<'a>(&self, sheet: &'a Sheet, target: f64) -> &'a [(f64, u32)] {
+        match self.neuron.time {
+            Time::Grid => sheet.before(target),
+            Time::Continuous => sheet.before(target - AT_TARGET),
+        }
+    }
+
+    /// Adds up, by train, what `part` sees at `t` of inputs before, the neuron having fired at `earlier` targets only.
+    fn sum(&self, inputs: &[(f64, u32)], t: f64, earlier: &[f64], part: impl Fn(State) -> f64, out: &mut [f64]) {
         out.fill(0.0);
         let neuron = &self.neuron;
-        let from = sheet.inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
+        let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
         let last = last_before(earlier, t);
         let (mut at, mut one) = (f64::NAN, 0.0);
-        for &(s, train) in sheet.inputs[from..].iter().take_while(|i| i.0 < t) {
+        for &(s, train) in &inputs[from..] {
             // Many inputs share a time where times are whole ms: an exponential a time, not an input.
             if s != at {
                 at = s;

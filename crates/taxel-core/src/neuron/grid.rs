@@ -1,6 +1,5 @@
 //! The neuron on a grid: potential and threshold are compared at the points `start + k step` only.
 
-use super::srm0::TOUCH;
 use super::streaming::{OutputSpike, Threshold};
 use super::{AfterSpike, Neuron, Shape, State, Step};
 
@@ -82,7 +81,7 @@ impl GridStream {
     /// Where it could not, the state stays behind and catches up in one jump at the next input. What is done depends on
     /// the state alone, so that a stream cut elsewhere gives the same bits.
     fn step_through(&mut self, last: f64, out: &mut Vec<OutputSpike>) {
-        while self.point < last && self.shape.bound(self.leaving()) >= self.threshold.base - TOUCH {
+        while self.point < last && self.shape.bound(self.leaving()) >= self.threshold.base - self.threshold.touch {
             self.jump(self.point + 1.0);
             self.compare(out);
         }

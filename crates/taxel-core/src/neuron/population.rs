@@ -13,7 +13,7 @@ use crate::{Result, SpikeTrains, Stop, problem};
 /// Neurons in a block: with 1000 inputs 256 KiB of weights.
 const LANES: usize = 32;
 
-/// By how much the bound may be off by rounding: relative for a decayed rise, and absolute, mV.
+/// By how much the bound may be off by rounding: relative for a decayed rise, and absolute, mV in proportion to `theta_0`.
 const FADED: f64 = 1.0 - 1e-9;
 const SLACK: f64 = 1e-11;
 

@@ -7,10 +7,6 @@
 use super::{AfterSpike, Kernel, Neuron, Shape, State};
 use crate::SpikeTrains;
 
-/// How far below the threshold a maximum may lie and still count as reaching it, mV: rounding of a potential that was
-/// trained to touch the threshold there.
-pub(super) const TOUCH: f64 = 1e-12;
-
 /// The inner maximum of potential less threshold, ms from now.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Peak {
@@ -22,16 +18,16 @@ pub(crate) struct Peak {
 
 /// Where the potential first reaches the threshold, ms from now, if no input comes; `rise` decays with `tau_rec`.
 ///
-/// It is asked for up to `within` ms from now, and may be left out beyond.
+/// A maximum `touch` mV below the threshold reaches it. Asked for up to `within` ms from now; may be left out beyond.
 pub(super) fn next_crossing(
     shape: &Shape,
     state: State,
-    theta: f64,
+    (theta, touch): (f64, f64),
     rise: f64,
     tau_rec: f64,
     within: f64,
 ) -> Option<f64> {
-    if shape.bound(state) < theta - TOUCH {
+    if shape.bound(state) < theta - touch {
         return None;
     }
     let risen = |s: f64| if rise == 0.0 { 0.0 } else { rise * (-s / tau_rec).exp() };
@@ -52,7 +48,7 @@ pub(super) fn next_crossing(
         }
         let peak = peak(shape, state, rise, tau_rec).filter(|peak| peak.at <= within)?;
         let (top, _) = above(peak.at);
-        if top < -TOUCH {
+        if top < -touch {
             return None;
         }
         if top <= 0.0 {

@@ -1,7 +1,7 @@
 //! The neuron at work: input spikes in, output spikes out, the same wherever the stream is cut.
 
 use super::grid::GridStream;
-use super::srm0::{TOUCH, next_crossing};
+use super::srm0::next_crossing;
 use super::{AT_EDGE, AfterSpike, FirstThreshold, Neuron, Shape, State, Time};
 use crate::allowed::{above_0, one_weight_a_train};
 use crate::{Result, problem};
@@ -94,6 +94,8 @@ impl NeuronStream {
 pub(super) struct Threshold {
     /// `theta_0` times the factor, mV.
     pub(super) base: f64,
+    /// How far below it counts as reaching it, mV.
+    pub(super) touch: f64,
     plus: f64,
     tau_rec: f64,
     refractory: f64,
@@ -110,6 +112,7 @@ impl Threshold {
     pub(super) fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
         Self {
             base: neuron.theta_0 * factor,
+            touch: neuron.touch(),
             plus: neuron.theta_plus * factor,
             tau_rec: neuron.tau_rec(),
             refractory: neuron.refractory,
@@ -141,7 +144,8 @@ impl Threshold {
 
     /// Whether a potential on a grid has reached the threshold at `t`, and the neuron may fire.
     pub(super) fn reached(&self, t: f64, potential: f64) -> bool {
-        potential >= self.base - TOUCH && !self.silent_at(t) && potential >= self.base + self.rise(t) - TOUCH
+        let potential = potential + self.touch;
+        potential >= self.base && !self.silent_at(t) && potential >= self.base + self.rise(t)
     }
 
     /// When the rise sets in and the refractory time ends.
@@ -214,22 +218,19 @@ impl ContinuousStream {
             return;
         }
         self.move_to(t);
-        self.shape.add(&mut self.state, weight, 0.0);
+        self.shape.add(&mut self.state, weight, self.at - t);
     }
 
     /// Fires whatever crosses up to an input at `t`, included.
     fn settle_at_input(&mut self, t: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
         self.settle(t, horizon, out);
-        // A crossing that rounding puts a hair behind an input is at it: the input could turn the potential down there.
-        if matches!(self.next, Next::At(crossing) if crossing - t <= AT_EDGE) && self.edge.is_none() && self.touches(t)
+        // An input a hair before a crossing is at it and comes too late: it could turn the potential down there.
+        if let Next::At(crossing) = self.next
+            && crossing - t <= AT_EDGE
+            && self.edge.is_none_or(|edge| crossing < edge)
         {
-            self.fire(t, out);
+            self.fire(crossing, out);
         }
-    }
-
-    /// Whether the potential has come up to the threshold at `t`, but for rounding.
-    fn touches(&self, t: f64) -> bool {
-        self.shape.after(self.state, t - self.at).b >= self.threshold.base + self.threshold.rise(t) - TOUCH
     }
 
     fn move_to(&mut self, t: f64) {
@@ -264,8 +265,8 @@ impl ContinuousStream {
     fn crossing(&self, horizon: f64) -> Next {
         // Before the printed first rise sets in there is none; it is an edge of its own.
         let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(self.at) };
-        let (base, tau_rec) = (self.threshold.base, self.threshold.tau_rec);
-        let found = next_crossing(&self.shape, self.state, base, rise, tau_rec, horizon - self.at);
+        let Threshold { base, touch, tau_rec, .. } = self.threshold;
+        let found = next_crossing(&self.shape, self.state, (base, touch), rise, tau_rec, horizon - self.at);
         found.map_or(Next::Never, |s| Next::At(self.at + s))
     }
 

@@ -52,8 +52,9 @@ impl Problem {
                 return Ok(best);
             }
             let mut weights = found.weights;
+            let met = rows.missed(&weights) <= 0.5 * MET;
             if !near
-                && rows.missed(&weights) > 0.5 * MET
+                && !met
                 && let Some(meets) = nearest(&weights, &rows.hard(), lower, upper, stop)?
             {
                 weights = meets;
@@ -204,6 +205,6 @@ impl Dense {
         let equal =
             self.equal.chunks_exact(n).zip(&self.equal_to).map(|(row, to)| (super::dot(row, weights) - to).abs());
         let below = self.below.chunks_exact(n).zip(&self.limit).map(|(row, limit)| super::dot(row, weights) - limit);
-        equal.chain(below).fold(0.0, f64::max)
+        super::largest(equal.chain(below).chain([0.0]))
     }
 }

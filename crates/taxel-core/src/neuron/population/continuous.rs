@@ -3,7 +3,7 @@
 use super::{FADED, LANES, Lanes, SLACK, Weight};
 use crate::SpikeTrains;
 use crate::neuron::streaming::{ContinuousStream, OutputSpike};
-use crate::neuron::{AfterSpike, Neuron, State, Step};
+use crate::neuron::{AT_EDGE, AfterSpike, Neuron, State, Step};
 use crate::wide::wide;
 
 /// From this share of tau on the tangent says less than the kernel's largest value.
@@ -18,8 +18,8 @@ pub(super) struct Script {
     all_hear: bool,
     /// The slope that a state of 1 gives, of `a` and of `b`, 1/ms.
     slope: State,
-    /// The base of the threshold, mV.
-    base: f64,
+    /// The base of the threshold, less the rounding of the bound, mV.
+    floor: f64,
 }
 
 /// The time from one input to the next.
@@ -31,7 +31,10 @@ struct Interval {
     step: Step,
     /// What is left at its end of a rise at its beginning.
     fade: f64,
-    length: f64,
+    /// How far ahead is looked, ms: an input a hair before a crossing is at it.
+    ahead: f64,
+    /// The least that is left there of the rise.
+    faded: f64,
     /// Long intervals are judged by the largest value within them of a kernel that begins with them.
     reach: Option<f64>,
 }
@@ -43,14 +46,16 @@ impl Script {
         let mut from = trains.start;
         let mut push = |from: f64, until: f64, inputs_end: usize| {
             let length = until - from;
+            let ahead = length + AT_EDGE;
             intervals.push(Interval {
                 from,
                 until,
                 inputs_end,
                 step: shape.step(length),
                 fade: (-length / neuron.tau_rec()).exp(),
-                length,
-                reach: (length > LONG * neuron.tau).then(|| shape.largest_within(length)),
+                ahead,
+                faded: (-ahead / neuron.tau_rec()).exp() * FADED,
+                reach: (length > LONG * neuron.tau).then(|| shape.largest_within(ahead)),
             });
         };
         for (k, spike) in spikes.iter().enumerate() {
@@ -65,7 +70,7 @@ impl Script {
             inputs: spikes.iter().map(|s| s.train).collect(),
             all_hear: neuron.after_spike == AfterSpike::Keep,
             slope: State { a: shape.slope(State { a: 1.0, b: 0.0 }), b: shape.slope(State { a: 0.0, b: 1.0 }) },
-            base: neuron.theta_0 * threshold,
+            floor: neuron.theta_0 * threshold - SLACK * neuron.unit(),
             intervals,
         }
     }
@@ -112,12 +117,12 @@ fn may_matter(a: f64, b: f64, rise: f64, edge: f64, script: &Script, interval: &
     let top = match interval.reach {
         None => {
             let slope = a * script.slope.a + b * script.slope.b;
-            b + (if slope > 0.0 { slope } else { 0.0 }) * interval.length
+            b + (if slope > 0.0 { slope } else { 0.0 }) * interval.ahead
         }
         Some(reach) => (if b > 0.0 { b } else { 0.0 }) + (if a > 0.0 { a } else { 0.0 }) * reach,
     };
     // A rise only falls, so what is left at the end is the least that stands in the way.
-    (top >= script.base - SLACK + rise * (interval.fade * FADED)) | (edge <= interval.until)
+    (top >= script.floor + rise * interval.faded) | (edge <= interval.until)
 }
 
 /// Goes through the interval before, adds an input, and says whether any neuron may matter.

@@ -9,6 +9,8 @@ use crate::wide::wide;
 /// What all neurons have in common: the grid and its inputs.
 pub(super) struct Script {
     threshold: Threshold,
+    /// The base of the threshold, less the rounding of the bound, mV.
+    floor: f64,
     points: Vec<Point>,
     inputs: Vec<Input>,
     step: Step,
@@ -113,6 +115,7 @@ impl Script {
         }
         Self {
             threshold: Threshold::new(neuron, threshold, start),
+            floor: neuron.theta_0 * threshold - SLACK * neuron.unit(),
             step: shape.step(step_ms),
             fade: (-step_ms / neuron.tau_rec()).exp(),
             all_hear: neuron.after_spike == AfterSpike::Keep,
@@ -162,7 +165,7 @@ wide! {
         from: Option<usize>,
         perhaps: &mut [bool; LANES],
     ) -> Option<usize> {
-        let floor = script.threshold.base - SLACK;
+        let floor = script.floor;
         let Step { aa, ba, bb } = script.step;
         let mut next = 0;
         if let Some(from) = from {
