@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import floats, number, numbers, parameters
+from taxel._arguments import floats, number, numbers
 from taxel._core import ProblemError
+from taxel._parameters import Value, defaults
 from taxel.spikes import SpikeTrains
 
 __all__ = ["Neuron"]
 
 
-class Neuron:
+_DEFAULT = defaults("neuron")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Neuron(Value):
     """Describe a neuron of the simplified Spike Response Model (SRM0); run it on spike trains.
 
     The defaults are those of Table 6.1; Table 6.2 (gait) differs in `tau`: 70 ms for contact, 190 ms for foot-off.
@@ -30,8 +36,8 @@ class Neuron:
         Rise of the threshold by a spike.
     tau_rec : float, ms, above 0, optional
         Time constant by which that rise decays; ``2 * tau`` where left out, as in Tables 6.1 and 6.2.
-    refractory : float, ms
-        Absolute refractory time: 0 potential, no spike.
+    refractory : float, ms, 0 or more
+        Absolute refractory time: 0 potential, no spike. 0 with `after_spike` "reset" alone.
     after_spike : {"keep", "ignore", "reset"}
         What remains of the inputs after a spike. "keep": all (6.7 as printed). "ignore": those of the refractory time
         are lost. "reset": all up to the end of the refractory time are lost.
@@ -65,33 +71,19 @@ class Neuron:
     array([0.   , 0.548])
     """
 
-    def __init__(
-        self,
-        *,
-        tau: float = 15.0,
-        theta_0: float = 0.3,
-        theta_plus: float = 0.2,
-        tau_rec: float | None = None,
-        refractory: float = 3.0,
-        after_spike: Literal["keep", "ignore", "reset"] = "keep",
-        first_threshold: Literal["theta_0", "printed"] = "theta_0",
-        time: Literal["continuous", "grid"] = "continuous",
-        step_ms: float = 1.0,
-        kernel: Literal["alpha", "double_exponential", "exponential"] = "alpha",
-        tau_s: float | None = None,
-    ) -> None:
-        self.tau = tau
-        self.theta_0 = theta_0
-        self.theta_plus = theta_plus
-        self.tau_rec = tau_rec
-        self.refractory = refractory
-        self.after_spike = after_spike
-        self.first_threshold = first_threshold
-        self.time = time
-        self.step_ms = step_ms
-        self.kernel = kernel
-        self.tau_s = tau_s
-        _core.check_neuron(self._json())
+    tau: float = _DEFAULT.tau
+    theta_0: float = _DEFAULT.theta_0
+    theta_plus: float = _DEFAULT.theta_plus
+    tau_rec: float | None = _DEFAULT.tau_rec
+    refractory: float = _DEFAULT.refractory
+    after_spike: Literal["keep", "ignore", "reset"] = _DEFAULT.after_spike
+    first_threshold: Literal["theta_0", "printed"] = _DEFAULT.first_threshold
+    time: Literal["continuous", "grid"] = _DEFAULT.time
+    step_ms: float = _DEFAULT.step_ms
+    kernel: Literal["alpha", "double_exponential", "exponential"] = _DEFAULT.kernel
+    tau_s: float | None = _DEFAULT.tau_s
+
+    _kind = "neuron"
 
     def run(self, weights: ArrayLike, trains: SpikeTrains, *, threshold: float = 1.0) -> NDArray[np.float64]:
         """Return when the neuron fires.
@@ -202,24 +194,6 @@ class Neuron:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         factor = number("threshold", threshold)
         return _core.neuron_run(self._json(), floats("weights", weights), _trains(trains)._parts(), factor)
-
-    def _parameters(self) -> dict[str, object]:
-        return dict(vars(self))
-
-    def _json(self) -> str:
-        return parameters(self._parameters())
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Neuron):
-            return NotImplemented
-        return self._parameters() == other._parameters()
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def __repr__(self) -> str:
-        default = Neuron.__init__.__kwdefaults__ or {}
-        changed = [f"{name}={value!r}" for name, value in vars(self).items() if value != default[name]]
-        return f"Neuron({', '.join(changed)})"
 
 
 def _trains(trains: SpikeTrains) -> SpikeTrains:

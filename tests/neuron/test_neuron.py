@@ -280,7 +280,8 @@ def test_other_arguments_that_make_no_sense_are_one_clear_error_each():
 
 
 def test_the_defaults_that_python_shows_are_those_of_the_core():
-    assert taxel._core.check_neuron(Neuron()._json()) == taxel._core.check_neuron("{}")
+    checked = taxel._core.check_parameters
+    assert checked("neuron", Neuron()._json()) == checked("neuron", "{}")
 
 
 def test_neurons_compare_and_print_by_their_parameters():

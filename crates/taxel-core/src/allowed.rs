@@ -1,17 +1,207 @@
-//! What a parameter may be, and what is said where it is not.
+//! What a parameter may be, and what is said where it is not: a table for each noun that has parameters.
+//!
+//! Checks and their messages read it, and so do the documentation of the Python classes and the tests that try wrong
+//! values.
+
+use std::fmt;
 
 use crate::{Result, problem};
+
+/// From which value to which; infinity that is not in asks for a finite value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    pub(crate) least: f64,
+    pub(crate) least_in: bool,
+    pub(crate) most: f64,
+    pub(crate) most_in: bool,
+    /// The value is a whole number of these; 0 where it need not be.
+    step: f64,
+}
+
+impl Range {
+    /// Any finite number.
+    pub const FINITE: Self =
+        Self { least: f64::NEG_INFINITY, least_in: false, most: f64::INFINITY, most_in: false, step: 0.0 };
+    /// Above 0 and finite.
+    pub const ABOVE_0: Self = Self { least: 0.0, ..Self::FINITE };
+    /// 0 or more and finite.
+    pub const FROM_0: Self = Self { least_in: true, ..Self::ABOVE_0 };
+    /// 0 or more, infinity too.
+    pub const COST: Self = Self { most_in: true, ..Self::FROM_0 };
+    /// A time in ms that is a whole number of us, 1 or more.
+    pub const WHOLE_US: Self = Self { least: 1e-3, step: 1e-3, ..Self::FROM_0 }.below(1e12);
+    /// The same in s.
+    pub const WHOLE_US_IN_S: Self = Self { least: 1e-6, step: 1e-6, ..Self::FROM_0 }.below(1e9);
+    /// 1 or more.
+    pub const FROM_1: Self = Self { least: 1.0, ..Self::FROM_0 };
+
+    /// Both ends in.
+    #[must_use]
+    pub const fn within(least: f64, most: f64) -> Self {
+        Self { least, least_in: true, most, most_in: true, step: 0.0 }
+    }
+
+    /// The same, up to a largest value.
+    #[must_use]
+    pub const fn at_most(self, most: f64) -> Self {
+        Self { most, most_in: true, ..self }
+    }
+
+    /// The same, up to but not at a value.
+    #[must_use]
+    pub const fn below(self, most: f64) -> Self {
+        Self { most, most_in: false, ..self }
+    }
+
+    /// Whether a value lies in it; NaN never does.
+    #[must_use]
+    pub fn holds(&self, value: f64) -> bool {
+        (if self.least_in { value >= self.least } else { value > self.least })
+            && (if self.most_in { value <= self.most } else { value < self.most })
+            && (self.step == 0.0 || {
+                let steps = value / self.step;
+                (steps - steps.round()).abs() < 1e-6 * steps.round()
+            })
+    }
+}
+
+/// As an error words it behind "must be".
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (least, most) = (said(self.least), said(self.most));
+        let lower = if self.least_in { format!("{least} or more") } else { format!("above {least}") };
+        let upper = if self.most_in { format!("at most {most}") } else { format!("below {most}") };
+        match (self.least.is_finite(), self.most.is_finite()) {
+            _ if self.step != 0.0 => write!(f, "a whole number of us, {lower}"),
+            (false, false) => f.write_str("finite"),
+            (true, false) if self.most_in => f.write_str(&lower),
+            (true, false) => write!(f, "{lower} and finite"),
+            (false, true) => f.write_str(&upper),
+            (true, true) if self.least_in && self.most_in => write!(f, "from {least} to {most}"),
+            (true, true) => write!(f, "{lower} and {upper}"),
+        }
+    }
+}
+
+/// A number as a reader writes it.
+fn said(value: f64) -> String {
+    if value != 0.0 && value.is_finite() && !(1e-3..1e7).contains(&value.abs()) {
+        format!("{value:e}")
+    } else {
+        format!("{value}")
+    }
+}
+
+/// A parameter that must lie in a range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parameter {
+    /// As the caller writes it.
+    pub name: &'static str,
+    /// Of its value; empty where it has none.
+    pub unit: &'static str,
+    /// Which values it may have, each entry where it is a list.
+    pub range: Range,
+}
+
+impl Parameter {
+    /// Refuses a value that lies outside.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter, its value and what would be right.
+    pub fn check(&self, value: &dyn Numbers) -> Result<()> {
+        let mut outcome = Ok(());
+        value.each(&mut |place, value| {
+            if outcome.is_ok() && !self.range.holds(value) {
+                let place = place.map_or(String::new(), |k| format!("[{k}]"));
+                let (name, unit, range) = (self.name, self.unit, self.range);
+                let value = said(value);
+                outcome = Err(match unit.strip_prefix('1') {
+                    Some(per) => problem!("{name}{place} is {value}{per}: must be {range}"),
+                    None if unit.is_empty() => problem!("{name}{place} is {value}: must be {range}"),
+                    None => problem!("{name}{place} is {value} {unit}: must be {range}"),
+                });
+            }
+        });
+        outcome
+    }
+}
+
+/// The numbers in a parameter, with their places where it is a list.
+pub trait Numbers {
+    /// Shows each to `look`.
+    fn each(&self, look: &mut dyn FnMut(Option<usize>, f64));
+}
+
+macro_rules! one_number {
+    ($($kind:ty)*) => {
+        $(impl Numbers for $kind {
+            fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
+                look(None, *self as f64);
+            }
+        })*
+    };
+}
+one_number!(f64 f32 usize u32 u64);
+
+impl<T: Numbers> Numbers for Option<T> {
+    fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
+        if let Some(value) = self {
+            value.each(look);
+        }
+    }
+}
+
+impl Numbers for [f64] {
+    fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
+        self.iter().enumerate().for_each(|(k, &value)| look(Some(k), value));
+    }
+}
+
+impl<const N: usize> Numbers for [f64; N] {
+    fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
+        self.as_slice().each(look);
+    }
+}
+
+impl Numbers for Vec<f64> {
+    fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
+        self.as_slice().each(look);
+    }
+}
+
+/// Gives a noun its table `RANGES`, and `check_ranges`, which reads it. A name in parentheses after a parameter's is the
+/// method that gives its value where it is left out.
+macro_rules! ranges {
+    ($($name:ident $(($method:ident))?: $unit:literal, $range:expr;)*) => {
+        /// Which values its parameters may have.
+        pub const RANGES: &'static [$crate::allowed::Parameter] = &[
+            $($crate::allowed::Parameter { name: stringify!($name), unit: $unit, range: $range },)*
+        ];
+
+        fn check_ranges(&self) -> $crate::Result<()> {
+            let mut of = Self::RANGES.iter();
+            $(if let Some(parameter) = of.next() {
+                parameter.check(&ranges!(@ self $name $($method)?))?;
+            })*
+            Ok(())
+        }
+    };
+    (@ $self:ident $name:ident) => { $self.$name };
+    (@ $self:ident $name:ident $method:ident) => { $self.$method() };
+}
+pub(crate) use ranges;
 
 /// Whether a value is above 0 and finite.
 #[must_use]
 pub fn is_above_0(value: f64) -> bool {
-    value.is_finite() && value > 0.0
+    Range::ABOVE_0.holds(value)
 }
 
 /// Whether a value is 0 or more and finite.
 #[must_use]
 pub fn is_at_least_0(value: f64) -> bool {
-    value.is_finite() && value >= 0.0
+    Range::FROM_0.holds(value)
 }
 
 /// Refuses a value that is not above 0 and finite; `unit` may be empty.
@@ -19,8 +209,8 @@ pub fn is_at_least_0(value: f64) -> bool {
 /// # Errors
 ///
 /// `Problem`, naming the parameter and its value.
-pub fn above_0(name: &str, value: f64, unit: &str) -> Result<()> {
-    require(is_above_0(value), name, value, unit, "above 0 and finite")
+pub fn above_0(name: &'static str, value: f64, unit: &'static str) -> Result<()> {
+    Parameter { name, unit, range: Range::ABOVE_0 }.check(&value)
 }
 
 /// Refuses a value that is below 0 or not finite; `unit` may be empty.
@@ -28,16 +218,8 @@ pub fn above_0(name: &str, value: f64, unit: &str) -> Result<()> {
 /// # Errors
 ///
 /// `Problem`, naming the parameter and its value.
-pub fn at_least_0(name: &str, value: f64, unit: &str) -> Result<()> {
-    require(is_at_least_0(value), name, value, unit, "0 or more and finite")
-}
-
-fn require(met: bool, name: &str, value: f64, unit: &str, what: &str) -> Result<()> {
-    if met {
-        return Ok(());
-    }
-    let space = if unit.is_empty() { "" } else { " " };
-    Err(problem!("{name} is {value}{space}{unit}: must be {what}"))
+pub fn at_least_0(name: &'static str, value: f64, unit: &'static str) -> Result<()> {
+    Parameter { name, unit, range: Range::FROM_0 }.check(&value)
 }
 
 /// Refuses weights that are not one a train, each finite.
@@ -53,4 +235,37 @@ pub fn one_weight_a_train(weights: &[f64], trains: usize) -> Result<()> {
         return Err(problem!("weights[{n}] is {}: must be finite", weights[n]));
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_range_says_what_it_holds() {
+        for (range, text, inside, outside) in [
+            (Range::FINITE, "finite", -1e300, f64::INFINITY),
+            (Range::ABOVE_0, "above 0 and finite", 5e-324, 0.0),
+            (Range::FROM_0, "0 or more and finite", 0.0, -5e-324),
+            (Range::COST, "0 or more", f64::INFINITY, -1.0),
+            (Range::ABOVE_0.at_most(4.0), "above 0 and at most 4", 4.0, 4.1),
+            (Range::FROM_0.below(1.0), "0 or more and below 1", 0.0, 1.0),
+            (Range::WHOLE_US, "a whole number of us, 0.001 or more", 0.2, 0.00025),
+            (Range::within(1e-10, 0.1), "from 1e-10 to 0.1", 1e-10, 0.11),
+        ] {
+            assert_eq!(range.to_string(), text);
+            assert!(range.holds(inside) && !range.holds(outside) && !range.holds(f64::NAN), "{text}");
+        }
+    }
+
+    #[test]
+    fn an_error_names_the_entry_its_value_and_unit() {
+        let parameter = |unit| Parameter { name: "tau", unit, range: Range::ABOVE_0 };
+        let said = |unit, value: &dyn Numbers| parameter(unit).check(value).unwrap_err().to_string();
+        assert_eq!(said("ms", &-1.0), "tau is -1 ms: must be above 0 and finite");
+        assert_eq!(said("", &f64::NAN), "tau is NaN: must be above 0 and finite");
+        assert_eq!(said("1/ms", &-1.0), "tau is -1/ms: must be above 0 and finite");
+        assert_eq!(said("mV", &[1.0, -2.0]), "tau[1] is -2 mV: must be above 0 and finite");
+        assert!(parameter("ms").check(&None::<f64>).is_ok());
+    }
 }

@@ -22,6 +22,8 @@ pub use running_range::{FirstWindow, RunningRange};
 pub use tare::{Tare, TareBuilder};
 pub use threshold_izhikevich::{Begin, Published, ThresholdIzhikevich};
 
+use crate::allowed::{Parameter, Range};
+use crate::parameters::Described;
 use crate::{Array, Error, Events, Frames, Result, Spike, SpikeTrains, Stop, problem};
 
 /// An encoder at work: takes what comes, in order of time, and hands on spikes as soon as they are certain.
@@ -121,6 +123,21 @@ impl Encoder {
             Self::Fa1(e) => e.check(),
             Self::ContactArea(e) => e.check(),
         }
+    }
+
+    /// The parameters of an encoder, by its name, with their defaults and ranges.
+    #[must_use]
+    pub fn described(name: &str) -> Option<Described> {
+        Some(match name {
+            "change_events" => Described::by(&ChangeEvents::default(), &[], ChangeEvents::RANGES),
+            "level_crossing" => Described::by(&LevelCrossing::at(vec![]), &["levels"], LevelCrossing::RANGES),
+            "threshold_izhikevich" => {
+                Described::by(&ThresholdIzhikevich::at(vec![]), &["levels"], ThresholdIzhikevich::RANGES)
+            }
+            "fa1" => Described::by(&Fa1::default(), &[], Fa1::RANGES),
+            "contact_area" => Described::by(&ContactArea::default(), &[], ContactArea::RANGES).or_nothing("tare"),
+            _ => return None,
+        })
     }
 
     /// Begins to encode what an array feels.
@@ -284,13 +301,10 @@ fn sort_from(out: &mut [Spike], from: usize) {
     out[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
 }
 
-/// A time in ms that must be a whole number of us, 1 or more.
-fn micros(name: &str, ms: f64) -> Result<i64> {
-    let us = (ms * 1000.0).round();
-    if !((1.0..1e15).contains(&us) && (ms * 1000.0 - us).abs() < 1e-6 * us) {
-        return Err(problem!("{name} is {ms}: must be a whole number of us, 0.001 ms or more"));
-    }
-    Ok(us as i64)
+/// A time in ms that must be a whole number of us, in us.
+fn micros(name: &'static str, ms: f64) -> Result<i64> {
+    Parameter { name, unit: "ms", range: Range::WHOLE_US }.check(&ms)?;
+    Ok((ms * 1000.0).round() as i64)
 }
 
 fn check_levels(levels: &[f64]) -> Result<()> {

@@ -5,6 +5,7 @@
 
 pub mod allowed;
 pub mod error;
+pub mod parameters;
 
 pub mod array;
 pub mod events;

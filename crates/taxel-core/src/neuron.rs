@@ -16,7 +16,8 @@ pub use streaming::{NeuronStream, OutputSpike};
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{above_0, at_least_0, one_weight_a_train};
+use crate::allowed::{Range, one_weight_a_train, ranges};
+use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// What remains of the inputs after the neuron's own spike.
@@ -115,25 +116,29 @@ impl Default for Neuron {
 }
 
 impl Neuron {
+    ranges! {
+        tau: "ms", Range::ABOVE_0;
+        theta_0: "mV", Range::ABOVE_0;
+        theta_plus: "mV", Range::FROM_0;
+        tau_rec(tau_rec): "ms", Range::ABOVE_0;
+        refractory: "ms", Range::FROM_0;
+        step_ms: "ms", Range::ABOVE_0;
+        tau_s(tau_s): "ms", Range::ABOVE_0;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        let all = [
-            ("tau", self.tau, "ms"),
-            ("theta_0", self.theta_0, "mV"),
-            ("tau_rec", self.tau_rec(), "ms"),
-            ("tau_s", self.tau_s(), "ms"),
-            ("step_ms", self.step_ms, "ms"),
-        ];
-        for (name, value, unit) in all {
-            above_0(name, value, unit)?;
-        }
-        for (name, value, unit) in [("theta_plus", self.theta_plus, "mV"), ("refractory", self.refractory, "ms")] {
-            at_least_0(name, value, unit)?;
-        }
+        self.check_ranges()?;
         if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
             return Err(problem!("tau_s is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
         }

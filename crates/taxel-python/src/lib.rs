@@ -34,6 +34,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     metrics::register(module)?;
     learn::register(module)?;
     neuron::register(module)?;
+    parameters::register(module)?;
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;

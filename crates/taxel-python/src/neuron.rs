@@ -3,7 +3,6 @@
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::neuron::Neuron;
-use taxel_core::problem;
 
 use crate::convert::{SpikesIn, SpikesOut, array, from_spikes, slice, to_spikes};
 use crate::enter::enter;
@@ -14,13 +13,6 @@ pub(crate) fn to_neuron(json: &str) -> PyResult<Neuron> {
     let neuron: Neuron = parsed("neuron", json)?;
     neuron.check().map_err(core)?;
     Ok(neuron)
-}
-
-/// Checks parameters; gives them back with every default filled in.
-#[pyfunction]
-fn check_neuron(parameters: &str) -> PyResult<String> {
-    let neuron = to_neuron(parameters)?;
-    serde_json::to_string(&neuron).map_err(|e| core(problem!("neuron: {e}")))
 }
 
 /// Times (ms) and slopes (mV/ms) of output spikes.
@@ -90,7 +82,6 @@ fn neuron_potential<'py>(
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(check_neuron, module)?)?;
     module.add_function(wrap_pyfunction!(neuron_run, module)?)?;
     module.add_function(wrap_pyfunction!(neuron_run_many, module)?)?;
     module.add_function(wrap_pyfunction!(neuron_potential, module)?)

@@ -16,7 +16,7 @@ def shipped() -> Readout:
 
 def described(readout: Readout) -> str:
     """Return the weights of contact area's trains that are not 0, one line a neuron."""
-    levels = readout.encoder._parameters()["levels"]
+    levels = readout.encoder.get_params()["levels"]
     names = [f"rise to {n}" for n in levels] + [f"fall below {n}" for n in levels]
     return "\n".join(
         f"{label}: " + ", ".join(f"{name} {w:.3f} mV" for name, w in zip(names, one.weights, strict=True) if w > 5e-4)

@@ -249,7 +249,7 @@ def _readout(
         if own is not None and neuron is None:
             # The nodes' threshold holds the factor already.
             said["theta_plus"] = rest.theta_plus * own.run_threshold
-        one = Neuron(**{**rest._parameters(), **said})
+        one = Neuron(**{**rest.get_params(), **said})
         trained[label] = TrainedNeuron(one, 1000.0 * row * factor, 0.0 if template is None else template.delay_ms)
     array = None if own is None else own.array
     return kind(encoder, trained, array=array, delays_ms=delays_ms)

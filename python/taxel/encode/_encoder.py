@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-import inspect
 import json
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
 from taxel import _core
-from taxel._arguments import instance, parameters, shown
+from taxel._arguments import instance, shown
 from taxel._core import ProblemError
+from taxel._parameters import Value
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -21,7 +20,7 @@ from taxel.tare import Tare
 __all__ = ["Encoder", "EncoderStream"]
 
 
-class Encoder:
+class Encoder(Value):
     """Turn events or frames into spike trains; the common part of all encoders.
 
     An encoder holds its parameters under their own names and nothing else. Two are equal where their parameters are.
@@ -38,16 +37,11 @@ class Encoder:
     _by_name: ClassVar[dict[str, type[Encoder]]] = {}
 
     def __init_subclass__(cls) -> None:
+        cls._kind = cls.name
         Encoder._by_name[cls.name] = cls
 
-    def _check(self) -> None:
-        _core.check_encoder(self._json())
-
-    def _parameters(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in inspect.signature(type(self)).parameters}
-
-    def _json(self) -> str:
-        return parameters({"name": self.name} | {name: _plain(value) for name, value in self._parameters().items()})
+    def _plain(self) -> dict[str, Any]:
+        return {"name": self.name} | super()._plain()
 
     def to_json(self) -> str:
         """Return the encoder as JSON: an object with its name and all parameters."""
@@ -64,11 +58,7 @@ class Encoder:
         if not isinstance(text, str):
             raise ProblemError(f"encoder is {shown(text)}: must be JSON text")
         values = json.loads(_core.check_encoder(text))
-        return Encoder._by_name[values.pop("name")]._from_parameters(values)
-
-    @classmethod
-    def _from_parameters(cls, values: dict[str, Any]) -> Self:
-        return cls(**values)
+        return Encoder._by_name[values.pop("name")]._from_values(values)
 
     def trains(self, array: Array) -> int:
         """Return on how many trains the encoder speaks for an array; signed ones count once."""
@@ -126,20 +116,6 @@ class Encoder:
             The sensor; that of the first piece where it is left out.
         """
         return EncoderStream(self, array)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Encoder):
-            return NotImplemented
-        return self.to_json() == other.to_json()
-
-    __hash__ = None  # type: ignore[assignment]
-
-    def __repr__(self) -> str:
-        defaults = {name: p.default for name, p in inspect.signature(type(self)).parameters.items()}
-        told = (
-            f"{name}={v!r}" for name, v in self._parameters().items() if v is not defaults[name] and v != defaults[name]
-        )
-        return f"{type(self).__name__}({', '.join(told)})"
 
 
 class EncoderStream:
@@ -200,12 +176,6 @@ class EncoderStream:
 
     def _told(self, parts: tuple[Any, ...] | None) -> SpikeTrains:
         return SpikeTrains.from_lists([]) if parts is None else SpikeTrains._from_parts(parts)
-
-
-def _plain(value: object) -> object:
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return dataclasses.asdict(value)
-    return value
 
 
 def _array(array: Array) -> Array:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
+from taxel._parameters import defaults
 from taxel.encode._encoder import Encoder
 
 __all__ = ["ChangeEvents"]
 
 
+_DEFAULT = defaults("change_events")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
 class ChangeEvents(Encoder):
     """Say how far each taxel moved since its last event, in units of the noise floor; +-(2^bits - 1) at most.
 
@@ -18,7 +24,7 @@ class ChangeEvents(Encoder):
     ----------
     noise_floor : float, in the sensor's unit, above 0
         The smallest change that counts; theta_0 of equation 5.7. 3 ticks in the board's fast presets.
-    bits : int, 1 to 10
+    bits : int, from 1 to 10
         Bits an event (figure 5.7); 1 tells rise from fall.
     previous : {"last_sent", "last_sample"}
         What a sample is compared with: the value at the last event, or the last sample, as 4.3 words it.
@@ -47,18 +53,8 @@ class ChangeEvents(Encoder):
 
     name = "change_events"
 
-    def __init__(
-        self,
-        *,
-        noise_floor: float = 3.0,
-        bits: int = 1,
-        previous: Literal["last_sent", "last_sample"] = "last_sent",
-        rounding: Literal["truncate", "floor"] = "truncate",
-        period_ms: float = 0.1,
-    ) -> None:
-        self.noise_floor = noise_floor
-        self.bits = bits
-        self.previous = previous
-        self.rounding = rounding
-        self.period_ms = period_ms
-        self._check()
+    noise_floor: float = _DEFAULT.noise_floor
+    bits: int = _DEFAULT.bits
+    previous: Literal["last_sent", "last_sample"] = _DEFAULT.previous
+    rounding: Literal["truncate", "floor"] = _DEFAULT.rounding
+    period_ms: float = _DEFAULT.period_ms

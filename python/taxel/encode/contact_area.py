@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import copy
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Self
 
-from taxel._arguments import parameters
+from taxel._arguments import instance, parameters
+from taxel._parameters import defaults
 from taxel.encode._encoder import Encoder
 from taxel.tare import Tare
 
 __all__ = ["ContactArea"]
 
 
+_DEFAULT = defaults("contact_area")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
 class ContactArea(Encoder):
     """Say where the number of loaded taxels rises through levels, and where it falls below them.
 
@@ -48,32 +55,24 @@ class ContactArea(Encoder):
 
     name = "contact_area"
 
-    def __init__(
-        self,
-        *,
-        noise_floor: float = 3.0,
-        levels: Sequence[int] = (2, 4, 8, 16, 32),
-        tare: Tare | None = None,
-    ) -> None:
-        self.noise_floor = noise_floor
-        self.levels = levels
-        self.tare = tare
-        self._check()
+    noise_floor: float = _DEFAULT.noise_floor
+    levels: Sequence[int] = _DEFAULT.levels
+    tare: Tare | None = _DEFAULT.tare
 
     def _json(self) -> str:
-        if not isinstance(self.tare, Tare):
+        if self.tare is None:
             return super()._json()
         # As it stands: a tare of thousands of taxels need not be read to be handed over.
-        others = parameters({"name": self.name, "noise_floor": self.noise_floor, "levels": self.levels})
-        return f'{others[:-1]}, "tare": {self.tare.to_json()}}}'
+        rest = instance("tare", self.tare, Tare).to_json()
+        others = {name: value for name, value in self._plain().items() if name != "tare"}
+        return f'{parameters(others)[:-1]}, "tare": {rest}}}'
 
     def with_tare(self, tare: Tare) -> ContactArea:
         """Return the same encoder with this tare."""
         super().with_tare(tare)
-        return ContactArea(noise_floor=self.noise_floor, levels=self.levels, tare=tare)
+        return copy.copy(self).set_params(tare=tare)
 
     @classmethod
-    def _from_parameters(cls, values: dict[str, Any]) -> Self:
-        if values.get("tare") is not None:
-            values["tare"] = Tare.from_json(json.dumps(values["tare"]))
-        return cls(**values)
+    def _from_values(cls, values: Mapping[str, Any]) -> Self:
+        rest = values.get("tare")
+        return super()._from_values({**values, "tare": rest and Tare.from_json(json.dumps(rest))})

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
+from taxel._parameters import defaults
 from taxel.encode._encoder import Encoder
 
 __all__ = ["FA1"]
 
 
+_DEFAULT = defaults("fa1")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
 class FA1(Encoder):
     """Integrate each taxel's change of compressed pressure; fire with its sign where that passes a moving threshold.
 
@@ -53,22 +59,10 @@ class FA1(Encoder):
 
     name = "fa1"
 
-    def __init__(
-        self,
-        *,
-        alpha: float = 0.7,
-        a: float = 20.0,
-        b: float = 0.05,
-        decay: Literal["sample", "ms"] = "sample",
-        theta_0: float | None = None,
-        range: float | None = None,  # noqa: A002  the thesis' word
-        period_ms: float = 1.0,
-    ) -> None:
-        self.alpha = alpha
-        self.a = a
-        self.b = b
-        self.decay = decay
-        self.theta_0 = theta_0
-        self.range = range
-        self.period_ms = period_ms
-        self._check()
+    alpha: float = _DEFAULT.alpha
+    a: float = _DEFAULT.a
+    b: float = _DEFAULT.b
+    decay: Literal["sample", "ms"] = _DEFAULT.decay
+    theta_0: float | None = _DEFAULT.theta_0
+    range: float | None = _DEFAULT.range
+    period_ms: float = _DEFAULT.period_ms

@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, Self
+from dataclasses import KW_ONLY, dataclass
+from typing import ClassVar, Literal
 
+from taxel._parameters import Value, defaults
 from taxel.encode._encoder import Encoder
 
 __all__ = ["LevelCrossing", "RunningRange"]
 
 
-@dataclass(frozen=True)
-class RunningRange:
+_RANGE = defaults("running_range")
+
+
+@dataclass(eq=False, repr=False)
+class RunningRange(Value):
     """Put levels on each channel's own range, y = (x - low) / (high - low), against drift and unknown gain.
 
     Parameters
     ----------
-    low, high : float, percent, 0 to 100
+    low, high : float, percent, from 0 to 100
         The percentiles (linear between ranks) of the past window that read 0 and 1.
-    window_s : float, s
+    window_s : float, s, whole us
         How long the window is; its samples are kept in memory.
-    renew_s : float, s
+    renew_s : float, s, whole us
         How often the percentiles are renewed, counted from the end of the first window.
     first_window : {"silent", "itself"}
         Until the first window is full: no spike; or, for recordings, the first window read by its own percentiles,
@@ -32,13 +36,19 @@ class RunningRange:
     A channel whose two percentiles are equal has no range and stays below all levels.
     """
 
-    low: float = 10.0
-    high: float = 95.0
-    window_s: float = 10.0
-    renew_s: float = 1.0
-    first_window: Literal["silent", "itself"] = "silent"
+    low: float = _RANGE.low
+    high: float = _RANGE.high
+    window_s: float = _RANGE.window_s
+    renew_s: float = _RANGE.renew_s
+    first_window: Literal["silent", "itself"] = _RANGE.first_window
+
+    _kind = "running_range"
 
 
+_DEFAULT = defaults("level_crossing")
+
+
+@dataclass(eq=False, repr=False)
 class LevelCrossing(Encoder):
     """Say where a taxel comes to a level (+1) and where it falls below the level's release (-1).
 
@@ -53,7 +63,7 @@ class LevelCrossing(Encoder):
         Release as a share of each level; 1 where neither release is given: plain crossings.
     release_by : float, 0 or more, optional
         Release as a distance below each level, instead.
-    hold_ms : float, ms, whole us
+    hold_ms : float, ms, 0 or more, whole us
         How long a crossing must last; it is said then, so this is the latency.
     tonic_ms : float, ms, whole us, optional
         Adds tonic spikes, the slowly adapting part: one at the crossing, then one every `tonic_ms` while above.
@@ -78,31 +88,14 @@ class LevelCrossing(Encoder):
     """
 
     name = "level_crossing"
+    _nested: ClassVar = {"running_range": RunningRange}
 
-    def __init__(
-        self,
-        levels: Sequence[float],
-        *,
-        release_share: float | None = None,
-        release_by: float | None = None,
-        hold_ms: float = 0.0,
-        tonic_ms: float | None = None,
-        tonic_level: float | None = None,
-        running_range: RunningRange | None = None,
-        period_ms: float = 0.1,
-    ) -> None:
-        self.levels = levels
-        self.release_share = release_share
-        self.release_by = release_by
-        self.hold_ms = hold_ms
-        self.tonic_ms = tonic_ms
-        self.tonic_level = tonic_level
-        self.running_range = running_range
-        self.period_ms = period_ms
-        self._check()
-
-    @classmethod
-    def _from_parameters(cls, values: dict[str, Any]) -> Self:
-        if values["running_range"] is not None:
-            values["running_range"] = RunningRange(**values["running_range"])
-        return cls(**values)
+    levels: Sequence[float]
+    _: KW_ONLY
+    release_share: float | None = _DEFAULT.release_share
+    release_by: float | None = _DEFAULT.release_by
+    hold_ms: float = _DEFAULT.hold_ms
+    tonic_ms: float | None = _DEFAULT.tonic_ms
+    tonic_level: float | None = _DEFAULT.tonic_level
+    running_range: RunningRange | None = _DEFAULT.running_range
+    period_ms: float = _DEFAULT.period_ms

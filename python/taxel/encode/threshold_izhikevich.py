@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
 from typing import Literal
 
+from taxel._parameters import defaults
 from taxel.encode._encoder import Encoder
 
 __all__ = ["ThresholdIzhikevich"]
 
 
+_DEFAULT = defaults("threshold_izhikevich")
+
+
+@dataclass(eq=False, repr=False)
 class ThresholdIzhikevich(Encoder):
     """Say with two Izhikevich neurons a level where a taxel came to it (+1) and where it left it (-1).
 
@@ -49,16 +55,8 @@ class ThresholdIzhikevich(Encoder):
 
     name = "threshold_izhikevich"
 
-    def __init__(
-        self,
-        levels: Sequence[float],
-        *,
-        published: Literal["6.5.1", "3.4.3"] = "6.5.1",
-        begin: Literal["settled", "rest"] = "settled",
-        period_ms: float = 0.1,
-    ) -> None:
-        self.levels = levels
-        self.published = published
-        self.begin = begin
-        self.period_ms = period_ms
-        self._check()
+    levels: Sequence[float]
+    _: KW_ONLY
+    published: Literal["6.5.1", "3.4.3"] = _DEFAULT.published
+    begin: Literal["settled", "rest"] = _DEFAULT.begin
+    period_ms: float = _DEFAULT.period_ms

@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
-use super::{Stream, micros, ms};
+use super::{Stream, ms};
+use crate::allowed::{Range, ranges};
 pub use crate::board::Previous;
 use crate::{Array, Result, Spike, problem};
 
@@ -64,6 +65,12 @@ impl Default for ChangeEvents {
 }
 
 impl ChangeEvents {
+    ranges! {
+        noise_floor: "", Range::ABOVE_0;
+        bits: "", Range::within(1.0, 10.0);
+        period_ms: "ms", Range::WHOLE_US;
+    }
+
     pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let changes = Changes {
             floor: self.noise_floor as f32,
@@ -77,14 +84,15 @@ impl ChangeEvents {
     }
 
     pub(super) fn check(&self) -> Result<()> {
-        let floor = self.noise_floor;
-        if !(floor.is_finite() && floor as f32 > 0.0 && (floor as f32).is_finite()) {
-            return Err(problem!("noise_floor is {floor}: must be above 0 and finite"));
+        self.check_ranges()?;
+        // Changes are compared in f32.
+        if !(self.noise_floor as f32).is_normal() {
+            return Err(problem!(
+                "noise_floor is {}: must be above 0 and finite in single precision",
+                self.noise_floor
+            ));
         }
-        if !(1..=10).contains(&self.bits) {
-            return Err(problem!("bits is {}: must be 1 to 10", self.bits));
-        }
-        micros("period_ms", self.period_ms).map(drop)
+        Ok(())
     }
 }
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sampled::{BLOCK, Block, Channels, Source, blocks};
 use super::{Stream, Tare, ms};
-use crate::allowed::at_least_0;
+use crate::allowed::{Range, ranges};
 use crate::wide::wide;
 use crate::{Array, Events, Result, Spike, problem};
 
@@ -43,8 +43,12 @@ impl Default for ContactArea {
 }
 
 impl ContactArea {
+    ranges! {
+        noise_floor: "", Range::FROM_0;
+    }
+
     pub(super) fn check(&self) -> Result<()> {
-        at_least_0("noise_floor", self.noise_floor, "")?;
+        self.check_ranges()?;
         if self.levels.is_empty() {
             return Err(problem!("levels: must hold one number of taxels or more"));
         }

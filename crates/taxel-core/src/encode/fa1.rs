@@ -12,8 +12,8 @@ use serde::{Deserialize, Serialize};
 
 use super::power::power;
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
-use super::{Stream, micros, ms};
-use crate::allowed::{above_0, at_least_0};
+use super::{Stream, ms};
+use crate::allowed::{Range, ranges};
 use crate::{Array, Result, Spike, problem};
 
 /// The FA-1 afferent exactly as equations 5.1 to 5.5, polarity kept.
@@ -94,25 +94,26 @@ impl Default for Fa1 {
 }
 
 impl Fa1 {
+    ranges! {
+        alpha: "", Range::ABOVE_0.at_most(4.0);
+        a: "1/ms", Range::FROM_0;
+        b: "", Range::FROM_0;
+        theta_0: "", Range::FROM_0;
+        range: "", Range::ABOVE_0;
+        period_ms: "ms", Range::WHOLE_US;
+    }
+
     pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let afferents = Afferents::new(self, Channels::new(array).len());
         Ok(Box::new(Sampled::new(afferents, array, self.period_ms, 0.0)?.steady()))
     }
 
     pub(super) fn check(&self) -> Result<()> {
-        if !(self.alpha.is_finite() && self.alpha > 0.0 && self.alpha <= 4.0) {
-            return Err(problem!("alpha is {}: must be above 0 and at most 4", self.alpha));
+        self.check_ranges()?;
+        if self.range.is_some() && self.theta_0.is_some() {
+            return Err(problem!("theta_0 and range: give one of them"));
         }
-        for (name, value) in [("a", self.a), ("b", self.b), ("theta_0", self.theta_0.unwrap_or(0.0))] {
-            at_least_0(name, value, "")?;
-        }
-        if let Some(range) = self.range {
-            if self.theta_0.is_some() {
-                return Err(problem!("theta_0 and range: give one of them"));
-            }
-            above_0("range", range, "")?;
-        }
-        micros("period_ms", self.period_ms).map(drop)
+        Ok(())
     }
 
     /// The baseline threshold, in compressed units.

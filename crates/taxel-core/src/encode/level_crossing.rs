@@ -8,6 +8,7 @@ use super::bracket::Bracket;
 use super::running_range::{RunningRange, Window};
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
 use super::{Stream, check_levels, micros, ms, sort_from};
+use crate::allowed::{Range, ranges};
 use crate::{Array, Result, Spike, problem};
 
 /// Crossings of levels: +1 where a taxel comes to a level, -1 where it falls below its release.
@@ -45,6 +46,29 @@ pub struct LevelCrossing {
 }
 
 impl LevelCrossing {
+    ranges! {
+        release_share: "", Range::ABOVE_0.at_most(1.0);
+        release_by: "", Range::FROM_0;
+        hold_ms: "ms", Range::FROM_0;
+        tonic_ms: "ms", Range::WHOLE_US;
+        period_ms: "ms", Range::WHOLE_US;
+    }
+
+    /// Plain crossings of these levels.
+    #[must_use]
+    pub fn at(levels: Vec<f64>) -> Self {
+        Self {
+            levels,
+            release_share: None,
+            release_by: None,
+            hold_ms: 0.0,
+            tonic_ms: None,
+            tonic_level: None,
+            running_range: None,
+            period_ms: super::stamp_period(),
+        }
+    }
+
     pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let crossings = Crossings::new(self, Channels::new(array).len())?;
         Ok(Box::new(Sampled::new(crossings, array, self.period_ms, self.latency_ms())?))
@@ -60,26 +84,19 @@ impl LevelCrossing {
 
     pub(super) fn check(&self) -> Result<()> {
         check_levels(&self.levels)?;
-        micros("period_ms", self.period_ms)?;
+        self.check_ranges()?;
         if self.hold_ms != 0.0 {
             micros("hold_ms", self.hold_ms)?;
         }
-        match (self.release_share, self.release_by) {
-            (Some(_), Some(_)) => return Err(problem!("release_share and release_by: give one of them")),
-            (Some(share), None) if !(share > 0.0 && share <= 1.0) => {
-                return Err(problem!("release_share is {share}: must be above 0 and at most 1"));
-            }
-            (Some(share), None) if share < 1.0 && self.levels[0] <= 0.0 => {
-                let level = self.levels[0];
-                return Err(problem!("release_share is {share}, but level {level} is not above 0: use release_by"));
-            }
-            (None, Some(by)) if !(by.is_finite() && by >= 0.0) => {
-                return Err(problem!("release_by is {by}: must be 0 or more"));
-            }
-            _ => {}
+        if self.release_share.is_some() && self.release_by.is_some() {
+            return Err(problem!("release_share and release_by: give one of them"));
         }
-        if let Some(every) = self.tonic_ms {
-            micros("tonic_ms", every)?;
+        if let Some(share) = self.release_share
+            && share < 1.0
+            && self.levels[0] <= 0.0
+        {
+            let level = self.levels[0];
+            return Err(problem!("release_share is {share}, but level {level} is not above 0: use release_by"));
         }
         if let Some(level) = self.tonic_level {
             if self.tonic_ms.is_none() {

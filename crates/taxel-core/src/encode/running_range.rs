@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::micros;
 use super::sampled::{BLOCK, Block};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
 use crate::{Result, problem};
 
 /// Levels as shares of a channel's running range, y = (x - low) / (high - low), against drift and unknown gain.
@@ -55,14 +57,38 @@ fn one() -> f64 {
     1.0
 }
 
+impl Default for RunningRange {
+    fn default() -> Self {
+        Self { low: ten(), high: ninety_five(), window_s: ten(), renew_s: one(), first_window: FirstWindow::default() }
+    }
+}
+
 impl RunningRange {
-    pub(super) fn check(&self) -> Result<()> {
-        if !(self.low >= 0.0 && self.low < self.high && self.high <= 100.0) {
+    ranges! {
+        low: "%", Range::within(0.0, 100.0);
+        high: "%", Range::within(0.0, 100.0);
+        window_s: "s", Range::WHOLE_US_IN_S;
+        renew_s: "s", Range::WHOLE_US_IN_S;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter, its value and what would be right.
+    pub fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        if self.low >= self.high {
             let (low, high) = (self.low, self.high);
             return Err(problem!("running_range from {low} to {high}: must ascend within 0 to 100 percent"));
         }
-        micros("running_range window_s", self.window_s * 1000.0)?;
-        micros("running_range renew_s", self.renew_s * 1000.0).map(drop)
+        Ok(())
     }
 }
 

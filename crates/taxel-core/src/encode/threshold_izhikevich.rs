@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::bracket::Bracket;
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
-use super::{Stream, check_levels, micros, ms, sort_from};
+use super::{Stream, check_levels, ms, sort_from};
+use crate::allowed::{Range, ranges};
 use crate::{Array, Result, Spike};
 
 /// A threshold and a pair of Izhikevich neurons: +1 about 16 or 20 ms after a taxel came to a level, -1 after it left.
@@ -66,6 +67,17 @@ pub enum Begin {
 }
 
 impl ThresholdIzhikevich {
+    ranges! {
+        period_ms: "ms", Range::WHOLE_US;
+    }
+
+    /// The neurons of 6.5.1 at these levels.
+    #[must_use]
+    pub fn at(levels: Vec<f64>) -> Self {
+        let (published, begin) = (Published::default(), Begin::default());
+        Self { levels, published, begin, period_ms: super::stamp_period() }
+    }
+
     pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         self.check()?;
         let pairs = Pairs::new(self, Channels::new(array).len());
@@ -82,7 +94,7 @@ impl ThresholdIzhikevich {
 
     pub(super) fn check(&self) -> Result<()> {
         check_levels(&self.levels)?;
-        micros("period_ms", self.period_ms).map(drop)
+        self.check_ranges()
     }
 }
 

@@ -1,0 +1,62 @@
+//! The parameters of a noun as other languages read them: names, defaults, ranges.
+
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+use crate::allowed::Parameter;
+
+/// The parameters of a noun: what each is where it is left out, which must be given, which values they may have.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Described {
+    /// The defaults by name.
+    pub defaults: Map<String, Value>,
+    /// Names without a default.
+    pub required: Vec<&'static str>,
+    /// The ranges, of numbers alone.
+    pub ranges: Vec<Parameter>,
+}
+
+impl Described {
+    /// Describes a noun by one that has all its defaults; what stands in `required` has none, whatever it is there.
+    #[must_use]
+    pub fn by(defaults: &impl Serialize, required: &[&'static str], ranges: &[Parameter]) -> Self {
+        // Parameters are plain structs of numbers, words and lists: nothing in them can fail to be written.
+        let mut defaults = match serde_json::to_value(defaults) {
+            Ok(Value::Object(defaults)) => defaults,
+            _ => Map::new(),
+        };
+        for name in required {
+            defaults.remove(*name);
+        }
+        Self { defaults, required: required.to_vec(), ranges: ranges.to_vec() }
+    }
+
+    /// The same with one more, which is nothing where it is left out.
+    #[must_use]
+    pub fn or_nothing(mut self, name: &'static str) -> Self {
+        self.defaults.insert(name.to_owned(), Value::Null);
+        self
+    }
+
+    /// The description as JSON: `{"defaults": {…}, "required": […], "ranges": {name: {"unit", "must_be", "least", …}}}`;
+    /// `least` and `most` are left out where there is none.
+    #[must_use]
+    pub fn to_json(&self) -> Value {
+        let ranges: Map<String, Value> = self
+            .ranges
+            .iter()
+            .map(|Parameter { name, unit, range }| {
+                let mut said = serde_json::json!({ "unit": unit, "must_be": range.to_string() });
+                for (end, value, is_in) in [("least", range.least, range.least_in), ("most", range.most, range.most_in)]
+                {
+                    if value.is_finite() {
+                        said[end] = value.into();
+                        said[format!("{end}_in")] = is_in.into();
+                    }
+                }
+                ((*name).to_owned(), said)
+            })
+            .collect();
+        serde_json::json!({ "defaults": self.defaults, "required": self.required, "ranges": ranges })
+    }
+}

@@ -1,0 +1,193 @@
+"""What all classes with parameters share: defaults and ranges from the compiled part, JSON on the way there."""
+
+from __future__ import annotations
+
+import copy
+import json
+import sys
+from collections.abc import Mapping
+from functools import cache
+from inspect import signature
+from types import SimpleNamespace
+from typing import Any, ClassVar, Self
+
+from taxel import _core
+from taxel._arguments import flag, instance, parameters, shown
+from taxel._core import ProblemError
+
+__all__ = ["Parameters", "Value", "defaults", "described"]
+
+
+@cache
+def described(kind: str) -> dict[str, Any]:
+    """Return what the compiled part says of a noun's parameters.
+
+    ``defaults`` by name, the names that are ``required``, and the ``ranges`` of numbers by name, with their ``unit``
+    and the words of an error, ``must_be``.
+    """
+    return dict(json.loads(_core.parameters(kind)))
+
+
+def defaults(kind: str) -> Any:
+    """Return a noun's defaults as attributes, for its signature; None stands for a group of parameters."""
+
+    def plain(value: object) -> object:
+        return tuple(value) if isinstance(value, list) else None if isinstance(value, dict) else value
+
+    return SimpleNamespace(**{name: plain(value) for name, value in described(kind)["defaults"].items()})
+
+
+class Parameters:
+    """Hold the parameters of the constructor under their own names, just as they were given.
+
+    A subclass says the `_kind` under which the compiled part knows it, and which of its parameters hold parameters
+    themselves (`_nested`). It is checked when it is made and when parameters are set.
+
+    The manners are scikit-learn's, which is never imported: `get_params`, `set_params`, nested names (``neuron__tau``),
+    tags.
+    """
+
+    _kind: ClassVar[str]
+    _nested: ClassVar[Mapping[str, type[Parameters]]] = {}
+
+    def __post_init__(self) -> None:
+        self._check()
+
+    @classmethod
+    @cache
+    def _names(cls) -> tuple[str, ...]:
+        """Return the names of all parameters, in the order of the constructor."""
+        return tuple(signature(cls).parameters)
+
+    @classmethod
+    def _stands_for(cls, name: str) -> Parameters | None:
+        """Return what None stands for in a parameter: a group with its defaults, or nothing."""
+        kind = cls._nested.get(name)
+        return kind() if kind is not None and isinstance(described(cls._kind)["defaults"].get(name), dict) else None
+
+    @classmethod
+    def _from_values(cls, values: Mapping[str, Any]) -> Self:
+        """Build from plain values, as JSON holds them."""
+        read = {
+            name: cls._nested[name]._from_values(value) if name in cls._nested and value is not None else value
+            for name, value in values.items()
+        }
+        return cls(**read)
+
+    def _values(self) -> dict[str, Any]:
+        """Return the parameters by name, just as they are held."""
+        return {name: getattr(self, name) for name in self._names()}
+
+    def _plain(self) -> dict[str, Any]:
+        """Return the parameters as the compiled part reads them; a group that is left out has its defaults there."""
+        plain: dict[str, Any] = {}
+        for name, value in self._values().items():
+            if value is None and self._stands_for(name) is not None:
+                continue
+            group = self._nested.get(name)
+            plain[name] = value if group is None or value is None else instance(name, value, group)._plain()
+        return plain
+
+    def _json(self) -> str:
+        return parameters(self._plain())
+
+    def _check(self) -> None:
+        _core.check_parameters(self._kind, self._json())
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Return all parameters by name, just as they are held.
+
+        Parameters
+        ----------
+        deep : bool
+            With those of a parameter that has parameters itself, as ``neuron__tau``; also where it is None and stands
+            for the defaults.
+        """
+        values = self._values()
+        if flag("deep", deep):
+            for name, value in list(values.items()):
+                held: Any = self._stands_for(name) if value is None else value
+                if hasattr(held, "get_params") and not isinstance(held, type):
+                    values |= {f"{name}__{inner}": entry for inner, entry in held.get_params().items()}
+        return values
+
+    def set_params(self, **parameters: Any) -> Self:
+        """Set parameters by name; what is learnt already stays.
+
+        Parameters
+        ----------
+        **parameters
+            As `get_params` lists them. A nested one (``neuron__tau``) puts a changed copy in the place of the old
+            group, so that another holder of that group keeps it as it was.
+
+        Returns
+        -------
+        Self
+            Itself.
+
+        Raises
+        ------
+        ProblemError : a name that is not known, or a value that makes no sense; all parameters are then as before
+        """
+        names = self._names()
+        given: dict[str, Any] = {}
+        inner: dict[str, dict[str, Any]] = {}
+        for name, value in parameters.items():
+            outer, nested, rest = name.partition("__")
+            if outer not in names:
+                raise ProblemError(f"{type(self).__name__}: no parameter {outer!r}: there are {', '.join(names)}")
+            if nested:
+                inner.setdefault(outer, {})[rest] = value
+            else:
+                given[outer] = value
+        for name, values in inner.items():
+            held: Any = given.get(name, getattr(self, name))
+            held = self._stands_for(name) if held is None else held
+            if not hasattr(held, "set_params") or isinstance(held, type):
+                raise ProblemError(f"{name} is {shown(held)}: has no parameter {next(iter(values))!r}")
+            given[name] = copy.copy(held).set_params(**values)
+        before = self._values()
+        try:
+            for name, value in given.items():
+                object.__setattr__(self, name, value)
+            self._check()
+        except BaseException:
+            for name, value in before.items():
+                object.__setattr__(self, name, value)
+            raise
+        return self
+
+    def __sklearn_tags__(self) -> Any:
+        # Only scikit-learn asks, so it is there already.
+        tags = sys.modules["sklearn.utils"]
+        return tags.Tags(estimator_type=None, target_tags=tags.TargetTags(required=False), input_tags=tags.InputTags())
+
+    def __repr__(self) -> str:
+        default = {name: entry.default for name, entry in signature(type(self)).parameters.items()}
+        told = (f"{name}={value!r}" for name, value in self._values().items() if not _same(value, default[name]))
+        return f"{type(self).__name__}({', '.join(told)})"
+
+
+class Value(Parameters):
+    """Be a value: two of a class are equal where their parameters are."""
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        return bool(json.loads(self._json()) == json.loads(other._json()))
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+def _same(value: object, default: object) -> bool:
+    """Whether a parameter has its default; a list or an array may stand for the tuple."""
+    if value is default:
+        return True
+    if isinstance(default, tuple):
+        try:
+            return bool(tuple(value) == default)  # type: ignore[arg-type]
+        except (TypeError, ValueError):
+            return False
+    return (
+        isinstance(value, bool | int | float | str) and type(value) in (type(default), int, float) and value == default
+    )

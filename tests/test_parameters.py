@@ -1,0 +1,188 @@
+"""Parameters live once: defaults and ranges are the compiled part's, and every class with some has the manners."""
+
+import ast
+import copy
+import inspect
+import json
+import math
+import pickle
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, get_args, get_type_hints
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import _core
+from taxel._parameters import Parameters, Value, described
+
+
+def of(kind: type[Parameters]) -> Iterator[type[Parameters]]:
+    for one in kind.__subclasses__():
+        if not inspect.isabstract(one) and "_kind" in vars(one):
+            yield one
+        yield from of(one)
+
+
+#: Every class with parameters.
+KINDS = sorted(set(of(Parameters)), key=lambda kind: kind.__name__)
+#: What has no default, for those that ask for some.
+REQUIRED: dict[str, dict[str, Any]] = {
+    "LevelCrossing": {"levels": [1.0]},
+    "ThresholdIzhikevich": {"levels": [1.0]},
+}
+
+
+def make(kind: type[Parameters], **changes: Any) -> Any:
+    return kind(**{**REQUIRED.get(kind.__name__, {}), **changes})
+
+
+def ranged() -> list[Any]:
+    return [
+        pytest.param(kind, name, id=f"{kind.__name__}.{name}")
+        for kind in KINDS
+        for name in described(kind._kind)["ranges"]
+    ]
+
+
+def test_every_class_with_parameters_is_found():
+    """What is public and has parameters is of the one base."""
+    named = {kind.__name__ for kind in KINDS}
+    assert {"Neuron", "RunningRange", *Encoders} <= named
+
+
+Encoders = {kind.__name__ for kind in taxel.encode.Encoder._by_name.values()}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_signature_shows_what_the_compiled_part_has(kind):
+    """Names and defaults of the constructor, one by one; a group is None, which stands for its defaults."""
+    known = described(kind._kind)
+    shown = {name: entry.default for name, entry in inspect.signature(kind).parameters.items()}
+    assert [name for name, default in shown.items() if default is inspect.Parameter.empty] == known["required"]
+    assert set(shown) - set(known["required"]) == set(known["defaults"])
+    for name, default in known["defaults"].items():
+        wanted = tuple(default) if isinstance(default, list) else None if isinstance(default, dict) else default
+        assert shown[name] == wanted, name
+        assert type(shown[name]) is type(wanted), name
+
+
+@pytest.mark.parametrize(("kind", "name"), ranged())
+def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
+    rules = described(kind._kind)["ranges"][name]
+    wrong = [math.nan]
+    if "least" in rules:
+        wrong.append(rules["least"] - 1 if rules["least_in"] else rules["least"])
+    if "most" in rules:
+        wrong.append(rules["most"] * 2 + 1 if rules["most_in"] else rules["most"])
+    default = described(kind._kind)["defaults"].get(name)
+    for value in wrong:
+        given = int(value) if isinstance(default, int) and math.isfinite(value) else value
+        with pytest.raises(taxel.ProblemError) as error:
+            make(kind, **{name: given})
+        assert name in str(error.value)
+        assert "\n" not in str(error.value)
+        if math.isfinite(value) and not (isinstance(default, int) and value < 0):
+            assert f"must be {rules['must_be']}" in str(error.value)
+
+
+@pytest.mark.parametrize(("kind", "name"), ranged())
+def test_the_documentation_says_the_table_s_range_and_unit(kind, name):
+    rules = described(kind._kind)["ranges"][name]
+    lines = inspect.getdoc(kind).splitlines()
+    said = [line for line in lines if " : " in line and name in line.split(" : ")[0].split(", ")]
+    assert len(said) == 1, f"{name}: must be documented once"
+    wanted = rules["must_be"].removesuffix(" and finite")
+    if "number of us" in wanted:
+        wanted = "whole us"
+    if wanted != "finite":
+        assert wanted.replace(" and ", ", ") in said[0].replace(" and ", ", "), f"{said[0]}: {wanted}"
+    if rules["unit"]:
+        assert f", {rules['unit']}" in said[0].replace("percent", "%"), said[0]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_words_of_a_choice_are_the_compiled_part_s(kind):
+    """A word that is none of those that the type names is refused by a list of just these."""
+    for name, hint in get_type_hints(kind).items():
+        words = [word for part in (hint, *get_args(hint)) for word in get_args(part) if isinstance(word, str)]
+        if not words or name not in inspect.signature(kind).parameters:
+            continue
+        with pytest.raises(taxel.ProblemError, match=name) as error:
+            make(kind, **{name: "nonsense"})
+        listed = str(error.value).split("expected ")[1].split("of ")[-1]
+        assert sorted(listed.replace("`", "").replace(" or ", ", ").split(", ")) == sorted(words)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_parameters_go_round(kind):
+    """`get_params` to a new one, a copy, a pickle; a constructor holds the very objects that it was given."""
+    one = make(kind)
+    again = type(one)(**one.get_params(deep=False))
+    for other in (again, copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+        assert type(other) is type(one)
+        assert (other._json(), repr(other)) == (one._json(), repr(one))
+        assert (other == one) is isinstance(one, Value)
+    for name, value in one.get_params(deep=False).items():
+        assert getattr(again, name) is value
+    assert json.loads(_core.check_parameters(kind._kind, one._json()))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_wrong_value_leaves_all_as_it_was(kind):
+    one = make(kind)
+    before, name = one.get_params(), next(iter(described(kind._kind)["ranges"]))
+    for nonsense in ({name: math.nan}, {name: object()}, {"nonsense": 1}, {f"{name}__nonsense": 1}, {"__": 1}):
+        with pytest.raises(taxel.ProblemError):
+            one.set_params(**nonsense)
+        assert all(held is before[key] for key, held in one.get_params(deep=False).items())
+    with pytest.raises(taxel.ProblemError, match="deep is 2"):
+        one.get_params(deep=2)
+
+
+def test_a_group_that_two_share_is_never_changed():
+    held = taxel.encode.RunningRange(window_s=3.0)
+    one, two = (taxel.encode.LevelCrossing([0.5], running_range=held) for _ in "ab")
+    one.set_params(running_range__window_s=5.0)
+    assert (one.running_range.window_s, two.running_range.window_s, held.window_s) == (5.0, 3.0, 3.0)
+    assert two.running_range is held
+
+
+def test_a_representation_tells_what_differs_from_the_default():
+    assert repr(taxel.Neuron()) == "Neuron()"
+    assert repr(taxel.Neuron(tau=15)) == "Neuron()"
+    assert repr(taxel.Neuron(tau=10.0, time="grid")) == "Neuron(tau=10.0, time='grid')"
+    assert repr(taxel.encode.ContactArea(levels=[2, 4, 8, 16, 32])) == "ContactArea()"
+    assert repr(taxel.encode.ContactArea(levels=np.array([2, 4]))) == "ContactArea(levels=array([2, 4]))"
+
+
+def test_python_types_no_default_of_a_parameter():
+    """A constructor's default is read from the compiled part: `_DEFAULT.tau`, never a number, a word or None."""
+    typed = []
+    for kind in KINDS:
+        path = Path(inspect.getsourcefile(kind))
+        tree = ast.parse(path.read_text())
+        (held,) = [node for node in ast.walk(tree) if isinstance(node, ast.ClassDef) and node.name == kind.__name__]
+        for node in held.body:
+            name = node.target.id if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) else ""
+            if name not in inspect.signature(kind).parameters or node.value is None:
+                continue
+            read = isinstance(node.value, ast.Attribute) and isinstance(node.value.value, ast.Name)
+            if not (read and node.value.attr == name):
+                typed.append(f"{path.name}: {kind.__name__}.{name} = {ast.unparse(node.value)}")
+    assert not typed
+
+
+def test_python_compares_no_parameter_with_a_number():
+    """A range is the compiled part's: no class with parameters compares one of its own with a number."""
+    typed = []
+    for kind in KINDS:
+        path = Path(inspect.getsourcefile(kind))
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Compare):
+                sides = [node.left, *node.comparators]
+                own = any(isinstance(s, ast.Attribute) and s.attr in inspect.signature(kind).parameters for s in sides)
+                if own and any(isinstance(s, ast.Constant) and isinstance(s.value, int | float) for s in sides):
+                    typed.append(f"{path.name}: {ast.unparse(node)}")
+    assert not typed
