@@ -220,7 +220,9 @@ SOUND: dict[str, Sound] = {
         taxel.detect.Recipe.load, recipe="here.toml", changes={"learner.tau": 5.0}, labels=["a"]
     ),
     "taxel.detect.train": plain(taxel.detect.train, examples=[EXAMPLE], recipe=RECIPE, progress=lambda _: None),
-    "taxel.detect.read_labels": plain(taxel.detect.read_labels, path="here_labels.csv"),
+    "taxel.Labels": plain(taxel.Labels, path="here_labels.csv"),
+    "taxel.Labels.named": lambda: (taxel.Labels("here_labels.csv").named, {"recording": "walk.mcap"}),
+    "taxel.Labels.of": lambda: (taxel.Labels("here_labels.csv").of, {"recording": taxel.open("here_events.npz")}),
     "taxel.encode.ChangeEvents": plain(
         taxel.encode.ChangeEvents, noise_floor=3.0, bits=2, previous="last_sent", rounding="floor", period_ms=0.1
     ),
@@ -519,6 +521,7 @@ LEFT_OUT = {
     "taxel.SceneError": "raised, not called",
     "taxel.Clock": "of a recording",
     "taxel.Clock.host_ns": "of a recording",
+    "taxel.Clock.board_us_at": "of a recording",
     "taxel.Datagrams": "of a recording",
     "taxel.Health": "a result",
     "taxel.Note": "of a recording",

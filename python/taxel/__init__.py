@@ -9,6 +9,7 @@ from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.labels import Label, Labels
 from taxel.neuron import Neuron
 from taxel.recording import Clock, Datagrams, Note, Recording
 from taxel.recording import open_recording as open  # noqa: A004  taxel.open is a recording's
@@ -28,6 +29,8 @@ __all__ = [
     "FormatError",
     "Frames",
     "Health",
+    "Label",
+    "Labels",
     "Neuron",
     "Note",
     "ProblemError",

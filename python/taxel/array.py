@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import number, numbers, shown, text, whole
+from taxel._arguments import instance, number, numbers, shown, text, whole
 from taxel._core import ProblemError
 
 __all__ = ["Array"]
@@ -70,6 +70,11 @@ class Array:
         Array(thesis 64x64: 64 rows x 64 columns, 4096 taxels, 2.67 mm apart)
         """
         return cls(64, 64, 2.67, name="thesis 64x64")
+
+    @classmethod
+    def _of(cls, given: object) -> Array:
+        """Return the array that was given; the thesis' where none was."""
+        return cls.thesis() if given is None else instance("array", given, cls)
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from taxel import _core
 from taxel._arguments import flag, instance, numbers, text, whole
 from taxel.array import Array
-from taxel.wire import _THESIS, Registers, _bytes
+from taxel.wire import Registers, _bytes
 
 __all__ = ["NOT_RETURNED", "Board"]
 
@@ -61,7 +61,7 @@ class Board:
         intensity: Literal["value", "difference"] = "value",
         queue: int = 16_384,
     ) -> None:
-        self.array = _THESIS if array is None else instance("array", array, Array)
+        self.array = Array._of(array)
         start = Registers() if registers is None else instance("registers", registers, Registers)
         self._core = _core.WireBoard(
             start._json(),

@@ -22,9 +22,9 @@ from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.tare import Tare
-from taxel.wire import _THESIS, Registers
+from taxel.wire import FRAME_US, Registers
 
-__all__ = ["PORT", "Live", "Said", "Summary", "delays", "heard", "send"]
+__all__ = ["PORT", "Live", "Said", "Summary", "heard", "send"]
 
 #: Where the board's datagrams go (reading: the thesis names no port).
 PORT = 5208
@@ -177,9 +177,9 @@ class Live:
     ) -> None:
         if readout is not None:
             instance("readout", readout, Readout)
-        if array is None:
-            array = readout.array if readout is not None and readout.array is not None else _THESIS
-        self.array = instance("array", array, Array)
+        if array is None and readout is not None:
+            array = readout.array
+        self.array = Array._of(array)
         sizes = {
             "kernel_buffer_bytes": kernel_buffer_bytes,
             "queue_bytes": queue_bytes,
@@ -362,7 +362,7 @@ def send(
     port: int = PORT,
     *,
     each: int = 1,
-    period_us: float = 192.0,
+    period_us: float = FRAME_US,
     seconds: float = 1.0,
     segment: bool = True,
 ) -> dict[str, Any]:
@@ -376,7 +376,7 @@ def send(
     each : int, 1 or more
         How many at a time.
     period_us : float, us
-        From one time to the next; 0 for as fast as it goes.
+        From one time to the next, a frame where it is left out; 0 for as fast as it goes.
     seconds : float, s
     segment : bool
         Hand trains of datagrams to the kernel in one call where it can cut them (`UDP_SEGMENT`).

@@ -144,6 +144,11 @@ class Clock:
         since = np.asarray(board_us, np.int64) - board
         return host + since * 1000 + np.rint(since * drift * 1e-3).astype(np.int64)
 
+    def board_us_at(self, host_ns: int) -> int:
+        """Return the board's time (us) at a time of the host (ns since 1970)."""
+        board, host, drift = self._line
+        return board + round((host_ns - host) / (1000.0 + drift * 1e-3))
+
     @property
     def delay_us(self) -> NDArray[np.float64]:
         """How much later than the quickest each datagram came, us."""

@@ -16,13 +16,10 @@ from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 
-__all__ = ["PRESETS", "Columns", "Command", "Counts", "Decoder", "Registers", "decode", "encode"]
+__all__ = ["FRAME_US", "PRESETS", "Columns", "Command", "Counts", "Decoder", "Registers", "decode", "encode"]
 
 #: The names that `Registers.preset` knows.
 PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
-
-#: The board's own array (thesis, chapter 4): the default of everything here.
-_THESIS = Array(64, 64, pitch_mm=2.67, name="thesis 64x64")
 
 _PAIRINGS = ("direct", "taxel")
 
@@ -242,7 +239,7 @@ class Decoder:
         pairing: Literal["direct", "taxel"] = "direct",
         differences: bool = False,
     ) -> None:
-        self.array = _THESIS if array is None else instance("array", array, Array)
+        self.array = Array._of(array)
         text("pairing", pairing, _PAIRINGS)
         self._core = _core.WireDecoder(self.array._parts(), pairing, flag("differences", differences))
 
@@ -457,10 +454,9 @@ class Registers:
         self._set(json.loads(_core.registers_preset(PRESETS[0])), fields, array)
 
     def _set(self, held: dict[str, Any], fields: dict[str, float], array: Array | None) -> None:
-        sensor = _THESIS if array is None else instance("array", array, Array)
+        self.array = Array._of(array)
         raw = [(name, _raw(name, value)) for name, value in fields.items()]
-        self._held = json.loads(_core.registers_with(json.dumps(held), raw, sensor._parts()))
-        self.array = sensor
+        self._held = json.loads(_core.registers_with(json.dumps(held), raw, self.array._parts()))
 
     @classmethod
     def preset(cls, name: str, *, array: Array | None = None) -> Registers:
@@ -558,3 +554,7 @@ def _raw(name: str, value: object) -> int:
     if _MANUAL.get(name, name) in _FLAGS:
         return int(flag(name, bool(value) if isinstance(value, int) and value in (0, 1) else value))
     return whole(name, value, 0, 2**32 - 1)
+
+
+#: The length of the board's frames at reset, us.
+FRAME_US: float = Registers().frame_us

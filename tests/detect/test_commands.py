@@ -270,10 +270,54 @@ def test_wrong_input_ends_in_one_line(
     assert not Path("readout.json").exists()
 
 
+def test_without_a_tare_the_rest_is_taken_from_before_the_first_label(folder: Path, capsys, tmp_path: Path) -> None:
+    events = taxel.open(folder / "9.npz").events
+    plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0")
+    arguments = ("train", folder / "9.npz", "--labels", folder / "truth.csv", *plan)
+    assert call(capsys, *arguments, "-o", tmp_path / "by_itself.json")[0] == 0
+    first = min(row.t_us for row in taxel.Labels(folder / "truth.csv").rows)
+    taxel.Tare.take(events, stop_us=first - 20_000).save(tmp_path / "tare.json")
+    assert call(capsys, *arguments, "--tare", tmp_path / "tare.json", "-o", tmp_path / "said.json")[0] == 0
+    assert taxel.Readout.load(tmp_path / "by_itself.json") == taxel.Readout.load(tmp_path / "said.json")
+    (tmp_path / "early.csv").write_text(f"label,t_us\ncontact,{events.t[0] + 5000}\nlift,{events.t[0] + 400_000}\n")
+    code, _, error = call(capsys, "train", folder / "9.npz", "--labels", tmp_path / "early.csv", *plan, "-o", "no.json")
+    assert (code, error.count("\n")) == (2, 1)
+    assert "before its first label" in error
+    assert "--tare SECONDS" in error
+
+
+def test_labels_that_lie_outside_are_left_out_and_said(folder: Path, trained: Path, capsys, tmp_path: Path) -> None:
+    late = tmp_path / "late.csv"
+    late.write_text((folder / "truth.csv").read_text() + "contact,3600000000\n")
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--truth")
+    code, out, error = call(capsys, *arguments, late, "--json")
+    assert (code, json.loads(out)["score"]["missed"]) == (0, 0)
+    assert f"1 of the 13 events of {late} lie outside {folder / '9.npz'}" in error
+    late.write_text("label,t_us\ncontact,3600000000\n")
+    assert "none of its 1 events lies within" in call(capsys, *arguments, late)[2]
+
+
+def test_a_name_that_no_recording_has_is_listed(folder: Path, capsys, tmp_path: Path) -> None:
+    labels = tmp_path / "labels.csv"
+    labels.write_text((folder / "labels.csv").read_text().replace("2.npz", "two.npz"))
+    code, _, error = call(capsys, "train", folder / "1.npz", folder / "2.npz", "--labels", labels, "-o", "no.json")
+    assert (code, error.count("\n")) == (2, 1)
+    assert f"names no event in {folder / '2.npz'}; it names 1.npz, 9.npz, two.npz" in error
+
+
+def test_a_label_without_a_neuron_is_an_error(folder: Path, capsys, tmp_path: Path) -> None:
+    labels = tmp_path / "labels.csv"
+    labels.write_text((folder / "labels.csv").read_text() + "1.npz,slip,500000\n")
+    arguments = ("train", folder / "1.npz", folder / "2.npz", "--labels", labels, "--tare", folder / "tare.json")
+    code, _, error = call(capsys, *arguments, "--recipe", folder / "recipe.toml", "-o", "no.json")
+    assert (code, error.count("\n")) == (2, 1)
+    assert "label 'slip' has no neuron: the recipe has 'contact', 'lift'" in error
+
+
 def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:
     table = tmp_path / "labels.csv"
     for text, said in [
-        ("a,b\n", "line 1: a,b; must be recording,label,t_us or label,t_us"),
+        ("a,b\n", "line 1: a,b; must be recording,label,t_us,host_ns"),
         ("label,t_us\nstep,soon\n", "line 2: t_us is 'soon'; must be whole us"),
         ("label,t_us\nstep\n", "line 2: 1 values; must be 2"),
         ("label,t_us\n,5\n", "line 2: must name a label"),
@@ -281,6 +325,4 @@ def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:
     ]:
         table.write_text(text)
         with pytest.raises(taxel.FormatError, match=said.replace("^", r"\^")):
-            taxel.detect.read_labels(table)
-    table.write_text("label,t_us\nb,5\n\na,7\na,-3\n")
-    assert {k: v.tolist() for k, v in taxel.detect.read_labels(table)[""].items()} == {"a": [-3, 7], "b": [5]}
+            taxel.Labels(table)

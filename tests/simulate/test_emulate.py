@@ -5,11 +5,15 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 
+import numpy as np
 import pytest
 
+import taxel
 from taxel import ProblemError, wire
-from taxel.simulate import Silence, emulate, play
+from taxel.demo.script import script
+from taxel.simulate import Silence, emulate, play, truth
 
 
 @pytest.fixture
@@ -97,3 +101,32 @@ def test_the_command_refuses_a_preset_that_is_none():
     assert ended.returncode == 2
     assert ended.stderr.count("\n") == 1
     assert "5.2 kHz" in ended.stderr
+
+
+def test_the_truth_is_written_as_it_happens_by_both_clocks(listener, tmp_path):
+    port, _, hear = listener
+    thread = threading.Thread(target=hear)
+    thread.start()
+    labels = tmp_path / "labels.csv"
+    command = [sys.executable, "-m", "taxel", "emulate", "--port", str(port), "--scenes", "1", "--seed", "3"]
+    began = time.time_ns()
+    process = subprocess.Popen([*command, "--truth", str(labels)], stderr=subprocess.DEVNULL)
+    while process.poll() is None:
+        if labels.exists() and labels.read_text().count("\n") > 1:
+            break
+        time.sleep(0.01)
+    assert process.poll() is None, "a line is there before the end"
+    process.wait(timeout=60)
+    ended = time.time_ns()
+    thread.join()
+    contacts, _ = truth(script(3, 1))
+    rows = taxel.Labels(labels).rows
+    times = sorted([round(c.start_us) for c in contacts] + [round(c.stop_us) for c in contacts])
+    assert [row.t_us for row in rows] == times
+    assert {row.label for row in rows} == {"contact", "lift"}
+    host = [row.host_ns for row in rows]
+    assert began < host[0] < host[-1] < ended
+    np.testing.assert_allclose(np.diff(host), 1000 * np.diff(times), atol=2000)
+    again = subprocess.run([*command, "--truth", str(labels)], capture_output=True, text=True, timeout=60, check=False)
+    assert (again.returncode, again.stdout) == (2, "")
+    assert str(labels) in again.stderr

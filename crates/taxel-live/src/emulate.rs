@@ -12,6 +12,7 @@ use taxel_core::{Array, Stop};
 
 use crate::capture::{SendCounts, Sender};
 use crate::latency::{Latencies, Quantiles};
+use crate::recording::now_ns;
 use crate::{Error, Result};
 use control::Control;
 
@@ -68,6 +69,8 @@ pub struct Report {
     pub late: Quantiles,
     /// Frames that were sent more than a frame late.
     pub late_frames: u64,
+    /// The host's clock at the board's time 0, ns since 1970: in real time all that the board does is due by it.
+    pub began_ns: i64,
     /// Time by the board's clock, s.
     pub board_seconds: f64,
     /// Time by the host's clock, s.
@@ -112,16 +115,18 @@ impl Emulator {
     /// # Errors
     ///
     /// `Socket` where the system refuses to send.
+    #[allow(clippy::cast_possible_truncation)]
     pub fn run(&mut self, touch: &mut dyn Touch, mut watch: impl FnMut(&Report), stop: Stop<'_>) -> Result<Report> {
         let mut ticks = vec![0; self.array.len()];
         let mut late = Latencies::default();
-        let mut report = Report::default();
         let mut schedule = std::mem::take(&mut self.options.commands).into_iter().peekable();
         if self.options.real_time {
             wake_sharply();
         }
-        let begun = Instant::now();
+        let (begun, begun_ns) = (Instant::now(), now_ns());
         let started_us = self.board.time_us();
+        let began_ns = begun_ns - (started_us * 1e3) as i64;
+        let mut report = Report { began_ns, ..Report::default() };
         let mut due = begun;
         let (mut looked, mut told) = (begun, begun);
         while !stop.asked() && touch.frame(&mut ticks) {

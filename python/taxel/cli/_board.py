@@ -33,7 +33,9 @@ def geometry(said: str) -> Array:
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", said)
     if match is None:
         raise ProblemError(f"array is {said!r}: must be rows x columns, as 64x64")
-    return Array(int(match[1]), int(match[2]), pitch_mm=2.67, name=f"thesis {said}" if said == "64x64" else said)
+    thesis = Array.thesis()
+    rows, columns = int(match[1]), int(match[2])
+    return thesis if thesis.shape == (rows, columns) else Array(rows, columns, pitch_mm=thesis.pitch_mm, name=said)
 
 
 #: From so many words outside the array, and from this share of all on, they are no damage: it is another array.

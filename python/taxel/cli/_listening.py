@@ -1,10 +1,10 @@
-"""What `encode`, `train` and `detect` have in common."""
+"""What the commands that work on recordings have in common."""
 
 from __future__ import annotations
 
 import tomllib
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,11 +18,17 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from taxel.encode import Encoder
+    from taxel.labels import Labels
     from taxel.recording import Recording
     from taxel.tare import Tare
 
+#: A rest ends so long before the first label, and lasts so long at least, us.
+_BEFORE_US, _LEAST_REST_US = 20_000, 10_000
+
 TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or so many seconds at the recording's beginning."
-SET_HELP = "A value by dotted key, as KEY=VALUE, where VALUE is TOML; may be said often."
+SET_HELP = (
+    "KEY=VALUE: another value (TOML) of a parameter, by dotted key where it lies within another; may be repeated."
+)
 
 
 def assignments(said: list[str]) -> dict[str, Any]:
@@ -79,25 +85,81 @@ def tare_of(said: str | None, recording: Recording) -> Tare | None:
     return Tare.take(source, stop_us=stop, note=str(recording.path))
 
 
-def reference(said: str | None, recording: Recording, among: int = 1) -> dict[str, NDArray[np.int64]]:
-    """Return a recording's reference events: from a table, or its own notes (a note's text is the label).
+def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
+    """Return the tare of what lies before a recording's first label, or before the board marks its start.
 
-    A table names recordings by path or file name; `among` is how many recordings it is about.
+    A label that a person set may come late, so the rest ends a little earlier.
     """
-    from taxel.detect import read_labels  # noqa: PLC0415  the command line starts quickly
+    from taxel.events import Events  # noqa: PLC0415  the command line starts quickly
+    from taxel.tare import Tare  # noqa: PLC0415
+
+    source = recording.events if recording.has_events else recording.frames()
+    ends = [int(times[0]) - _BEFORE_US for times in labels.values() if len(times)]
+    first = int(source.t[0]) if len(source) else 0
+    if isinstance(source, Events):
+        ends += [t for t, start in source.markers if start and t > first]
+    if not ends or min(ends) - first < _LEAST_REST_US:
+        what = f"only {max(0, min(ends) - first) / 1e3:g} ms before its first label" if ends else "no label"
+        raise ProblemError(
+            f"{recording.path}: holds {what}, from which to take the taxels' rest; give --tare SECONDS or --tare FILE"
+        )
+    return Tare.take(source, stop_us=min(ends), note=str(recording.path))
+
+
+def references(said: str | None, option: str, recordings: Sequence[Recording]) -> list[dict[str, NDArray[np.int64]]]:
+    """Return the reference events of each recording: from a table, or its own notes (a note's text is the label).
+
+    A table names recordings by path, file name or stem; one that it does not name is one in which nothing happened,
+    unless the table also names one that is not there.
+    """
+    from taxel.labels import Labels  # noqa: PLC0415  the command line starts quickly
 
     if said is None or said == "notes":
-        times: dict[str, list[int]] = {}
-        for note in recording.notes:
-            if note.t is not None:
-                times.setdefault(note.text, []).append(note.t)
-        return {label: np.sort(np.array(t, np.int64)) for label, t in times.items()}
-    table = read_labels(said)
-    if "" in table:
-        if among > 1:
-            raise ProblemError(f"{said}: names no recording, and there are {among}; must be recording,label,t_us")
-        return table[""]
-    return next((table[name] for name in (str(recording.path), recording.path.name) if name in table), {})
+        return [_notes(recording) for recording in recordings]
+    table = Labels(said)
+    if len(recordings) > 1 and any(not row.recording for row in table.rows):
+        raise ProblemError(
+            f"{option} {said}: names no recording, and there are {len(recordings)}; must have the column recording"
+        )
+    unnamed = [str(recording.path) for recording in recordings if table.named(recording.path) is None]
+    known = {table.named(recording.path) for recording in recordings}
+    others = [name for name in table.recordings if name not in known]
+    if unnamed and (others or len(unnamed) == len(recordings)):
+        names = f"it names {', '.join(table.recordings)}" if table.rows else "it is empty"
+        raise ProblemError(f"{option} {said}: names no event in {', '.join(unnamed)}; {names}")
+    return [_within(table, recording, option) for recording in recordings]
+
+
+def _notes(recording: Recording) -> dict[str, NDArray[np.int64]]:
+    times: dict[str, list[int]] = {}
+    for note in recording.notes:
+        if note.t is not None:
+            times.setdefault(note.text, []).append(note.t)
+    return {label: np.sort(np.array(t, np.int64)) for label, t in times.items()}
+
+
+def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArray[np.int64]]:
+    """Return the events of a recording that lie within it; what lies outside is left out, and said."""
+    times = recording.events.t if recording.has_events else recording.frames().t
+    if not len(times):
+        raise ProblemError(f"{recording.path}: holds nothing")
+    first, last = int(times.min()), int(times.max())
+    found = table.of(recording)
+    inside = {label: t[(t >= first) & (t <= last + 1_000_000)] for label, t in found.items()}
+    total = sum(map(len, found.values()))
+    lost = total - sum(map(len, inside.values()))
+    span = f"{recording.path} ({first / 1e6:.3f} to {last / 1e6:.3f} s)"
+    if total and lost == total:
+        raise ProblemError(f"{option} {table.path}: none of its {total} events lies within {span}")
+    if recording.clock is None and any(row.host_ns is not None for row in table.rows):
+        warnings.warn(
+            f"a .{recording.kind} keeps no arrival times, so host_ns cannot settle by how many turns of the board's "
+            f"clock (6.5536 s) {table.path} is ahead of it: times are taken as they are",
+            stacklevel=2,
+        )
+    if lost:
+        warnings.warn(f"{lost} of the {total} events of {table.path} lie outside {span}: left out", stacklevel=2)
+    return inside
 
 
 @contextmanager

@@ -10,7 +10,7 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import TARE_HELP, open_recording, reference, tare_of, told
+from taxel.cli._listening import TARE_HELP, open_recording, references, tare_of, told
 
 __all__ = ["detect"]
 
@@ -42,10 +42,10 @@ def detect(
 
     loaded = Readout.load(readout)
     opened = open_recording(recording)
-    events = None if truth is None else reference(truth, opened)
-    if events is not None and not events:
-        raise ProblemError(f"--truth {truth}: names no event in {recording}")
     with told(as_json) as tell:
+        events = None if truth is None else references(truth, "--truth", [opened])[0]
+        if events is not None and not events:
+            raise ProblemError(f"--truth {truth}: names no event in {recording}")
         tell(f"reading {recording}")
         found = run(loaded, opened, frame_us=frame_us, tare=tare_of(tare, opened))
     scored = None

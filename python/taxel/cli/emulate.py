@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import json
 import secrets
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Self
 
 import typer
 from rich.console import Console
@@ -14,7 +17,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED, script
-from taxel.simulate import EmulatorReport, truth
+from taxel.simulate import Contact, EmulatorReport, truth
 from taxel.simulate import emulate as run
 
 __all__ = ["emulate"]
@@ -34,14 +37,20 @@ def emulate(
         int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")
     ] = None,
     rest: Annotated[bool, typer.Option("--rest", help="Nobody catches the ball.")] = False,
+    labels: Annotated[
+        Path | None,
+        typer.Option("--truth", help="Write what really happens when to this CSV, label,t_us,host_ns, as it happens."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the CSV where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False,
 ) -> None:
     """Play scenes on an emulated board of 64 x 64 taxels that sends its events by UDP, in real time.
 
     A ball is dropped on foam, caught in flight, pressed by hand and lifted. The board arms after its first frame, is
-    tared with a noise floor of 0, then takes the preset's floor and marks the start.
+    tared with a noise floor of 0, then takes the preset's floor and marks the start. --truth is what taxel train learns
+    from: contact and lift, by the board's clock (t_us) and by this machine's (host_ns).
 
-    Example: taxel emulate --port 5208 --scenes 5 --seed 1
+    Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
     if not 1 <= port <= 65_535:
         raise ProblemError(f"port is {port}: must be 1 to 65535")
@@ -56,7 +65,7 @@ def emulate(
         TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}"), TimeRemainingColumn(),
         console=console, transient=True, disable=as_json,
     )  # fmt: skip
-    with bar:
+    with bar, _Diary(labels, contacts, overwrite) as diary:
         task = bar.add_task("playing", total=len(force), said="")
 
         def begun(address: str | None) -> None:
@@ -64,6 +73,7 @@ def emulate(
                 console.print(f"commands are taken at {address}")
 
         def watch(report: EmulatorReport) -> None:
+            diary.write(report)
             late = report.late_us["p99"]
             bar.update(task, completed=report.frames, said=f"{report.changes} events, frames late p99 {late:.0f} us")
 
@@ -78,6 +88,9 @@ def emulate(
             begun=begun,
             watch=watch,
         )
+        diary.write(report)
+    if labels is not None:
+        console.print(f"truth: {labels}", soft_wrap=True)
     if as_json:
         said = {"seed": seed, "scenes": scenes, "preset": preset, "held": report.held, "verdict": report.verdict}
         said |= {"wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
@@ -85,3 +98,32 @@ def emulate(
     else:
         typer.echo(f"{report.changes} events in {report.datagrams} datagrams, {report.bytes} bytes")
         typer.echo(report.verdict)
+
+
+class _Diary:
+    """Write what happens to a CSV, a line when it has happened."""
+
+    def __init__(self, path: Path | None, contacts: Sequence[Contact], overwrite: bool) -> None:
+        happenings = [(c.start_us, "contact") for c in contacts] + [(c.stop_us, "lift") for c in contacts]
+        self._left = deque(sorted(happenings))
+        # Written as it goes, so not whole or not at all: what was written before Ctrl-C is what happened before it.
+        self._file = None if path is None else path.open("w" if overwrite else "x", encoding="utf-8")
+        self._put("label,t_us,host_ns")
+
+    def write(self, report: EmulatorReport) -> None:
+        """Write what has happened by the board's time."""
+        while self._left and self._left[0][0] <= 1e6 * report.board_seconds:
+            t, label = self._left.popleft()
+            self._put(f"{label},{round(t)},{report.began_ns + round(1e3 * t)}")
+
+    def _put(self, line: str) -> None:
+        if self._file is not None:
+            self._file.write(f"{line}\n")
+            self._file.flush()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._file is not None:
+            self._file.close()

@@ -9,8 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
-from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._listening import SET_HELP, assignments
 from taxel.studies import STUDIES, load
 
 studies = typer.Typer(help="Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.")
@@ -24,9 +24,7 @@ Scheduler = Annotated[
 Report = Annotated[Path, typer.Option(help="Folder for the page, pictures and all results; resumes what is in it.")]
 Size = Annotated[str, typer.Option(help="full, or toy (shows that it runs); some studies have more.")]
 Realisations = Annotated[int | None, typer.Option(help="How many, instead of the size's.")]
-Changes = Annotated[
-    list[str] | None, typer.Option("--set", help="NAME=VALUE: another value (JSON) of a parameter; may be repeated.")
-]
+Changes = Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)]
 Data = Annotated[
     Path | None, typer.Option(help="Folder of recordings, for the studies that need some (or TAXEL_DATA names it).")
 ]
@@ -141,16 +139,7 @@ def _data(data: Path | None) -> Path | None:
 
 
 def _changes(said: list[str], realisations: int | None) -> dict[str, Any]:
-    changes: dict[str, Any] = {} if realisations is None else {"realisations": realisations}
-    for text in said:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise ProblemError(f"--set {text}: must be NAME=VALUE")
-        try:
-            changes[name] = json.loads(value)
-        except ValueError:
-            changes[name] = value
-    return changes
+    return ({} if realisations is None else {"realisations": realisations}) | assignments(said)
 
 
 def _tell(section: dict[str, Any]) -> None:

@@ -10,7 +10,16 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import SET_HELP, TARE_HELP, assignments, open_recording, reference, tare_of, told
+from taxel.cli._listening import (
+    SET_HELP,
+    TARE_HELP,
+    assignments,
+    open_recording,
+    references,
+    tare_before,
+    tare_of,
+    told,
+)
 
 __all__ = ["train"]
 
@@ -31,7 +40,7 @@ def train(
     ] = None,
     encoder: Annotated[str | None, typer.Option(help="The encoder's name, short for --set encoder.name=NAME.")] = None,
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
+    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Left out: what lies before the first label.")] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="Where the readout goes.")] = Path("readout.json"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the readout where it exists.")] = False,
     window_ms: Annotated[float, typer.Option(help="Of the score on the training recordings themselves.")] = 50.0,
@@ -61,18 +70,23 @@ def train(
         plan = Recipe.from_dict(changed({}, changes))
     opened = [open_recording(path) for path in recordings]
     with told(as_json) as tell:
-        examples = []
-        for one in opened:
-            tell(f"reading {one.path}")
-            source = one.events if one.has_events else one.frames()
-            examples.append(Example(source, reference(labels, one, len(opened)), tare_of(tare, one)))
-        if not any(example.labels for example in examples):
+        tell("reading")
+        happened = references(labels, "--labels", opened)
+        if not any(happened):
             raise ProblemError(f"--labels {labels}: names no event in {', '.join(str(one.path) for one in opened)}")
+        sources = [one.events if one.has_events else one.frames() for one in opened]
         if recipe is None and "encoder.name" not in changes:
-            recipe = recipes.fitting(examples[0].source)
+            recipe = recipes.fitting(sources[0])
         if recipe is not None:
-            plan = Recipe.load(recipe, changes, sorted({label for example in examples for label in example.labels}))
+            plan = Recipe.load(recipe, changes, sorted({label for events in happened for label in events}))
             tell(f"starting from the recipe {recipe}")
+        # An encoder that has a tare needs one.
+        rested = tare is not None or getattr(plan.encoder, "tare", True) is not None
+        tares = [
+            tare_of(tare, one) if rested else tare_before(events, one)
+            for one, events in zip(opened, happened, strict=True)
+        ]
+        examples = [Example(*parts) for parts in zip(sources, happened, tares, strict=True)]
         readout = train_readout(examples, plan, progress=tell)
         scores = []
         for one, example in zip(opened, examples, strict=True):

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from taxel._core import ProblemError
+from taxel.array import Array
 from taxel.formats import plate
 from taxel.formats.trial import Trial
 from taxel.simulate import Act, Pictures, Silence
@@ -19,8 +20,8 @@ __all__ = ["NOTE", "footfalls"]
 #: Of each person, how many footfalls are played.
 _EACH = 2
 
-#: The array; how much of it a footprint may fill; the peak as a share of the way from rest to the ramp's end.
-_ROWS, _PITCH_MM, _FILL_MM, _PEAK = 64, 2.67, 150.0, 0.8
+#: How much of the array a footprint may fill; the peak as a share of the way from rest to the ramp's end.
+_FILL_MM, _PEAK = 150.0, 0.8
 
 NOTE = (
     f"Footfalls of a pressure plate, laid over the array and heard by the same readout, which never heard one in "
@@ -56,11 +57,12 @@ def _shrunk(trial: Trial) -> NDArray[np.float32]:
     size = np.array([(bottom - top + 1) * plate.ROW_MM, (right - left + 1) * plate.COLUMN_MM])
     scale = max(1.0, float(size.max()) / _FILL_MM)
     # Where each taxel lies on the plate, in its rows and columns; the footprint's middle on the array's.
-    away = (np.arange(_ROWS) - (_ROWS - 1) / 2) * _PITCH_MM * scale
+    array = Array.thesis()
+    away = (np.arange(array.rows) - (array.rows - 1) / 2) * array.pitch_mm * scale
     rows = (top + bottom) / 2 + away / plate.ROW_MM
     columns = (left + right) / 2 + away / plate.COLUMN_MM
     places = np.meshgrid(rows, columns, indexing="ij")
-    pictures = np.zeros((len(values) + 2, _ROWS, _ROWS), np.float32)
+    pictures = np.zeros((len(values) + 2, *array.shape), np.float32)
     for k, picture in enumerate(values):
         pictures[k + 1] = map_coordinates(picture, places, order=1, mode="constant")
     return pictures * np.float32(_PEAK / pictures.max())

@@ -16,11 +16,9 @@ from taxel.events import Events
 from taxel.simulate import Act, Contact, play, truth
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
+from taxel.wire import FRAME_US
 
-__all__ = ["FRAME_US", "Hearing", "hear", "listen"]
-
-#: A frame of the 5.2 kHz preset.
-FRAME_US = 192.0
+__all__ = ["Hearing", "hear", "listen"]
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from taxel.demo.hearing import FRAME_US, Hearing
+from taxel.demo.hearing import Hearing
 from taxel.demo.judging import LABELS, Judged
 from taxel.events import Events
 from taxel.simulate import Contact
+from taxel.wire import FRAME_US
 
 __all__ = ["STYLE", "close_up", "delay_split", "delays_by_class", "maps", "noise", "rates", "scene_picture", "svg"]
 

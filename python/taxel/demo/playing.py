@@ -13,11 +13,12 @@ from typing import Any, Protocol
 
 import taxel
 from taxel._core import DeviceError
-from taxel.demo.hearing import FRAME_US, Hearing, listen
+from taxel.demo.hearing import Hearing, listen
 from taxel.demo.script import script
 from taxel.detect import Readout, run
 from taxel.live import Live, Said, heard
 from taxel.simulate import Contact, truth
+from taxel.wire import FRAME_US
 
 __all__ = ["Playing", "Screen", "play_live"]
 

@@ -19,9 +19,10 @@ from markupsafe import Markup
 
 import taxel
 from taxel.demo import pictures
-from taxel.demo.hearing import FRAME_US, Hearing
+from taxel.demo.hearing import Hearing
 from taxel.demo.judging import GOALS, LABELS, Judged, Row
 from taxel.live import delays
+from taxel.wire import FRAME_US
 
 __all__ = ["GUESSES", "Material", "figures", "write"]
 

@@ -16,11 +16,12 @@ from taxel.learn import ConeR
 from taxel.simulate import Contact, play, truth
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
+from taxel.wire import FRAME_US
 
 __all__ = ["train"]
 
-#: One frame of the 5.2 kHz preset, ms: the step of silent rows and of the neuron's grid.
-_FRAME_MS = 0.192
+#: One frame, ms: the step of silent rows and of the neuron's grid.
+_FRAME_MS = FRAME_US / 1e3
 
 #: How much later than the event each neuron is trained to fire, ms.
 _DELAY_MS = {"contact": 0.2, "lift": 0.5}

@@ -3,7 +3,7 @@
 from taxel.detect.readout import Learner, Readout, ReadoutStream, run
 from taxel.detect.scoring import Score, Spread, score
 from taxel.detect.trained import TrainedNeuron
-from taxel.detect.training import Example, Recipe, read_labels, train
+from taxel.detect.training import Example, Recipe, train
 
 __all__ = [
     "Example",
@@ -14,7 +14,6 @@ __all__ = [
     "Score",
     "Spread",
     "TrainedNeuron",
-    "read_labels",
     "run",
     "score",
     "train",

@@ -26,11 +26,9 @@ from taxel.frames import Frames
 from taxel.neuron import Neuron
 from taxel.recording import Recording
 from taxel.tare import Tare
+from taxel.wire import FRAME_US
 
 __all__ = ["Learner", "Readout", "ReadoutStream", "run"]
-
-#: The length of the board's frames at reset, us (its 5.2 kHz preset).
-FRAME_US = 192.0
 
 
 class Learner(Protocol):

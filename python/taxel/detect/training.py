@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import inspect
 import json
 import os
@@ -14,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._arguments import callback, column, instance, number, parameters, several, shown, text
-from taxel._arguments import path as checked_path
-from taxel._core import FormatError, ProblemError
+from taxel._core import ProblemError
 from taxel.detect import recipes
 from taxel.detect.readout import Readout
 from taxel.encode import Encoder
@@ -25,7 +23,7 @@ from taxel.learn import ConeR
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
-__all__ = ["Example", "Recipe", "read_labels", "train"]
+__all__ = ["Example", "Recipe", "train"]
 
 
 #: How long after its last event something may still happen in an example, ms: a readout listens as long.
@@ -223,6 +221,11 @@ def train(
     wanted = tuple(recipe.neurons) or tuple(sorted({label for example in examples for label in example.labels}))
     if not wanted:
         raise ProblemError("no label in any example: there is nothing to learn")
+    for label in {label for example in examples for label in example.labels} - set(wanted):
+        raise ProblemError(
+            f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, wanted))}; "
+            f"give it [neurons.{label}], or leave it out of the labels"
+        )
     arrays = [example.source.array for example in examples]
     for k, array in enumerate(arrays):
         if array != arrays[0]:
@@ -254,49 +257,6 @@ def train(
     return Readout(
         recipe.encoder, learners, array=arrays[0], delay_ms=delays, run_threshold=float(recipe.run_threshold)
     )
-
-
-def read_labels(path: str | os.PathLike[str]) -> dict[str, dict[str, NDArray[np.int64]]]:
-    """Read reference events: a table ``recording,label,t_us``, or ``label,t_us`` where it is of one recording.
-
-    Returns
-    -------
-    dict of recording to dict of label to int64, us, ascending
-        The recording is "" where the table does not name it.
-
-    Raises
-    ------
-    FormatError : another header, or a value that makes no sense (names the line)
-    FileNotFoundError : no such file
-    """
-    place = checked_path("path", path)
-    found: dict[str, dict[str, list[int]]] = {}
-    try:
-        with open(place, newline="", encoding="utf-8-sig") as file:
-            table = csv.reader(file)
-            header = [name.strip() for name in next(table, [])]
-            if header not in (["recording", "label", "t_us"], ["label", "t_us"]):
-                said = ",".join(header) or "nothing"
-                raise FormatError(f"{place}, line 1: {said}; must be recording,label,t_us or label,t_us")
-            for row in table:
-                if not row:
-                    continue
-                if len(row) != len(header):
-                    raise FormatError(f"{place}, line {table.line_num}: {len(row)} values; must be {len(header)}")
-                *recording, label, t = (cell.strip() for cell in row)
-                try:
-                    time = int(t)
-                except ValueError:
-                    raise FormatError(f"{place}, line {table.line_num}: t_us is {shown(t)}; must be whole us") from None
-                if not label or not -(2**52) <= time <= 2**52:
-                    raise FormatError(f"{place}, line {table.line_num}: must name a label, and a time within 2^52 us")
-                found.setdefault("".join(recording), {}).setdefault(label, []).append(time)
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise FormatError(f"{place}: not a table of text: {error}") from None
-    return {
-        recording: {label: np.sort(np.array(times, np.int64)) for label, times in labels.items()}
-        for recording, labels in found.items()
-    }
 
 
 def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import flag, instance, number, numbers, parameters, shown, whole
+from taxel._arguments import flag, number, numbers, parameters, shown, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -97,7 +97,7 @@ class Scene:
         array : Array, optional
             The thesis' 64 x 64 taxels where it is left out.
         """
-        parts = _thesis(array)._parts()
+        parts = Array._of(array)._parts()
         seed, index = whole("seed", seed, 0), whole("index", index, 0, 1_000_000)
         return cls(json.loads(_core.draw_scene(parts, seed, index, flag("left_to_rest", left_to_rest))))
 
@@ -165,8 +165,3 @@ class Pictures:
 
 
 Act = Silence | Scene | Pictures
-
-
-def _thesis(array: Array | None) -> Array:
-    """Return the array, or the thesis' where there is none."""
-    return Array(64, 64, pitch_mm=2.67, name="thesis 64x64") if array is None else instance("array", array, Array)

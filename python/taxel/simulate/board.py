@@ -15,7 +15,7 @@ from taxel._arguments import callback, mapping, number, parameters, several, sho
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
-from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence, _thesis
+from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence
 
 __all__ = ["EmulatorReport", "Played", "emulate", "play", "truth"]
 
@@ -38,6 +38,8 @@ class EmulatorReport:
     """What an emulated board has done so far."""
 
     frames: int
+    began_ns: int
+    """The host's clock at the board's time 0, ns since 1970: what the board does is due by it."""
     board_seconds: float
     """By the board's own clock."""
     seconds: float
@@ -87,6 +89,7 @@ class EmulatorReport:
         board, sent, late = report["board"], report["sent"], report["late"]
         return cls(
             frames=board["frames"],
+            began_ns=report["began_ns"],
             board_seconds=report["board_seconds"],
             seconds=report["seconds"],
             changes=board["changes"],
@@ -121,7 +124,7 @@ def truth(
     >>> round(contacts[0].start_us), float(force[:520].max())
     (427782, 0.0)
     """
-    contacts, force = _core.truth(_thesis(array)._parts(), text("preset", preset), _parts(acts, _thesis(array)))
+    contacts, force = _core.truth(Array._of(array)._parts(), text("preset", preset), _parts(acts, Array._of(array)))
     return [Contact(*contact) for contact in contacts], force
 
 
@@ -166,9 +169,9 @@ def play(
     >>> played.events.markers
     ((50300, True), (59900, False))
     """
-    parts = _parts(acts, _thesis(array))
+    parts = _parts(acts, Array._of(array))
     events, datagrams, words = _core.play(
-        _thesis(array)._parts(),
+        Array._of(array)._parts(),
         text("preset", preset),
         parameters({} if sensor is None else mapping("sensor", sensor)),
         whole("seed", seed, 0),
@@ -217,11 +220,11 @@ def emulate(
     """
     report = _core.emulate(
         text("to", to),
-        _thesis(array)._parts(),
+        Array._of(array)._parts(),
         text("preset", preset),
         parameters({} if sensor is None else mapping("sensor", sensor)),
         whole("seed", seed, 0),
-        _parts(acts, _thesis(array)),
+        _parts(acts, Array._of(array)),
         number("tare_ms", tare_ms),
         None if control is None else text("control", control),
         callback("begun", begun),

@@ -34,5 +34,5 @@ def write_page(report: Path) -> Path:
         loader=jinja2.PackageLoader("taxel.studies", "."), autoescape=True, undefined=jinja2.StrictUndefined
     )
     sections = {name: read_section(report / name) for name in STUDIES}
-    text = environment.get_template("page.html.jinja").render(titles=STUDIES, sections=sections)
+    text = environment.get_template("page.html.j2").render(titles=STUDIES, sections=sections)
     return write_whole(report / "index.html", lambda file: file.write(text.encode()), overwrite=True)

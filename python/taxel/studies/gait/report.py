@@ -221,7 +221,7 @@ def write_report(folder: Path, said: dict[str, Any]) -> None:
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("taxel.studies.gait", "."), autoescape=True, undefined=jinja2.StrictUndefined
     )
-    page = environment.get_template("gait.html.jinja").render(study=said, events=EVENTS)
+    page = environment.get_template("gait.html.j2").render(study=said, events=EVENTS)
     for name, text in (("gait.json", json.dumps(said, indent=1) + "\n"), ("gait.html", page)):
         part = folder / f"{name}.part"
         part.write_text(text, encoding="utf-8")

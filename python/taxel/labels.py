@@ -1,0 +1,171 @@
+"""Reference events: what really happened when, as a table that a person or `taxel emulate --truth` wrote."""
+
+from __future__ import annotations
+
+import csv
+import os
+from pathlib import Path
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._arguments import path as checked_path
+from taxel._arguments import shown
+from taxel._core import FormatError, ProblemError
+
+__all__ = ["Label", "Labels"]
+
+#: A whole turn of the board's 16-bit clock of 100 us, us.
+TURN_US = 6_553_600
+
+#: Columns of a table; those in brackets may be absent.
+_WANTED, _OTHERS = ("label", "t_us"), ("recording", "host_ns")
+
+
+class Label(NamedTuple):
+    """Say what happened when.
+
+    Attributes
+    ----------
+    recording : str
+        Path, name or stem of the file in which it is; "" where the table is about one recording.
+    label : str
+    t_us : int, us
+        By the board's clock.
+    host_ns : int or None, ns since 1970
+        By the host's.
+    """
+
+    recording: str
+    label: str
+    t_us: int
+    host_ns: int | None = None
+
+
+class _Clock(Protocol):
+    @property
+    def board_us(self) -> NDArray[np.int64]: ...
+
+    def board_us_at(self, host_ns: int) -> int: ...
+
+
+@runtime_checkable
+class _Recorded(Protocol):
+    """What a `taxel.Recording` has that matters here."""
+
+    @property
+    def path(self) -> Path: ...
+
+    @property
+    def clock(self) -> _Clock | None: ...
+
+
+class Labels:
+    r"""Hold reference events of one recording or several, read from a table.
+
+    Parameters
+    ----------
+    path : path
+        A CSV ``recording,label,t_us,host_ns``, its columns in any order; `recording` and `host_ns` may be absent.
+
+    Attributes
+    ----------
+    path : Path
+    rows : tuple of Label
+
+    Raises
+    ------
+    FormatError : another header, or a value that makes no sense (names the line)
+    FileNotFoundError : no such file
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> place = Path(tempfile.mkdtemp()) / "labels.csv"
+    >>> _ = place.write_text("recording,label,t_us\nwalk,contact,400\nwalk,lift,900\nrun,contact,100\n")
+    >>> labels = Labels(place)
+    >>> labels.recordings
+    ('run', 'walk')
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        place = checked_path("path", path)
+        try:
+            with open(place, newline="", encoding="utf-8-sig") as file:
+                table = csv.reader(file)
+                header = [name.strip() for name in next(table, [])]
+                known = {*_WANTED, *_OTHERS}
+                if not set(_WANTED) <= set(header) <= known or len(set(header)) < len(header):
+                    said = ",".join(header) or "nothing"
+                    raise FormatError(f"{place}, line 1: {said}; must be recording,label,t_us,host_ns or some of them")
+                rows = [_row(f"{place}, line {table.line_num}", header, cells) for cells in table if cells]
+        except (UnicodeDecodeError, csv.Error) as error:
+            raise FormatError(f"{place}: not a table of text: {error}") from None
+        self.path, self.rows = Path(place), tuple(rows)
+
+    @property
+    def recordings(self) -> tuple[str, ...]:
+        """The names of the recordings, in order; none where it is about one."""
+        return tuple(sorted({row.recording for row in self.rows} - {""}))
+
+    def named(self, recording: str | os.PathLike[str]) -> str | None:
+        """Return as what the table names a recording: by its path, its name or its stem; None where it does not."""
+        place = Path(checked_path("recording", recording))
+        names = {row.recording for row in self.rows}
+        return next((name for name in ("", str(recording), place.name, place.stem) if name in names), None)
+
+    def of(self, recording: _Recorded) -> dict[str, NDArray[np.int64]]:
+        """Return the events of a `taxel.Recording` by label, us on its own clock; none where it is not named.
+
+        A recording that began in mid-stream counts from its first stamp, which is whole turns of the board's clock
+        (6.5536 s) behind the board. Where both know the host's time, that settles how many.
+
+        Raises
+        ------
+        ProblemError : events whose host's time and board's time do not fit this recording
+        """
+        if not isinstance(recording, _Recorded):
+            raise ProblemError(f"recording is {shown(recording)}: must be a taxel.Recording")
+        name = self.named(recording.path)
+        found: dict[str, list[int]] = {}
+        for row in self.rows if name is not None else ():
+            if row.recording == name:
+                found.setdefault(row.label, []).append(row.t_us - self._turns(row, recording) * TURN_US)
+        return {label: np.sort(np.array(times, np.int64)) for label, times in found.items()}
+
+    def _turns(self, row: Label, recording: _Recorded) -> int:
+        """Return by how many turns of its clock the board is ahead of a recording's own time."""
+        clock = recording.clock
+        if row.host_ns is None or clock is None or not len(clock.board_us):
+            return 0
+        turns = (row.t_us - clock.board_us_at(row.host_ns)) / TURN_US
+        if abs(turns - round(turns)) > 0.25:
+            raise ProblemError(
+                f"{self.path}: {row.label} at {row.t_us} us and {row.host_ns} ns is of another run than "
+                f"{recording.path}: board's and host's time do not fit together"
+            )
+        return round(turns)
+
+    def __repr__(self) -> str:
+        return f"Labels({len(self.rows)} events of {', '.join(self.recordings) or 'one recording'}, {self.path})"
+
+
+def _row(place: str, header: list[str], cells: list[str]) -> Label:
+    if len(cells) != len(header):
+        raise FormatError(f"{place}: {len(cells)} values; must be {len(header)}")
+    values = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
+    times: dict[str, int] = {}
+    for name in ("t_us", "host_ns"):
+        said = values.get(name, "")
+        if not said and name == "host_ns":
+            continue
+        try:
+            times[name] = int(said)
+        except ValueError:
+            raise FormatError(f"{place}: {name} is {shown(said)}; must be whole {name[-2:]}") from None
+    if not values["label"] or not -(2**52) <= times["t_us"] <= 2**52:
+        raise FormatError(f"{place}: must name a label, and a time within 2^52 us")
+    if not 0 <= times.get("host_ns", 0) < 2**63:
+        raise FormatError(f"{place}: host_ns must be ns since 1970")
+    return Label(values.get("recording", ""), values["label"], times["t_us"], times.get("host_ns"))

@@ -1,0 +1,82 @@
+"""Reference events find their recording, and its own clock."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import _core
+from taxel.labels import TURN_US
+
+ARRAY = {"rows": 64, "columns": 64, "pitch_mm": 2.67, "name": "thesis 64x64"}
+BEGAN_NS = 1_700_000_000_000_000_000
+
+
+def record(path: Path, begins_us: int, seconds: float = 20.0) -> taxel.Recording:
+    """Write what a host hears from `begins_us` on of a board whose time 0 was at BEGAN_NS: a change each 10 ms."""
+    writer = _core.RecordingWriter(path, json.dumps({"array": ARRAY}), "none", True)
+    t = np.arange(begins_us, begins_us + int(seconds * 1e6), 10_000)
+    for k, one in enumerate(t.tolist()):
+        event = taxel.Events([one], [1], [2], [True], array=taxel.Array.thesis(), intensity=[40 + k % 2])
+        late_ns = 40_000 + 1_000 * (k % 7)
+        writer.datagram(BEGAN_NS + one * 1000 + late_ns, k, taxel.wire.encode(event))
+    writer.finish("{}")
+    return taxel.open(path)
+
+
+def table(path: Path, times: list[int], *, host: bool) -> taxel.Labels:
+    rows = [f"tick,{t}" + f",{BEGAN_NS + 1000 * t}" * host for t in times]
+    path.write_text("\n".join(["label,t_us" + ",host_ns" * host, *rows]) + "\n")
+    return taxel.Labels(path)
+
+
+@pytest.mark.parametrize("begins_us", [0, 2_000_000, 6_553_500, 7_000_000, 40_000_000, 3_600_000_000])
+def test_host_time_settles_how_many_turns_a_recording_is_behind_the_board(tmp_path: Path, begins_us: int) -> None:
+    recording = record(tmp_path / "walk.mcap", begins_us)
+    happened = [begins_us + offset for offset in (0, 10_000, 6_550_000, 13_110_000, 19_990_000)]
+    found = table(tmp_path / "labels.csv", happened, host=True).of(recording)["tick"]
+    assert set(found.tolist()) <= set(recording.events.t.tolist())
+    assert found[0] == recording.events.t[0] == begins_us % TURN_US
+    np.testing.assert_array_equal(np.diff(found), np.diff(happened))
+
+
+def test_without_host_time_times_are_taken_as_they_are(tmp_path: Path) -> None:
+    recording = record(tmp_path / "walk.mcap", 40_000_000)
+    assert table(tmp_path / "labels.csv", [5, 40_000_000], host=False).of(recording)["tick"].tolist() == [5, 40_000_000]
+
+
+def test_labels_of_another_run_are_refused(tmp_path: Path) -> None:
+    recording = record(tmp_path / "walk.mcap", 0, 2.0)
+    (tmp_path / "labels.csv").write_text(f"label,t_us,host_ns\ntick,100000,{BEGAN_NS + 3_000_000_000}\n")
+    with pytest.raises(taxel.ProblemError, match="is of another run than"):
+        taxel.Labels(tmp_path / "labels.csv").of(recording)
+
+
+def test_a_table_names_recordings_by_path_name_or_stem(tmp_path: Path) -> None:
+    place = tmp_path / "labels.csv"
+    place.write_text("t_us, label ,recording\n5,a,walk\n7,b,run.mcap\n9,c,/data/far.mcap\n3,a,walk\n")
+    labels = taxel.Labels(place)
+    assert labels.recordings == ("/data/far.mcap", "run.mcap", "walk")
+    assert labels.named("some/walk.mcap") == "walk"
+    assert labels.named("some/run.mcap") == "run.mcap"
+    assert labels.named("/data/far.mcap") == "/data/far.mcap"
+    assert labels.named("other.mcap") is None
+    assert labels.of(record(tmp_path / "walk.mcap", 0, 0.1))["a"].tolist() == [3, 5]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("label,t_us,host_ns\na,5,soon\n", "line 2: host_ns is 'soon'; must be whole ns"),
+        ("label,t_us,host_ns\na,5,-1\n", "line 2: host_ns must be ns since 1970"),
+        ("label,t_us,t_us\na,5,5\n", "line 1: label,t_us,t_us; must be recording,label,t_us,host_ns or some of them"),
+        ("label,host_ns\na,5\n", "line 1: label,host_ns; must be"),
+    ],
+)
+def test_a_table_that_makes_no_sense_is_named(tmp_path: Path, text: str, said: str) -> None:
+    place = tmp_path / "labels.csv"
+    place.write_text(text)
+    with pytest.raises(taxel.FormatError, match=said):
+        taxel.Labels(place)
