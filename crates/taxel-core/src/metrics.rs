@@ -28,9 +28,10 @@ pub use van_rossum::{Normalisation, VanRossum};
 pub use van_rossum_absolute::VanRossumAbsolute;
 pub use van_rossum_spatial::{OwnTrain, Smoothing, VanRossumSpatial};
 pub use van_rossum_spatial_absolute::VanRossumSpatialAbsolute;
-pub use victor_purpura::{Vectors, VictorPurpura};
+pub use victor_purpura::VictorPurpura;
 pub use victor_purpura_multi_unit::VictorPurpuraMultiUnit;
 
+use crate::vectors::Instructions;
 use crate::{Result, Stop, problem};
 use pairwise::Matrix;
 
@@ -93,7 +94,9 @@ impl Metric {
         let ready = self.prepare(a, b)?;
         let matrix = Matrix::new(a.count, b.map(|b| b.count));
         match &ready {
-            Ready::VictorPurpura(m) if m.has_reach() && work.vectors != Vectors::None => m.fill(&matrix, a, b, work)?,
+            Ready::VictorPurpura(m) if m.has_reach() && work.instructions != Instructions::Plain => {
+                m.fill(&matrix, a, b, work)?
+            }
             Ready::VanRossum(m) => m.fill(&matrix, a, b, work)?,
             Ready::VanRossumSpatial(m, kernel) => m.fill(kernel, &matrix, a, b, work)?,
             _ => matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?,

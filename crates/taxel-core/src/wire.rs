@@ -9,6 +9,6 @@ pub mod registers;
 pub mod v1;
 
 pub use command::{Command, CommandReader};
-pub use decoder::{Counts, Decoder, Filled, Instructions, Pairing, Room};
+pub use decoder::{Counts, Decoder, Filled, Pairing, Room};
 pub use registers::{Refusal, Registers};
 pub use v1::{STAMP_US, WORD_BYTES, Word, decode, encode};

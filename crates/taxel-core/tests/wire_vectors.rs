@@ -1,7 +1,8 @@
 //! The shared vectors of the wire: every implementation gives each file the meaning that its JSON says.
 
 use serde::Deserialize;
-use taxel_core::wire::{Counts, Decoder, Instructions, Pairing};
+use taxel_core::vectors::Instructions;
+use taxel_core::wire::{Counts, Decoder, Pairing};
 use taxel_core::{Array, Events};
 
 type Row = (i64, u16, u16, bool, Option<u16>);

@@ -32,7 +32,7 @@ const EMPTY_FOR: Duration = Duration::from_millis(50);
 
 /// How a [`Receiver`] listens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Options {
+pub struct ReceiverOptions {
     /// Asked of the kernel for its own queue, bytes; [`Counts::kernel_buffer_bytes`] says what it gave.
     pub kernel_buffer_bytes: usize,
     /// How much may wait for the one who takes, bytes; memory is bounded by twice this.
@@ -41,7 +41,7 @@ pub struct Options {
     pub gro: bool,
 }
 
-impl Default for Options {
+impl Default for ReceiverOptions {
     /// 32 MiB in the kernel and 64 MiB here: 0.9 s at the sensor's worst case of 107 MB/s.
     fn default() -> Self {
         Self { kernel_buffer_bytes: 32 << 20, queue_bytes: 64 << 20, gro: true }
@@ -86,7 +86,7 @@ impl Receiver {
     ///
     /// `Socket` where the address cannot be bound (taken, not ours), `Core(Problem)` where the queue is smaller than
     /// the largest datagram.
-    pub fn bind(address: SocketAddr, options: Options) -> Result<Self> {
+    pub fn bind(address: SocketAddr, options: ReceiverOptions) -> Result<Self> {
         if options.queue_bytes < socket::LARGEST {
             return Err(taxel_core::problem!(
                 "queue_bytes is {}: must be {} or more, the largest datagram",

@@ -36,7 +36,7 @@ impl<F: FnMut(&mut [u16]) -> bool + Send> Touch for F {
 
 /// How an [`Emulator`] works.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct EmulatorOptions {
     /// Where the datagrams go.
     pub to: SocketAddr,
     /// Send trains of datagrams in one call where the kernel can cut them (`UDP_SEGMENT`).
@@ -50,7 +50,7 @@ pub struct Options {
     pub commands: Vec<(u64, Command)>,
 }
 
-impl Options {
+impl EmulatorOptions {
     /// In real time to `to`, without commands.
     #[must_use]
     pub fn to(to: SocketAddr) -> Self {
@@ -84,7 +84,7 @@ pub struct Emulator {
     array: Array,
     sender: Sender,
     control: Option<Control>,
-    options: Options,
+    options: EmulatorOptions,
 }
 
 impl Emulator {
@@ -93,7 +93,7 @@ impl Emulator {
     /// # Errors
     ///
     /// `Socket` where the control port is taken; `Core(Problem)` where the schedule does not ascend.
-    pub fn open(board: Board, array: &Array, options: Options) -> Result<Self> {
+    pub fn open(board: Board, array: &Array, options: EmulatorOptions) -> Result<Self> {
         if let Some(k) = options.commands.windows(2).position(|w| w[1].0 < w[0].0) {
             return Err(taxel_core::problem!("command {}: its frame lies before that of command {k}", k + 1).into());
         }

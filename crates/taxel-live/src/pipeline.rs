@@ -39,7 +39,7 @@ const SAID_WAITING: usize = 1 << 14;
 
 /// How a [`Live`] works.
 #[derive(Debug, Clone)]
-pub struct Options {
+pub struct LiveOptions {
     /// The sensor.
     pub array: Array,
     /// The board's registers, as far as they are known: its frame's length is taken from them.
@@ -51,12 +51,12 @@ pub struct Options {
     /// How many events may wait for the readout.
     pub readout_events: usize,
     /// The socket and the queue behind it.
-    pub capture: capture::Options,
+    pub capture: capture::ReceiverOptions,
     /// Where everything is kept, if anywhere.
     pub record: Option<Record>,
 }
 
-impl Options {
+impl LiveOptions {
     /// The usual ones for an array: the first preset's registers, 5 frames' guard, nothing recorded.
     #[must_use]
     pub fn new(array: Array) -> Self {
@@ -66,7 +66,7 @@ impl Options {
             differences: false,
             guard_frames: 5.0,
             readout_events: 1 << 20,
-            capture: capture::Options::default(),
+            capture: capture::ReceiverOptions::default(),
             record: None,
         }
     }
@@ -237,7 +237,7 @@ impl Live {
     ///
     /// `Socket` where the port is taken, `File` where the file exists or cannot be created, `Core(Problem)` for options
     /// that make no sense.
-    pub fn start(address: SocketAddr, options: Options, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+    pub fn start(address: SocketAddr, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
         if !(options.guard_frames.is_finite() && options.guard_frames >= 0.0) {
             return Err(taxel_core::problem!("guard_frames is {}: must be 0 or more", options.guard_frames).into());
         }

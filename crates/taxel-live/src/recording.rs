@@ -58,7 +58,7 @@ pub struct Header {
 
 /// How a file is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Options {
+pub struct WriterOptions {
     /// Of the chunks.
     pub compression: Compression,
     /// Whether an existing file may be replaced.

@@ -4,11 +4,11 @@ use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
 use taxel_live::Error;
-use taxel_live::capture::{Batch, Counts, Options, Receiver, SendCounts, Sender};
+use taxel_live::capture::{Batch, Counts, Receiver, ReceiverOptions, SendCounts, Sender};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
-fn bind(options: Options) -> Receiver {
+fn bind(options: ReceiverOptions) -> Receiver {
     Receiver::bind(ANY, options).expect("loopback binds")
 }
 
@@ -49,7 +49,7 @@ fn drain(receiver: &Receiver) -> (Vec<(u64, u64)>, Counts) {
 #[test]
 fn every_datagram_comes_once_in_order_with_and_without_trains() {
     for (segment, gro) in [(false, false), (false, true), (true, false), (true, true)] {
-        let receiver = bind(Options { gro, ..Options::default() });
+        let receiver = bind(ReceiverOptions { gro, ..ReceiverOptions::default() });
         let sent = send(receiver.address(), 3000, segment);
         let (taken, counts) = drain(&receiver);
         assert_eq!(taken, (0..3000).map(|k| (k, k)).collect::<Vec<_>>());
@@ -68,7 +68,7 @@ fn every_datagram_comes_once_in_order_with_and_without_trains() {
 fn what_the_kernel_drops_closes_the_sum_at_the_socket() {
     for (segment, gro) in [(false, false), (true, false), (true, true)] {
         // The kernel rounds 1 up to its least buffer: a datagram or two.
-        let options = Options { kernel_buffer_bytes: 1, gro, ..Options::default() };
+        let options = ReceiverOptions { kernel_buffer_bytes: 1, gro, ..ReceiverOptions::default() };
         let (sent, counts, taken) = (0..20)
             .find_map(|_| {
                 let receiver = bind(options);
@@ -87,7 +87,7 @@ fn what_the_kernel_drops_closes_the_sum_at_the_socket() {
 
 #[test]
 fn what_our_queue_drops_closes_the_sum_behind_it_and_leaves_a_gap_in_the_numbers() {
-    let receiver = bind(Options { queue_bytes: 1 << 16, ..Options::default() });
+    let receiver = bind(ReceiverOptions { queue_bytes: 1 << 16, ..ReceiverOptions::default() });
     let sent = send(receiver.address(), 2000, true);
     // Nobody takes until all has come.
     let begun = Instant::now();
@@ -108,20 +108,21 @@ fn what_our_queue_drops_closes_the_sum_behind_it_and_leaves_a_gap_in_the_numbers
 fn a_port_that_is_taken_is_one_clear_error() {
     let holder = UdpSocket::bind(ANY).expect("a port");
     let address = holder.local_addr().expect("its address");
-    let error = Receiver::bind(address, Options::default()).expect_err("the port is taken");
+    let error = Receiver::bind(address, ReceiverOptions::default()).expect_err("the port is taken");
     assert!(matches!(&error, Error::Socket { source, .. } if source.kind() == std::io::ErrorKind::AddrInUse));
     assert!(error.to_string().starts_with(&format!("UDP {address}: ")), "{error}");
 }
 
 #[test]
 fn a_queue_smaller_than_a_datagram_is_refused() {
-    let error = Receiver::bind(ANY, Options { queue_bytes: 1000, ..Options::default() }).expect_err("too small");
+    let error = Receiver::bind(ANY, ReceiverOptions { queue_bytes: 1000, ..ReceiverOptions::default() })
+        .expect_err("too small");
     assert_eq!(error.to_string(), "queue_bytes is 1000: must be 65536 or more, the largest datagram");
 }
 
 #[test]
 fn a_datagram_to_nobody_is_sent_and_counted() {
-    let address = bind(Options::default()).address();
+    let address = bind(ReceiverOptions::default()).address();
     let sent = send(address, 100, true);
     assert_eq!(sent.datagrams, 100);
 }

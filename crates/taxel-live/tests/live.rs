@@ -15,7 +15,7 @@ use taxel_core::wire::{Command, Decoder, Registers};
 use taxel_core::{Array, Events, Stop};
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{self, Emulator, Report, Touch};
-use taxel_live::pipeline::{Ear, Live, Options, Record, Said, Sink, Summary};
+use taxel_live::pipeline::{Ear, Live, LiveOptions, Record, Said, Sink, Summary};
 use taxel_live::recording::{Compression, Reader, Topic};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -79,7 +79,7 @@ fn sent(frames: u64, pressed: u64) -> Events {
 fn emulate(to: SocketAddr, real_time: bool, mut touch: impl Touch) -> Report {
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
-    let options = emulate::Options { real_time, ..emulate::Options::to(to) };
+    let options = emulate::EmulatorOptions { real_time, ..emulate::EmulatorOptions::to(to) };
     let mut emulator = Emulator::open(board, &array, options).expect("a socket");
     emulator.run(&mut touch, |_| {}, Stop::never()).expect("sent")
 }
@@ -107,10 +107,10 @@ fn reading(readout: &Readout) -> Ear {
     Ear::Reading(Box::new(readout.stream(&Array::thesis(), 192.0, None).expect("a sound readout")))
 }
 
-fn options(record: Option<&Scratch>) -> Options {
+fn options(record: Option<&Scratch>) -> LiveOptions {
     let record = record.map(|s| Record { path: s.0.clone(), compression: Compression::Lz4, overwrite: false });
     // A machine too slow for real time holds frames back: here the host's clock moves nothing on, so no event is late.
-    Options { record, guard_frames: 1e9, ..Options::new(Array::thesis()) }
+    LiveOptions { record, guard_frames: 1e9, ..LiveOptions::new(Array::thesis()) }
 }
 
 fn wait_for(live: &Live, what: impl Fn(&Live) -> bool) {
@@ -213,7 +213,7 @@ fn what_is_said_live_is_what_the_recording_says() {
 
 #[test]
 fn in_silence_time_moves_on_by_the_hosts_clock() {
-    let live = Live::start(ANY, Options { guard_frames: 5.0, ..options(None) }, reading(&readout(20.0)), vec![])
+    let live = Live::start(ANY, LiveOptions { guard_frames: 5.0, ..options(None) }, reading(&readout(20.0)), vec![])
         .expect("a port");
     // Two frames are all that ever comes; the potential crosses some ms after them.
     let mut frames = 0;
@@ -281,7 +281,7 @@ fn a_slow_readout_loses_events_where_they_are_counted_and_the_recording_loses_no
         std::thread::sleep(Duration::from_millis(50));
         Ok(())
     });
-    let options = Options { readout_events: 1000, ..options(Some(&path)) };
+    let options = LiveOptions { readout_events: 1000, ..options(Some(&path)) };
     let live = Live::start(ANY, options, reading(&readout(20.0)), vec![slow]).expect("started");
     let report = emulate(live.address(), false, presses(3000, 3000));
     let summary = live.stop().expect("a sound way");
@@ -343,7 +343,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_w
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
     let commands = vec![(260, Command::new(7, 1 << 16).expect("a command"))];
-    let options = emulate::Options { commands, ..emulate::Options::to(live.address()) };
+    let options = emulate::EmulatorOptions { commands, ..emulate::EmulatorOptions::to(live.address()) };
     let mut emulator = Emulator::open(board, &array, options).expect("a socket");
     let (mut quiet, mut pressed) = (presses(300, 0), presses(1500, 1000));
     let mut touch = move |ticks: &mut [u16]| quiet.frame(ticks) || pressed.frame(ticks);
@@ -371,7 +371,7 @@ fn the_board_takes_commands_and_answers() {
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
     let control = Some(ANY);
-    let options = emulate::Options { control, ..emulate::Options::to(live.address()) };
+    let options = emulate::EmulatorOptions { control, ..emulate::EmulatorOptions::to(live.address()) };
     let mut emulator = Emulator::open(board, &array, options).expect("sockets");
     let address = emulator.control_address().expect("a port");
     let stop = std::sync::atomic::AtomicBool::new(false);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use taxel_core::detect::Detection;
 use taxel_core::wire::Registers;
 use taxel_core::{Array, Marker, Stop};
-use taxel_live::recording::{Compression, Counts, Ending, Header, NOTHING_LOST, Options, Reader, Topic, Writer};
+use taxel_live::recording::{Compression, Counts, Ending, Header, NOTHING_LOST, Reader, Topic, Writer, WriterOptions};
 
 /// A folder that is gone when the test ends.
 struct Folder(PathBuf);
@@ -41,7 +41,7 @@ fn datagram(k: u64) -> Vec<u8> {
 }
 
 fn record(path: &Path, datagrams: u64, compression: Compression) {
-    let writer = Writer::create(path, &header(), Options { compression, overwrite: false }).unwrap();
+    let writer = Writer::create(path, &header(), WriterOptions { compression, overwrite: false }).unwrap();
     for k in 0..datagrams {
         writer.datagram(1_000_000_000_000 + i64::try_from(k).unwrap() * 1000, k, &datagram(k)).unwrap();
     }
@@ -100,10 +100,10 @@ fn an_existing_file_is_replaced_only_when_asked() {
     let folder = Folder::new("exists");
     let path = folder.0.join("a.mcap");
     std::fs::write(&path, b"precious").unwrap();
-    let said = Writer::create(&path, &header(), Options::default()).err().unwrap().to_string();
+    let said = Writer::create(&path, &header(), WriterOptions::default()).err().unwrap().to_string();
     assert!(said.contains("a.mcap") && said.to_lowercase().contains("exists"), "{said}");
     assert_eq!(std::fs::read(&path).unwrap(), b"precious");
-    let options = Options { overwrite: true, ..Options::default() };
+    let options = WriterOptions { overwrite: true, ..WriterOptions::default() };
     Writer::create(&path, &header(), options).unwrap().finish(Counts::default()).unwrap();
     assert!(Reader::open(&path).is_ok());
 }
@@ -179,7 +179,7 @@ fn a_damaged_length_loses_no_more_than_its_chunk() {
 fn a_writer_that_is_dropped_keeps_everything_and_says_that_it_was_not_finished() {
     let folder = Folder::new("drop");
     let path = folder.0.join("a.mcap");
-    let writer = Writer::create(&path, &header(), Options::default()).unwrap();
+    let writer = Writer::create(&path, &header(), WriterOptions::default()).unwrap();
     for k in 0..100 {
         writer.datagram(k, u64::try_from(k).unwrap(), &datagram(0)).unwrap();
     }
@@ -191,7 +191,7 @@ fn a_writer_that_is_dropped_keeps_everything_and_says_that_it_was_not_finished()
 
 #[test]
 fn a_full_disk_is_one_error() {
-    let options = Options { overwrite: true, ..Options::default() };
+    let options = WriterOptions { overwrite: true, ..WriterOptions::default() };
     let said = Writer::create(Path::new("/dev/full"), &header(), options).err().map(|e| e.to_string());
     assert_eq!(said.as_deref(), Some("/dev/full: No space left on device (os error 28)"));
 }

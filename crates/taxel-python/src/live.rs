@@ -14,7 +14,7 @@ use taxel_core::encode::Tare;
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::capture::{self, SendCounts, Sender};
-use taxel_live::pipeline::{Ear, Lines, Live as Pipeline, Options, Record, Said, Sink};
+use taxel_live::pipeline::{Ear, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink};
 
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
@@ -114,13 +114,13 @@ impl Live {
                 Some(Record { path, compression: compression.parse().map_err(core)?, overwrite })
             }
         };
-        let usual = Options::new(to_array(parts)?);
-        let options = Options {
+        let usual = LiveOptions::new(to_array(parts)?);
+        let options = LiveOptions {
             registers: chosen.registers(&usual.array)?,
             differences: chosen.differences,
             guard_frames: chosen.guard_frames,
             readout_events: chosen.readout_events.unwrap_or(usual.readout_events),
-            capture: capture::Options {
+            capture: capture::ReceiverOptions {
                 kernel_buffer_bytes: chosen.kernel_buffer_bytes.unwrap_or(usual.capture.kernel_buffer_bytes),
                 queue_bytes: chosen.queue_bytes.unwrap_or(usual.capture.queue_bytes),
                 gro: chosen.gro.unwrap_or(usual.capture.gro),

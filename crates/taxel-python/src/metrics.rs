@@ -4,8 +4,9 @@ use std::num::NonZero;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::metrics::{Metric, Patterns, Vectors, Work};
+use taxel_core::metrics::{Metric, Patterns, Work};
 use taxel_core::problem;
+use taxel_core::vectors::Instructions;
 
 use crate::convert::{array, slice};
 use crate::enter::enter;
@@ -55,15 +56,19 @@ fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: PatternsI
 }
 
 /// Vector instructions by their names; the widest of the machine where none is named.
-fn to_vectors(name: Option<&str>) -> PyResult<Vectors> {
-    let vectors = match name {
-        None => Vectors::best(),
-        Some("none") => Vectors::None,
-        Some("avx2") => Vectors::Avx2,
-        Some("avx512") => Vectors::Avx512,
+fn to_instructions(name: Option<&str>) -> PyResult<Instructions> {
+    let instructions = match name {
+        None => Instructions::best(),
+        Some("none") => Instructions::Plain,
+        Some("avx2") => Instructions::Avx2,
+        Some("avx512") => Instructions::Avx512,
         Some(other) => return Err(core(problem!("vectors is {other:?}: must be none, avx2 or avx512"))),
     };
-    if vectors.present() { Ok(vectors) } else { Err(core(problem!("vectors: this machine has no {vectors:?}"))) }
+    if instructions.present() {
+        Ok(instructions)
+    } else {
+        Err(core(problem!("vectors: this machine has no {instructions:?}")))
+    }
 }
 
 /// The distances of all patterns from all others, row by row.
@@ -79,7 +84,7 @@ fn pairwise<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
     let (metric, a, b) = (to_metric(metric)?, Held::new(a)?, b.map(Held::new).transpose()?);
     let (a, b) = (a.patterns()?, b.as_ref().map(Held::patterns).transpose()?);
-    let vectors = to_vectors(vectors)?;
+    let instructions = to_instructions(vectors)?;
     let raised = std::sync::Mutex::new(None);
     let outcome = enter(py, |stop| {
         let mut report = |done: usize, all: usize| {
@@ -92,7 +97,7 @@ fn pairwise<'py>(
         };
         let asked = || stop.asked() || raised.lock().is_ok_and(|r| r.is_some());
         let mut work = Work::new(threads, taxel_core::Stop::when(&asked), &mut report);
-        work.vectors = vectors;
+        work.instructions = instructions;
         metric.pairwise(&a, b.as_ref(), &mut work)
     });
     if let Ok(Some(error)) = raised.into_inner() {

@@ -10,7 +10,7 @@ use serde_json::json;
 use taxel_core::detect::Detection;
 use taxel_core::{Marker, Stop, wire};
 use taxel_live::clock::BoardClock;
-use taxel_live::recording::{Counts, Header, LsaWriter, Options, Reader, Topic, Writer, numbered};
+use taxel_live::recording::{Counts, Header, LsaWriter, Reader, Topic, Writer, WriterOptions, numbered};
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
 use crate::enter::enter;
@@ -113,7 +113,7 @@ impl RecordingWriter {
     #[new]
     fn create(py: Python<'_>, path: PathBuf, header: &str, compression: &str, overwrite: bool) -> PyResult<Self> {
         let header: Header = parsed("header", header)?;
-        let options = Options { compression: compression.parse().map_err(core)?, overwrite };
+        let options = WriterOptions { compression: compression.parse().map_err(core)?, overwrite };
         let writer = enter(py, |_| Writer::create(&path, &header, options))?;
         Ok(Self { writer: Mutex::new(Some(writer)) })
     }

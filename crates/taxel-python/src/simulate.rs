@@ -9,7 +9,7 @@ use taxel_core::board::{Board, session};
 use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor, Stage, Taxels};
 use taxel_core::wire::{Decoder, Registers};
 use taxel_core::{Array, Error, Events, Result, Stop, problem};
-use taxel_live::emulate::{Emulator, Options, Report};
+use taxel_live::emulate::{Emulator, EmulatorOptions, Report};
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
 use crate::enter::enter;
@@ -169,7 +169,7 @@ fn emulate(
         let mut first = vec![0; array.len()];
         stage.frame(&mut first)?;
         board.arm(&first)?;
-        let options = Options { control, commands, ..Options::to(to) };
+        let options = EmulatorOptions { control, commands, ..EmulatorOptions::to(to) };
         let mut emulator = Emulator::open(board, &array, options)?;
         tell(&raised, &begun, emulator.control_address().map(|a| a.to_string()));
         let mut failed = Ok(());

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::sampled::{BLOCK, Block, Channels, Source, blocks};
 use super::{Stream, Tare, ms};
 use crate::allowed::{Range, ranges};
-use crate::wide::wide;
+use crate::vectors::wide;
 use crate::{Array, Events, Result, Spike, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.

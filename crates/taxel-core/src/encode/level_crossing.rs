@@ -120,7 +120,7 @@ impl LevelCrossing {
 
 /// One level at one channel.
 #[derive(Clone, Copy)]
-struct State {
+struct ChannelLevel {
     /// At or above this the taxel is above ...
     on_at: f32,
     /// ... until it reads less than this.
@@ -140,7 +140,7 @@ struct Crossings {
     releases: Vec<f64>,
     hold: i64,
     /// `channel * levels + level`.
-    states: Vec<State>,
+    states: Vec<ChannelLevel>,
     bracket: Bracket,
     /// Crossings on trial: when they will have held, and which; all hold equally long, so this is in order.
     trials: VecDeque<(i64, usize)>,
@@ -172,7 +172,7 @@ impl Crossings {
                 above_since: vec![None; channels],
             }),
         };
-        let blank = |(&on, &off): (&f64, &f64)| State {
+        let blank = |(&on, &off): (&f64, &f64)| ChannelLevel {
             on_at: on as f32,
             off_at: off as f32,
             above: false,

@@ -5,7 +5,7 @@
 
 use super::{Stream, micros, ms};
 use crate::events::FARTHEST_BACK_US;
-use crate::wide::wide;
+use crate::vectors::wide;
 use crate::{Array, Events, Result, Spike, problem};
 
 /// Channels that are looked at together; the compiler turns loops over a block into vector instructions.

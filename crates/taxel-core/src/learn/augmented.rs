@@ -12,9 +12,10 @@ use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::cone_r::{Norm, Objective, Problem};
-use super::point::{Point, Tangents, add, dot};
+use super::point::{Point, Tangents};
 use super::rounds::Rounds;
 use crate::Stop;
+use crate::vectors::{add, dot};
 
 /// At first a target's kink is rounded over so many thresholds (all of them, seen from no weights), one of silence over so many.
 const TARGETS_FROM: f64 = 2.0;

@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 
 use super::augmented::Start;
 use super::bounds::{Bound, bounds_of, check_bounds};
-use super::point::{add, dot};
 use super::rounds::START_NEAR_MS;
 use super::rows::{Layout, SilentRows, TargetRow, target_rows};
 use super::{check_examples, check_trains};
 use crate::neuron::{Neuron, Time};
+use crate::vectors::{add, dot};
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// What B(w) is divided by.

@@ -17,6 +17,7 @@ use super::cone_r::{Divisor, Norm};
 use super::silence::{Peak, Silence};
 use super::statement::{Margin, Row, Stated, Statement};
 use crate::neuron::{Neuron, Time};
+use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
 use shortest::{End, Shortest};
 
@@ -542,8 +543,4 @@ impl Slopes {
 /// The largest value, or no number where one is none.
 fn largest(values: impl IntoIterator<Item = f64>) -> f64 {
     values.into_iter().fold(f64::NEG_INFINITY, |most, x| if x <= most || most.is_nan() { most } else { x })
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

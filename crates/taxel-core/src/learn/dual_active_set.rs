@@ -12,7 +12,8 @@ mod factor;
 mod kernels;
 
 use self::factor::Factor;
-use self::kernels::{Aligned, LANES, add_rows, dot, products, rows_times};
+use self::kernels::{add_rows, products, rows_times};
+use crate::vectors::{Aligned, LANES, dot};
 use crate::{Result, Stop, problem};
 
 /// Rows count as met within this, as they were stated or scaled to length 1, whichever asks for more.

@@ -10,13 +10,14 @@ mod polish;
 #[cfg(test)]
 mod tests;
 
-use dense::{add_sum, dot, times};
+use dense::{add_sum, times};
 
 use super::certificate::Bounds;
 use super::cone_program::{ConeProgram, HardRows, Hinges};
 use super::cone_r::Norm;
 use super::cone_x::NOTHING;
 use super::nearest::nearest;
+use crate::vectors::dot;
 use crate::{Error, Result, Stop};
 use interior::{Interior, State};
 use polish::{Guess, polish};

@@ -2,6 +2,7 @@
 
 use super::cone_program::HardRows;
 use super::dual_active_set::{DualActiveSet, Verdict};
+use crate::vectors::dot;
 use crate::{Result, Stop};
 
 /// The weights within the bounds that meet all rows and lie nearest to these; none where there are none, or on a stop.
@@ -16,8 +17,7 @@ pub(super) fn nearest(
     // is missed at most, so that this is far above what counts as met.
     let width = weights.len().max(1);
     let left = |rows: &[f64], limits: &[f64]| -> Vec<f64> {
-        let dot = |row: &[f64]| row.iter().zip(weights).map(|(a, w)| a * w).sum::<f64>();
-        rows.chunks_exact(width).zip(limits).map(|(row, limit)| limit - dot(row)).collect()
+        rows.chunks_exact(width).zip(limits).map(|(row, limit)| limit - dot(row, weights)).collect()
     };
     let (equal, below) = (left(rows.equal, rows.equal_to), left(rows.below, rows.limit));
     let most = equal.iter().map(|l| l.abs()).chain(below.iter().map(|l| -l)).fold(f64::MIN_POSITIVE, f64::max);

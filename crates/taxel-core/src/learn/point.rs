@@ -1,6 +1,7 @@
 //! 6.14 at given weights, and a bound from below on the least it can be.
 
 use super::cone_r::{Norm, Objective, Parts, Problem};
+use crate::vectors::{add, dot};
 
 /// Weights, and where they bring the potential.
 #[derive(Debug, Clone)]
@@ -83,23 +84,4 @@ pub(super) struct Tangents<'a> {
     pub(super) behind: &'a [f64],
     pub(super) multipliers: &'a [f64],
     pub(super) pull: &'a [f64],
-}
-
-/// The sum of products, by eight lanes.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let (eights, rest) = a.as_chunks::<8>();
-    let (others, last) = b.as_chunks::<8>();
-    let mut lanes = [0.0; 8];
-    for (a, b) in eights.iter().zip(others) {
-        for k in 0..8 {
-            lanes[k] += a[k] * b[k];
-        }
-    }
-    lanes.iter().sum::<f64>() + rest.iter().zip(last).map(|(a, b)| a * b).sum::<f64>()
-}
-
-pub(super) fn add(sum: &mut [f64], factor: f64, row: &[f64]) {
-    if factor != 0.0 {
-        sum.iter_mut().zip(row).for_each(|(s, r)| *s += factor * r);
-    }
 }

@@ -9,7 +9,8 @@
 use super::augmented::relative;
 use super::cone_program::{ConeProgram, HardRows, Hinges};
 use super::cone_r::{Norm, Objective, Problem};
-use super::point::{Point, Tangents, add};
+use super::point::{Point, Tangents};
+use crate::vectors::add;
 use crate::{Error, Result, Stop};
 
 /// Rows of the first program: targets and every 4th ms of the 60 ms before them, of so many targets that it stays small.

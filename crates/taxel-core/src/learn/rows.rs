@@ -5,8 +5,8 @@
 //! Silent rows are never stored: one sweep over the grid gives the potential on all of them (the kernel needs two numbers
 //! a pattern), one sweep backwards gives a weighted sum of all of them.
 
-use super::point::{add, dot};
 use crate::neuron::{AfterSpike, FirstThreshold, Neuron, Shape, State, Step};
+use crate::vectors::{add, dot};
 use crate::{Result, SpikeTrains, Stop};
 
 /// Rounding of a grid point on the very edge of a refractory time, ms.

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering::Relaxed};
 use std::thread;
 use std::time::Duration;
 
-use super::Vectors;
+use crate::vectors::Instructions;
 use crate::{Error, Result, Stop};
 
 /// How often the caller's thread asks whether to stop while only others still work.
@@ -16,7 +16,7 @@ pub struct Work<'a> {
     /// Threads; the caller's is one of them, and the only one that asks `stop` and calls `progress`.
     pub threads: usize,
     /// What a matrix of Victor-Purpura distances uses; the machine must have it.
-    pub vectors: Vectors,
+    pub instructions: Instructions,
     /// Ends the work early.
     pub stop: Stop<'a>,
     /// Called with the pairs done and all of them, now and then.
@@ -28,7 +28,7 @@ impl<'a> Work<'a> {
     #[must_use]
     pub fn new(threads: Option<NonZero<usize>>, stop: Stop<'a>, progress: &'a mut dyn FnMut(usize, usize)) -> Self {
         let threads = threads.or_else(|| thread::available_parallelism().ok()).map_or(1, NonZero::get);
-        Self { threads, vectors: Vectors::best(), stop, progress }
+        Self { threads, instructions: Instructions::best(), stop, progress }
     }
 
     /// Does tasks as [`Self::each`] does, without telling of them.

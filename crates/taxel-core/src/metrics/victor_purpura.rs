@@ -4,12 +4,10 @@ mod lanes;
 
 use serde::{Deserialize, Serialize};
 
-pub use lanes::Vectors;
-
 use super::pairwise::Matrix;
 use super::{Patterns, Work, cost, number_or_name};
 use crate::{Result, Stop};
-use lanes::Block;
+use lanes::{Block, lanes};
 
 /// The least cost of turning one train into the other: 1 for each spike removed or added, `q |dt|` for each one moved.
 ///
@@ -92,7 +90,7 @@ impl VictorPurpura {
         b: Option<&Patterns<'_>>,
         work: &mut Work<'_>,
     ) -> Result<()> {
-        let (vectors, lanes) = (work.vectors, work.vectors.lanes());
+        let (set, lanes) = (work.instructions, lanes(work.instructions));
         let others = b.unwrap_or(a);
         let (pairs, reach) = (matrix.pairs(), self.reach());
         for n in 0..a.trains {
@@ -110,7 +108,7 @@ impl VictorPurpura {
                 let mut cost = Vec::new();
                 for (block, from) in blocks.iter().zip((0..).step_by(lanes)).skip(first / lanes) {
                     stop.check()?;
-                    let distances = block.distances(vectors, a.train(i, n), self.q, reach, &mut cost, stop)?;
+                    let distances = block.distances(set, a.train(i, n), self.q, reach, &mut cost, stop)?;
                     for (at, distance) in (from..others.count).zip(distances).skip(first.saturating_sub(from)) {
                         matrix.add(i, order[at], distance);
                     }

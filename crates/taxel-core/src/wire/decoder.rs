@@ -6,10 +6,10 @@ use std::mem::MaybeUninit;
 
 use serde::{Deserialize, Serialize};
 
-pub use blocks::Instructions;
-use blocks::State;
+use blocks::Carried;
 
 use crate::events::FARTHEST_BACK_US;
+use crate::vectors::Instructions;
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
 use crate::{Array, Events, Intensities, Marker, Result, problem};
 
@@ -311,53 +311,53 @@ impl Decoder {
         paired: bool,
         markers: &mut Vec<Marker>,
     ) -> Filled {
-        let mut sheet = Sheet { room, rows: 0, paired, open: false };
+        let mut filling = Filling { room, rows: 0, paired, open: false };
         if let Some(change) = self.waiting.take() {
-            sheet.change(change);
+            filling.change(change);
         }
         let mut at = 0;
         while self.have > 0 && at < bytes.len() {
-            self.byte(bytes[at], arrived, &mut sheet, markers);
+            self.byte(bytes[at], arrived, &mut filling, markers);
             at += 1;
         }
         while at < bytes.len() {
-            at += self.plain(&bytes[at..], arrived, &mut sheet);
+            at += self.plain(&bytes[at..], arrived, &mut filling);
             // What is not plain: one word, or damage byte by byte to the next place.
             for &byte in &bytes[at..] {
-                self.byte(byte, arrived, &mut sheet, markers);
+                self.byte(byte, arrived, &mut filling, markers);
                 at += 1;
                 if self.have == 0 {
                     break;
                 }
             }
         }
-        if sheet.open {
-            self.waiting = Some(sheet.take_last());
+        if filling.open {
+            self.waiting = Some(filling.take_last());
         }
-        Filled { rows: sheet.rows, paired: sheet.paired }
+        Filled { rows: filling.rows, paired: filling.paired }
     }
 
     /// Decodes the plain words that lie ahead; gives how many bytes they had.
     ///
     /// None where stamps alone do not unwrap them: before the first, and until this arrival has been reckoned with.
-    fn plain(&mut self, bytes: &[u8], arrived: Option<i64>, sheet: &mut Sheet<'_>) -> usize {
+    fn plain(&mut self, bytes: &[u8], arrived: Option<i64>, filling: &mut Filling<'_>) -> usize {
         if self.by_taxel.is_some() || self.held.is_some() || self.clock.heard != arrived {
             return 0;
         }
         let Some(latest) = self.clock.latest else { return 0 };
-        let mut state = State { latest, intensities: 0, unpaired: 0 };
-        let before = sheet.rows;
-        let done = self.instructions.plain(bytes, self.array.columns, self.array.rows, &mut state, sheet);
+        let mut state = Carried { latest, intensities: 0, unpaired: 0 };
+        let before = filling.rows;
+        let done = blocks::plain(self.instructions, bytes, self.array.columns, self.array.rows, &mut state, filling);
         self.clock.latest = Some(state.latest);
         self.counts.bytes += done as u64;
         self.counts.words += (done / WORD_BYTES) as u64;
-        self.counts.changes += (sheet.rows - before) as u64;
+        self.counts.changes += (filling.rows - before) as u64;
         self.counts.intensities += state.intensities;
         self.counts.unpaired += state.unpaired;
         done
     }
 
-    fn byte(&mut self, byte: u8, arrived: Option<i64>, sheet: &mut Sheet<'_>, markers: &mut Vec<Marker>) {
+    fn byte(&mut self, byte: u8, arrived: Option<i64>, filling: &mut Filling<'_>, markers: &mut Vec<Marker>) {
         if byte & FIRST != 0 {
             self.give_up_partial();
         } else if self.have == 0 {
@@ -371,7 +371,7 @@ impl Decoder {
             self.have = 0;
             self.counts.bytes += WORD_BYTES as u64;
             self.counts.words += 1;
-            self.word(Word::from_bytes(self.partial), arrived, sheet, markers);
+            self.word(Word::from_bytes(self.partial), arrived, filling, markers);
         }
     }
 
@@ -382,8 +382,8 @@ impl Decoder {
         self.have = 0;
     }
 
-    fn word(&mut self, word: Word, arrived: Option<i64>, sheet: &mut Sheet<'_>, markers: &mut Vec<Marker>) {
-        let open = std::mem::take(&mut sheet.open);
+    fn word(&mut self, word: Word, arrived: Option<i64>, filling: &mut Filling<'_>, markers: &mut Vec<Marker>) {
+        let open = std::mem::take(&mut filling.open);
         match word {
             Word::Contradictory => self.counts.contradictory += 1,
             Word::Marker { stamp, start } => {
@@ -401,7 +401,7 @@ impl Decoder {
                 let change = Change { t: self.time(stamp, arrived), x: x.into(), y: y.into(), p };
                 match &mut self.by_taxel {
                     Some(by_taxel) => by_taxel.change(change),
-                    None => sheet.change(change),
+                    None => filling.change(change),
                 }
             }
             Word::Intensity { ticks, x, y, p } => {
@@ -417,7 +417,7 @@ impl Decoder {
                 };
                 let paired = match &mut self.by_taxel {
                     Some(by_taxel) => by_taxel.intensity(taxel, ticks),
-                    None => open && sheet.pair(ticks, x, y),
+                    None => open && filling.pair(ticks, x, y),
                 };
                 *(if paired { &mut self.counts.intensities } else { &mut self.counts.unpaired }) += 1;
             }
@@ -485,7 +485,7 @@ pub struct Filled {
 }
 
 /// Columns as they fill: the first `rows` entries of t, x, y, p are written, and with `paired` those of ticks, present.
-pub(crate) struct Sheet<'a> {
+pub(crate) struct Filling<'a> {
     pub(crate) room: Room<'a>,
     pub(crate) rows: usize,
     pub(crate) paired: bool,
@@ -493,7 +493,7 @@ pub(crate) struct Sheet<'a> {
     pub(crate) open: bool,
 }
 
-impl Sheet<'_> {
+impl Filling<'_> {
     #[inline]
     fn change(&mut self, change: Change) {
         let k = self.rows;
@@ -869,7 +869,7 @@ mod tests {
             let bytes = stream(&mut random, 3000);
             let (longest, heard) = (*[7, 300, 1400, 100_000].choose(&mut random).unwrap(), random.random());
             let with = |set| pieces(decoder.clone().instructions(set).unwrap(), &bytes, longest, heard, round);
-            let (events, counts) = with(Instructions::Scalar);
+            let (events, counts) = with(Instructions::Plain);
             seen.0 += counts.changes;
             seen.1 += counts.intensities;
             for set in Instructions::ALL.into_iter().filter(|set| set.present()) {

@@ -89,14 +89,14 @@ impl Batch {
 /// datagrams packs tightly while the taker is behind, so that the bound in bytes is also a bound in time.
 #[derive(Debug)]
 pub(super) struct Queue {
-    state: Mutex<State>,
+    state: Mutex<Received>,
     came: Condvar,
     stop: AtomicBool,
     limit: usize,
 }
 
 #[derive(Debug)]
-struct State {
+struct Received {
     waiting: Batch,
     counts: Counts,
     closed: bool,
@@ -105,14 +105,14 @@ struct State {
 
 impl Queue {
     pub(super) fn new(limit: usize, counts: Counts) -> Self {
-        let state = State { waiting: Batch::new(), counts, closed: false, failed: None };
+        let state = Received { waiting: Batch::new(), counts, closed: false, failed: None };
         Self { state: Mutex::new(state), came: Condvar::new(), stop: AtomicBool::new(false), limit }
     }
 
     /// Moves what was received into the waiting batch; what has no room is dropped and counted.
     pub(super) fn put(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
         let mut state = self.state();
-        let State { waiting, counts, .. } = &mut *state;
+        let Received { waiting, counts, .. } = &mut *state;
         counts.messages += messages;
         counts.dropped_by_kernel = dropped_by_kernel;
         for (datagram, bytes) in received.iter() {
@@ -137,7 +137,7 @@ impl Queue {
     pub(super) fn take(&self, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
         batch.clear();
         let state = self.state();
-        let nothing = |s: &mut State| s.waiting.is_empty() && !s.closed;
+        let nothing = |s: &mut Received| s.waiting.is_empty() && !s.closed;
         let (mut state, _) =
             self.came.wait_timeout_while(state, timeout, nothing).unwrap_or_else(PoisonError::into_inner);
         std::mem::swap(&mut state.waiting, batch);
@@ -176,7 +176,7 @@ impl Queue {
     }
 
     /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, Received> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

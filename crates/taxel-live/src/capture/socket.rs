@@ -8,7 +8,7 @@ use std::ptr::{from_mut, from_ref};
 
 use libc::{c_int, c_void};
 
-use super::{Batch, LOOK_EVERY, Options};
+use super::{Batch, LOOK_EVERY, ReceiverOptions};
 use crate::recording::now_ns;
 
 /// No UDP message, train or single, is longer than this, bytes.
@@ -32,7 +32,7 @@ pub(super) struct Socket {
 }
 
 impl Socket {
-    pub(super) fn bind(address: SocketAddr, options: &Options) -> io::Result<Self> {
+    pub(super) fn bind(address: SocketAddr, options: &ReceiverOptions) -> io::Result<Self> {
         let socket = UdpSocket::bind(address)?;
         let fd = socket.as_raw_fd();
         let bytes = c_int::try_from(options.kernel_buffer_bytes).unwrap_or(c_int::MAX);

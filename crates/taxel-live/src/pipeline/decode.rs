@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use taxel_core::Events;
 use taxel_core::wire::Decoder;
 
-use super::{Options, Shared, handover};
+use super::{LiveOptions, Shared, handover};
 use crate::Result;
 use crate::capture::Batch;
 use crate::clock::BoardClock;
@@ -29,7 +29,7 @@ const HAND_ON: usize = 1 << 14;
 /// The largest datagram of a board that closes frames with a shorter one: 280 events.
 const FULL: usize = 280 * taxel_core::wire::WORD_BYTES;
 
-pub(super) fn run(shared: &Shared, decoder: Decoder, options: &Options, listens: bool) {
+pub(super) fn run(shared: &Shared, decoder: Decoder, options: &LiveOptions, listens: bool) {
     let mut work = Work {
         shared,
         decoder,
@@ -56,7 +56,7 @@ pub(super) fn run(shared: &Shared, decoder: Decoder, options: &Options, listens:
 struct Work<'a> {
     shared: &'a Shared,
     decoder: Decoder,
-    options: &'a Options,
+    options: &'a LiveOptions,
     listens: bool,
     clock: BoardClock,
     events: Events,

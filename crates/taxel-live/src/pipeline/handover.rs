@@ -7,13 +7,13 @@ use taxel_core::{Array, Events, Intensities};
 /// Events that wait for the readout, and how far the board's time has come without any.
 #[derive(Debug)]
 pub(super) struct Handover {
-    state: Mutex<State>,
+    state: Mutex<Waiting>,
     came: Condvar,
     limit: usize,
 }
 
 #[derive(Debug)]
-struct State {
+struct Waiting {
     events: Events,
     /// After these events there is nothing before this time, us.
     quiet_until: Option<i64>,
@@ -32,7 +32,7 @@ pub(super) struct Taken {
 
 impl Handover {
     pub(super) fn new(array: &Array, limit: usize) -> Self {
-        let state = State { events: Events::empty(array.clone()), quiet_until: None, dropped: 0, closed: false };
+        let state = Waiting { events: Events::empty(array.clone()), quiet_until: None, dropped: 0, closed: false };
         Self { state: Mutex::new(state), came: Condvar::new(), limit }
     }
 
@@ -69,15 +69,16 @@ impl Handover {
     /// Waits for something and takes all of it.
     pub(super) fn take(&self, events: &mut Events) -> Taken {
         clear(events);
-        let nothing =
-            |s: &mut State| s.events.is_empty() && s.events.markers.is_empty() && s.quiet_until.is_none() && !s.closed;
+        let nothing = |s: &mut Waiting| {
+            s.events.is_empty() && s.events.markers.is_empty() && s.quiet_until.is_none() && !s.closed
+        };
         let mut state = self.came.wait_while(self.state(), nothing).unwrap_or_else(PoisonError::into_inner);
         std::mem::swap(&mut state.events, events);
         Taken { quiet_until: state.quiet_until.take(), last: state.closed }
     }
 
     /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, Waiting> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

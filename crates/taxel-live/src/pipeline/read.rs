@@ -9,7 +9,7 @@ use taxel_core::detect::{Detection, Readout, ReadoutStream};
 use super::ahead::Ahead;
 use super::handover::Taken;
 use super::rest::Rest;
-use super::{Options, Said, Shared, Sink};
+use super::{LiveOptions, Said, Shared, Sink};
 use crate::Error;
 use crate::recording::now_ns;
 
@@ -25,7 +25,7 @@ pub enum Ear {
 }
 
 pub(super) struct Reader {
-    state: State,
+    mode: Mode,
     sinks: Vec<Box<dyn Sink>>,
     say: Sender<Said>,
     found: Vec<Detection>,
@@ -33,7 +33,7 @@ pub(super) struct Reader {
     frame_us: f64,
 }
 
-enum State {
+enum Mode {
     Reading(Ahead),
     Taring(Box<Rest>),
     /// Between the two, and after an error.
@@ -41,23 +41,23 @@ enum State {
 }
 
 impl Reader {
-    pub(super) fn new(ear: Ear, sinks: Vec<Box<dyn Sink>>, say: Sender<Said>, options: &Options) -> Self {
+    pub(super) fn new(ear: Ear, sinks: Vec<Box<dyn Sink>>, say: Sender<Said>, options: &LiveOptions) -> Self {
         let events = Events::empty(options.array.clone());
-        let state = match ear {
-            Ear::Deaf => State::Idle,
-            Ear::Reading(stream) => State::Reading(Ahead::new(stream)),
-            Ear::Taring(stretch_us, readout) => State::Taring(Box::new(Rest::new(stretch_us, readout, &options.array))),
+        let mode = match ear {
+            Ear::Deaf => Mode::Idle,
+            Ear::Reading(stream) => Mode::Reading(Ahead::new(stream)),
+            Ear::Taring(stretch_us, readout) => Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array))),
         };
-        Self { state, sinks, say, found: vec![], events, frame_us: options.registers.frame_us() }
+        Self { mode, sinks, say, found: vec![], events, frame_us: options.registers.frame_us() }
     }
 
     pub(super) fn run(mut self, shared: &Shared) {
-        shared.board().counters.taring = matches!(self.state, State::Taring(_));
+        shared.board().counters.taring = matches!(self.mode, Mode::Taring(_));
         loop {
             let taken = shared.handover.take(&mut self.events);
             if let Err(error) = self.hear(shared, taken) {
                 shared.fail(error);
-                self.state = State::Idle;
+                self.mode = Mode::Idle;
             }
             if taken.last {
                 break;
@@ -67,8 +67,8 @@ impl Reader {
     }
 
     fn hear(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
-        match &mut self.state {
-            State::Reading(readout) => {
+        match &mut self.mode {
+            Mode::Reading(readout) => {
                 readout.push(&self.events, &mut self.found)?;
                 match taken.quiet_until {
                     Some(t) if taken.last => readout.advance(t, &mut self.found)?,
@@ -76,17 +76,17 @@ impl Reader {
                     None => {}
                 }
             }
-            State::Taring(rest) => {
+            Mode::Taring(rest) => {
                 if let Some((stop, inside)) = rest.hear(&self.events, taken.quiet_until)? {
                     self.begin(shared, stop, inside)?;
                 }
             }
-            State::Idle => {}
+            Mode::Idle => {}
         }
         if !self.events.is_empty() || taken.last {
             let counters = &mut shared.board().counters;
             counters.read_out += self.events.len() as u64;
-            if let State::Reading(readout) = &self.state {
+            if let Mode::Reading(readout) = &self.mode {
                 (counters.late, counters.wrong) = (readout.late(), readout.wrong());
             }
         }
@@ -95,11 +95,11 @@ impl Reader {
 
     /// The rest is over: begins to read with the first event after it.
     fn begin(&mut self, shared: &Shared, stop: i64, inside: usize) -> crate::Result<()> {
-        let State::Taring(rest) = std::mem::replace(&mut self.state, State::Idle) else { return Ok(()) };
+        let Mode::Taring(rest) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
         let (tare, stream) = rest.finish(stop, self.frame_us)?;
         let mut readout = Ahead::new(Box::new(stream));
         readout.push(&self.events.piece(inside..self.events.len()), &mut self.found)?;
-        self.state = State::Reading(readout);
+        self.mode = Mode::Reading(readout);
         let mut board = shared.board();
         board.counters.taring = false;
         board.tare = Some(tare);

@@ -8,7 +8,7 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 
 use taxel_core::{Marker, problem};
 
-use super::{Counters, Options, Record, Said};
+use super::{Counters, LiveOptions, Record, Said};
 use crate::capture::Batch;
 use crate::recording::{self, Header, LsaWriter, Writer, now_ns};
 use crate::{Error, Result};
@@ -35,7 +35,7 @@ enum Kind {
 }
 
 impl Recorder {
-    pub(super) fn create(record: &Record, options: &Options, address: SocketAddr) -> Result<Self> {
+    pub(super) fn create(record: &Record, options: &LiveOptions, address: SocketAddr) -> Result<Self> {
         let header = Header {
             array: options.array.clone(),
             registers: Some(options.registers),
@@ -72,7 +72,7 @@ impl Recorder {
         let Record { path, compression, overwrite } = &self.record;
         let kind = match named(path)? {
             "mcap" => {
-                let how = recording::Options { compression: *compression, overwrite: *overwrite };
+                let how = recording::WriterOptions { compression: *compression, overwrite: *overwrite };
                 Kind::Mcap(Writer::create(path, &self.header, how)?)
             }
             _ => Kind::Lsa(Mutex::new(LsaWriter::create(path, *overwrite)?)),

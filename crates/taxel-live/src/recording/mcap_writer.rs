@@ -20,7 +20,7 @@ use taxel_core::detect::Detection;
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
-use super::{Compression, Counts, FLUSH_EVERY, Header, Options, Topic, create};
+use super::{Compression, Counts, FLUSH_EVERY, Header, Topic, WriterOptions, create};
 use crate::{Error, Result};
 
 /// A chunk is closed when it is this large, or when the queue is empty.
@@ -47,7 +47,7 @@ pub struct Writer {
 }
 
 struct Shared {
-    state: Mutex<State>,
+    state: Mutex<Pending>,
     /// Wakes the thread: the end has come, or the queue fills a chunk.
     work: Condvar,
     /// Wakes callers: there is room in the queue again, or no hope.
@@ -55,7 +55,7 @@ struct Shared {
 }
 
 #[derive(Default)]
-struct State {
+struct Pending {
     queue: Queue,
     recorded: u64,
     /// How the recording ends: set once.
@@ -101,11 +101,11 @@ impl Writer {
     /// # Errors
     ///
     /// `File` where the file exists (and `overwrite` is not set), or cannot be created or written.
-    pub fn create(path: &Path, header: &Header, options: Options) -> Result<Self> {
+    pub fn create(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
         let file = create(path, options.overwrite)?;
         let pen = Pen::begin(file, header, options.compression).map_err(|e| Broken::of(e).named(path))?;
         let shared =
-            Arc::new(Shared { state: Mutex::new(State::default()), work: Condvar::new(), room: Condvar::new() });
+            Arc::new(Shared { state: Mutex::new(Pending::default()), work: Condvar::new(), room: Condvar::new() });
         let thread = std::thread::Builder::new()
             .name("taxel-record".to_owned())
             .spawn({
@@ -270,7 +270,7 @@ impl Drop for Writer {
 }
 
 impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
+    fn lock(&self) -> MutexGuard<'_, Pending> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -309,7 +309,7 @@ impl Shared {
     }
 
     /// Tells callers of an error, and leaves a file that can be read.
-    fn broke(&self, error: McapError, sheet: Sheet, path: &Path) -> Error {
+    fn broke(&self, error: McapError, sheet: RecordFile, path: &Path) -> Error {
         let broken = Broken::of(error);
         sheet.salvage(&broken.text);
         self.lock().broken = Some(broken.clone());
@@ -340,7 +340,7 @@ impl Broken {
 }
 
 /// The file behind a small buffer that, unlike the standard library's, is thrown away when a write failed.
-struct Sheet {
+struct RecordFile {
     file: File,
     waiting: Vec<u8>,
     written: u64,
@@ -351,7 +351,7 @@ struct Sheet {
 /// From here on bytes go to the file without a stay in the buffer.
 const LARGE: usize = 1 << 14;
 
-impl Write for Sheet {
+impl Write for RecordFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if bytes.len() < LARGE {
             self.waiting.extend_from_slice(bytes);
@@ -370,7 +370,7 @@ impl Write for Sheet {
     }
 }
 
-impl Sheet {
+impl RecordFile {
     fn hand_over(&mut self) -> io::Result<()> {
         self.file.write_all(&self.waiting)?;
         self.written += self.waiting.len() as u64;
@@ -395,7 +395,7 @@ impl Sheet {
 
 /// The crate's writer with what a recording is about.
 struct Pen {
-    mcap: mcap::Writer<NoSeek<Sheet>>,
+    mcap: mcap::Writer<NoSeek<RecordFile>>,
     header: Header,
 }
 
@@ -415,7 +415,7 @@ impl Pen {
             .calculate_data_section_crc(false)
             .disable_seeking(true)
             .chunk_size(Some(2 * CHUNK_BYTES as u64));
-        let sheet = Sheet { file, waiting: Vec::new(), written: 0, whole: 0 };
+        let sheet = RecordFile { file, waiting: Vec::new(), written: 0, whole: 0 };
         let mut pen = Self { mcap: options.create(NoSeek::new(sheet))?, header: header.clone() };
         let said = BTreeMap::from([("header".to_owned(), json!(header).to_string())]);
         pen.mcap.write_metadata(&Metadata { name: BEGIN.to_owned(), metadata: said.clone() })?;
@@ -469,7 +469,7 @@ impl Pen {
         Ok(())
     }
 
-    fn sheet(self) -> Sheet {
+    fn sheet(self) -> RecordFile {
         self.mcap.into_inner().into_inner()
     }
 }

@@ -9,6 +9,7 @@ use crate::learn::mixed::{self, Terms};
 use crate::learn::nearest::nearest;
 use crate::learn::silence::Peak;
 use crate::learn::statement::Row;
+use crate::vectors::dot;
 use crate::{Result, Stop};
 
 /// As for the shortest weights, with more room: rows that are nearly the same are harder here.
@@ -188,7 +189,7 @@ impl Dense {
         let most = multipliers.iter().fold(0.0, |m: f64, z| m.max(*z));
         let rows = self.below.chunks_exact(n).zip(&self.limit).zip(multipliers);
         let keep: Vec<bool> =
-            rows.map(|((row, limit), z)| *z > 1e-6 * most || limit - super::dot(row, weights) < room).collect();
+            rows.map(|((row, limit), z)| *z > 1e-6 * most || limit - dot(row, weights) < room).collect();
         let kept = |k: &usize| keep[*k];
         self.below = (0..keep.len()).filter(kept).flat_map(|k| self.below[k * n..(k + 1) * n].to_vec()).collect();
         self.limit = (0..keep.len()).filter(kept).map(|k| self.limit[k]).collect();
@@ -202,9 +203,8 @@ impl Dense {
     /// How far the worst row is missed.
     fn missed(&self, weights: &[f64]) -> f64 {
         let n = weights.len();
-        let equal =
-            self.equal.chunks_exact(n).zip(&self.equal_to).map(|(row, to)| (super::dot(row, weights) - to).abs());
-        let below = self.below.chunks_exact(n).zip(&self.limit).map(|(row, limit)| super::dot(row, weights) - limit);
+        let equal = self.equal.chunks_exact(n).zip(&self.equal_to).map(|(row, to)| (dot(row, weights) - to).abs());
+        let below = self.below.chunks_exact(n).zip(&self.limit).map(|(row, limit)| dot(row, weights) - limit);
         super::largest(equal.chain(below).chain([0.0]))
     }
 }

@@ -1,6 +1,7 @@
 //! Cholesky factor of the Gram matrix of the active rows: rows are appended by the block and removed by rotations.
 
-use super::kernels::{Aligned, LANES, backward, dot, forward, forward_many, products, rotate};
+use super::kernels::{backward, forward, forward_many, products, rotate};
+use crate::vectors::{Aligned, LANES, dot};
 
 /// L with `L L' = G` over the active rows, in the order in which they came.
 #[derive(Debug, Clone, Default)]

@@ -1,239 +1,10 @@
-//! The loops that the time goes into, compiled once a width of vectors.
+//! The loops that the time goes into, over rows and columns of whole lines.
 
-/// Numbers on a cache line's border, so that no vector straddles two lines.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Aligned(Vec<Line>);
-
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-struct Line([f64; LANES]);
-
-/// Numbers a vector of the widest kind, and to which strides are rounded.
-pub(super) const LANES: usize = 8;
-
-impl Aligned {
-    pub(super) fn zeros(len: usize) -> Self {
-        Self(vec![Line([0.0; LANES]); len.div_ceil(LANES)])
-    }
-}
-
-impl std::ops::Deref for Aligned {
-    type Target = [f64];
-
-    fn deref(&self) -> &[f64] {
-        // SAFETY: a `Line` is eight f64 and nothing else (repr(C), 64 bytes), so n of them are 8 n f64 in a row.
-        unsafe { std::slice::from_raw_parts(self.0.as_ptr().cast(), self.0.len() * LANES) }
-    }
-}
-
-impl std::ops::DerefMut for Aligned {
-    fn deref_mut(&mut self) -> &mut [f64] {
-        // SAFETY: as above, and the borrow is the only one.
-        unsafe { std::slice::from_raw_parts_mut(self.0.as_mut_ptr().cast(), self.0.len() * LANES) }
-    }
-}
-
-/// Eight numbers in the machine's registers.
-trait Vector: Copy {
-    fn splat(value: f64) -> Self;
-    fn load(from: &[f64; LANES]) -> Self;
-    fn store(self, to: &mut [f64; LANES]);
-    /// `a b + self`.
-    fn add_product(self, a: Self, b: Self) -> Self;
-    fn total(self) -> f64;
-}
-
-impl Vector for [f64; LANES] {
-    #[inline(always)]
-    fn splat(value: f64) -> Self {
-        [value; LANES]
-    }
-    #[inline(always)]
-    fn load(from: &[f64; LANES]) -> Self {
-        *from
-    }
-    #[inline(always)]
-    fn store(self, to: &mut [f64; LANES]) {
-        *to = self;
-    }
-    #[inline(always)]
-    fn add_product(self, a: Self, b: Self) -> Self {
-        std::array::from_fn(|l| a[l] * b[l] + self[l])
-    }
-    #[inline(always)]
-    fn total(self) -> f64 {
-        let [a, b, c, d, e, f, g, h] = self;
-        ((a + e) + (c + g)) + ((b + f) + (d + h))
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-mod x86 {
-    use std::arch::x86_64::*;
-
-    use super::{LANES, Vector};
-
-    /// A vector of AVX-512; made only in functions compiled for it.
-    #[derive(Clone, Copy)]
-    pub(super) struct Zmm(__m512d);
-
-    impl Vector for Zmm {
-        #[inline(always)]
-        fn splat(value: f64) -> Self {
-            // SAFETY: `kernel!` names this type only where the machine has AVX-512F.
-            Self(unsafe { _mm512_set1_pd(value) })
-        }
-        #[inline(always)]
-        fn load(from: &[f64; LANES]) -> Self {
-            // SAFETY: as above; eight numbers are read.
-            Self(unsafe { _mm512_loadu_pd(from.as_ptr()) })
-        }
-        #[inline(always)]
-        fn store(self, to: &mut [f64; LANES]) {
-            // SAFETY: as above; eight numbers are written.
-            unsafe { _mm512_storeu_pd(to.as_mut_ptr(), self.0) }
-        }
-        #[inline(always)]
-        fn add_product(self, a: Self, b: Self) -> Self {
-            // SAFETY: as above.
-            Self(unsafe { _mm512_fmadd_pd(a.0, b.0, self.0) })
-        }
-        #[inline(always)]
-        fn total(self) -> f64 {
-            // SAFETY: as above.
-            unsafe { _mm512_reduce_add_pd(self.0) }
-        }
-    }
-
-    /// Two vectors of AVX2; made only in functions compiled for it.
-    #[derive(Clone, Copy)]
-    pub(super) struct Ymm(__m256d, __m256d);
-
-    impl Vector for Ymm {
-        #[inline(always)]
-        fn splat(value: f64) -> Self {
-            // SAFETY: `kernel!` names this type only where the machine has AVX2 and FMA.
-            let one = unsafe { _mm256_set1_pd(value) };
-            Self(one, one)
-        }
-        #[inline(always)]
-        fn load(from: &[f64; LANES]) -> Self {
-            // SAFETY: as above; eight numbers are read.
-            unsafe { Self(_mm256_loadu_pd(from.as_ptr()), _mm256_loadu_pd(from[4..].as_ptr())) }
-        }
-        #[inline(always)]
-        fn store(self, to: &mut [f64; LANES]) {
-            // SAFETY: as above; eight numbers are written.
-            unsafe {
-                _mm256_storeu_pd(to.as_mut_ptr(), self.0);
-                _mm256_storeu_pd(to[4..].as_mut_ptr(), self.1);
-            }
-        }
-        #[inline(always)]
-        fn add_product(self, a: Self, b: Self) -> Self {
-            // SAFETY: as above.
-            unsafe { Self(_mm256_fmadd_pd(a.0, b.0, self.0), _mm256_fmadd_pd(a.1, b.1, self.1)) }
-        }
-        #[inline(always)]
-        fn total(self) -> f64 {
-            let mut lanes = [0.0; LANES];
-            self.store(&mut lanes);
-            lanes.total()
-        }
-    }
-}
-
-#[inline(always)]
-fn lines(numbers: &[f64]) -> &[[f64; LANES]] {
-    numbers.as_chunks().0
-}
-
-#[inline(always)]
-fn lines_mut(numbers: &mut [f64]) -> &mut [[f64; LANES]] {
-    numbers.as_chunks_mut().0
-}
-
-/// Defines a function over vectors `V`, compiled for AVX-512, for AVX2 and plainly; the machine's widest is taken.
-macro_rules! kernel {
-    ($(#[$about:meta])* fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) $(-> $out:ty)? $body:block) => {
-        $(#[$about])*
-        pub(super) fn $name($($argument: $kind),*) $(-> $out)? {
-            #[inline(always)]
-            fn plain<$vector: Vector>($($argument: $kind),*) $(-> $out)? $body
-
-            #[cfg(target_arch = "x86_64")]
-            {
-                #[target_feature(enable = "avx512f,fma")]
-                fn avx512($($argument: $kind),*) $(-> $out)? {
-                    plain::<x86::Zmm>($($argument),*)
-                }
-                #[target_feature(enable = "avx2,fma")]
-                fn avx2($($argument: $kind),*) $(-> $out)? {
-                    plain::<x86::Ymm>($($argument),*)
-                }
-                if std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("fma") {
-                    // SAFETY: the machine was just asked and has these.
-                    return unsafe { avx512($($argument),*) };
-                }
-                if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
-                    // SAFETY: the machine was just asked and has these.
-                    return unsafe { avx2($($argument),*) };
-                }
-            }
-            plain::<[f64; LANES]>($($argument),*)
-        }
-    };
-}
-
-kernel! {
-    /// `a.b`; what does not fill a line counts too.
-    fn dot<V>(a: &[f64], b: &[f64]) -> f64 {
-        let mut sums = [V::splat(0.0); 4];
-        let (a4, b4) = (lines(a).chunks_exact(4), lines(b).chunks_exact(4));
-        for (x, y) in a4.clone().zip(b4.clone()) {
-            for s in 0..4 {
-                sums[s] = sums[s].add_product(V::load(&x[s]), V::load(&y[s]));
-            }
-        }
-        for (x, y) in a4.remainder().iter().zip(b4.remainder()) {
-            sums[0] = sums[0].add_product(V::load(x), V::load(y));
-        }
-        let tail: f64 = a.as_chunks::<LANES>().1.iter().zip(b.as_chunks::<LANES>().1).map(|(x, y)| x * y).sum();
-        (sums[0].total() + sums[1].total()) + (sums[2].total() + sums[3].total()) + tail
-    }
-}
-
-/// Products of S rows with x, by vectors.
-#[inline(always)]
-fn times<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], x: &[[f64; LANES]]) -> [f64; S] {
-    let rows = rows.map(|row| &row[..x.len()]);
-    let mut sums = [V::splat(0.0); S];
-    for (i, x) in x.iter().enumerate() {
-        let x = V::load(x);
-        for s in 0..S {
-            sums[s] = sums[s].add_product(V::load(&rows[s][i]), x);
-        }
-    }
-    sums.map(V::total)
-}
-
-/// `sum += by[0] rows[0] + ..`, by vectors.
-#[inline(always)]
-fn add<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], by: [f64; S], sum: &mut [[f64; LANES]]) {
-    let rows = rows.map(|row| &row[..sum.len()]);
-    let by = by.map(V::splat);
-    for (i, sum) in sum.iter_mut().enumerate() {
-        let mut here = V::load(sum);
-        for s in 0..S {
-            here = here.add_product(by[s], V::load(&rows[s][i]));
-        }
-        here.store(sum);
-    }
-}
+use crate::vectors::{LANES, add_lines, kernel, lines, lines_mut, times};
 
 kernel! {
     /// `out[k] = rows[which[k]].x`; rows of `stride` numbers, a multiple of eight, the padding 0.
-    fn rows_times<V>(rows: &[f64], stride: usize, which: &[usize], x: &[f64], out: &mut [f64]) {
+    pub(super) fn rows_times<V>(rows: &[f64], stride: usize, which: &[usize], x: &[f64], out: &mut [f64]) {
         let x = lines(&x[..stride]);
         let row = |k: usize| lines(&rows[k * stride..][..stride]);
         for (which, out) in which.chunks(LANES).zip(out.chunks_mut(LANES)) {
@@ -250,15 +21,15 @@ kernel! {
 
 kernel! {
     /// `out += sum of by[k] rows[which[k]]`; rows as in `rows_times`.
-    fn add_rows<V>(rows: &[f64], stride: usize, which: &[usize], by: &[f64], out: &mut [f64]) {
+    pub(super) fn add_rows<V>(rows: &[f64], stride: usize, which: &[usize], by: &[f64], out: &mut [f64]) {
         let out = lines_mut(&mut out[..stride]);
         let row = |k: usize| lines(&rows[k * stride..][..stride]);
         for (which, by) in which.chunks(LANES).zip(by.chunks(LANES)) {
             if let (Ok(which), Ok(by)) = (<[usize; LANES]>::try_from(which), by.try_into()) {
-                add::<V, LANES>(which.map(row), by, out);
+                add_lines::<V, LANES>(which.map(row), by, out);
             } else {
                 for (&k, &by) in which.iter().zip(by) {
-                    add::<V, 1>([row(k)], [by], out);
+                    add_lines::<V, 1>([row(k)], [by], out);
                 }
             }
         }
@@ -284,13 +55,13 @@ fn below(l: &[f64], stride: usize, k: usize, padded: usize) -> [&[[f64; LANES]];
 
 kernel! {
     /// Solves `L x = x` in place; L by columns of `stride`, the first `m`; lines beyond `m` are 0.
-    fn forward<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
+    pub(super) fn forward<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
         let padded = m.next_multiple_of(LANES);
         for k in (0..m).step_by(LANES) {
             triangle(l, stride, inverse, k, (m - k).min(LANES), x);
             if k + LANES < padded {
                 let by = std::array::from_fn(|j| -x[k + j]);
-                add::<V, LANES>(below(l, stride, k, padded), by, lines_mut(&mut x[k + LANES..padded]));
+                add_lines::<V, LANES>(below(l, stride, k, padded), by, lines_mut(&mut x[k + LANES..padded]));
             }
         }
     }
@@ -298,7 +69,7 @@ kernel! {
 
 kernel! {
     /// Solves `L' x = x` in place; L as in `forward`.
-    fn backward<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
+    pub(super) fn backward<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64]) {
         let padded = m.next_multiple_of(LANES);
         for k in (0..m).step_by(LANES).rev() {
             if k + LANES < padded {
@@ -338,7 +109,7 @@ const NEAR: usize = 16;
 
 kernel! {
     /// `forward` for many right sides, columns of `x_stride` numbers each.
-    fn forward_many<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64], x_stride: usize) {
+    pub(super) fn forward_many<V>(l: &[f64], stride: usize, inverse: &[f64], m: usize, x: &mut [f64], x_stride: usize) {
         let padded = m.next_multiple_of(LANES);
         for x in x.chunks_mut(SIDES * x_stride) {
             for k in (0..m).step_by(LANES) {
@@ -364,7 +135,7 @@ kernel! {
                     for x in x.chunks_mut(2 * x_stride) {
                         if x.len() < 2 * x_stride {
                             let by = std::array::from_fn(|j| -x[k + j]);
-                            add::<V, LANES>(columns, by, lines_mut(&mut x[from..to]));
+                            add_lines::<V, LANES>(columns, by, lines_mut(&mut x[from..to]));
                             continue;
                         }
                         let (a, b) = x.split_at_mut(x_stride);
@@ -396,7 +167,7 @@ const DEEP: usize = 512;
 
 kernel! {
     /// `out[i][j] += left[i].right[j]`: all products of two sets of rows, of `stride` numbers each; `out` by rows of `width`.
-    fn products<V>(left: &[f64], right: &[f64], stride: usize, out: &mut [f64], width: usize) {
+    pub(super) fn products<V>(left: &[f64], right: &[f64], stride: usize, out: &mut [f64], width: usize) {
         for from in (0..stride).step_by(DEEP) {
             let to = (from + DEEP).min(stride);
             for (left, out) in left.chunks(128 * stride).zip(out.chunks_mut(128 * width)) {
@@ -437,7 +208,7 @@ kernel! {
 
 kernel! {
     /// Turns `(x, y)` by a plane rotation: `x = c x + s y`, `y = c y - s x`; both of whole lines.
-    fn rotate<V>(c: f64, s: f64, x: &mut [f64], y: &mut [f64]) {
+    pub(super) fn rotate<V>(c: f64, s: f64, x: &mut [f64], y: &mut [f64]) {
         let (c, s, minus, zero) = (V::splat(c), V::splat(s), V::splat(-s), V::splat(0.0));
         for (x, y) in lines_mut(x).iter_mut().zip(lines_mut(y)) {
             let (a, b) = (V::load(x), V::load(y));

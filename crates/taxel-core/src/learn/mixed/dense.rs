@@ -28,10 +28,6 @@ pub(super) fn add_sum(rows: &[f64], factors: &[f64], sum: &mut [f64]) {
     matmul(into.as_mat_mut(), Accum::Add, rows, ColRef::from_slice(factors).as_mat(), 1.0, Par::Seq);
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 /// Columns of one block of a Gram matrix: the product of a block is quicker than that of a triangle.
 const BLOCK: usize = 128;
 

@@ -5,11 +5,12 @@
 //! and Todd do, and adds a multiple of one and one rank to the Newton matrix; its length is eliminated as well. So each
 //! iteration takes the Cholesky factors of one matrix of synapses and one of equality rows.
 
-use super::dense::{Cholesky, add_gram, add_sum, dot, outer, times};
+use super::dense::{Cholesky, add_gram, add_sum, outer, times};
 use super::polish::Guess;
 use super::{Place, Point, Program, retain};
 use crate::Stop;
 use crate::learn::cone_r::Norm;
+use crate::vectors::dot;
 use faer::Mat;
 
 const MOST_ITERATIONS: usize = 100;

@@ -5,10 +5,11 @@
 
 use faer::Mat;
 
-use super::dense::{Lu, add_gram, add_sum, dot, times};
+use super::dense::{Lu, add_gram, add_sum, times};
 use super::{Place, Point, Program};
 use crate::Stop;
 use crate::learn::cone_r::Norm;
+use crate::vectors::dot;
 
 const MOST_GUESSES: usize = 12;
 const MOST_REFINEMENTS: usize = 12;

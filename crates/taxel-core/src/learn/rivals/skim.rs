@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::allowed::{above_0, at_least_0, one_weight_a_train};
 use crate::neuron::{Kernel, Neuron, Shape, State};
+use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// Rows that are laid out at once: few enough for the cache, many enough to be worth a reflection each.
@@ -112,18 +113,6 @@ impl Normal {
             }
         }
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a_blocks, b_blocks) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a_blocks.remainder().iter().zip(b_blocks.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a_blocks.zip(b_blocks) {
-        for k in 0..8 {
-            sums[k] += x[k] * y[k];
-        }
-    }
-    sums.iter().sum::<f64>() + rest
 }
 
 /// One branch on its way through a pattern: what comes in, and its kernel's state.

@@ -60,7 +60,7 @@ pub struct Peak {
 }
 
 /// A pattern's inputs by time, each with what the time up to it does.
-struct Events {
+struct Inputs {
     start: f64,
     stop: f64,
     times: Vec<f64>,
@@ -105,7 +105,7 @@ impl Tempotron {
         Shape::new(Kernel::DoubleExponential, self.tau, self.tau_s())
     }
 
-    fn lay_out(&self, pattern: &SpikeTrains) -> Events {
+    fn lay_out(&self, pattern: &SpikeTrains) -> Inputs {
         let shape = self.shape();
         let spikes = pattern.by_time();
         let mut last = pattern.start;
@@ -117,7 +117,7 @@ impl Tempotron {
                 step
             })
             .collect();
-        Events {
+        Inputs {
             start: pattern.start,
             stop: pattern.stop,
             times: spikes.iter().map(|s| s.t).collect(),
@@ -127,7 +127,7 @@ impl Tempotron {
     }
 
     /// The highest point of the potential, exactly: between inputs it has one maximum at most, and its time is known.
-    fn reach(&self, shape: &Shape, weights: &[f64], events: &Events) -> Reached {
+    fn reach(&self, shape: &Shape, weights: &[f64], events: &Inputs) -> Reached {
         let mut state = State::default();
         let mut best = Peak { v_max: 0.0, t_max: events.start, t_spike: None };
         for k in 0..=events.times.len() {
@@ -189,7 +189,7 @@ impl Tempotron {
         Ok(change)
     }
 
-    fn correct(&self, shape: &Shape, events: &Events, reached: &Reached, label: bool, change: &mut [f64]) {
+    fn correct(&self, shape: &Shape, events: &Inputs, reached: &Reached, label: bool, change: &mut [f64]) {
         let sign = if label { 1.0 } else { -1.0 };
         let mut t_max = reached.peak.t_max;
         if reached.peak.v_max <= 0.0 {
@@ -235,7 +235,7 @@ impl Tempotron {
         };
         let length = patterns.iter().map(|p| p.stop - p.start).sum::<f64>() / patterns.len() as f64;
         let eta = self.eta.unwrap_or(3e-3 * length / (self.tau * trains as f64 * shape.scale));
-        let events: Vec<Events> = patterns.iter().map(|p| self.lay_out(p)).collect();
+        let events: Vec<Inputs> = patterns.iter().map(|p| self.lay_out(p)).collect();
         let mut order: Vec<usize> = (0..patterns.len()).collect();
         let (mut change, mut before) = (vec![0.0; trains], vec![0.0; trains]);
         let mut trained = Trained { weights: weights.clone(), right: Vec::new(), best_epoch: 0, ended: Ended::Epochs };

@@ -4,7 +4,7 @@ use super::{FADED, LANES, Lanes, SLACK, Weight};
 use crate::SpikeTrains;
 use crate::neuron::streaming::{ContinuousStream, OutputSpike};
 use crate::neuron::{AT_EDGE, AfterSpike, Neuron, State, Step};
-use crate::wide::wide;
+use crate::vectors::wide;
 
 /// From this share of tau on the tangent says less than the kernel's largest value.
 const LONG: f64 = 0.3;

@@ -4,7 +4,7 @@ use super::{FADED, LANES, Lanes, SLACK, Weight};
 use crate::SpikeTrains;
 use crate::neuron::streaming::{EDGE, Threshold};
 use crate::neuron::{AfterSpike, Neuron, State, Step};
-use crate::wide::wide;
+use crate::vectors::wide;
 
 /// What all neurons have in common: the grid and its inputs.
 pub(super) struct Script {

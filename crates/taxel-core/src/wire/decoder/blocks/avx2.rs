@@ -2,8 +2,8 @@
 
 use std::arch::x86_64::*;
 
-use super::{FARTHEST_AHEAD, State, indices, value};
-use crate::wire::decoder::Sheet;
+use super::{Carried, FARTHEST_AHEAD, indices, value};
+use crate::wire::decoder::Filling;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
 const WORDS: usize = 16;
@@ -37,13 +37,19 @@ static HEAD: [[u8; 16]; 3] = fetch([Some(0), None]);
 /// Bits of a byte mask that belong to the first bytes of 16-bit lanes.
 const FIRSTS: u32 = 0x5555_5555;
 
-/// See [`super::Instructions::blocks`].
+/// See [`super::blocks`].
 ///
 /// # Safety
 ///
-/// The machine must have AVX2, and each column of `sheet.room` at least `sheet.rows + bytes.len() / 5` entries.
+/// The machine must have AVX2, and each column of `filling.room` at least `filling.rows + bytes.len() / 5` entries.
 #[target_feature(enable = "avx2")]
-pub(super) unsafe fn blocks(bytes: &[u8], columns: u16, rows: u16, state: &mut State, sheet: &mut Sheet<'_>) -> usize {
+pub(super) unsafe fn blocks(
+    bytes: &[u8],
+    columns: u16,
+    rows: u16,
+    state: &mut Carried,
+    filling: &mut Filling<'_>,
+) -> usize {
     // SAFETY: each table is 16 bytes long.
     let table = |t: &[u8; 16]| unsafe { _mm256_broadcastsi128_si256(_mm_loadu_si128(t.as_ptr().cast())) };
     let low_from = [table(&LOW[0]), table(&LOW[1]), table(&LOW[2])];
@@ -88,7 +94,7 @@ pub(super) unsafe fn blocks(bytes: &[u8], columns: u16, rows: u16, state: &mut S
             _mm256_add_epi64(start, _mm256_mul_epu32(ahead, _mm256_set1_epi64x(STAMP_US)))
         };
         let polarity = _mm256_and_si256(_mm256_srli_epi16::<6>(head), _mm256_set1_epi16(1));
-        let first = sheet.rows;
+        let first = filling.rows;
 
         if intensities == 0 {
             // Stamps ahead of the latest time that do not fall are each ahead of the one before.
@@ -104,21 +110,21 @@ pub(super) unsafe fn blocks(bytes: &[u8], columns: u16, rows: u16, state: &mut S
             let (early, late) = (_mm256_castsi256_si128(ahead), _mm256_extracti128_si256::<1>(ahead));
             // SAFETY: at least 16 words are left, so 16 rows fit after `first`.
             unsafe {
-                let t = sheet.room.t.as_mut_ptr().add(first).cast::<i64>();
+                let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
                 _mm256_storeu_si256(t.cast(), time(early));
                 _mm256_storeu_si256(t.add(4).cast(), time(_mm_srli_si128::<8>(early)));
                 _mm256_storeu_si256(t.add(8).cast(), time(late));
                 _mm256_storeu_si256(t.add(12).cast(), time(_mm_srli_si128::<8>(late)));
-                _mm256_storeu_si256(sheet.room.x.as_mut_ptr().add(first).cast(), x);
-                _mm256_storeu_si256(sheet.room.y.as_mut_ptr().add(first).cast(), y);
-                _mm_storeu_si128(sheet.room.p.as_mut_ptr().add(first).cast(), p);
-                if sheet.paired {
-                    _mm256_storeu_si256(sheet.room.ticks.as_mut_ptr().add(first).cast(), _mm256_setzero_si256());
-                    _mm_storeu_si128(sheet.room.present.as_mut_ptr().add(first).cast(), _mm_setzero_si128());
+                _mm256_storeu_si256(filling.room.x.as_mut_ptr().add(first).cast(), x);
+                _mm256_storeu_si256(filling.room.y.as_mut_ptr().add(first).cast(), y);
+                _mm_storeu_si128(filling.room.p.as_mut_ptr().add(first).cast(), p);
+                if filling.paired {
+                    _mm256_storeu_si256(filling.room.ticks.as_mut_ptr().add(first).cast(), _mm256_setzero_si256());
+                    _mm_storeu_si128(filling.room.present.as_mut_ptr().add(first).cast(), _mm_setzero_si128());
                 }
             }
-            sheet.rows = first + WORDS;
-            sheet.open = true;
+            filling.rows = first + WORDS;
+            filling.open = true;
             state.latest += i64::from(farthest);
         } else {
             // Lanes of 32 bits are a change and its intensity, where they alternate and name the same taxel.
@@ -139,22 +145,22 @@ pub(super) unsafe fn blocks(bytes: &[u8], columns: u16, rows: u16, state: &mut S
             if !rising || farthest > FARTHEST_AHEAD {
                 break;
             }
-            sheet.begin_pairs();
+            filling.begin_pairs();
             let p = changes(polarity);
             // SAFETY: at least 16 words are left, so 8 rows fit after `first`.
             unsafe {
-                let t = sheet.room.t.as_mut_ptr().add(first).cast::<i64>();
+                let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
                 _mm256_storeu_si256(t.cast(), time(ahead));
                 _mm256_storeu_si256(t.add(4).cast(), time(_mm_srli_si128::<8>(ahead)));
-                _mm_storeu_si128(sheet.room.x.as_mut_ptr().add(first).cast(), changes(x));
-                _mm_storeu_si128(sheet.room.y.as_mut_ptr().add(first).cast(), changes(y));
-                _mm_storel_epi64(sheet.room.p.as_mut_ptr().add(first).cast(), _mm_packus_epi16(p, p));
+                _mm_storeu_si128(filling.room.x.as_mut_ptr().add(first).cast(), changes(x));
+                _mm_storeu_si128(filling.room.y.as_mut_ptr().add(first).cast(), changes(y));
+                _mm_storel_epi64(filling.room.p.as_mut_ptr().add(first).cast(), _mm_packus_epi16(p, p));
                 let ticks = changes(_mm256_srli_epi32::<16>(values));
-                _mm_storeu_si128(sheet.room.ticks.as_mut_ptr().add(first).cast(), ticks);
-                _mm_storel_epi64(sheet.room.present.as_mut_ptr().add(first).cast(), _mm_set1_epi8(1));
+                _mm_storeu_si128(filling.room.ticks.as_mut_ptr().add(first).cast(), ticks);
+                _mm_storel_epi64(filling.room.present.as_mut_ptr().add(first).cast(), _mm_set1_epi8(1));
             }
-            sheet.rows = first + WORDS / 2;
-            sheet.open = false;
+            filling.rows = first + WORDS / 2;
+            filling.open = false;
             state.intensities += (WORDS / 2) as u64;
             state.latest += i64::from(farthest);
         }

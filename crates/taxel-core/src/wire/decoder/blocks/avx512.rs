@@ -2,8 +2,8 @@
 
 use std::arch::x86_64::*;
 
-use super::{FARTHEST_AHEAD, State, indices, value};
-use crate::wire::decoder::Sheet;
+use super::{Carried, FARTHEST_AHEAD, indices, value};
+use crate::wire::decoder::Filling;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
 const WORDS: usize = 32;
@@ -57,14 +57,20 @@ const fn shifted(by: i32) -> [u8; 64] {
     lanes
 }
 
-/// See [`super::Instructions::blocks`].
+/// See [`super::blocks`].
 ///
 /// # Safety
 ///
-/// The machine must have the features below, and each column of `sheet.room` at least `sheet.rows + bytes.len() / 5`
+/// The machine must have the features below, and each column of `filling.room` at least `filling.rows + bytes.len() / 5`
 /// entries.
 #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-pub(super) unsafe fn blocks(bytes: &[u8], columns: u16, rows: u16, state: &mut State, sheet: &mut Sheet<'_>) -> usize {
+pub(super) unsafe fn blocks(
+    bytes: &[u8],
+    columns: u16,
+    rows: u16,
+    state: &mut Carried,
+    filling: &mut Filling<'_>,
+) -> usize {
     // The index tables are read as whole registers.
     // SAFETY: each is 64 bytes long.
     let table = |t: &[u8; 64]| unsafe { _mm512_loadu_si512(t.as_ptr().cast()) };
@@ -137,41 +143,41 @@ pub(super) unsafe fn blocks(bytes: &[u8], columns: u16, rows: u16, state: &mut S
             break;
         }
 
-        let first = sheet.rows;
+        let first = filling.rows;
         if intensities != 0 {
             // An intensity is paired where the word before it is a change of the same taxel.
             let place_before = _mm512_permutexvar_epi16(one_up, place);
             let same = _mm512_cmpeq_epi16_mask(place, place_before) & !1;
             let mut paired = intensities & (changes << 1) & same;
             let taxel = (u16::from(bytes[at + 3] & 0x3f), u16::from(bytes[at + 4] & 0x3f));
-            if intensities & 1 != 0 && sheet.open && sheet.last_taxel() == taxel {
+            if intensities & 1 != 0 && filling.open && filling.last_taxel() == taxel {
                 paired |= 1;
             }
             if paired != 0 {
-                sheet.begin_pairs();
+                filling.begin_pairs();
                 if paired & 1 != 0 {
-                    sheet.room.ticks[first - 1].write(value(bytes, at));
-                    sheet.room.present[first - 1].write(true);
+                    filling.room.ticks[first - 1].write(value(bytes, at));
+                    filling.room.present[first - 1].write(true);
                 }
             }
-            if sheet.paired {
+            if filling.paired {
                 let next = _mm512_maskz_permutexvar_epi16(paired >> 1, one_down, values);
                 let ticks = _mm512_maskz_compress_epi16(changes, next);
                 let present = _mm256_maskz_set1_epi8(_pext_u32(paired >> 1, changes), 1);
                 // SAFETY: at least 32 words are left, so 32 rows fit after `first`.
                 unsafe {
-                    _mm512_storeu_si512(sheet.room.ticks.as_mut_ptr().add(first).cast(), ticks);
-                    _mm256_storeu_si256(sheet.room.present.as_mut_ptr().add(first).cast(), present);
+                    _mm512_storeu_si512(filling.room.ticks.as_mut_ptr().add(first).cast(), ticks);
+                    _mm256_storeu_si256(filling.room.present.as_mut_ptr().add(first).cast(), present);
                 }
             }
             let found = u64::from(paired.count_ones());
             state.intensities += found;
             state.unpaired += u64::from(intensities.count_ones()) - found;
-        } else if sheet.paired {
+        } else if filling.paired {
             // SAFETY: as above.
             unsafe {
-                _mm512_storeu_si512(sheet.room.ticks.as_mut_ptr().add(first).cast(), _mm512_setzero_si512());
-                _mm256_storeu_si256(sheet.room.present.as_mut_ptr().add(first).cast(), _mm256_setzero_si256());
+                _mm512_storeu_si512(filling.room.ticks.as_mut_ptr().add(first).cast(), _mm512_setzero_si512());
+                _mm256_storeu_si256(filling.room.present.as_mut_ptr().add(first).cast(), _mm256_setzero_si256());
             }
         }
         let start = _mm512_set1_epi64(state.latest * STAMP_US);
@@ -181,17 +187,17 @@ pub(super) unsafe fn blocks(bytes: &[u8], columns: u16, rows: u16, state: &mut S
         };
         // SAFETY: as above. What lies beyond the block's changes is written again by later rows, or never read.
         unsafe {
-            let t = sheet.room.t.as_mut_ptr().add(first).cast::<i64>();
+            let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
             _mm512_storeu_si512(t.cast(), time(_mm512_castsi512_si128(ahead)));
             _mm512_storeu_si512(t.add(8).cast(), time(_mm512_extracti32x4_epi32::<1>(ahead)));
             _mm512_storeu_si512(t.add(16).cast(), time(_mm512_extracti32x4_epi32::<2>(ahead)));
             _mm512_storeu_si512(t.add(24).cast(), time(_mm512_extracti32x4_epi32::<3>(ahead)));
-            _mm512_storeu_si512(sheet.room.x.as_mut_ptr().add(first).cast(), xs);
-            _mm512_storeu_si512(sheet.room.y.as_mut_ptr().add(first).cast(), ys);
-            _mm256_storeu_si256(sheet.room.p.as_mut_ptr().add(first).cast(), _mm256_maskz_set1_epi8(ps, 1));
+            _mm512_storeu_si512(filling.room.x.as_mut_ptr().add(first).cast(), xs);
+            _mm512_storeu_si512(filling.room.y.as_mut_ptr().add(first).cast(), ys);
+            _mm256_storeu_si256(filling.room.p.as_mut_ptr().add(first).cast(), _mm256_maskz_set1_epi8(ps, 1));
         }
-        sheet.rows = first + count;
-        sheet.open = changes >> 31 == 1;
+        filling.rows = first + count;
+        filling.open = changes >> 31 == 1;
         state.latest += i64::from(farthest);
         at += BYTES;
     }

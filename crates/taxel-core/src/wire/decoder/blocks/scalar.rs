@@ -1,29 +1,29 @@
 //! Plain words one by one, on any machine.
 
-use super::{FARTHEST_AHEAD, State, value};
-use crate::wire::decoder::Sheet;
+use super::{Carried, FARTHEST_AHEAD, value};
+use crate::wire::decoder::Filling;
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES};
 
-/// See [`super::Instructions::blocks`]; at most `most` words. The first pair of a sheet counts as not plain.
+/// See [`super::blocks`]; at most `most` words. The first pair of a filling counts as not plain.
 pub(super) fn words(
     bytes: &[u8],
     columns: u16,
     rows: u16,
-    state: &mut State,
-    sheet: &mut Sheet<'_>,
+    state: &mut Carried,
+    filling: &mut Filling<'_>,
     most: usize,
 ) -> usize {
     let words = most.min(bytes.len() / WORD_BYTES);
-    let (first, paired, mut open) = (sheet.rows, sheet.paired, sheet.open);
-    let mut last = if open { sheet.last_taxel() } else { (0, 0) };
+    let (first, paired, mut open) = (filling.rows, filling.paired, filling.open);
+    let mut last = if open { filling.last_taxel() } else { (0, 0) };
     // Places of rows from here on: there are never more rows than words.
     let place = first..first + words;
-    let (t, p) = (&mut sheet.room.t[place.clone()], &mut sheet.room.p[place.clone()]);
-    let (x, y) = (&mut sheet.room.x[place.clone()], &mut sheet.room.y[place]);
+    let (t, p) = (&mut filling.room.t[place.clone()], &mut filling.room.p[place.clone()]);
+    let (x, y) = (&mut filling.room.x[place.clone()], &mut filling.room.y[place]);
     // Intensities may belong to the row before.
     let back = usize::from(first > 0);
-    let ticks = &mut sheet.room.ticks[first - back..first + words];
-    let present = &mut sheet.room.present[first - back..first + words];
+    let ticks = &mut filling.room.ticks[first - back..first + words];
+    let present = &mut filling.room.present[first - back..first + words];
     let (mut latest, mut n, mut done) = (state.latest, 0, 0);
     for word in bytes.chunks_exact(WORD_BYTES).take(words) {
         let taxel = (u16::from(word[3] & 0x3f), u16::from(word[4] & 0x3f));
@@ -61,8 +61,8 @@ pub(super) fn words(
         }
         done += 1;
     }
-    sheet.rows = first + n;
-    sheet.open = open;
+    filling.rows = first + n;
+    filling.open = open;
     state.latest = latest;
     done
 }

@@ -1,0 +1,160 @@
+//! Which vector instructions the machine has, and functions compiled for each of them.
+
+use std::sync::OnceLock;
+
+/// Sets of vector instructions that code is written or compiled for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Instructions {
+    /// None: on any machine.
+    Plain,
+    /// AVX2 with fused multiply-add.
+    Avx2,
+    /// AVX-512 F, BW, DQ and VL.
+    Avx512,
+    /// AVX-512 that moves single bytes as well: VBMI and VBMI2 (and BMI2, LZCNT, POPCNT).
+    Avx512Bytes,
+}
+
+impl Instructions {
+    /// All, from the plainest; each machine that has one has those before it.
+    pub const ALL: [Self; 4] = [Self::Plain, Self::Avx2, Self::Avx512, Self::Avx512Bytes];
+
+    /// The best that this machine has.
+    #[must_use]
+    #[inline]
+    pub fn best() -> Self {
+        static BEST: OnceLock<Instructions> = OnceLock::new();
+        *BEST.get_or_init(|| Self::ALL.into_iter().take_while(|i| i.asked()).last().unwrap_or(Self::Plain))
+    }
+
+    /// Whether this machine has them.
+    #[must_use]
+    #[inline]
+    pub fn present(self) -> bool {
+        self <= Self::best()
+    }
+
+    /// Asks the machine for what this set has beyond the one before.
+    fn asked(self) -> bool {
+        match self {
+            Self::Plain => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => {
+                is_x86_feature_detected!("avx512f")
+                    && is_x86_feature_detected!("avx512bw")
+                    && is_x86_feature_detected!("avx512dq")
+                    && is_x86_feature_detected!("avx512vl")
+            }
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512Bytes => {
+                is_x86_feature_detected!("avx512vbmi")
+                    && is_x86_feature_detected!("avx512vbmi2")
+                    && is_x86_feature_detected!("bmi2")
+                    && is_x86_feature_detected!("lzcnt")
+                    && is_x86_feature_detected!("popcnt")
+            }
+            #[cfg(not(target_arch = "x86_64"))]
+            _ => false,
+        }
+    }
+}
+
+/// Calls what fits a set of [`Instructions`], in a function with arms compiled for AVX-512, for AVX2 and plainly.
+macro_rules! by_width {
+    ($set:expr, ($($argument:ident: $kind:ty),*) -> $out:ty, [$($generic:tt)*], $avx512:expr, $avx2:expr, $plain:expr) => {{
+        #[cfg(target_arch = "x86_64")]
+        {
+            #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
+            fn avx512 $($generic)* ($($argument: $kind),*) -> $out {
+                $avx512($($argument),*)
+            }
+            #[target_feature(enable = "avx2,fma")]
+            fn avx2 $($generic)* ($($argument: $kind),*) -> $out {
+                $avx2($($argument),*)
+            }
+            let set: $crate::vectors::Instructions = $set;
+            if set >= $crate::vectors::Instructions::Avx512 {
+                // SAFETY: the machine has these: the set is its best, or was just asserted to be present.
+                return unsafe { avx512($($argument),*) };
+            }
+            if set == $crate::vectors::Instructions::Avx2 {
+                // SAFETY: as above.
+                return unsafe { avx2($($argument),*) };
+            }
+        }
+        $plain($($argument),*)
+    }};
+}
+
+/// Defines a function that runs compiled for AVX-512 or AVX2 where the machine has it, and as it stands elsewhere.
+///
+/// Only the width of vectors differs, never the arithmetic (the compiler fuses nothing by itself), so all machines give
+/// the same bits. What the function calls must be `#[inline(always)]` to be compiled with it.
+macro_rules! wide {
+    (
+        $(#[$about:meta])*
+        fn $name:ident $(<$rule:ident: $bound:ident>)? ($($argument:ident: $kind:ty),* $(,)?) $body:block
+    ) => {
+        $crate::vectors::wide! { $(#[$about])* fn $name $(<$rule: $bound>)? ($($argument: $kind),*) -> () $body }
+    };
+    (
+        $(#[$about:meta])*
+        fn $name:ident $(<$rule:ident: $bound:ident>)? ($($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
+    ) => {
+        $(#[$about])*
+        fn $name $(<$rule: $bound>)? ($($argument: $kind),*) -> $out {
+            #[inline(always)]
+            fn plain $(<$rule: $bound>)? ($($argument: $kind),*) -> $out $body
+            $crate::vectors::by_width!(
+                $crate::vectors::Instructions::best(),
+                ($($argument: $kind),*) -> $out, [$(<$rule: $bound>)?], plain, plain, plain
+            )
+        }
+    };
+}
+
+/// Defines a function over [`Vector`](super::Vector)s `V`, compiled for AVX-512, for AVX2 and plainly.
+///
+/// The machine's best is taken; where the arguments begin with `on NAME;`, the caller names the set, which the machine
+/// must have.
+macro_rules! kernel {
+    (
+        $(#[$about:meta])*
+        $seen:vis fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) $body:block
+    ) => {
+        $crate::vectors::kernel! { $(#[$about])* $seen fn $name<$vector>($($argument: $kind),*) -> () $body }
+    };
+    (
+        $(#[$about:meta])*
+        $seen:vis fn $name:ident<$vector:ident>($($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
+    ) => {
+        $(#[$about])*
+        $seen fn $name($($argument: $kind),*) -> $out {
+            #[inline(always)]
+            fn plain<$vector: $crate::vectors::Vector>($($argument: $kind),*) -> $out $body
+            $crate::vectors::by_width!(
+                $crate::vectors::Instructions::best(), ($($argument: $kind),*) -> $out, [],
+                plain::<$crate::vectors::Zmm>, plain::<$crate::vectors::Ymm>, plain::<[f64; $crate::vectors::LANES]>
+            )
+        }
+    };
+    (
+        $(#[$about:meta])*
+        $seen:vis fn $name:ident<$vector:ident>(on $set:ident; $($argument:ident: $kind:ty),* $(,)?) -> $out:ty $body:block
+    ) => {
+        $(#[$about])*
+        $seen fn $name($set: $crate::vectors::Instructions, $($argument: $kind),*) -> $out {
+            #[inline(always)]
+            fn plain<$vector: $crate::vectors::Vector>($($argument: $kind),*) -> $out $body
+            assert!($set.present(), "the machine must have the instructions");
+            $crate::vectors::by_width!(
+                $set, ($($argument: $kind),*) -> $out, [],
+                plain::<$crate::vectors::Zmm>, plain::<$crate::vectors::Ymm>, plain::<[f64; $crate::vectors::LANES]>
+            )
+        }
+    };
+}
+
+pub(crate) use {by_width, kernel, wide};

@@ -1,0 +1,65 @@
+//! Sums of products.
+
+use super::eight::{LANES, Vector, lines, lines_mut};
+use super::instructions::kernel;
+
+kernel! {
+    /// `a.b`; what does not fill a line counts too.
+    pub(crate) fn dot<V>(a: &[f64], b: &[f64]) -> f64 {
+        let mut sums = [V::splat(0.0); 4];
+        let (a4, b4) = (lines(a).chunks_exact(4), lines(b).chunks_exact(4));
+        for (x, y) in a4.clone().zip(b4.clone()) {
+            for s in 0..4 {
+                sums[s] = sums[s].add_product(V::load(&x[s]), V::load(&y[s]));
+            }
+        }
+        for (x, y) in a4.remainder().iter().zip(b4.remainder()) {
+            sums[0] = sums[0].add_product(V::load(x), V::load(y));
+        }
+        let tail: f64 = a.as_chunks::<LANES>().1.iter().zip(b.as_chunks::<LANES>().1).map(|(x, y)| x * y).sum();
+        (sums[0].total() + sums[1].total()) + (sums[2].total() + sums[3].total()) + tail
+    }
+}
+
+/// Products of S rows with x, by vectors.
+#[inline(always)]
+pub(crate) fn times<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], x: &[[f64; LANES]]) -> [f64; S] {
+    let rows = rows.map(|row| &row[..x.len()]);
+    let mut sums = [V::splat(0.0); S];
+    for (i, x) in x.iter().enumerate() {
+        let x = V::load(x);
+        for s in 0..S {
+            sums[s] = sums[s].add_product(V::load(&rows[s][i]), x);
+        }
+    }
+    sums.map(V::total)
+}
+
+/// `sum += by[0] rows[0] + ..`, by vectors.
+#[inline(always)]
+pub(crate) fn add_lines<V: Vector, const S: usize>(rows: [&[[f64; LANES]]; S], by: [f64; S], sum: &mut [[f64; LANES]]) {
+    let rows = rows.map(|row| &row[..sum.len()]);
+    let by = by.map(V::splat);
+    for (i, sum) in sum.iter_mut().enumerate() {
+        let mut here = V::load(sum);
+        for s in 0..S {
+            here = here.add_product(by[s], V::load(&rows[s][i]));
+        }
+        here.store(sum);
+    }
+}
+
+kernel! {
+    /// `sum += factor row`.
+    pub(crate) fn add<V>(sum: &mut [f64], factor: f64, row: &[f64]) {
+        if factor == 0.0 {
+            return;
+        }
+        let all = sum.len().min(row.len());
+        let whole = all - all % LANES;
+        add_lines::<V, 1>([lines(&row[..whole])], [factor], lines_mut(&mut sum[..whole]));
+        for (sum, row) in sum[whole..all].iter_mut().zip(&row[whole..all]) {
+            *sum += factor * row;
+        }
+    }
+}
