@@ -18,10 +18,18 @@ from tests.formats.test_loaders import interpolated
 from taxel import FormatError, ProblemError
 from taxel.cli import main
 from taxel.studies import load
-from taxel.studies.gait import report, study
+from taxel.studies.gait import outcomes
 from taxel.studies.gait.protocols import PROTOCOLS
 from taxel.studies.gait.recipes import ENCODERS, SEARCH, SETTINGS
 from taxel.studies.page import write_page
+from taxel.studies.study import Section
+
+GAIT = load("gait")
+
+
+def study(data: Path | None, report: Path, *, strict: bool = False, **changes) -> Section:
+    """Run the study at toy size; its part of the page."""
+    return GAIT.run(report, size="toy", data=data, changes=changes, strict=strict, quiet=True)
 
 
 def walker(folder: Path, name: str, seed: int) -> None:
@@ -70,19 +78,19 @@ def data(tmp_path_factory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def ran(data, tmp_path_factory) -> tuple[Path, dict]:
-    folder = tmp_path_factory.mktemp("report") / "gait"
-    return folder, study(data, size="toy", report=folder, quiet=True)
+def ran(data, tmp_path_factory) -> tuple[Path, Section]:
+    folder = tmp_path_factory.mktemp("report")
+    return folder, study(data, folder)
 
 
-def rows(said: dict, source: str, event: str) -> dict[str, dict]:
-    found = next(s for s in said["sources"] if s["source"] == source)
+def rows(section: Section, source: str, event: str) -> dict[str, dict]:
+    found = next(s for s in section["said"]["sources"] if s["source"] == source)
     return {row["row"]: row for row in found["protocols"][0]["rows"] if row["event"] == event}
 
 
 def test_a_toy_study_has_all_its_rows_and_finds_easy_steps(ran):
     _, said = ran
-    assert said["skipped"] == ["insole_gaitndd", "insole_moticon", "pressure_formats"]
+    assert said["said"]["skipped"] == ["insole_gaitndd", "insole_moticon", "pressure_formats"]
     contact = rows(said, "gaitpdb", "contact")
     assert {"notes", "chosen", "printed", "tonic", "rule: spikes", "rule: state", "rule: level"} == set(contact)
     assert contact["notes"]["figures"]["events"] >= 70
@@ -97,7 +105,7 @@ def test_a_toy_study_has_all_its_rows_and_finds_easy_steps(ran):
 
 def test_every_figure_adds_up(ran):
     _, said = ran
-    for source in said["sources"]:
+    for source in said["said"]["sources"]:
         for row in source["protocols"][0]["rows"]:
             f = row["figures"]
             assert f["found"] + f["missed"] == f["events"]
@@ -107,7 +115,7 @@ def test_every_figure_adds_up(ran):
 
 def test_errors_take_off_the_delay_that_known_keeps(ran):
     folder, _ = ran
-    for line in (folder / "results.jsonl").read_text().splitlines():
+    for line in (folder / "gait" / "results.jsonl").read_text().splitlines():
         row = json.loads(line)
         if row["params"]["kind"] == "neuron" and row["params"]["source"] == "gaitpdb":
             for units in row["result"]["tested"].values():
@@ -116,42 +124,50 @@ def test_errors_take_off_the_delay_that_known_keeps(ran):
                     assert np.allclose(late, row["params"]["point"]["learner"]["delay_ms"], atol=0.2)
 
 
-def test_the_report_lies_beside_its_figures_and_folds(ran):
-    folder, said = ran
-    assert json.loads((folder / "gait.json").read_text()) == json.loads(json.dumps(said))
-    page = (folder / "gait.html").read_text()
+def test_the_page_shows_every_row_and_the_folds_lie_with_the_numbers(ran):
+    folder, section = ran
+    assert json.loads((folder / "gait" / "summary.json").read_text())["said"] == json.loads(json.dumps(section["said"]))
+    assert len(json.loads((folder / "gait" / "summary.json").read_text())["pictures"]) == 2
+    page = write_page(folder).read_text()
     assert "Table 6.2 as printed" in page
     assert "a threshold on the sum of the inputs" in page
-    people = json.loads((folder / "folds.json").read_text())["gaitpdb/people left out"]
+    assert page.count("rule: state") >= 2, "a row a source"
+    assert "gaitpdb, people left out: contact, chosen, by person" in page
+    people = section["said"]["folds"]["gaitpdb/people left out"]
     assert sum(len(group) for group in people[0]["groups"]) == 8
 
 
+def test_every_table_is_as_wide_as_its_head(ran):
+    for table in ran[1]["tables"]:
+        assert {len(row) for row in table["rows"]} == {len(table["head"])}, table["title"]
+
+
 def test_a_second_run_reckons_nothing_again(data, ran):
-    folder, said = ran
-    before = (folder / "results.jsonl").stat().st_size
-    assert study(data, size="toy", report=folder, quiet=True) == said
-    assert (folder / "results.jsonl").stat().st_size == before
+    folder, section = ran
+    before = (folder / "gait" / "results.jsonl").stat().st_size
+    assert study(data, folder)["said"] == section["said"]
+    assert (folder / "gait" / "results.jsonl").stat().st_size == before
 
 
 def test_the_full_search_chooses_inside_each_fold_and_only_on_the_plate(data, ran, tmp_path):
-    said = study(data, size="toy", search="full", report=tmp_path, quiet=True)
-    found = rows(said, "plate", "contact")
+    section = study(data, tmp_path, search="full")
+    found = rows(section, "plate", "contact")
     assert {"528: as printed", "528: recipe"} <= set(found)
-    assert not any(row.startswith("528") for row in rows(said, "gaitpdb", "contact"))
-    assert sorted(one["left_out"] for one in said["full_search"]) == sorted(["subj900", "subj901", "subj902"] * 2)
-    for one in said["full_search"]:
+    assert not any(row.startswith("528") for row in rows(section, "gaitpdb", "contact"))
+    searched = section["said"]["full_search"]
+    assert sorted(one["left_out"] for one in searched) == sorted(["subj900", "subj901", "subj902"] * 2)
+    for one in searched:
         assert one["tau"] in (10.0, 40.0)
         assert one["lambda_1"] + one["lambda_2"] == 4
-    results = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
+    results = [json.loads(line) for line in (tmp_path / "gait" / "results.jsonl").read_text().splitlines()]
     searches = [r for r in results if r["params"]["kind"] == "search"]
     assert len(searches) == 2 * 3 * 4  # as printed and recipe; folds; tau and kappa
     for one in searches:
         assert set(one["params"]["judged"]) < set(one["params"]["left_out"])
         assert [t["lambdas"][0] for t in one["result"]["tried"]] == [4.0, 3.6]
         assert all(t["status"] == "solved" for t in one["result"]["tried"])
-    assert "The 528 settings of 6.5.2" in (tmp_path / "gait.html").read_text()
-    _, listed = ran
-    assert listed["full_search"] == []
+    assert "The 528 settings of 6.5.2" in write_page(tmp_path).read_text()
+    assert ran[1]["said"]["full_search"] == []
 
 
 def test_the_settings_of_the_full_search_are_528():
@@ -159,27 +175,23 @@ def test_the_settings_of_the_full_search_are_528():
     assert (SETTINGS["tau"][-1], SETTINGS["kappa"][-1], SETTINGS["lambda_1"][0]) == (220.0, 1.3, 4.0)
 
 
-def test_its_part_of_the_page_of_all_studies_is_made_of_the_same_results(data, ran):
-    folder, _ = ran
-    before = (folder / "results.jsonl").stat().st_size
-    section = load("gait").run(folder.parent, size="toy", data=data, quiet=True)
-    assert (folder / "results.jsonl").stat().st_size == before
-    says = [s["says"] for s in section["statements"]]
+def test_what_the_thesis_says_is_judged_by_the_rows_that_stand_for_it(ran):
+    says = [statement["says"] for statement in ran[1]["statements"]]
     assert "On walking recordings it finds more than 95 % of contact." in says
-    assert {(r["source"], r["row"]) for r in section["said"]["rows"]} == {("gaitpdb", "chosen"), ("gaitpdb", "printed")}
-    assert len(json.loads((folder / "summary.json").read_text())["pictures"]) == 2
-    assert "gait.html" in write_page(folder.parent).read_text()
+    assert {s["why"].split(";")[0] for s in ran[1]["statements"] if "walking" in s["says"]} == {
+        "gaitpdb, people left out"
+    }
     with pytest.raises(ProblemError, match="gait has no parameter 'tau'"):
-        load("gait").run(folder.parent, size="toy", data=data, changes={"tau": 3})
+        GAIT.set("toy", tau=3)
 
 
 def test_other_people_are_judged_by_all_of_these(data, tmp_path):
     other = tmp_path / "other"
     (other / "insole_gaitpdb").mkdir(parents=True)
     walker(other / "insole_gaitpdb", "SiPt99", 9)
-    said = study(data, other, size="toy", report=tmp_path / "report", quiet=True)
-    assert said["judged"] == "on another folder"
-    assert said["skipped"] == ["plate", "insole_gaitndd", "insole_moticon", "pressure_formats"]
+    said = study(data, tmp_path / "report", test=str(other))
+    assert said["said"]["judged"] == "on another folder"
+    assert said["said"]["skipped"] == ["plate", "insole_gaitndd", "insole_moticon", "pressure_formats"]
     contact = rows(said, "gaitpdb", "contact")
     assert set(contact["chosen"]["by_person"]) == {"SiPt99"}
     assert contact["chosen"]["figures"]["found_percent"] >= 90
@@ -191,7 +203,7 @@ def test_ctrl_c_stops_the_command_and_the_next_run_goes_on(data, tmp_path):
     command += ["--report", str(tmp_path), "--only", "gaitpdb"]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     try:
-        lines = tmp_path / "results.jsonl"
+        lines = tmp_path / "gait" / "results.jsonl"
         while process.poll() is None and not (lines.exists() and lines.stat().st_size):
             time.sleep(0.02)
         if process.poll() is None:
@@ -201,7 +213,7 @@ def test_ctrl_c_stops_the_command_and_the_next_run_goes_on(data, tmp_path):
         process.kill()
         process.wait()
     done = len(lines.read_text().splitlines())
-    said = study(data, size="toy", report=tmp_path, only=["gaitpdb"], quiet=True)
+    said = study(data, tmp_path, sources=["gaitpdb"])
     assert len(lines.read_text().splitlines()) >= done
     assert rows(said, "gaitpdb", "contact")["notes"]["figures"]["found_percent"] >= 95
 
@@ -218,41 +230,40 @@ def test_no_delay_is_longer_than_12_ms():
 
 
 def test_a_goal_is_met_only_where_every_part_of_it_is():
-    units = [report.Unit("a", "a", "", 10, 1, 1.0, (1.0,) * 10, (9.0,) * 10)]
-    f = report.figures(units)
-    assert report._met(f, {"found_percent": 100.0, "false_per_minute": 1.0, "within_10_ms_percent": 100.0})
-    assert not report._met(f, {"missed": 0, "false": 0})
-    assert not report._met(report.figures([]), {"found_percent": 98.0})
+    units = [outcomes.Unit("a", "a", "", 10, 1, 1.0, (1.0,) * 10, (9.0,) * 10)]
+    f = outcomes.figures(units)
+    assert outcomes._met(f, {"found_percent": 100.0, "false_per_minute": 1.0, "within_10_ms_percent": 100.0})
+    assert not outcomes._met(f, {"missed": 0, "false": 0})
+    assert not outcomes._met(outcomes.figures([]), {"found_percent": 98.0})
 
 
 @pytest.mark.parametrize(
-    ("arguments", "error", "said"),
+    ("changes", "error", "said"),
     [
-        ({"size": "huge"}, ProblemError, "size is 'huge'"),
         ({"search": "all"}, ProblemError, "search is 'all'"),
-        ({"only": ["emed"]}, ProblemError, "only is 'emed'"),
-        ({"only": 3}, ProblemError, "only is 3"),
+        ({"sources": ["emed"]}, ProblemError, "sources is 'emed'"),
+        ({"sources": 3}, ProblemError, "sources is 3"),
+        ({"protocols": ["by moon"]}, ProblemError, "protocols is 'by moon'"),
+        ({"test": 3}, ProblemError, "test is 3"),
+        ({"test": "nothing/here"}, FileNotFoundError, "nothing/here"),
         (
-            {"only": ["pedar"]},
+            {"sources": ["pedar"]},
             FormatError,
             "holds no recordings; must have one or more of the folders pressure_formats",
         ),
     ],
 )
-def test_nonsense_is_refused(data, tmp_path, arguments, error, said):
+def test_nonsense_is_refused(data, tmp_path, changes, error, said):
     with pytest.raises(error, match=said):
-        study(data, report=tmp_path, quiet=True, **({"size": "toy"} | arguments))
-
-
-@pytest.mark.parametrize("name", ["data", "test", "report"])
-def test_a_path_that_is_none_is_refused(data, tmp_path, name):
-    with pytest.raises(ProblemError, match=f"{name} is 3"):
-        study(**({"data": data, "report": tmp_path, "quiet": True} | {name: 3}))
+        study(data, tmp_path, **changes)
+    assert not (tmp_path / "gait" / "results.jsonl").exists()
 
 
 def test_a_folder_that_is_not_there_is_told(tmp_path):
     with pytest.raises(FileNotFoundError):
-        study(tmp_path / "nothing", report=tmp_path, quiet=True)
+        study(tmp_path / "nothing", tmp_path)
+    with pytest.raises(FormatError, match="gait: holds no recordings; name a folder"):
+        study(None, tmp_path)
 
 
 def test_too_few_people_to_choose_inside_are_said(data, tmp_path):
@@ -260,15 +271,15 @@ def test_too_few_people_to_choose_inside_are_said(data, tmp_path):
     (few / "insole_gaitpdb").mkdir(parents=True)
     for name in ("GaCo90", "GaPt90"):
         (few / "insole_gaitpdb" / f"{name}_01.txt").symlink_to(data / "insole_gaitpdb" / f"{name}_01.txt")
-    said = study(few, size="toy", report=tmp_path / "report", quiet=True)
-    assert "gaitpdb, people left out: chosen inside (too few people)" in said["skipped"]
+    said = study(few, tmp_path / "report")
+    assert "gaitpdb, people left out: chosen inside (too few people)" in said["said"]["skipped"]
     assert "chosen" not in rows(said, "gaitpdb", "contact")
 
 
 def test_one_person_alone_is_said(data, tmp_path):
     (tmp_path / "plate").mkdir()
     (tmp_path / "plate" / "subj900.h5").symlink_to(data / "plate" / "subj900.h5")
-    said = study(tmp_path, size="toy", report=tmp_path / "report", quiet=True)
+    said = study(tmp_path, tmp_path / "report")["said"]
     assert said["skipped"][-1] == "plate (too few people or recordings)"
     assert said["sources"] == []
 
@@ -294,9 +305,9 @@ def test_a_file_that_cannot_be_read_is_left_out_and_said(ran, damaged, tmp_path,
     out = capsys.readouterr().out
     assert "left out: insole_gaitpdb/GaPt99_01.txt: line" in out
     assert "left out: pressure_formats/pliance.asc: no line of column names" in out
-    said = json.loads((tmp_path / "report" / "gait.json").read_text())
+    said = json.loads((tmp_path / "report" / "gait" / "summary.json").read_text())
     assert list(said["unread"]) == ["insole_gaitpdb/GaPt99_01.txt", "pressure_formats/pliance.asc"]
-    assert "pliance.asc" in (tmp_path / "report" / "gait.html").read_text()
+    assert "pliance.asc" in (tmp_path / "report" / "index.html").read_text()
     found, whole = (rows(s, "gaitpdb", "contact")["notes"]["figures"] for s in (said, ran[1]))
     assert found == whole, "the people that can be read are judged as if the others were not there"
 
@@ -304,7 +315,7 @@ def test_a_file_that_cannot_be_read_is_left_out_and_said(ran, damaged, tmp_path,
 def test_strict_ends_at_a_file_that_cannot_be_read_before_anything_is_reckoned(damaged, tmp_path):
     report = tmp_path / "report"
     with pytest.raises(FormatError, match=r"^insole_gaitpdb/GaPt99_01\.txt: line .* \(1 more cannot be read\)$"):
-        study(damaged, size="toy", report=report, strict=True, quiet=True)
+        study(damaged, report, strict=True)
     with pytest.raises(FormatError, match="GaPt99"):
         load("fig6.15").run(report, size="toy", data=damaged, strict=True, quiet=True)
     assert not report.exists()
@@ -312,7 +323,7 @@ def test_strict_ends_at_a_file_that_cannot_be_read_before_anything_is_reckoned(d
 
 def test_a_folder_in_which_nothing_can_be_read_is_refused(damaged, tmp_path):
     with pytest.raises(FormatError, match=r"pressure_formats/pliance\.asc: no line of column names"):
-        study(damaged, size="toy", report=tmp_path / "report", only=["pedar"], quiet=True)
+        study(damaged, tmp_path / "report", sources=["pedar"])
     (damaged / "insole_gaitpdb").rename(damaged / "elsewhere")
     (damaged / "insole_gaitpdb").mkdir()
     (damaged / "insole_gaitpdb" / "GaPt99_01.txt").write_text("no numbers\n")

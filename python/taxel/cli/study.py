@@ -5,13 +5,16 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from taxel.cli._app import app
 from taxel.cli._listening import SET_HELP, assignments
 from taxel.studies import STUDIES, load
+
+if TYPE_CHECKING:
+    from taxel.studies.runner import Workers
 
 studies = typer.Typer(help="Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.")
 app.add_typer(studies, name="study", no_args_is_help=True)
@@ -100,28 +103,35 @@ def _add(name: str, title: str) -> None:
         strict: Strict = False,
         as_json: AsJson = False,
     ) -> None:
-        study = load(name)
-        section = study.run(
-            report,
-            size=size,
-            changes=_changes(changes or [], realisations),
-            data=_data(data),
-            workers=_workers(jobs, backend, scheduler),
-            strict=strict,
-            quiet=as_json,
-        )
-        page = _page(report)
-        if as_json:
-            typer.echo(json.dumps(section))
-            return
-        _tell(section)
-        typer.echo(f"page: {page}  picture: {report / name}  numbers: {report / name / 'summary.json'}")
+        workers = _workers(jobs, backend, scheduler)
+        _run(name, size, _changes(changes or [], realisations), data, workers, report, strict, as_json)
 
     text = f"{title[0].upper()}{title[1:]}.\n\nExample: taxel study {name} --report figures --jobs 2"
     studies.command(name=name, help=text, short_help=title)(one)
 
 
-def _workers(jobs: int, backend: str, scheduler: str | None) -> Any:
+def _run(
+    name: str,
+    size: str,
+    changes: dict[str, Any],
+    data: Path | None,
+    workers: Workers,
+    report: Path,
+    strict: bool,
+    as_json: bool,
+) -> None:
+    section = load(name).run(
+        report, size=size, changes=changes, data=_data(data), workers=workers, strict=strict, quiet=as_json
+    )
+    page = _page(report)
+    if as_json:
+        typer.echo(json.dumps(section))
+        return
+    _tell(section)
+    typer.echo(f"page: {page}  picture: {report / name}  numbers: {report / name / 'summary.json'}")
+
+
+def _workers(jobs: int, backend: str, scheduler: str | None) -> Workers:
     from taxel.studies.runner import Workers  # noqa: PLC0415  joblib loads slowly
 
     return Workers(jobs, backend, scheduler)
@@ -143,111 +153,55 @@ def _changes(said: list[str], realisations: int | None) -> dict[str, Any]:
 
 
 def _tell(section: dict[str, Any]) -> None:
+    from rich.console import Console  # noqa: PLC0415  the command line starts quickly
+    from rich.table import Table  # noqa: PLC0415
+
     typer.echo(f"\n{section['name']}, size {section['size']}: {section['title']}")
     for s in section["statements"]:
         holds = {True: "holds", False: "does not hold", None: "not judged"}[s["holds"]]
         typer.echo(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
         typer.echo(f"    published: {s['published']}\n    ours: {s['ours']}")
-    _left_out(section)
+    for said in section["tables"]:
+        if not said["folded"]:
+            table = Table(title=said["title"], title_justify="left")
+            for k, name in enumerate(said["head"]):
+                table.add_column(name, justify="right" if k else "left", no_wrap=not k)
+            for row in said["rows"]:
+                table.add_row(*row)
+            Console().print(table)
+    for file, why in section["unread"].items():
+        typer.echo(f"could not be read, so left out: {file}: {why}")
 
 
-@studies.command()
+@studies.command(short_help=STUDIES["gait"])
 def gait(
-    data: Annotated[
-        Path,
-        typer.Option(
-            help="Folder with any of plate, insole_gaitpdb, insole_gaitndd, insole_moticon, pressure_formats."
-        ),
-    ],
+    size: Size = "full",
     test: Annotated[
-        Path | None, typer.Option(help="Such a folder of other people: train on DATA, judge on TEST.")
+        str | None,
+        typer.Option(help="Such a folder of other people: train on DATA, judge on TEST, instead of by folds."),
     ] = None,
-    size: Annotated[str, typer.Option(help="full, or toy (shows that it runs).")] = "full",
     search: Annotated[
-        str, typer.Option(help="listed points, or full: on plate also the 528 settings of 6.5.2 (hours).")
-    ] = "listed",
-    jobs: Jobs = 1,
-    backend: Backend = "loky",
-    scheduler: Scheduler = None,
-    report: Annotated[
-        Path, typer.Option(help="Folder for the report, the folds and all results; resumes what is in it.")
-    ] = Path("taxel-study-gait"),
+        str | None, typer.Option(help="listed points, or full: on plate also the 528 settings of 6.5.2 (hours).")
+    ] = None,
     only: Annotated[
         list[str] | None, typer.Option(help="One source (plate, gaitpdb, gaitndd, moticon, pedar); may be repeated.")
     ] = None,
+    changes: Changes = None,
+    data: Data = None,
+    jobs: Jobs = 1,
+    backend: Backend = "loky",
+    scheduler: Scheduler = None,
+    report: Report = REPORT,
     strict: Strict = False,
     as_json: AsJson = False,
 ) -> None:
     """Find gait events in walking recordings with one neuron an event (thesis 6.5, figures 6.12 to 6.14).
 
-    Example: taxel study gait --data recordings --jobs 2 --report gait-report
+    Example: taxel study gait --data recordings --jobs 2 --report figures
     """
-    from taxel.studies.gait import study  # noqa: PLC0415  the learner and its libraries load slowly
-
+    named = {name: value for name, value in (("test", test), ("search", search), ("sources", only)) if value}
     workers = _workers(jobs, backend, scheduler)
-    options = {
-        "size": size,
-        "search": search,
-        "workers": workers,
-        "report": report,
-        "only": only or (),
-        "strict": strict,
-    }
-    said = study(data, test, **options, quiet=as_json)
-    if as_json:
-        typer.echo(json.dumps(said))
-        return
-    _show(said)
-    typer.echo(f"report: {report / 'gait.html'}  figures: {report / 'gait.json'}  folds: {report / 'folds.json'}")
-
-
-def _show(said: dict[str, Any]) -> None:
-    from rich.console import Console  # noqa: PLC0415
-    from rich.table import Table  # noqa: PLC0415
-
-    console = Console()
-    for source in said["sources"]:
-        for protocol in source["protocols"]:
-            table = Table(title=f"{source['source']}: {protocol['protocol']}", title_justify="left")
-            for name in (
-                "event",
-                "row",
-                "% found",
-                "missed",
-                "false",
-                "false/min",
-                "% in 10 ms",
-                "error of t, ms",
-                "goal",
-            ):
-                table.add_column(name, justify="left" if name in ("event", "row") else "right")
-            for row in protocol["rows"]:
-                f = row["figures"]
-                error = f["error_ms"]
-                table.add_row(
-                    row["event"],
-                    row["row"],
-                    _number(f["found_percent"]),
-                    str(f["missed"]),
-                    str(f["false"]),
-                    _number(f["false_per_minute"]) if source["by_minute"] else "",
-                    _number(f["within_10_ms_percent"]),
-                    f"{error['mean']:+.1f} ± {error['sd']:.1f}" if error else "",
-                    {True: "met", False: "below"}.get(row.get("goal_met"), ""),
-                )
-            console.print(table)
-    if said["skipped"]:
-        console.print(f"not here, so skipped: {', '.join(said['skipped'])}")
-    _left_out(said)
-
-
-def _left_out(said: dict[str, Any]) -> None:
-    for file, why in said["unread"].items():
-        typer.echo(f"could not be read, so left out: {file}: {why}")
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.1f}"
+    _run("gait", size, named | _changes(changes or [], None), data, workers, report, strict, as_json)
 
 
 for _name, _title in STUDIES.items():

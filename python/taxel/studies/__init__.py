@@ -1,6 +1,6 @@
 """Studies: a protocol, its parameters, the published values as data, and a runner that gives all of them the rest.
 
-A study is a file of this folder whose `STUDY` is a `taxel.studies.study.Study` (or runs like one), and a line in
+A study is a file of this folder whose `STUDY` is a `taxel.studies.study.Study`, and a line in
 `STUDIES`.
 """
 
@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from taxel.studies.study import Runs
+    from taxel.studies.study import Study
 
 __all__ = ["STUDIES", "load"]
 
@@ -36,7 +36,7 @@ STUDIES = {
 }
 
 
-def load(name: str) -> Runs:
+def load(name: str) -> Study:
     """Return a study by its name in `STUDIES`."""
-    study: Runs = import_module(f"taxel.studies.{name.replace('.', '_')}").STUDY
+    study: Study = import_module(f"taxel.studies.{name.replace('.', '_')}").STUDY
     return study

@@ -5,24 +5,20 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taxel import encode, formats, learn
-from taxel._core import ProblemError
-from taxel.studies.gait import folds, insole, pieces, sources
-from taxel.studies.gait import realise as realisation
-from taxel.studies.gait.protocols import PROTOCOLS, Protocol
-from taxel.studies.gait.realise import Setting
+from taxel.studies.gait import folds, insole, pieces, protocols, sources
+from taxel.studies.gait.outcomes import EVENTS
+from taxel.studies.gait.realise import realise
 from taxel.studies.gait.recipes import NOTES, PRINTED
-from taxel.studies.gait.report import EVENTS
-from taxel.studies.gait.section import STANDS_FOR
-from taxel.studies.gait.sources import SOURCES, encoded, fingerprint, present, readings
+from taxel.studies.gait.sources import SOURCES, fingerprint
+from taxel.studies.gait.statements import STANDS_FOR
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study, refuse
+from taxel.studies.study import Parameters, Row, Said, Statement, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,29 +40,16 @@ LEARNERS = {"neuron": "CONE", "skim": "SKIM"}
 LOWEST = 0.1
 
 
-@lru_cache(maxsize=4)
-def _setting(data: Path, source: str) -> tuple[Protocol, Setting]:
-    folder = present(data)[source]
-    protocol = next(p for p in PROTOCOLS[source] if p.name == STANDS_FOR[source][0])
-    encoder = next(iter(NOTES[source].values()))["encoder"]
-    scopes = [s for s in protocol.scopes(list(encoded(folder, source, encoder).pieces.values())) if len(s.groups) > 1]
-    return protocol, Setting({source: folder}, {}, {f"{source}/{protocol.name}": scopes})
-
-
 def tasks(p: Parameters, *, data: Path) -> list[Task]:
     """List a fit of each learner a source, recipe, event and fold; 0 scopes or folds stand for all of them."""
-    folders = present(data)
-    here = [name for name in p["sources"] if name in folders and readings(folders[name], name).trials]
-    if not here:
-        raise ProblemError(f"{data}: holds none of the recordings {', '.join(p['sources'])}")
     listed = []
-    for source in here:
-        protocol, setting = _setting(data, source)
-        scopes = setting.scopes[f"{source}/{protocol.name}"]
+    for source, folder in sources.readable(data, p["sources"]).items():
+        protocol = protocols.of(source, STANDS_FOR[source][0])
+        scopes = protocols.scopes(folder, source, protocol.name)
         common = {
             "source": source,
             "protocol": protocol.name,
-            "data": fingerprint(setting.folders[source], source),
+            "data": fingerprint(folder, source),
             "folds": hashlib.sha256(json.dumps(folds.to_json(scopes)).encode()).hexdigest()[:16],
             "train": dict(protocol.train),
             "placed": "own",
@@ -85,20 +68,12 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
 
 def unread(p: Parameters, data: Path) -> dict[str, str]:
     """Return which files of the sources cannot be read, and why."""
-    here = {name: place for name, place in present(data).items() if name in p["sources"]}
-    found = sources.unread(here.items())
-    refuse(found, strict=not any(readings(place, name).trials for name, place in here.items()))
-    return found
+    return sources.unread(data, p["sources"])
 
 
-def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
-    """Train one learner without a group, test it there."""
-    return realisation.realise(params, seed, setting=_setting(data, params["source"])[1])
-
-
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Said:
     """Add up the folds; of SKIM's thresholds the one with the fewest missed and false over all of them, as 6.5.4."""
-    del p
+    del p, data
     said: Said = {"rows": []}
     keys = dict.fromkeys((r.params["source"], r.params["recipe"], r.params["event"]) for r in rows)
     for source, recipe, event in keys:
@@ -228,7 +203,7 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(sources, insole, pieces, folds, realisation, formats, encode, learn),
+    code=(sources, insole, pieces, folds, formats, encode, learn),
     data=tuple(SOURCES[name].folder for name in STANDS_FOR),
     unread=unread,
 )

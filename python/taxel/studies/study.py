@@ -14,7 +14,7 @@ from functools import partial
 from importlib import metadata
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from taxel import __version__
 from taxel import _arguments as arguments
@@ -28,15 +28,13 @@ if TYPE_CHECKING:
 __all__ = [
     "Parameters",
     "Row",
-    "Runs",
     "Said",
     "Section",
     "Statement",
     "Study",
-    "machine",
+    "Table",
     "read_section",
     "refuse",
-    "write_section",
 ]
 
 #: Experiment parameters by name: what JSON can hold.
@@ -45,43 +43,6 @@ Parameters = Mapping[str, Any]
 Said = dict[str, Any]
 #: One study's part of the page, as ``summary.json`` holds it.
 Section = dict[str, Any]
-
-
-class Runs(Protocol):
-    """Say what the page and the command line ask of a study; `Study` is one."""
-
-    @property
-    def name(self) -> str:
-        """As in ``taxel study NAME``."""
-
-    @property
-    def title(self) -> str:
-        """One line."""
-
-    @property
-    def parameters(self) -> Parameters:
-        """Of full size."""
-
-    @property
-    def sizes(self) -> Mapping[str, Parameters]:
-        """What other sizes change."""
-
-    @property
-    def data(self) -> tuple[str, ...]:
-        """Folders of recordings, any of which it needs."""
-
-    def run(
-        self,
-        report: Path,
-        *,
-        size: str = "full",
-        changes: Parameters | None = None,
-        data: Path | None = None,
-        workers: Workers = HERE,
-        strict: bool = False,
-        quiet: bool = False,
-    ) -> Section:
-        """Run, judge, draw; leave a summary in ``report``."""
 
 
 @dataclass(frozen=True)
@@ -109,17 +70,43 @@ class Statement:
 
 
 @dataclass(frozen=True)
+class Table:
+    """Hold a table of the page.
+
+    Attributes
+    ----------
+    title : str
+    head : sequence of str
+    rows : sequence of sequences of str
+        The first cell names the row.
+    note : str
+        What to know of it.
+    folded : bool
+        Shown on the page only where it is opened, and not by the command.
+    """
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    folded: bool = False
+
+
+@dataclass(frozen=True)
 class Row:
-    """Hold one realisation and its result."""
+    """Hold one realisation, its result and the CPU seconds that it took."""
 
     params: dict[str, Any]
     seed: int
     result: Any
+    seconds: float = 0.0
 
 
 @dataclass(frozen=True)
 class Study:
     """Describe a study: everything that the runner, the page and the command line need.
+
+    Of studies on recordings `tasks`, `then`, `realise` and `summarise` are also given ``data``, the folder of them.
 
     Attributes
     ----------
@@ -132,14 +119,18 @@ class Study:
     sizes : mapping of mappings
         What other sizes change of it; "toy" shows that it runs, in seconds.
     tasks : function of parameters
-        The realisations. Of studies on recordings also of the folder that holds them.
+        The realisations.
     realise : function of (params, seed)
-        Pure. Of studies on recordings also of ``data``.
+        Pure.
     summarise : function of (parameters, rows)
         Plain values for JSON: numbers and curves.
     statements : function of (parameters, said)
     draw : function of (parameters, said)
-        The picture, as the source draws it.
+        The picture, as the source draws it; or several.
+    then : function of (parameters, rows), optional
+        A second phase: the realisations that depend on what the first gave.
+    tables : function of (parameters, said), optional
+        Tables below the picture.
     code : tuple of modules
         What a realisation uses beside its own file: when they change, results are reckoned anew.
     data : tuple of str
@@ -156,9 +147,11 @@ class Study:
     sizes: Mapping[str, Parameters]
     tasks: Callable[..., Sequence[Task]]
     realise: Callable[..., Any]
-    summarise: Callable[[Parameters, Sequence[Row]], Said]
+    summarise: Callable[..., Said]
     statements: Callable[[Parameters, Said], Sequence[Statement]]
-    draw: Callable[[Parameters, Said], Figure]
+    draw: Callable[[Parameters, Said], Figure | Sequence[Figure]]
+    then: Callable[..., Sequence[Task]] | None = None
+    tables: Callable[[Parameters, Said], Sequence[Table]] | None = None
     code: tuple[ModuleType, ...] = ()
     data: tuple[str, ...] = field(default=())
     unread: Callable[[Parameters, Path], Mapping[str, str]] = lambda _parameters, _data: {}
@@ -223,20 +216,27 @@ class Study:
         FormatError : recordings that it needs are not there, or cannot be read (none of them; one, with `strict`)
         """
         parameters = self.set(size, **(changes or {}))
-        tasks, realise = self.tasks, self.realise
+        given: dict[str, Any] = {}
         unread: Mapping[str, str] = {}
         if self.data:
-            folder = self._recordings(data)
-            unread = self.unread(parameters, folder)
+            given["data"] = self._recordings(data)
+            unread = self.unread(parameters, given["data"])
             refuse(unread, strict=strict)
-            tasks, realise = partial(tasks, data=folder), partial(realise, data=folder)
         folder = report / self.name
         folder.mkdir(parents=True, exist_ok=True)
         results = Results(folder / "results.jsonl", code_digest((sys.modules[self.realise.__module__], *self.code)))
-        wanted = list(tasks(parameters))
         begun = time.time()
-        run(realise, wanted, results, workers=workers, title=self.name, quiet=quiet)
-        said = self.summarise(parameters, [Row(t.params, t.seed, results[t]) for t in wanted])
+        rows: dict[str, Row] = {}
+
+        def phase(title: str, wanted: Sequence[Task]) -> None:
+            run(partial(self.realise, **given), wanted, results, workers=workers, title=title, quiet=quiet)
+            for t in wanted:
+                rows[t.key("")] = Row(t.params, t.seed, results[t], results.seconds([t]))
+
+        phase(self.name, self.tasks(parameters, **given))
+        if self.then is not None:
+            phase(f"{self.name}, second phase", self.then(parameters, list(rows.values()), **given))
+        said = self.summarise(parameters, list(rows.values()), **given)
         section = {
             "name": self.name,
             "title": self.title,
@@ -246,18 +246,22 @@ class Study:
             "parameters": parameters,
             "changed": sorted(changes or {}),
             "unread": dict(unread),
-            "realisations": len(wanted),
+            "realisations": len(rows),
             "statements": [asdict(s) for s in self.statements(parameters, said)],
+            "tables": [asdict(t) for t in self.tables(parameters, said)] if self.tables is not None else [],
             "said": said,
-            "cpu_seconds": round(results.seconds(wanted), 1),
+            "cpu_seconds": round(sum(row.seconds for row in rows.values()), 1),
             "wall_seconds": round(time.time() - begun, 1),
             "code": results.code,
-            **machine(),
+            **_machine(),
         }
-        write_section(folder, section, [self.draw(parameters, said)])
+        drawn = self.draw(parameters, said)
+        _write_section(folder, section, drawn if isinstance(drawn, Sequence) else [drawn])
         return section
 
     def _recordings(self, data: Path | None) -> Path:
+        if data is not None and not data.is_dir():
+            raise FileNotFoundError(2, "No such folder", str(data))
         missing = [name for name in self.data if data is None or not (data / name).is_dir()]
         if data is None or len(missing) == len(self.data):
             raise FormatError(
@@ -284,7 +288,7 @@ def _alike(value: Any, other: Any) -> bool:
     return isinstance(value, type(other))
 
 
-def machine() -> dict[str, Any]:
+def _machine() -> dict[str, Any]:
     """Return what a reader needs to place the times: processor, versions, date."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
@@ -302,7 +306,7 @@ def machine() -> dict[str, Any]:
     }
 
 
-def write_section(folder: Path, section: Section, pictures: Sequence[Figure]) -> None:
+def _write_section(folder: Path, section: Section, pictures: Sequence[Figure]) -> None:
     """Write a study's summary and its pictures, each whole; the summary names the pictures."""
     names = []
     for number, figure in enumerate(pictures, 1):
@@ -320,7 +324,7 @@ def _put(data: bytes, file: BinaryIO) -> None:
 
 
 def read_section(folder: Path) -> Section | None:
-    """Return what `write_section` left, pictures as data addresses; None where nothing was run."""
+    """Return what a study left, pictures as data addresses; None where nothing was run."""
     path = folder / "summary.json"
     if not path.exists():
         return None

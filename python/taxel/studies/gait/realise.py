@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,56 +15,36 @@ from taxel.detect import score
 from taxel.detect.training import learner_from
 from taxel.detections import Detections
 from taxel.learn import SKIM, ConeR
-from taxel.studies.gait import insole, rules
+from taxel.studies.gait import insole, protocols, rules
 from taxel.studies.gait.folds import Scope
 from taxel.studies.gait.pieces import Piece, joined
 from taxel.studies.gait.sources import SOURCES, Encoded, encoded
 
-__all__ = ["TEST", "Setting", "realise"]
+__all__ = ["TEST", "realise"]
 
 #: Detections count up to so far from a reference event, ms (thesis 6.5.2).
 WINDOW_MS = 50.0
 #: A plain rule says nothing for so long after an event, ms.
 DEAD_MS = 250.0
-#: The group of the people of the other folder (``--test``).
+#: The group of the people of the other folder, where one is judged.
 TEST = "test"
 
 
-@dataclass(frozen=True)
-class Setting:
-    """Where the data lies and how it is split: what a realisation's parameters refer to by name.
-
-    Attributes
-    ----------
-    folders, test_folders : mapping from source to Path
-        To train on; and other people, to be judged on by what all of `folders` trained.
-    scopes : mapping from "source/protocol" to its scopes
-    """
-
-    folders: Mapping[str, Path]
-    test_folders: Mapping[str, Path]
-    scopes: Mapping[str, Sequence[Scope]]
-
-    def scope(self, params: Mapping[str, Any]) -> Scope:
-        """Return the scope that parameters name."""
-        scopes = self.scopes[f"{params['source']}/{params['protocol']}"]
-        return next(s for s in scopes if s.name == params["scope"])
-
-
-def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str, Any]:
+def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     """Train without the groups ``left_out``, test on each of them.
 
     Parameters
     ----------
     params : dict
         ``kind`` ("neuron", "skim", "search" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of
-        groups; none: the test folder is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a
-        person), ``placed``; of a neuron its ``point``; of SKIM a ``point`` and its own options ``skim``; of a search a
-        ``point``, the ``lambda_1`` to try one after the other, and which of the groups left out are ``judged``; of a
+        groups; none: the folder ``test`` is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls
+        a person), ``placed``; of a neuron its ``point``; of SKIM a ``point`` and its own options ``skim``; of a search
+        a ``point``, the ``lambda_1`` to try one after the other, and which of the groups left out are ``judged``; of a
         rule ``rule`` and ``encoder``.
     seed : int
         Draws the footfalls and their order in the training row.
-    setting : Setting
+    data : Path
+        Holds the sources' folders.
 
     Returns
     -------
@@ -73,23 +52,25 @@ def realise(params: dict[str, Any], seed: int, *, setting: Setting) -> dict[str,
         ``tested``: by group and unit what was found (of SKIM so ``by_threshold``); ``fit``: what the learner says of
         itself, or the rule's numbers.
     """
-    scope = setting.scope(params)
+    source = params["source"]
     encoder = params["encoder"] if params["kind"] == "rule" else params["point"]["encoder"]
-    data = encoded(setting.folders[params["source"]], params["source"], encoder, params["placed"])
-    training = _training(scope, params, data, seed)
-    tested = {str(g): [part.of(data.pieces) for part in scope.groups[g]] for g in params["left_out"]}
+    folder = SOURCES[source].folder
+    split = protocols.scopes(data / folder, source, params["protocol"], 1 if params.get("test") else 2)
+    scope = next(s for s in split if s.name == params["scope"])
+    told = encoded(data / folder, source, encoder, params["placed"])
+    training = _training(scope, params, told, seed)
+    tested = {str(g): [part.of(told.pieces) for part in scope.groups[g]] for g in params["left_out"]}
     if not tested:
-        other = encoded(setting.test_folders[params["source"]], params["source"], encoder, params["placed"])
-        tested = {TEST: list(other.pieces.values())}
-    rows = {g: _rows(pieces, params["source"]) for g, pieces in tested.items()}
+        tested = {TEST: list(encoded(Path(params["test"]) / folder, source, encoder, params["placed"]).pieces.values())}
+    rows = {g: _rows(pieces, source) for g, pieces in tested.items()}
     if params["kind"] == "neuron":
-        return _neuron(params, data, training, rows, seed)
+        return _neuron(params, told, training, rows, seed)
     if params["kind"] == "skim":
-        return _skim(params, data, training, rows, seed)
+        return _skim(params, told, training, rows, seed)
     if params["kind"] == "search":
         judged = [row for g in params["judged"] for row in rows[str(g)]]
-        return _search(params, data, training, judged, seed)
-    return _rule(params, data, training, rows)
+        return _search(params, told, training, judged, seed)
+    return _rule(params, told, training, rows)
 
 
 def _training(scope: Scope, params: Mapping[str, Any], data: Encoded, seed: int) -> list[Piece]:

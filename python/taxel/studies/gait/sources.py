@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel import _arguments as arguments
 from taxel import formats
-from taxel._arguments import parameters
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.encode import Encoder
@@ -22,8 +22,9 @@ from taxel.formats import Trial
 from taxel.frames import Frames
 from taxel.studies.gait import insole
 from taxel.studies.gait.pieces import Piece
+from taxel.studies.study import refuse
 
-__all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "present", "readings", "unread"]
+__all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "readable", "readings", "unread"]
 
 #: Silence before each footfall of the plate, ms: random, so that no cut marks time.
 SILENCE_MS = (300, 900)
@@ -117,18 +118,15 @@ SOURCES = {
 }
 
 
-def present(folder: Path) -> dict[str, Path]:
-    """Find which sources a data folder holds.
-
-    Returns
-    -------
-    dict from source name to its folder
-    """
+def _present(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
+    """Return those of the wanted sources of which a folder holds files, each with its own folder."""
+    if not folder.is_dir():
+        raise FileNotFoundError(2, "No such folder", str(folder))
     found = {}
-    for source in SOURCES.values():
-        place = folder / source.folder
-        if place.is_dir() and formats.FORMATS[source.name].files(place):
-            found[source.name] = place
+    for name in [arguments.text("sources", name, SOURCES) for name in wanted]:
+        place = folder / SOURCES[name].folder
+        if place.is_dir() and formats.FORMATS[name].files(place):
+            found[name] = place
     return found
 
 
@@ -167,9 +165,26 @@ def readings(folder: Path, name: str) -> Readings:
     return Readings(tuple(trials), tuple(read), unread)
 
 
-def unread(folders: Iterable[tuple[str, Path]]) -> dict[str, str]:
-    """Return which files of sources and their folders cannot be read, and why."""
-    return {file: why for name, folder in folders for file, why in readings(folder, name).unread.items()}
+def readable(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
+    """Return those of the wanted sources of which a folder holds files that can be read, each with its own folder."""
+    return {name: place for name, place in _present(folder, wanted).items() if readings(place, name).trials}
+
+
+def unread(folder: Path, wanted: Sequence[str]) -> dict[str, str]:
+    """Return which files of the wanted sources cannot be read, and why.
+
+    Raises
+    ------
+    FormatError : none of the sources is there; or there are files, and none can be read (says why, of the first)
+    ProblemError : a source that is none
+    """
+    here = _present(folder, wanted)
+    if not here:
+        names = ", ".join(SOURCES[name].folder for name in wanted)
+        raise FormatError(f"{folder}: holds no recordings; must have one or more of the folders {names}")
+    found = {file: why for name, place in here.items() for file, why in readings(place, name).unread.items()}
+    refuse(found, strict=not readable(folder, wanted))
+    return found
 
 
 def fingerprint(folder: Path, name: str) -> str:
@@ -211,7 +226,7 @@ def encoded(folder: Path, name: str, encoder: Mapping[str, Any], placed: str = "
     placed : {"own", "others"}
         Whose footfalls tell the insole's size and toe-out on the plate: the person's other ones, or other people's.
     """
-    return _encoded(folder, name, parameters(dict(sorted(encoder.items()))), placed)
+    return _encoded(folder, name, arguments.parameters(dict(sorted(encoder.items()))), placed)
 
 
 @lru_cache(maxsize=12)
