@@ -10,10 +10,14 @@ from collections.abc import Callable, Iterator
 from datetime import datetime
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import taxel
+
+mpl.use("Agg")
 
 NONSENSE: dict[str, Any] = {
     "None": None,
@@ -47,6 +51,8 @@ NONSENSE: dict[str, Any] = {
     "other trains": taxel.SpikeTrains.from_lists([[1.0], [2.0]]),
 }
 
+#: Drawn on again and again; where it is None a new one is made, which pyplot keeps.
+AXES = Figure().add_subplot()
 ARRAY = taxel.Array(4, 4, pitch_mm=2.0, name="small")
 EVENTS = taxel.Events(
     [0, 200, 400], [0, 1, 2], [0, 1, 2], [True, False, True], array=ARRAY, intensity=[9, 8, 7], markers=[(0, True)]
@@ -130,6 +136,8 @@ SOUND: dict[str, Sound] = {
     "taxel.Events.from_tonic": plain(taxel.Events.from_tonic, records=EVENTS.to_tonic(), array=ARRAY),
     "taxel.Events.from_faery": plain(taxel.Events.from_faery, records=EVENTS.to_faery(), array=ARRAY),
     "taxel.Frames": plain(taxel.Frames, values=np.ones((2, 4, 4)), t=[0, 5], unit="N", array=ARRAY),
+    "taxel.Frames.area": method(FRAMES, "area", above=0.5),
+    "taxel.Frames.centre": method(FRAMES, "centre", above=0.5),
     "taxel.Frames.from_events": plain(taxel.Frames.from_events, events=EVENTS, period_us=100, start=0, stop=500),
     "taxel.Frames.between": method(FRAMES, "between", start=0, stop=200),
     "taxel.Frames.region": method(FRAMES, "region", x=slice(0, 2), y=slice(0, 2)),
@@ -155,6 +163,17 @@ SOUND: dict[str, Sound] = {
     "taxel.Detections.from_neo": plain(taxel.Detections.from_neo, events=FOUND.to_neo()),
     "taxel.Detections.to_csv": method(FOUND, "to_csv", path="found.csv", overwrite=True),
     "taxel.Detections.from_csv": plain(taxel.Detections.from_csv, path="here.csv"),
+    "taxel.plot.detections": plain(taxel.plot.detections, found=FOUND, ax=AXES),
+    "taxel.plot.event_picture": plain(taxel.plot.event_picture, events=EVENTS, ax=AXES),
+    "taxel.plot.health_map": plain(taxel.plot.health_map, health=taxel.health(EVENTS), ax=AXES),
+    "taxel.plot.html": plain(taxel.plot.html, noun=TRAINS),
+    "taxel.plot.overview": lambda: (
+        taxel.plot.overview,
+        {"recording": taxel.open("here_events.npz"), "figure": Figure()},
+    ),
+    "taxel.plot.pressure_map": plain(taxel.plot.pressure_map, frames=FRAMES, at=200, ax=AXES),
+    "taxel.plot.raster": plain(taxel.plot.raster, trains=TRAINS, ax=AXES),
+    "taxel.Tare.off": method(TARE, "off", frames=FRAMES),
     "taxel.Tare.take": plain(taxel.Tare.take, x=FRAMES, start_us=0, stop_us=300, note="bench 2"),
     "taxel.Tare.from_json": plain(taxel.Tare.from_json, text=TARE.to_json()),
     "taxel.Tare.save": method(TARE, "save", path="tare.json", overwrite=True),

@@ -1,5 +1,9 @@
 """Touch as events: from the bytes of a tactile array to decisions that say when."""
 
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING
+
 from taxel import detect, device, encode, formats, learn, live, metrics, simulate, wire
 from taxel._convert import convert
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
@@ -15,6 +19,9 @@ from taxel.recording import Clock, Datagrams, Note, Recording
 from taxel.recording import open_recording as open  # noqa: A004  taxel.open is a recording's
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
+
+if TYPE_CHECKING:
+    from taxel import plot
 
 __version__ = "0.1.0"
 
@@ -49,6 +56,14 @@ __all__ = [
     "live",
     "metrics",
     "open",
+    "plot",
     "simulate",
     "wire",
 ]
+
+
+def __getattr__(name: str) -> ModuleType:
+    """Load `taxel.plot` when it is first asked for: matplotlib takes longer than all else together."""
+    if name == "plot":
+        return import_module("taxel.plot")
+    raise AttributeError(f"module 'taxel' has no attribute {name!r}")

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 import os
 from collections.abc import Collection, Mapping
 from itertools import chain
-from typing import Any, TypeVar
+from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +24,7 @@ __all__ = [
     "floats",
     "instance",
     "mapping",
+    "nth",
     "number",
     "numbers",
     "parameters",
@@ -251,6 +253,19 @@ def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
     if index.dtype.kind != "b" and not (-length <= index.min() and index.max() < length):
         raise ProblemError(f"{name}: rows {index.min()} to {index.max()} are asked for, there are 0 to {length - 1}")
     return index
+
+
+def nth(what: str, chosen: SupportsIndex, length: int) -> int:
+    """Return the place that a number chooses, counted from the end where it is below 0.
+
+    Raises
+    ------
+    IndexError : there is no such place
+    """
+    n = operator.index(chosen)
+    if not -length <= n < length:
+        raise IndexError(f"{what} {n} of {length}")
+    return n % length
 
 
 def fields(records: object, wanted: tuple[str, ...]) -> tuple[str, ...]:

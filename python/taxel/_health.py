@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from taxel._arguments import shown
 from taxel._core import ProblemError
+from taxel._recorded import Recorded
+from taxel._recorded import recorded as held_by
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -56,12 +58,17 @@ class Health:
 
         return health_map(self, ax)
 
+    def _repr_html_(self) -> str:
+        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
+
+        return html(self)
+
     def __repr__(self) -> str:
         counts = ", ".join(f"{len(found)} {name}" for name, found in self.named().items())
         return f"Health({self.array.taxels} taxels: {counts})"
 
 
-def health(recorded: Events | Frames) -> Health:
+def health(recorded: Events | Frames | Recorded) -> Health:
     """Tell which taxels are dead, stuck or noisy, each against its up to 8 neighbours.
 
     A recording in which a place was never touched cannot show whether its taxels live: a taxel counts as dead only
@@ -69,7 +76,7 @@ def health(recorded: Events | Frames) -> Health:
 
     Parameters
     ----------
-    recorded : Events or Frames
+    recorded : Events, Frames or Recording
         Of pictures each change of a value counts as an event.
 
     Returns
@@ -78,7 +85,7 @@ def health(recorded: Events | Frames) -> Health:
 
     Raises
     ------
-    ProblemError : neither events nor frames
+    ProblemError : none of these
 
     Notes
     -----
@@ -95,18 +102,19 @@ def health(recorded: Events | Frames) -> Health:
     >>> health(events)
     Health(9 taxels: 1 dead, 0 stuck, 0 noisy)
     """
-    if isinstance(recorded, Events):
-        activity = np.zeros(recorded.array.shape, np.int64)
-        np.add.at(activity, (recorded.y, recorded.x), 1)
-        values = _values_of_events(recorded)
-    elif isinstance(recorded, Frames):
-        changes = recorded.values[1:] != recorded.values[:-1]
-        activity = changes.sum(axis=0, dtype=np.int64).reshape(recorded.array.shape)
+    held = held_by(recorded)
+    if isinstance(held, Events):
+        activity = np.zeros(held.array.shape, np.int64)
+        np.add.at(activity, (held.y, held.x), 1)
+        values = _values_of_events(held)
+    elif isinstance(held, Frames):
+        changes = held.values[1:] != held.values[:-1]
+        activity = changes.sum(axis=0, dtype=np.int64).reshape(held.array.shape)
         # A taxel of pictures that never changes is dead or stuck: its value tells which.
         values = activity + 1
     else:
-        raise ProblemError(f"recorded is {shown(recorded)}: must be Events or Frames")
-    array = recorded.array
+        raise ProblemError(f"recorded is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
+    array = held.array
     exists = np.ones(array.shape, bool) if array.exists is None else array.exists
     around = _median_around(np.where(exists, activity, np.nan))
     dead = exists & (activity == 0) & (around >= DEAD_BELOW)
@@ -114,8 +122,8 @@ def health(recorded: Events | Frames) -> Health:
     if values is not None:
         varied = _median_around(np.where(exists & (activity > 0), values, np.nan)) > 1
         stuck = exists & (activity >= STUCK_FROM) & (values == 1) & varied
-    if isinstance(recorded, Frames) and len(recorded):
-        loaded = recorded.values[0] > recorded.values.reshape(len(recorded), -1).min()
+    if isinstance(held, Frames) and len(held):
+        loaded = held.values[0] > held.values.reshape(len(held), -1).min()
         stuck = dead & loaded
         dead = dead & ~loaded
     noisy = exists & (activity >= NOISY_FROM) & (activity > NOISY_TIMES * np.fmax(around, 0))

@@ -5,14 +5,15 @@ from __future__ import annotations
 import csv
 import io
 import os
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import column, fields, floats, shown, window
+from taxel._arguments import column, fields, floats, nth, shown, window
 from taxel._arguments import path as checked_path
 from taxel._core import FormatError, ProblemError
 from taxel._files import write_whole
@@ -24,6 +25,29 @@ __all__ = ["Detections"]
 
 _CSV = ("label", "t_us", "known_us", "slope_mv_per_ms")
 _SAID = "said_us"
+
+
+class Detection(NamedTuple):
+    """Hold one thing that a readout said.
+
+    Attributes
+    ----------
+    label : str
+    t : int, us
+        When the event was.
+    known : int, us
+        When it could first be said.
+    slope : float, mV/ms
+        How steeply the potential rose above its threshold; NaN where that is not known.
+    said : int, us, or None
+        When it was said, where that is known.
+    """
+
+    label: str
+    t: int
+    known: int
+    slope: float
+    said: int | None
 
 
 class Detections:
@@ -54,6 +78,10 @@ class Detections:
     Detections(2: contact 1, lift 1; 1000 to 9000 us)
     >>> found["lift"].t
     array([9000])
+    >>> found[0].known
+    1344
+    >>> [d.label for d in found]
+    ['contact', 'lift']
     >>> len(found.between(0, 5000))
     1
     """
@@ -90,8 +118,20 @@ class Detections:
         """The labels that occur, in alphabetical order."""
         return tuple(str(name) for name in np.unique(self.label))
 
-    def __getitem__(self, chosen: str | slice | NDArray[Any]) -> Detections:
-        """Return the detections of one label, or those chosen by slice, mask or numbers."""
+    def __iter__(self) -> Iterator[Detection]:
+        said = [None] * len(self) if self.said is None else self.said.tolist()
+        columns = (self.label, self.t, self.known, self.slope)
+        return map(Detection, *(column.tolist() for column in columns), said)
+
+    @overload
+    def __getitem__(self, chosen: int) -> Detection: ...
+    @overload
+    def __getitem__(self, chosen: str | slice | NDArray[Any]) -> Detections: ...
+    def __getitem__(self, chosen: int | str | slice | NDArray[Any]) -> Detection | Detections:
+        """Return one detection by its number, those of one label, or those chosen by slice, mask or numbers."""
+        if isinstance(chosen, int | np.integer) and not isinstance(chosen, bool):
+            n = nth("detection", chosen, len(self))
+            return next(iter(self[n : n + 1]))
         places: Any = self.label == chosen if isinstance(chosen, str) else chosen
         try:
             places = np.arange(len(self))[places]
@@ -106,6 +146,36 @@ class Detections:
         """Return the detections of ``start <= t < stop`` (us)."""
         start, stop = window("us", start, stop)
         return self[(self.t >= start) & (self.t < stop)]
+
+    def __add__(self, other: Detections) -> Detections:
+        """Return the detections of both in order of `t`, those of the first before the other's at equal times.
+
+        Raises
+        ------
+        ProblemError : only one of the two says when its detections were said
+        """
+        if not isinstance(other, Detections):
+            return NotImplemented
+        if (self.said is None) != (other.said is None):
+            raise ProblemError("detections with `said` and without: only alike ones are merged")
+        order = np.argsort(np.concatenate([self.t, other.t]), kind="stable")
+        names = ["label", "t", "known", "slope"] + ([] if self.said is None else ["said"])
+        return Detections(*(np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names))
+
+    def to_pandas(self) -> Any:
+        """Return a table ``label t_us known_us slope_mv_per_ms``, and ``said_us`` where it is known.
+
+        Raises
+        ------
+        ImportError : pandas is not installed (``pip install taxel[pandas]``)
+        """
+        import pandas  # noqa: PLC0415  heavy, and an extra
+
+        columns: list[NDArray[Any]] = [self.label.astype(object), self.t, self.known, self.slope]
+        names = list(_CSV)
+        if self.said is not None:
+            columns, names = [*columns, self.said], [*names, _SAID]
+        return pandas.DataFrame(dict(zip(names, columns, strict=True)))
 
     def to_numpy(self) -> NDArray[np.void]:
         """Return one record a detection with the fields ``label t known slope``, and ``said`` where it is known."""
@@ -210,6 +280,11 @@ class Detections:
         from taxel.plot import detections  # noqa: PLC0415  matplotlib loads slowly
 
         return detections(self, ax)
+
+    def _repr_html_(self) -> str:
+        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
+
+        return html(self)
 
     def _parts(self) -> tuple[list[str], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
         return self.label.tolist(), self.t, self.known, self.slope

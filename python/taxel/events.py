@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import column, fields, instance, rows, shown, window
+from taxel._arguments import column, fields, instance, nth, rows, shown, window
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -17,6 +17,27 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 __all__ = ["Events"]
+
+
+class Event(NamedTuple):
+    """Hold one change at a taxel.
+
+    Attributes
+    ----------
+    t : int, us
+    x, y : int
+        Column and row.
+    p : bool
+        Polarity: more pressure (true) or less.
+    intensity : int, ticks, or None
+        The held value that came with the change, where one came.
+    """
+
+    t: int
+    x: int
+    y: int
+    p: bool
+    intensity: int | None
 
 
 class Events:
@@ -50,6 +71,8 @@ class Events:
     Events(2 events, 0 to 192 us, 8 x 8 taxels, no intensities)
     >>> len(events.between(0, 100))
     1
+    >>> events[0]
+    Event(t=0, x=3, y=5, p=True, intensity=None)
     """
 
     def __init__(
@@ -113,12 +136,27 @@ class Events:
         kept.markers = tuple(sorted(self.markers, key=lambda marker: marker[0]))
         return kept
 
-    def __getitem__(self, chosen: slice | NDArray[Any]) -> Events:
-        """Return the chosen events (slice, mask or numbers), with the markers of their time.
+    def __iter__(self) -> Iterator[Event]:
+        ticks: list[int | None] = [None] * len(self)
+        if self.intensity is not None and self.present is not None:
+            pairs = zip(self.intensity.tolist(), self.present.tolist(), strict=True)
+            ticks = [value if there else None for value, there in pairs]
+        columns = (self.t, self.x, self.y, self.p)
+        return map(Event, *(column.tolist() for column in columns), ticks)
+
+    @overload
+    def __getitem__(self, chosen: int) -> Event: ...
+    @overload
+    def __getitem__(self, chosen: slice | ArrayLike) -> Events: ...
+    def __getitem__(self, chosen: int | slice | ArrayLike) -> Event | Events:
+        """Return one event by its number, or the chosen ones (slice, mask or numbers) with the markers of their time.
 
         That time goes from the first chosen event to the one that follows the last; it has no end where none follows,
         and no beginning where the very first event is chosen. So slices that make the whole hold each marker once.
         """
+        if isinstance(chosen, int | np.integer) and not isinstance(chosen, bool):
+            n = nth("event", chosen, len(self))
+            return next(iter(self[n : n + 1]))
         places = chosen if isinstance(chosen, slice) else rows("events", chosen, len(self))
         try:
             t = self.t[places]
@@ -146,6 +184,45 @@ class Events:
         start = self.t[first] if first > 0 else -np.inf
         stop = self.t[last + 1] if last + 1 < len(self) else np.inf
         return tuple(marker for marker in self.markers if start <= marker[0] < stop)
+
+    def __add__(self, other: Events) -> Events:
+        """Return the events and markers of both in order of time, those of the first before the other's at equal times.
+
+        Where only one has intensities, the other's are not present.
+
+        Raises
+        ------
+        ProblemError : events of another array
+        """
+        if not isinstance(other, Events):
+            return NotImplemented
+        if self.array != other.array:
+            raise ProblemError(f"events of {self.array!r} and of {other.array!r}: only those of one array are merged")
+        both = (self, other)
+        ticks = present = None
+        if self.intensity is not None or other.intensity is not None:
+            none = [np.zeros(len(e), np.uint16) for e in both]
+            ticks = np.concatenate([z if e.intensity is None else e.intensity for e, z in zip(both, none, strict=True)])
+            present = np.concatenate(
+                [z > 0 if e.present is None else e.present for e, z in zip(both, none, strict=True)]
+            )
+        t, x, y, p = (np.concatenate([getattr(e, name) for e in both]) for name in ("t", "x", "y", "p"))
+        return self._unchecked(t, x, y, p, self.array, ticks, present, self.markers + other.markers).sorted()
+
+    def to_pandas(self) -> Any:
+        """Return a table ``t_us x y p``, and ``intensity`` where there are any (missing where none came).
+
+        Raises
+        ------
+        ImportError : pandas is not installed (``pip install taxel[pandas]``)
+        """
+        import pandas  # noqa: PLC0415  heavy, and an extra
+
+        table = pandas.DataFrame({"t_us": self.t, "x": self.x, "y": self.y, "p": self.p})
+        if self.intensity is not None and self.present is not None:
+            table["intensity"] = pandas.array(self.intensity, "UInt16").copy()
+            table.loc[~self.present, "intensity"] = pandas.NA
+        return table
 
     def to_numpy(self) -> NDArray[np.void]:
         """Return one record an event with the fields ``t x y p``, and ``intensity present`` where there are any."""
@@ -213,10 +290,15 @@ class Events:
         return cls(records["t"], records["x"], records["y"], records["on"], array=array)
 
     def plot(self, ax: Axes | None = None) -> Axes:
-        """Draw the event picture: at each taxel, more rises than falls in one colour, more falls in another."""
+        """Draw the event picture: how often each taxel rose, in one colour, and how often it fell, in another."""
         from taxel.plot import event_picture  # noqa: PLC0415  matplotlib loads slowly
 
         return event_picture(self, ax)
+
+    def _repr_html_(self) -> str:
+        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
+
+        return html(self)
 
     @classmethod
     def _unchecked(

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import column, instance, numbers, shown, text, whole, window
+from taxel._arguments import column, instance, number, numbers, shown, text, whole, window
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -133,10 +133,74 @@ class Frames:
         array = Array(values.shape[1], values.shape[2], self.array.pitch_mm, exists, self.array.name)
         return Frames(values, self.t, unit=self.unit, array=array)
 
-    @property
+    def area(self, above: float = 0.0) -> NDArray[np.float64]:
+        """Return the contact area of each picture, mm2: the pitch squared for each taxel that reads more than `above`.
+
+        Parameters
+        ----------
+        above : float, in the pictures' unit
+            What a loaded taxel reads more than. Where taxels at rest do not read 0, take their rest off first:
+            `Tare.off`.
+
+        Returns
+        -------
+        float64, shape (n,), mm2
+
+        Examples
+        --------
+        >>> frames = Frames([[[0.0, 2.0, 6.0]]], [0], unit="N", array=Array(1, 3, pitch_mm=10.0))
+        >>> frames.area(), frames.peak(), frames.total(), frames.centre()
+        (array([200.]), array([6.]), array([8.]), array([[17.5,  0. ]]))
+        """
+        return np.asarray(self.array.pitch_mm**2 * np.count_nonzero(self._loaded(above), axis=(1, 2)))
+
+    def peak(self) -> NDArray[np.float64]:
+        """Return the largest value of each picture, in the pictures' unit; shape (n,)."""
+        return np.asarray(self.values.max(axis=(1, 2)), np.float64)
+
     def total(self) -> NDArray[np.float64]:
-        """The sum over taxels of each picture, in the pictures' unit."""
+        """Return the sum over taxels of each picture, in the pictures' unit; shape (n,)."""
         return np.asarray(self.values.sum(axis=(1, 2), dtype=np.float64))
+
+    def centre(self, above: float = 0.0) -> NDArray[np.float64]:
+        """Return the centre of pressure of each picture, mm.
+
+        Parameters
+        ----------
+        above : float, in the pictures' unit, 0 or more
+            Only taxels that read more count, each with what it reads.
+
+        Returns
+        -------
+        float64, shape (n, 2), mm
+            x to the right and y downwards from the middle of the taxel in the first column and row; NaN where no taxel
+            counts.
+        """
+        if not number("above", above) >= 0:
+            raise ProblemError(f"above is {shown(above)}: must be 0 or more, as values are weights")
+        weights = np.where(self._loaded(above), self.values, 0.0)
+        across, down = weights.sum(axis=1, dtype=np.float64), weights.sum(axis=2, dtype=np.float64)
+        moments = np.stack([across @ np.arange(self.array.columns), down @ np.arange(self.array.rows)], axis=1)
+        total = across.sum(axis=1)[:, None]
+        centre = np.full(moments.shape, np.nan)
+        np.divide(moments * self.array.pitch_mm, total, out=centre, where=total > 0)
+        return centre
+
+    def _loaded(self, above: float) -> NDArray[np.bool_]:
+        return np.asarray(self.values > np.float64(number("above", above)))
+
+    def to_pandas(self) -> Any:
+        """Return a table with a row a picture: its time ``t_us`` as the index, and a column a taxel, ``(row, column)``.
+
+        Raises
+        ------
+        ImportError : pandas is not installed (``pip install taxel[pandas]``)
+        """
+        import pandas  # noqa: PLC0415  heavy, and an extra
+
+        taxels = pandas.MultiIndex.from_product([range(n) for n in self.array.shape], names=["row", "column"])
+        index = pandas.Index(self.t, name="t_us")
+        return pandas.DataFrame(self.values.reshape(len(self), taxels.size), index=index, columns=taxels)
 
     def to_numpy(self) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
         """Return values (n, rows, columns) and times (us)."""
@@ -147,6 +211,11 @@ class Frames:
         from taxel.plot import pressure_map  # noqa: PLC0415  matplotlib loads slowly
 
         return pressure_map(self, at, ax)
+
+    def _repr_html_(self) -> str:
+        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
+
+        return html(self)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Frames):

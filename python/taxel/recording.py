@@ -339,6 +339,11 @@ class Recording:
 
         return overview(self)
 
+    def _repr_html_(self) -> str:
+        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
+
+        return html(self)
+
     def __repr__(self) -> str:
         what = self.events if self.has_events else self.frames()
         noun = "events" if self.has_events else "pictures"

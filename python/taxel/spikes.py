@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import bare, column, floats, number, shown, text, window
+from taxel._arguments import bare, column, floats, nth, number, shown, text, window
 from taxel._arguments import path as checked_path
 from taxel._core import FormatError, ProblemError
 from taxel._files import whole_file, write_whole
@@ -118,11 +118,32 @@ class SpikeTrains:
         """Return the times of one train, ms."""
         if isinstance(train, bool) or not isinstance(train, int | np.integer):
             raise ProblemError(f"trains[{shown(train)}]: choose one train by its number, several by select")
-        n = int(train)
-        if not -len(self) <= n < len(self):
-            raise IndexError(f"train {n} of {len(self)}")
-        n %= len(self)
+        n = nth("train", train, len(self))
         return self.times[self.offsets[n] : self.offsets[n + 1]]
+
+    def __add__(self, other: SpikeTrains) -> SpikeTrains:
+        """Return the spikes of both, train by train in order of time; the window holds both windows.
+
+        Raises
+        ------
+        ProblemError : another number of trains, or only one of the two is signed
+        """
+        if not isinstance(other, SpikeTrains):
+            return NotImplemented
+        if len(self) != len(other):
+            raise ProblemError(f"{len(self)} trains and {len(other)}: only equally many are merged")
+        if self.signed != other.signed:
+            raise ProblemError("signed and unsigned trains: only alike ones are merged; see split_by_sign")
+        times = np.concatenate([self.times, other.times])
+        train = np.concatenate(
+            [np.repeat(np.arange(len(self)), self.counts), np.repeat(np.arange(len(self)), other.counts)]
+        )
+        order = np.lexsort((times, train))
+        values = None
+        if self.values is not None and other.values is not None:
+            values = np.concatenate([self.values, other.values])[order]
+        offsets = self.offsets + other.offsets
+        return SpikeTrains(times[order], offsets, min(self.start, other.start), max(self.stop, other.stop), values)
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -254,6 +275,18 @@ class SpikeTrains:
         if all("value" in t.array_annotations for t in trains):
             values = [np.asarray(t.array_annotations["value"], np.float32) for t in trains]
         return cls.from_lists(times, start, stop, values)
+
+    def to_pandas(self) -> Any:
+        """Return a table with a row a spike, ``train t_ms``, and ``value`` of signed ones, train after train.
+
+        Raises
+        ------
+        ImportError : pandas is not installed (``pip install taxel[pandas]``)
+        """
+        import pandas  # noqa: PLC0415  heavy, and an extra
+
+        columns: dict[str, Any] = {"train": np.repeat(np.arange(len(self)), self.counts), "t_ms": self.times}
+        return pandas.DataFrame(columns if self.values is None else columns | {"value": self.values})
 
     def to_nwb(
         self,
@@ -392,6 +425,11 @@ class SpikeTrains:
         from taxel.plot import raster  # noqa: PLC0415  matplotlib loads slowly
 
         return raster(self, ax)
+
+    def _repr_html_(self) -> str:
+        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
+
+        return html(self)
 
     def _parts(self) -> tuple[Any, ...]:
         return self.times, self.offsets, self.values, self.start, self.stop

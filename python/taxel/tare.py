@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
+from taxel._arguments import instance, shown, whole
 from taxel._arguments import path as checked_path
-from taxel._arguments import shown, whole
 from taxel._arguments import text as checked_text
 from taxel._core import FormatError, ProblemError
 from taxel._files import write_whole
+from taxel._recorded import Recorded, recorded
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -61,13 +62,13 @@ class Tare:
 
     @classmethod
     def take(
-        cls, x: Events | Frames, *, start_us: int | None = None, stop_us: int | None = None, note: str = ""
+        cls, x: Events | Frames | Recorded, *, start_us: int | None = None, stop_us: int | None = None, note: str = ""
     ) -> Tare:
         """Take the mean by time of each taxel's held values.
 
         Parameters
         ----------
-        x : Events or Frames
+        x : Events, Frames or Recording
             Events need their intensities.
         start_us, stop_us : int, us, optional
             The stretch at rest, its end exclusive; from the first stamp to the last where left out. What came before
@@ -84,12 +85,28 @@ class Tare:
             None if start_us is None else whole("start_us", start_us, unit="us"),
             None if stop_us is None else whole("stop_us", stop_us, unit="us"),
         )
+        x = recorded(x)
         if isinstance(x, Events):
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
         if isinstance(x, Frames):
             parts = x.array._parts(), x.t, x.values.reshape(-1)
             return cls.from_json(_core.tare_of_frames(*parts, *window, note))
         raise ProblemError(f"{type(x).__name__}: a tare is taken from taxel.Events or taxel.Frames")
+
+    def off(self, frames: Frames) -> Frames:
+        """Return pictures with each taxel's rest taken off: 0 where it reads less, or where its rest is not known.
+
+        Raises
+        ------
+        ProblemError : pictures of an array of another shape
+        """
+        instance("frames", frames, Frames)
+        if frames.array.shape != self.array.shape:
+            (rows, columns), (of_rows, of_columns) = frames.array.shape, self.array.shape
+            raise ProblemError(f"pictures of {rows} x {columns} taxels: the tare is of {of_rows} x {of_columns}")
+        rest = np.where(np.isnan(self.rest), np.inf, self.rest)
+        values = np.maximum(frames.values - rest, 0.0)
+        return Frames(values.astype(np.float32), frames.t, unit=frames.unit, array=frames.array)
 
     @classmethod
     def from_json(cls, text: str) -> Tare:

@@ -260,7 +260,7 @@ def test_nonsense_in_a_column_is_one_error_that_names_it(name: str, value: objec
         lambda e: e["t"],
         lambda e: e[None],
         lambda e: e[1.5],
-        lambda e: e[0],
+        lambda e: e[True],
         lambda e: e[[0, 9]],
         lambda e: e[np.array([True])],
         lambda e: e[[[0, 1]]],

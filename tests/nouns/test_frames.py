@@ -53,7 +53,7 @@ def test_a_region_is_a_smaller_array_of_the_same_values(frames: Frames) -> None:
 
 @given(some())
 def test_the_total_is_the_sum_over_taxels(frames: Frames) -> None:
-    assert np.allclose(frames.total, frames.values.astype(np.float64).sum(axis=2).sum(axis=1))
+    assert np.allclose(frames.total(), frames.values.astype(np.float64).sum(axis=2).sum(axis=1))
 
 
 @given(some())

@@ -11,6 +11,7 @@ from taxel import _core
 from taxel._arguments import instance, shown
 from taxel._core import ProblemError
 from taxel._parameters import Value
+from taxel._recorded import Recorded, recorded
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -80,12 +81,12 @@ class Encoder(Value):
             raise ProblemError(f"tare is {shown(tare)}: must be a taxel.Tare")
         return self
 
-    def encode(self, x: Events | Frames) -> SpikeTrains:
+    def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
         """Return the spikes of a whole recording.
 
         Parameters
         ----------
-        x : Events or Frames
+        x : Events, Frames or Recording
             Events need their intensities: they are read as held values. One up to 0.1 s behind another (datagrams that
             overtook each other) counts as of that later time, as in a stream. Channels are the existing taxels, in the
             order of their index.
@@ -98,9 +99,10 @@ class Encoder(Value):
 
         Raises
         ------
-        ProblemError : neither events nor frames, events without intensities, or one more than 0.1 s behind another
+        ProblemError : none of these, events without intensities, or one more than 0.1 s behind another
             (names it; `Events.sorted` puts them in order)
         """
+        x = recorded(x)
         if isinstance(x, Events):
             return SpikeTrains._from_parts(_core.encode_events(self._json(), x._parts()))
         frames = _frames(x)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 
 from taxel._arguments import instance, number, shown
 from taxel._core import ProblemError
@@ -51,7 +53,7 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
     if not len(frames):
         raise ProblemError("no picture to draw: the frames are empty")
     ax = axes(ax, (5, 4.4))
-    k = int(frames.total.argmax())
+    k = int(frames.total().argmax())
     if until is not None:
         k = max(0, int(np.searchsorted(frames.t, until, side="right")) - 1)
     exists = True if frames.array.exists is None else frames.array.exists
@@ -63,14 +65,22 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
 
 
 def event_picture(events: Events, ax: Axes | None = None) -> Axes:
-    """Draw, at each taxel, rises less falls."""
+    """Draw how often each taxel rose, in one colour, and how often it fell, in another; both together are dark."""
     instance("events", events, Events)
-    ax = axes(ax, (5, 4.4))
-    picture = np.zeros(events.array.shape)
-    np.add.at(picture, (events.y, events.x), np.where(events.p, 1, -1))
-    limit = max(1.0, float(np.abs(picture).max()))
-    image = ax.imshow(picture, origin="upper", cmap="RdBu_r", vmin=-limit, vmax=limit, interpolation="nearest")
-    ax.figure.colorbar(image, ax=ax, label="rises less falls")
+    ax = axes(ax, (5.6, 4.4))
+    picture = np.ones((*events.array.shape, 3))
+    counts = [np.zeros(events.array.shape) for _ in range(2)]
+    for count, there in zip(counts, (events.p, ~events.p), strict=True):
+        np.add.at(count, (events.y[there], events.x[there]), 1)
+    most = max(1.0, *(float(count.max()) for count in counts))
+    for count, colour, name in zip(counts, (ON, OFF), ("rises", "falls"), strict=True):
+        shades = LinearSegmentedColormap.from_list(name, ["white", colour])
+        # The least that is there shows beside taxels that never spoke.
+        share = np.where(count > 0, 0.15 + 0.85 * count / most, 0.0)
+        picture *= shades(share)[..., :3]
+        scale = ScalarMappable(Normalize(0, most), shades)
+        ax.figure.colorbar(scale, ax=ax, label=name, fraction=0.05)
+    ax.imshow(picture, origin="upper", interpolation="nearest")
     ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{len(events)} events, {events.duration_us / 1000:.1f} ms")
     return ax
 

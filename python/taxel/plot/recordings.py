@@ -21,14 +21,16 @@ __all__ = ["health_map", "overview"]
 _COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}
 
 
-def overview(recording: Recording) -> Figure:
+def overview(recording: Recording, figure: Figure | None = None) -> Figure:
     """Draw events a second (or the sum of pressure) over time, and the activity of each taxel."""
     from taxel._health import health  # noqa: PLC0415  health draws itself here
     from taxel.recording import Recording  # noqa: PLC0415  a recording draws itself here
 
     instance("recording", recording, Recording)
 
-    figure, (over, where) = plt.subplots(1, 2, figsize=(11, 4), width_ratios=(2, 1), layout="constrained")
+    if figure is None:
+        figure = plt.figure(figsize=(11, 4), layout="constrained")
+    over, where = instance("figure", figure, Figure).subplots(1, 2, width_ratios=(2, 1))
     if recording.has_events:
         events = recording.events
         t = events.t / 1e6
@@ -45,7 +47,7 @@ def overview(recording: Recording) -> Figure:
         found = health(events)
     else:
         frames = recording.frames()
-        over.plot(frames.t / 1e6, frames.total, color="black", linewidth=0.8)
+        over.plot(frames.t / 1e6, frames.total(), color="black", linewidth=0.8)
         over.set_ylabel(f"sum of taxels ({frames.unit})")
         found = health(frames)
     for note in recording.notes:

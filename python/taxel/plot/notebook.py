@@ -1,0 +1,57 @@
+"""A noun as a notebook shows it: its line and a small picture."""
+
+from __future__ import annotations
+
+import base64
+import io
+from html import escape
+
+from matplotlib.figure import Figure
+
+from taxel._arguments import shown
+from taxel._core import ProblemError
+from taxel._health import Health
+from taxel.detections import Detections
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.plot.nouns import detections, event_picture, pressure_map, raster
+from taxel.plot.recordings import health_map, overview
+from taxel.recording import Recording
+from taxel.spikes import SpikeTrains
+
+__all__ = ["html"]
+
+Drawn = Events | Frames | SpikeTrains | Detections | Recording | Health
+
+
+def html(noun: Drawn) -> str:
+    """Return a noun's line and a small picture of it as HTML; where there is nothing to draw, the line alone.
+
+    Raises
+    ------
+    ProblemError : nothing that draws itself
+    """
+    line = f"<code>{escape(repr(noun))}</code>"
+    # A figure of its own, which no window and no notebook shows a second time.
+    figure = Figure(figsize=(7.0, 2.6) if isinstance(noun, Recording) else (4.2, 2.8), layout="constrained")
+    match noun:
+        case Recording():
+            overview(noun, figure)
+        case Frames() if not len(noun):
+            return line
+        case Events():
+            event_picture(noun, figure.add_subplot())
+        case Frames():
+            pressure_map(noun, ax=figure.add_subplot())
+        case SpikeTrains():
+            raster(noun, figure.add_subplot())
+        case Detections():
+            detections(noun, figure.add_subplot())
+        case Health():
+            health_map(noun, figure.add_subplot())
+        case _:
+            raise ProblemError(f"noun is {shown(noun)}: must be one that draws itself, as taxel.Events")
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=80)
+    picture = base64.b64encode(file.getvalue()).decode()
+    return f'{line}<br><img alt="{escape(repr(noun))}" src="data:image/png;base64,{picture}">'

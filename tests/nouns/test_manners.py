@@ -1,0 +1,217 @@
+"""Python's manners: nouns are iterated, indexed, added, shown in notebooks and handed to pandas."""
+
+from __future__ import annotations
+
+import base64
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Detections, Events, Frames, SpikeTrains
+from taxel._core import ProblemError
+
+mpl.use("Agg")
+GRID = Array(3, 4, 2.0)
+
+
+def drawn(seed: int, n: int, *, ticks: bool = True) -> Events:
+    rng = np.random.default_rng(seed)
+    more = {"intensity": rng.integers(0, 99, n), "present": rng.random(n) < 0.7} if ticks else {}
+    markers = [(int(t), bool(t % 2)) for t in np.sort(rng.integers(0, 50, 3))]
+    t = np.sort(rng.integers(0, 50, n))
+    return Events(
+        t, rng.integers(0, 4, n), rng.integers(0, 3, n), rng.random(n) < 0.5, array=GRID, markers=markers, **more
+    )
+
+
+def found(seed: int, n: int, *, said: bool = False) -> Detections:
+    rng = np.random.default_rng(seed)
+    t = np.sort(rng.integers(0, 50, n))
+    label = rng.choice(["contact", "lift"], n) if n else []
+    return Detections(label, t, t + rng.integers(0, 5, n), rng.random(n), t + 9 if said else None)
+
+
+def trains(seed: int, *, signed: bool, n: int = 3) -> SpikeTrains:
+    rng = np.random.default_rng(seed)
+    times = [np.sort(np.round(rng.random(rng.integers(0, 9)) * 20) / 2) for _ in range(n)]
+    values = [rng.choice([-1.0, 1.0], len(t)) for t in times] if signed else None
+    return SpikeTrains.from_lists(times, -float(rng.integers(0, 3)), 10.0 + float(rng.integers(0, 3)), values)
+
+
+seeds, sizes = st.integers(0, 10**6), st.integers(0, 30)
+
+
+@given(seeds, sizes, st.booleans())
+def test_what_is_iterated_is_what_the_columns_hold(seed: int, n: int, other: bool) -> None:
+    events = drawn(seed, n, ticks=other)
+    for k, event in enumerate(events):
+        assert [event, events[k - n], events[np.int64(k)]] == [event] * 3
+        assert (event.t, event.x, event.y, event.p) == (events.t[k], events.x[k], events.y[k], events.p[k])
+        there = other and events.present[k]
+        assert event.intensity == (events.intensity[k] if there else None)
+    detections = found(seed, n, said=other)
+    for k, one in enumerate(detections):
+        assert [one, detections[k - n], detections[np.int64(k)]] == [one] * 3
+        assert (one.label, one.t, one.known, one.slope) == tuple(
+            getattr(detections, name)[k] for name in ("label", "t", "known", "slope")
+        )
+        assert one.said == (one.t + 9 if other else None)
+    assert (len(list(events)), len(list(detections))) == (n, n)
+    for noun in (events, detections):
+        for outside in (n, -n - 1, 10**30):
+            with pytest.raises(IndexError, match=f" of {n}"):
+                noun[outside]
+        with pytest.raises(ProblemError):
+            noun[True]
+
+
+@given(seeds, sizes, sizes, st.tuples(st.booleans(), st.booleans()))
+def test_events_of_both_are_merged_by_time_and_nothing_is_lost(
+    seed: int, n: int, m: int, ticks: tuple[bool, bool]
+) -> None:
+    a, b = drawn(seed, n, ticks=ticks[0]), drawn(seed + 1, m, ticks=ticks[1])
+    both = a + b
+    assert (np.diff(both.t) >= 0).all()
+    assert list(both) == sorted([*a, *b], key=lambda event: event.t)
+    assert list(both.markers) == sorted([*a.markers, *b.markers], key=lambda marker: marker[0])
+    assert (both.intensity is not None) == any(ticks)
+    assert a + Events([], [], [], [], array=GRID) == a
+    assert n == 0 or a[: n // 2] + a[n // 2 :] == a
+
+
+@given(seeds, sizes, sizes, st.booleans())
+def test_detections_of_both_are_merged_by_time(seed: int, n: int, m: int, said: bool) -> None:
+    a, b = found(seed, n, said=said), found(seed + 1, m, said=said)
+    assert list(a + b) == sorted([*a, *b], key=lambda one: one.t)
+    assert a[: n // 2] + a[n // 2 :] == a
+
+
+@given(seeds, st.booleans())
+def test_trains_of_both_are_merged_train_by_train(seed: int, signed: bool) -> None:
+    a, b = trains(seed, signed=signed), trains(seed + 1, signed=signed)
+    both = a + b
+    assert (both.start, both.stop) == (min(a.start, b.start), max(a.stop, b.stop))
+    for k in range(3):
+        pairs = [pair for one in (a, b) for pair in zip(one[k], _values(one, k), strict=True)]
+        spikes = sorted(pairs, key=lambda pair: pair[0])
+        assert list(zip(both[k], _values(both, k), strict=True)) == spikes
+    assert both.split_by_sign().counts.tolist() == (a.split_by_sign().counts + b.split_by_sign().counts).tolist()
+    assert a.between(a.start, 4.0) + a.between(4.0, a.stop) == SpikeTrains.from_lists(
+        [t[t < a.stop] for t in a],
+        a.start,
+        a.stop,
+        [v[t < a.stop] for v, t in zip((_values(a, k) for k in range(3)), a, strict=True)] if signed else None,
+    )
+
+
+def _values(of: SpikeTrains, k: int) -> np.ndarray:
+    return np.ones(len(of[k])) if of.values is None else of.values[of.offsets[k] : of.offsets[k + 1]]
+
+
+@pytest.mark.parametrize(
+    ("add", "said"),
+    [
+        (lambda: drawn(1, 3) + Events([], [], [], [], array=Array(3, 5)), "only those of one array"),
+        (lambda: trains(1, signed=True) + trains(1, signed=False), "only alike ones"),
+        (lambda: trains(1, signed=True) + trains(1, signed=True, n=4), "only equally many"),
+        (lambda: found(1, 3) + found(1, 3, said=True), "only alike ones"),
+    ],
+)
+def test_what_does_not_go_together_is_refused(add: Callable[[], Any], said: str) -> None:
+    with pytest.raises(ProblemError, match=said):
+        add()
+
+
+@pytest.mark.parametrize("noun", [drawn(1, 3), trains(1, signed=True), found(1, 3)])
+def test_a_noun_and_something_else_are_python_s_own_error(noun: Any) -> None:
+    for other in (5, None, [1], "x"):
+        with pytest.raises(TypeError, match="unsupported operand"):
+            noun + other
+
+
+def test_tables_of_pandas_hold_the_columns() -> None:
+    pandas = pytest.importorskip("pandas")
+    events = drawn(3, 20)
+    table = events.to_pandas()
+    assert list(table.columns) == ["t_us", "x", "y", "p", "intensity"]
+    assert table.intensity.isna().tolist() == (~events.present).tolist()
+    assert table.intensity.dropna().tolist() == events.intensity[events.present].tolist()
+    assert table[["t_us", "x", "y", "p"]].to_numpy().tolist() == [list(e)[:4] for e in events]
+    assert "intensity" not in drawn(3, 5, ticks=False).to_pandas()
+    assert found(3, 8).to_pandas().columns.tolist() == ["label", "t_us", "known_us", "slope_mv_per_ms"]
+    assert list(found(3, 8, said=True).to_pandas().itertuples(index=False, name=None)) == list(found(3, 8, said=True))
+    spikes = trains(4, signed=True)
+    table = spikes.to_pandas()
+    assert [g.t_ms.tolist() for _, g in table.groupby("train")] == [t.tolist() for t in spikes if len(t)]
+    assert np.array_equal(table["value"], spikes.values)
+    frames = Frames(np.arange(24.0).reshape(2, 3, 4), [5, 9])
+    table = frames.to_pandas()
+    assert table.index.tolist() == [5, 9]
+    assert table.loc[9, (2, 1)] == frames.values[1, 2, 1]
+    assert isinstance(table, pandas.DataFrame)
+
+
+def shown_nouns(tmp_path: Any) -> list[Any]:
+    events = drawn(5, 20)
+    taxel.convert(events, tmp_path / "a.npz")
+    rec = taxel.open(tmp_path / "a.npz")
+    frames = [Frames(np.ones((n, 3, 4)), np.arange(n)) for n in (2, 0)]
+    spikes = [trains(1, signed=True), SpikeTrains.from_lists([])]
+    return [events, events[:0], *frames, *spikes, found(1, 3), found(1, 0), rec, taxel.health(rec)]
+
+
+def test_a_notebook_shows_the_line_and_a_small_picture(tmp_path: Any) -> None:
+    import matplotlib.pyplot as plt
+
+    before = plt.get_fignums()
+    for noun in shown_nouns(tmp_path):
+        html = noun._repr_html_()
+        assert "&" in repr(noun) or repr(noun).replace("<", "&lt;").replace(">", "&gt;") in html
+        if not (isinstance(noun, Frames) and not len(noun)):
+            picture = base64.b64decode(html.split("base64,")[1].split('"')[0])
+            assert picture.startswith(b"\x89PNG")
+            assert len(picture) < 60_000
+    assert plt.get_fignums() == before, "no figure stays open"
+
+
+def test_rises_and_falls_are_both_seen_where_they_are_equally_many() -> None:
+    """Their difference would be nothing; a taxel that never spoke is white."""
+    t = np.arange(8)
+    events = Events(t, [0, 0, 0, 0, 1, 1, 2, 2], [0] * 8, [1, 0, 1, 0, 1, 1, 0, 0], array=Array(1, 4))
+    picture = events.plot().images[0].get_array()
+    both, rises, falls, silent = picture[0]
+    assert silent.tolist() == [1, 1, 1]
+    assert rises[0] > rises[2]
+    assert falls[2] > falls[0]
+    assert both.sum() < min(rises.sum(), falls.sum())
+
+
+def test_encoders_tares_health_and_detections_take_a_recording(tmp_path: Any) -> None:
+    for source in (drawn(6, 30), Frames(np.arange(60.0).reshape(5, 3, 4), np.arange(5) * 1000)):
+        path = tmp_path / f"{type(source).__name__}.npz"
+        taxel.convert(source, path)
+        rec = taxel.open(path)
+        encoder = taxel.encode.LevelCrossing([30.0, 50.0])
+        assert encoder.encode(rec) == encoder.encode(source)
+        assert taxel.Tare.take(rec) == taxel.Tare.take(source)
+        assert repr(taxel.health(rec)) == repr(taxel.health(source))
+        readout = taxel.Readout(encoder, {"a": (taxel.Neuron(), np.ones(48))})
+        assert taxel.detect.run(readout, rec) == taxel.detect.run(readout, source)
+
+
+def test_plots_are_there_after_import_taxel_and_cost_nothing_before() -> None:
+    said = (
+        "import sys, taxel; assert 'matplotlib' not in sys.modules, 'loaded'; taxel.plot.raster; "
+        "assert 'matplotlib' in sys.modules; assert 'plot' in dir(taxel)"
+    )
+    subprocess.run([sys.executable, "-c", said], check=True, timeout=120)
+    with pytest.raises(AttributeError, match="no attribute 'plots'"):
+        getattr(taxel, "plots")  # noqa: B009  a name that is not there

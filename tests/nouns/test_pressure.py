@@ -1,0 +1,60 @@
+"""What a pressure lab reads first, against SciPy: area, peak, sum and centre of pressure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import ndimage
+
+from taxel import Array, Frames, Tare
+from taxel._core import ProblemError
+
+
+def drawn(seed: int) -> Frames:
+    rng = np.random.default_rng(seed)
+    values = rng.normal(1, 4, (6, 5, 7)) * (rng.random((6, 5, 7)) < 0.5)
+    values[2] = 0
+    array = Array(5, 7, pitch_mm=2.5)
+    return Frames(values, np.arange(6), unit="N", array=array)
+
+
+@given(st.integers(0, 10**6), st.sampled_from([0.0, 1.5]))
+def test_area_peak_sum_and_centre_are_scipy_s(seed: int, above: float) -> None:
+    frames = drawn(seed)
+    for k, picture in enumerate(frames.values.astype(np.float64)):
+        loaded = picture > above
+        assert frames.area(above)[k] == loaded.sum() * 6.25
+        assert frames.peak()[k] == picture.max()
+        assert frames.total()[k] == pytest.approx(picture.sum(), abs=1e-9)
+        if not loaded.any():
+            assert np.isnan(frames.centre(above)[k]).all()
+        else:
+            y, x = ndimage.center_of_mass(np.where(loaded, picture, 0.0))
+            np.testing.assert_allclose(frames.centre(above)[k], [2.5 * x, 2.5 * y], 1e-9, 1e-9)
+
+
+@given(st.integers(0, 10**6))
+def test_a_rest_that_is_taken_off_leaves_what_is_above_it(seed: int) -> None:
+    frames = drawn(seed)
+    rest = Frames(np.abs(frames.values[:2]) / 2, [0, 9], unit="N", array=frames.array)
+    tare = Tare.take(rest)
+    off = tare.off(frames)
+    np.testing.assert_allclose(off.values, np.maximum(frames.values - tare.rest, 0), 1e-6, 1e-6)
+    assert (off.unit, off.array) == ("N", frames.array)
+    assert (off.values >= 0).all()
+
+
+def test_nonsense_is_one_clear_error() -> None:
+    frames = drawn(1)
+    for call in (
+        lambda: frames.area("x"),
+        lambda: frames.centre(-1),
+        lambda: frames.centre(float("nan")),
+        lambda: Tare.take(Frames(np.ones((2, 3, 3)), [0, 1])).off(frames),
+        lambda: Tare.take(Frames(np.ones((2, 3, 3)), [0, 1])).off(None),
+    ):
+        with pytest.raises(ProblemError) as caught:
+            call()
+        assert "\n" not in str(caught.value)
