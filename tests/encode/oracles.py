@@ -4,6 +4,7 @@ Each takes times in whole us and values of shape (samples, channels), and gives 
 """
 
 import numpy as np
+from scipy import ndimage
 
 TICK_SHIFT = 0.5
 
@@ -159,4 +160,51 @@ def contact_area(t, pictures, rest, floor=3.0, levels=(2, 4, 8, 16, 32)):
             if area < level <= before:
                 spikes.append((at, len(levels) + k, 1))
         before = area
+    return sorted(spikes)
+
+
+def counted(picture, rest, floor):
+    """Which taxels are loaded and have a loaded neighbour."""
+    loaded = np.nan_to_num(picture - rest, nan=-np.inf) >= floor + TICK_SHIFT
+    return loaded & (ndimage.convolve(loaded.astype(int), np.ones((3, 3)), mode="constant") > 1)
+
+
+def moment_levels(levels, **ranges):
+    """Each level as (moment, level); moments are area, total, peak, x and y."""
+    every = []
+    for k, name in enumerate(("area", "total", "peak", "displacement_mm", "displacement_mm")):
+        if ranges.get(name) is not None:
+            spaced = [float(f"{at:.11e}") for at in np.geomspace(*ranges[name], levels)]
+            every += [(k, at) for at in spaced] + [(k, -at) for at in spaced if k > 2]
+    return every
+
+
+def moments(t, pictures, rest, end, floor, pitch, every, tonic=None):
+    """Crossings of the levels in `every`, and tonic spikes (us) up to `end`."""
+    values, origin = [], None
+    for picture in pictures.astype(np.float64):
+        there = counted(picture, rest, floor)
+        if not there.any():
+            values.append([0.0] * 5)
+            origin = None
+            continue
+        above = np.where(there, picture - rest, 0.0)
+        y, x = ndimage.center_of_mass(above)
+        origin = (x, y) if origin is None else origin
+        values.append([there.sum(), above.sum(), above.max(), (x - origin[0]) * pitch, (y - origin[1]) * pitch])
+    spikes, values = [], np.array(values)
+    for n, (moment, at) in enumerate(every):
+        reached = values[:, moment] >= at if at > 0 else values[:, moment] <= at
+        begin = None
+        for time, is_, was in zip(t, reached, [reached[0], *reached[:-1]], strict=True):
+            if is_ and begin is None:
+                begin = time
+            if is_ and not was:
+                spikes.append((time, n, 1))
+            if was and not is_:
+                spikes.append((time, len(every) + n, 1))
+                spikes += [(s, 2 * len(every) + n, 1) for s in range(begin, time, tonic)] if tonic else []
+                begin = None
+        if begin is not None and tonic:
+            spikes += [(s, 2 * len(every) + n, 1) for s in range(begin, end + 1, tonic)]
     return sorted(spikes)

@@ -5,6 +5,8 @@ mod change_events;
 mod contact_area;
 mod fa1;
 mod level_crossing;
+mod loaded;
+mod moments;
 mod power;
 mod running_range;
 mod sampled;
@@ -18,6 +20,7 @@ pub use change_events::{ChangeEvents, Previous, Rounding};
 pub use contact_area::ContactArea;
 pub use fa1::{Decay, Fa1};
 pub use level_crossing::LevelCrossing;
+pub use moments::Moments;
 pub use running_range::{FirstWindow, RunningRange};
 pub use tare::{Tare, TareBuilder};
 pub use threshold_izhikevich::{Begin, Published, ThresholdIzhikevich};
@@ -89,6 +92,8 @@ pub enum Encoder {
     Fa1(Fa1),
     /// How many taxels are loaded.
     ContactArea(ContactArea),
+    /// How large a touch is, how hard, and where its centre has gone.
+    Moments(Moments),
 }
 
 impl Encoder {
@@ -122,6 +127,7 @@ impl Encoder {
             Self::ThresholdIzhikevich(e) => e.check(),
             Self::Fa1(e) => e.check(),
             Self::ContactArea(e) => e.check(),
+            Self::Moments(e) => e.check(),
         }
     }
 
@@ -153,6 +159,7 @@ impl Encoder {
             Self::ThresholdIzhikevich(e) => e.stream(array),
             Self::Fa1(e) => e.stream(array),
             Self::ContactArea(e) => e.stream(array),
+            Self::Moments(e) => e.stream(array),
         }
     }
 
@@ -162,7 +169,7 @@ impl Encoder {
         match self {
             Self::LevelCrossing(e) => e.latency_ms(),
             Self::ThresholdIzhikevich(e) => e.latency_ms(),
-            Self::ChangeEvents(_) | Self::Fa1(_) | Self::ContactArea(_) => 0.0,
+            Self::ChangeEvents(_) | Self::Fa1(_) | Self::ContactArea(_) | Self::Moments(_) => 0.0,
         }
     }
 
@@ -175,19 +182,20 @@ impl Encoder {
             Self::LevelCrossing(e) => e.trains(channels),
             Self::ThresholdIzhikevich(e) => e.trains(channels),
             Self::ContactArea(e) => e.trains(),
+            Self::Moments(e) => e.trains(),
         }
     }
 
     /// Whether its spikes carry a signed value, so that a neuron hears each train as two, ON and OFF.
     #[must_use]
     pub fn signed(&self) -> bool {
-        !matches!(self, Self::ContactArea(_))
+        !matches!(self, Self::ContactArea(_) | Self::Moments(_))
     }
 
     /// Whether it must be given a tare before it can work: a tare belongs to a board and a day, not to an encoder.
     #[must_use]
     pub fn needs_tare(&self) -> bool {
-        matches!(self, Self::ContactArea(ContactArea { tare: None, .. }))
+        matches!(self, Self::ContactArea(ContactArea { tare: None, .. }) | Self::Moments(Moments { tare: None, .. }))
     }
 
     /// The same encoder with this tare; one that reads none stays as it is.
@@ -195,6 +203,7 @@ impl Encoder {
     pub fn with_tare(&self, tare: &Tare) -> Self {
         match self {
             Self::ContactArea(e) => Self::ContactArea(ContactArea { tare: Some(tare.clone()), ..e.clone() }),
+            Self::Moments(e) => Self::Moments(Moments { tare: Some(tare.clone()), ..e.clone() }),
             other => other.clone(),
         }
     }
@@ -289,7 +298,7 @@ fn said(json: &str, error: &serde_json::Error) -> Error {
     problem!("encoder {name}: {error}")
 }
 
-const NAMES: [&str; 5] = ["change_events", "level_crossing", "threshold_izhikevich", "fa1", "contact_area"];
+const NAMES: [&str; 6] = ["change_events", "level_crossing", "threshold_izhikevich", "fa1", "contact_area", "moments"];
 
 /// us to ms.
 fn ms(t: i64) -> f64 {

@@ -5,6 +5,7 @@ from taxel.encode.change_events import ChangeEvents
 from taxel.encode.contact_area import ContactArea
 from taxel.encode.fa1 import FA1
 from taxel.encode.level_crossing import LevelCrossing, RunningRange
+from taxel.encode.moments import Moments
 from taxel.encode.threshold_izhikevich import ThresholdIzhikevich
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "Encoder",
     "EncoderStream",
     "LevelCrossing",
+    "Moments",
     "RunningRange",
     "ThresholdIzhikevich",
 ]

@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::loaded::Loaded;
 use super::sampled::{BLOCK, Block, Channels, Source, blocks};
 use super::{Stream, Tare, ms};
 use crate::allowed::{Range, ranges};
-use crate::vectors::wide;
 use crate::{Array, Events, Result, Spike, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.
@@ -63,75 +63,23 @@ impl ContactArea {
     }
 
     pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let Some(tare) = &self.tare else {
-            return Err(problem!("contact area without a tare: take one at rest and give it to the encoder"));
-        };
-        if (tare.array.rows, tare.array.columns) != (array.rows, array.columns) {
-            let (of, to) = (&tare.array, array);
-            return Err(problem!(
-                "tare of {} x {} taxels: the array has {} x {}",
-                of.rows,
-                of.columns,
-                to.rows,
-                to.columns
-            ));
-        }
-        let n = blocks(array.len());
-        let exists = |place: usize| array.exists.as_ref().is_none_or(|e| e[place]);
-        let mut loaded_from = vec![[f32::INFINITY; BLOCK]; n];
-        for (place, rest) in tare.rest.iter().enumerate().filter(|&(place, _)| exists(place)) {
-            if let Some(rest) = rest {
-                loaded_from[place / BLOCK][place % BLOCK] = round_up(rest + self.noise_floor + 0.5);
-            }
-        }
         Ok(Box::new(Area {
             levels: self.levels.clone(),
-            rows: usize::from(array.rows),
-            columns: usize::from(array.columns),
-            loaded_from,
-            loaded: vec![[0; BLOCK]; n],
-            neighbours: vec![0; array.len()],
-            area: 0,
+            loaded: Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?,
             said: 0,
-            held: vec![[0.0; BLOCK]; n],
-            changed: vec![false; n],
-            // Place by place: which taxels exist is in `loaded_from`.
+            held: vec![[0.0; BLOCK]; blocks(array.len())],
+            changed: vec![false; blocks(array.len())],
+            // Place by place: which taxels exist is in `loaded`.
             channels: Channels::new(&Array { exists: None, ..array.clone() }),
             source: Source::Unknown,
         }))
     }
 }
 
-/// The smallest f32 that is not below `x`.
-fn round_up(x: f64) -> f32 {
-    let near = x as f32;
-    if f64::from(near) < x { near.next_up() } else { near }
-}
-
-wide! {
-    /// Whether the same places are loaded as before.
-    fn as_loaded(held: &Block, from: &Block, loaded: &[u32; BLOCK]) -> bool {
-        let mut other = 0;
-        for lane in 0..BLOCK {
-            other |= u32::from(held[lane] >= from[lane]) ^ loaded[lane];
-        }
-        other == 0
-    }
-}
-
 #[derive(Clone)]
 struct Area {
     levels: Vec<u32>,
-    rows: usize,
-    columns: usize,
-    /// From which value on each place is loaded; infinite where it has no rest.
-    loaded_from: Vec<Block>,
-    /// 1 where a place is loaded.
-    loaded: Vec<[u32; BLOCK]>,
-    /// How many neighbours of each place are loaded.
-    neighbours: Vec<u8>,
-    /// How many loaded places have a loaded neighbour.
-    area: u32,
+    loaded: Loaded,
     /// The area at the end of the last stamp.
     said: u32,
     held: Vec<Block>,
@@ -141,40 +89,9 @@ struct Area {
 }
 
 impl Area {
-    fn is_loaded(&self, place: usize) -> bool {
-        self.loaded[place / BLOCK][place % BLOCK] != 0
-    }
-
-    /// Loads or unloads a place, and keeps the counts of its neighbours and the area in step.
-    fn toggle(&mut self, place: usize) {
-        let loaded = !self.is_loaded(place);
-        self.loaded[place / BLOCK][place % BLOCK] = u32::from(loaded);
-        let (row, column) = (place / self.columns, place % self.columns);
-        for y in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
-            for x in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
-                let other = y * self.columns + x;
-                if other == place {
-                    continue;
-                }
-                let counted = self.neighbours[other] > 0;
-                if loaded {
-                    self.neighbours[other] += 1;
-                } else {
-                    self.neighbours[other] -= 1;
-                }
-                if self.is_loaded(other) && counted != (self.neighbours[other] > 0) {
-                    self.area = if loaded { self.area + 1 } else { self.area - 1 };
-                }
-            }
-        }
-        if self.neighbours[place] > 0 {
-            self.area = if loaded { self.area + 1 } else { self.area - 1 };
-        }
-    }
-
     /// The stamp at `t` us is over: says which levels the area passed since the last one.
     fn say(&mut self, t: i64, out: &mut Vec<Spike>) {
-        let (before, now) = (self.said, self.area);
+        let (before, now) = (self.said, self.loaded.area());
         if before == now {
             return;
         }
@@ -225,11 +142,8 @@ impl Stream for Area {
                 present = events.t[k];
             }
             if intensity.present[k] {
-                let place = usize::from(events.y[k]) * self.columns + usize::from(events.x[k]);
-                let value = f32::from(intensity.ticks[k]);
-                if (value >= self.loaded_from[place / BLOCK][place % BLOCK]) != self.is_loaded(place) {
-                    self.toggle(place);
-                }
+                let place = events.array.index(events.x[k], events.y[k]);
+                self.loaded.take(place, f32::from(intensity.ticks[k]));
             }
         }
         Ok(())
@@ -238,17 +152,9 @@ impl Stream for Area {
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
         self.source.frame(t)?;
         self.channels.load(t, values, &mut self.held, &mut self.changed)?;
-        for block in 0..self.held.len() {
-            if !std::mem::take(&mut self.changed[block]) {
-                continue;
-            }
-            if !as_loaded(&self.held[block], &self.loaded_from[block], &self.loaded[block]) {
-                for lane in 0..BLOCK {
-                    let loaded = self.held[block][lane] >= self.loaded_from[block][lane];
-                    if loaded != (self.loaded[block][lane] != 0) {
-                        self.toggle(block * BLOCK + lane);
-                    }
-                }
+        for (block, values) in self.held.iter().enumerate() {
+            if std::mem::take(&mut self.changed[block]) {
+                self.loaded.take_block(block, values);
             }
         }
         self.say(t, out);

@@ -20,6 +20,11 @@ pub(super) type Block = [f32; BLOCK];
 pub(super) trait Rule: Send + Clone + 'static {
     fn trains(&self) -> usize;
 
+    /// Whether its spikes carry a signed value.
+    fn signed(&self) -> bool {
+        true
+    }
+
     /// The first sample: the encoder begins as if it had always been so.
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>);
 
@@ -311,7 +316,7 @@ impl<R: Rule> Stream for Sampled<R> {
     }
 
     fn signed(&self) -> bool {
-        true
+        self.rule.signed()
     }
 
     fn latency_ms(&self) -> f64 {

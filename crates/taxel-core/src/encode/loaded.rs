@@ -1,0 +1,138 @@
+//! Which taxels are loaded, and how many: what encoders without a place in them read.
+
+use super::Tare;
+use super::sampled::{BLOCK, Block, blocks};
+use crate::wide::wide;
+use crate::{Array, Result, problem};
+
+/// The smallest f32 that is not below `x`.
+fn round_up(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) < x { near.next_up() } else { near }
+}
+
+wide! {
+    /// Whether the same places are loaded as before.
+    fn as_loaded(held: &Block, from: &Block, loaded: &[u32; BLOCK]) -> bool {
+        let mut other = 0;
+        for lane in 0..BLOCK {
+            other |= u32::from(held[lane] >= from[lane]) ^ loaded[lane];
+        }
+        other == 0
+    }
+}
+
+/// The loaded places of an array.
+///
+/// A place is loaded while its held value stands above its rest by the noise floor and half a tick; it counts if one of
+/// its 8 neighbours is loaded too, so that noise does not.
+#[derive(Clone)]
+pub(super) struct Loaded {
+    rows: usize,
+    columns: usize,
+    /// From which value on each place is loaded; infinite where it has no rest.
+    from: Vec<Block>,
+    /// 1 where a place is loaded.
+    loaded: Vec<[u32; BLOCK]>,
+    /// How many neighbours of each place are loaded.
+    neighbours: Vec<u8>,
+    /// How many loaded places have a loaded neighbour.
+    area: u32,
+}
+
+impl Loaded {
+    /// Nothing is loaded yet; `what` asks for the tare.
+    pub(super) fn new(what: &str, array: &Array, tare: Option<&Tare>, noise_floor: f64) -> Result<Self> {
+        let Some(tare) = tare else {
+            return Err(problem!("{what} without a tare: take one at rest and give it to the encoder"));
+        };
+        if (tare.array.rows, tare.array.columns) != (array.rows, array.columns) {
+            let (of, to) = (&tare.array, array);
+            return Err(problem!(
+                "tare of {} x {} taxels: the array has {} x {}",
+                of.rows,
+                of.columns,
+                to.rows,
+                to.columns
+            ));
+        }
+        let mut from = vec![[f32::INFINITY; BLOCK]; blocks(array.len())];
+        let exists = |place: usize| array.exists.as_ref().is_none_or(|e| e[place]);
+        for (place, rest) in tare.rest.iter().enumerate().filter(|&(place, _)| exists(place)) {
+            if let Some(rest) = rest {
+                from[place / BLOCK][place % BLOCK] = round_up(rest + noise_floor + 0.5);
+            }
+        }
+        Ok(Self {
+            rows: usize::from(array.rows),
+            columns: usize::from(array.columns),
+            loaded: vec![[0; BLOCK]; from.len()],
+            from,
+            neighbours: vec![0; array.len()],
+            area: 0,
+        })
+    }
+
+    /// How many taxels count.
+    pub(super) fn area(&self) -> u32 {
+        self.area
+    }
+
+    /// Whether any place of a block is loaded.
+    pub(super) fn any(&self, block: usize) -> bool {
+        self.loaded[block].iter().any(|&l| l != 0)
+    }
+
+    /// Whether a place counts.
+    pub(super) fn counts(&self, place: usize) -> bool {
+        self.is_loaded(place) && self.neighbours[place] > 0
+    }
+
+    /// Takes the value of a place.
+    pub(super) fn take(&mut self, place: usize, value: f32) {
+        if (value >= self.from[place / BLOCK][place % BLOCK]) != self.is_loaded(place) {
+            self.toggle(place);
+        }
+    }
+
+    /// Takes the values of a block of places.
+    pub(super) fn take_block(&mut self, block: usize, values: &Block) {
+        if !as_loaded(values, &self.from[block], &self.loaded[block]) {
+            let last = self.neighbours.len();
+            for (place, &value) in (block * BLOCK..last).zip(values) {
+                self.take(place, value);
+            }
+        }
+    }
+
+    fn is_loaded(&self, place: usize) -> bool {
+        self.loaded[place / BLOCK][place % BLOCK] != 0
+    }
+
+    /// Loads or unloads a place, and keeps the counts of its neighbours and the area in step.
+    fn toggle(&mut self, place: usize) {
+        let loaded = !self.is_loaded(place);
+        self.loaded[place / BLOCK][place % BLOCK] = u32::from(loaded);
+        let (row, column) = (place / self.columns, place % self.columns);
+        for y in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
+            for x in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
+                let other = y * self.columns + x;
+                if other == place {
+                    continue;
+                }
+                let counted = self.neighbours[other] > 0;
+                if loaded {
+                    self.neighbours[other] += 1;
+                } else {
+                    self.neighbours[other] -= 1;
+                }
+                if self.is_loaded(other) && counted != (self.neighbours[other] > 0) {
+                    self.area = if loaded { self.area + 1 } else { self.area - 1 };
+                }
+            }
+        }
+        if self.neighbours[place] > 0 {
+            self.area = if loaded { self.area + 1 } else { self.area - 1 };
+        }
+    }
+}

@@ -1,0 +1,314 @@
+//! How large a touch is, how hard, and where its centre has gone since it began: nothing in it says where it began, so
+//! what is learnt at one place holds at others.
+
+use std::collections::VecDeque;
+
+use serde::{Deserialize, Serialize};
+
+use super::loaded::Loaded;
+use super::sampled::{BLOCK, Block, Rule, Sampled};
+use super::{Stream, Tare, micros, ms, sort_from};
+use crate::allowed::at_least_0;
+use crate::{Array, Result, Spike, problem};
+
+/// Moments of the held picture above rest, each through levels in equal ratios.
+///
+/// Of the taxels that count as [`ContactArea`](super::ContactArea) counts them: how many (area), the sum and the largest
+/// of their values above rest (total, peak), and how far their centre, weighted by these values, has moved to the right
+/// and downwards since the present touch began, mm. A touch begins where area rises above 0 and ends where it is 0;
+/// between touches all are 0. A level of the displacement stands on both sides of 0 and is passed outwards.
+///
+/// Trains, unsigned, levels in the order area, total, peak, x right, x left, y down, y up, from the least on: where each
+/// is reached, then where each is left, then, with `tonic_ms`, one that speaks while beyond. Begins settled.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Moments {
+    /// The board's noise floor, 0 or more, in the sensor's unit (ticks). Default 3, that of the fast presets.
+    #[serde(default = "three")]
+    pub noise_floor: f64,
+    /// How many levels each moment has, on each side of 0 for a displacement. Default 20.
+    #[serde(default = "twenty")]
+    pub levels: usize,
+    /// Least and largest level of the number of taxels; `None` leaves the moment out.
+    #[serde(default = "areas")]
+    pub area: Option<[f64; 2]>,
+    /// The same of the sum above rest, in the sensor's unit.
+    #[serde(default = "totals")]
+    pub total: Option<[f64; 2]>,
+    /// The same of the largest value above rest, in the sensor's unit.
+    #[serde(default = "peaks")]
+    pub peak: Option<[f64; 2]>,
+    /// The same of the centre's way in x and in y, mm.
+    #[serde(default = "ways")]
+    pub displacement_mm: Option<[f64; 2]>,
+    /// While beyond a level: one spike when it is reached, and one every so often, ms; `None` for none. Default 0.5.
+    #[serde(default = "half")]
+    pub tonic_ms: Option<f64>,
+    /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
+    #[serde(default = "super::stamp_period")]
+    pub period_ms: f64,
+    /// The taxels' rest. It belongs to a board and a day: a saved readout has none and is given one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tare: Option<Tare>,
+}
+
+fn three() -> f64 {
+    3.0
+}
+
+fn twenty() -> usize {
+    20
+}
+
+fn areas() -> Option<[f64; 2]> {
+    Some([2.0, 500.0])
+}
+
+fn totals() -> Option<[f64; 2]> {
+    Some([8.0, 20_000.0])
+}
+
+fn peaks() -> Option<[f64; 2]> {
+    Some([4.0, 120.0])
+}
+
+fn ways() -> Option<[f64; 2]> {
+    Some([0.2, 20.0])
+}
+
+#[allow(clippy::unnecessary_wraps)] // None is a value of its own: no tonic spikes
+fn half() -> Option<f64> {
+    Some(0.5)
+}
+
+impl Default for Moments {
+    fn default() -> Self {
+        Self {
+            noise_floor: three(),
+            levels: twenty(),
+            area: areas(),
+            total: totals(),
+            peak: peaks(),
+            displacement_mm: ways(),
+            tonic_ms: half(),
+            period_ms: super::stamp_period(),
+            tare: None,
+        }
+    }
+}
+
+/// So many levels a moment at most: more would be no finer than the board's ticks.
+const MOST_LEVELS: usize = 1000;
+
+impl Moments {
+    pub(super) fn check(&self) -> Result<()> {
+        at_least_0("noise_floor", self.noise_floor, "")?;
+        if !(1..=MOST_LEVELS).contains(&self.levels) {
+            return Err(problem!("levels is {}: must be 1 to {MOST_LEVELS}", self.levels));
+        }
+        let ranges = self.ranges();
+        if ranges.iter().all(|(_, range)| range.is_none()) {
+            return Err(problem!("area, total, peak and displacement_mm are all left out: give one or more"));
+        }
+        for (name, range) in ranges {
+            if let Some([least, most]) = range
+                && !(least > 0.0 && most > least && most.is_finite())
+            {
+                return Err(problem!("{name} is {least} to {most}: must go from above 0 to more, and be finite"));
+            }
+        }
+        if let Some(tonic) = self.tonic_ms {
+            micros("tonic_ms", tonic)?;
+        }
+        micros("period_ms", self.period_ms)?;
+        self.tare.as_ref().map_or(Ok(()), Tare::check)
+    }
+
+    fn ranges(&self) -> [(&'static str, Option<[f64; 2]>); 4] {
+        [("area", self.area), ("total", self.total), ("peak", self.peak), ("displacement_mm", self.displacement_mm)]
+    }
+
+    /// All levels, each with the moment that it is of: area, total, peak, x, y.
+    fn all_levels(&self) -> Vec<Level> {
+        let mut all = vec![];
+        let [area, total, peak, way] = self.ranges().map(|(_, range)| range);
+        for (moment, range) in [area, total, peak, way, way].into_iter().enumerate() {
+            let Some([least, most]) = range else { continue };
+            let levels = in_equal_ratios(least, most, self.levels);
+            all.extend(levels.iter().map(|&at| Level { moment, at }));
+            if moment >= 3 {
+                all.extend(levels.iter().map(|&at| Level { moment, at: -at }));
+            }
+        }
+        all
+    }
+
+    pub(super) fn trains(&self) -> usize {
+        self.all_levels().len() * if self.tonic_ms.is_some() { 3 } else { 2 }
+    }
+
+    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let loaded = Loaded::new("moments", array, self.tare.as_ref(), self.noise_floor)?;
+        // There is one, else `Loaded` would not be.
+        let rest = self.tare.iter().flat_map(|t| &t.rest).map(|rest| rest.unwrap_or(f64::INFINITY)).collect();
+        let levels = self.all_levels();
+        let passing = Passing {
+            loaded,
+            rest,
+            columns: usize::from(array.columns),
+            pitch_mm: array.pitch_mm,
+            origin: None,
+            since: vec![None; levels.len()],
+            levels,
+            every: self.tonic_ms.map(|every| micros("tonic_ms", every)).transpose()?,
+            due: VecDeque::new(),
+        };
+        // Place by place: which taxels exist is in `loaded`.
+        let places = Array { exists: None, ..array.clone() };
+        Ok(Box::new(Sampled::new(passing, &places, self.period_ms, 0.0)?))
+    }
+}
+
+/// `n` levels from the least to the largest, to 12 digits, so that no machine's power puts one beside a whole number.
+fn in_equal_ratios(least: f64, most: f64, n: usize) -> Vec<f64> {
+    let level = |k: usize| {
+        let exact = least * (most / least).powf(k as f64 / (n.max(2) - 1) as f64);
+        format!("{exact:.11e}").parse().unwrap_or(exact)
+    };
+    (0..n).map(level).collect()
+}
+
+/// A level of one moment; one below 0 is passed downwards.
+#[derive(Clone, Copy)]
+struct Level {
+    moment: usize,
+    at: f64,
+}
+
+impl Level {
+    fn is_reached(self, moments: &[f64; 5]) -> bool {
+        let value = moments[self.moment];
+        if self.at > 0.0 { value >= self.at } else { value <= self.at }
+    }
+}
+
+#[derive(Clone)]
+struct Passing {
+    loaded: Loaded,
+    rest: Vec<f64>,
+    columns: usize,
+    pitch_mm: f64,
+    /// The centre as the present touch began, in taxels.
+    origin: Option<[f64; 2]>,
+    levels: Vec<Level>,
+    /// Since when each level is reached, us.
+    since: Vec<Option<i64>>,
+    /// How often tonic spikes come, us.
+    every: Option<i64>,
+    /// When a level speaks next, which, and since when it was reached then; all wait equally long, so in order.
+    due: VecDeque<(i64, usize, i64)>,
+}
+
+impl Passing {
+    /// Area, total, peak, and the way of the centre in x and y, mm.
+    fn moments(&mut self, held: &[Block]) -> [f64; 5] {
+        if self.loaded.area() == 0 {
+            self.origin = None;
+            return [0.0; 5];
+        }
+        let (mut total, mut peak, mut x, mut y) = (0.0, 0.0_f64, 0.0, 0.0);
+        for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.loaded.any(block)) {
+            for (place, &value) in (block * BLOCK..self.rest.len()).zip(values) {
+                if self.loaded.counts(place) {
+                    let above = f64::from(value) - self.rest[place];
+                    total += above;
+                    peak = peak.max(above);
+                    x += above * (place % self.columns) as f64;
+                    y += above * (place / self.columns) as f64;
+                }
+            }
+        }
+        let centre = [x / total, y / total];
+        let origin = *self.origin.get_or_insert(centre);
+        let way = |axis: usize| (centre[axis] - origin[axis]) * self.pitch_mm;
+        [f64::from(self.loaded.area()), total, peak, way(0), way(1)]
+    }
+
+    /// A level is reached: its tonic spikes begin.
+    fn reach(&mut self, t: i64, level: usize, out: &mut Vec<Spike>) {
+        self.since[level] = Some(t);
+        if let Some(every) = self.every {
+            out.push(Spike { t: ms(t), train: (2 * self.levels.len() + level) as u32, value: 1.0 });
+            self.due.push_back((t + every, level, t));
+        }
+    }
+
+    /// Says the tonic spikes before `t`, or at `t` too.
+    fn speak(&mut self, t: i64, at_too: bool, out: &mut Vec<Spike>) {
+        let Some(every) = self.every else { return };
+        while let Some(&(due, level, since)) = self.due.front()
+            && (due < t || (at_too && due == t))
+        {
+            self.due.pop_front();
+            if self.since[level] == Some(since) {
+                out.push(Spike { t: ms(due), train: (2 * self.levels.len() + level) as u32, value: 1.0 });
+                self.due.push_back((due + every, level, since));
+            }
+        }
+    }
+}
+
+impl Rule for Passing {
+    fn trains(&self) -> usize {
+        self.levels.len() * if self.every.is_some() { 3 } else { 2 }
+    }
+
+    fn signed(&self) -> bool {
+        false
+    }
+
+    fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
+        for (block, values) in held.iter().enumerate() {
+            self.loaded.take_block(block, values);
+        }
+        let moments = self.moments(held);
+        for level in 0..self.levels.len() {
+            if self.levels[level].is_reached(&moments) {
+                self.reach(t, level, out);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+        if !changed.contains(&true) {
+            return;
+        }
+        for (block, values) in held.iter().enumerate().filter(|&(block, _)| changed[block]) {
+            self.loaded.take_block(block, values);
+        }
+        let (moments, from) = (self.moments(held), out.len());
+        for level in 0..self.levels.len() {
+            let (is, was) = (self.levels[level].is_reached(&moments), self.since[level].is_some());
+            if is && !was {
+                out.push(Spike { t: ms(t), train: level as u32, value: 1.0 });
+                self.reach(t, level, out);
+            } else if was && !is {
+                out.push(Spike { t: ms(t), train: (self.levels.len() + level) as u32, value: 1.0 });
+                self.since[level] = None;
+            }
+        }
+        self.speak(t, true, out);
+        sort_from(out, from);
+    }
+
+    fn pass(&mut self, t: i64, out: &mut Vec<Spike>) {
+        let from = out.len();
+        self.speak(t, false, out);
+        sort_from(out, from);
+    }
+
+    fn idle(&self) -> bool {
+        self.due.is_empty()
+    }
+}

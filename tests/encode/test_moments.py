@@ -1,0 +1,158 @@
+"""Moments against NumPy and SciPy: area, total, peak and the way of the centre, through levels in equal ratios."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Frames, Tare
+from taxel.encode import Moments
+
+from . import oracles
+from .scenes import rest, spikes_of, wander
+
+ARRAY = Array(3, 4, 2.0)
+RANGES = {"area": (1, 12), "total": (3.0, 400.0), "peak": (2.0, 90.0), "displacement_mm": (0.1, 5.0)}
+
+
+def some_rest(rng, array, unknown=0.1):
+    """A tare of taxels that rest at fractions of ticks; of some nothing is known."""
+    still = rng.uniform(50, 60, array.shape)
+    tare = Tare.take(Frames(np.stack([still, still]), [0, 1000], unit="ticks", array=array))
+    holes = rng.random(array.shape) < unknown
+    values = [None if hole else value for hole, value in zip(holes.ravel(), tare.rest.ravel().tolist(), strict=True)]
+    import json
+
+    return Tare.from_json(json.dumps(json.loads(tare.to_json()) | {"rest": values}))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    levels=st.integers(1, 7),
+    left_out=st.sets(st.sampled_from(sorted(RANGES)), max_size=3),
+    floor=st.sampled_from([0.0, 3.0, 7.5]),
+    tonic=st.sampled_from([None, 300, 500, 7000]),
+)
+def test_moments_are_those_of_numpy_and_scipy(seed, levels, left_out, floor, tonic):
+    rng = np.random.default_rng(seed)
+    array = Array(5, 7, 2.67)
+    tare = some_rest(rng, array)
+    t = 77 + np.cumsum(rng.choice([192, 100, 3333], 150))
+    pictures = wander(rng, 150, 35).reshape(150, 5, 7).astype(np.float32)
+    pictures[rng.random(150) < 0.1] = 40  # touches end and begin anew
+    ranges = {name: None if name in left_out else of for name, of in RANGES.items()}
+    encoder = Moments(
+        levels=levels, noise_floor=floor, tonic_ms=None if tonic is None else tonic / 1000, tare=tare, **ranges
+    )
+    spikes = encoder.encode(Frames(pictures, t, unit="ticks", array=array))
+    every = oracles.moment_levels(levels, **ranges)
+    assert len(spikes) == encoder.trains(array) == len(every) * (2 if tonic is None else 3)
+    assert not spikes.signed
+    wanted = oracles.moments(t.tolist(), pictures, tare.rest, int(t[-1]), floor, 2.67, every, tonic)
+    assert spikes_of(spikes) == wanted
+    assert wanted
+
+
+def bump(x, y, height=60.0, shape=(16, 24)):
+    """A round touch above a rest of 50, in whole ticks, so that sums have no rounding."""
+    rows, columns = np.mgrid[: shape[0], : shape[1]]
+    return 50 + np.rint(height * np.exp(-((columns - x) ** 2 + (rows - y) ** 2) / 3.0))
+
+
+def felt(pictures, encoder=None):
+    pictures = np.array(pictures)
+    array = Array(*pictures.shape[1:], 2.0)
+    encoder = (encoder or Moments(levels=9)).with_tare(rest(array, 50))
+    return encoder.encode(Frames(pictures, np.arange(len(pictures)) * 1000, unit="ticks", array=array))
+
+
+STILL = np.full((16, 24), 50.0)
+
+
+def test_what_moves_by_a_taxel_moves_by_the_pitch():
+    way = Moments(levels=2, area=None, total=None, peak=None, displacement_mm=(1.999999, 3.999999), tonic_ms=None)
+    spikes = spikes_of(felt([STILL, bump(8, 8), bump(9, 8), bump(8, 10), bump(6, 7), STILL], way))
+    right, left, down, up = (0, 1), (2, 3), (4, 5), (6, 7)
+    assert spikes == [
+        (2000, right[0], 1),  # a taxel to the right
+        (3000, down[0], 1),  # where it began in x, two taxels down
+        (3000, down[1], 1),
+        (3000, 8 + right[0], 1),
+        (4000, left[0], 1),
+        (4000, left[1], 1),
+        (4000, up[0], 1),
+        (4000, 8 + down[0], 1),
+        (4000, 8 + down[1], 1),
+        (5000, 8 + left[0], 1),  # lifted: the way is 0
+        (5000, 8 + left[1], 1),
+        (5000, 8 + up[0], 1),
+    ]
+
+
+@settings(max_examples=30, deadline=None)
+@given(dx=st.integers(-4, 8), dy=st.integers(-3, 4), seed=st.integers(0, 1000))
+def test_the_same_touch_elsewhere_gives_the_same_spikes(dx, dy, seed):
+    way = np.cumsum(np.random.default_rng(seed).choice([-0.25, 0.0, 0.25], (40, 2)), axis=0).clip(-2, 2)
+    heights = np.abs(np.random.default_rng(seed).normal(50, 30, 40))
+    here = [bump(9 + x, 7 + y, h) for (x, y), h in zip(way, heights, strict=True)]
+    there = [bump(9 + x + dx, 7 + y + dy, h) for (x, y), h in zip(way, heights, strict=True)]
+    assert all(np.roll(a, (dy, dx), (0, 1)).tolist() == b.tolist() for a, b in zip(here, there, strict=True))
+    # Between levels, not at them: the centre's last digit depends on where it is counted from.
+    encoder = Moments(levels=9, displacement_mm=(0.1234567, 7.654321))
+    assert spikes_of(felt([STILL, *here, STILL], encoder)) == spikes_of(felt([STILL, *there, STILL], encoder))
+
+
+def test_a_mirrored_touch_swaps_left_and_right_or_up_and_down():
+    way = np.cumsum(np.random.default_rng(3).choice([-0.25, 0.0, 0.25], (60, 2)), axis=0)
+    pictures = np.array([STILL, *[bump(11 + x, 7 + y) for x, y in way], STILL])
+    encoder = Moments(levels=4, displacement_mm=(0.1234567, 7.654321))
+    plain = felt(pictures, encoder)
+    parts = np.arange(len(plain)).reshape(3, 7, 4)
+    for axis, (a, b) in ((2, (3, 4)), (1, (5, 6))):
+        swapped = parts.copy()
+        swapped[:, [a, b]] = parts[:, [b, a]]
+        mirrored = felt(np.flip(pictures, axis), encoder)
+        assert spikes_of(mirrored) == spikes_of(plain.select(swapped.ravel()))
+
+
+def test_a_tonic_train_speaks_as_long_as_its_level_is_reached():
+    spikes = felt([STILL, *[bump(8, 8)] * 4, STILL, STILL], Moments(levels=1, area=(2, 3), total=None, peak=None,
+                  displacement_mm=None, tonic_ms=0.5))  # fmt: skip
+    assert [s.tolist() for s in spikes] == [[1.0], [5.0], (np.arange(8) / 2 + 1).tolist()]
+
+
+def test_it_begins_settled():
+    spikes = felt([bump(8, 8), bump(8, 8), STILL], Moments(levels=1, area=(2, 3), total=None, peak=None,
+                  displacement_mm=None, tonic_ms=None))  # fmt: skip
+    assert [s.tolist() for s in spikes] == [[], [2.0]]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"levels": 0}, "levels is 0: must be 1 to 1000"),
+        ({"levels": 2.5}, "levels: "),
+        ({"area": (0, 5)}, "area is 0 to 5: must go from above 0"),
+        ({"total": (5, 5)}, "total is 5 to 5"),
+        ({"peak": (5, 4)}, "peak is 5 to 4"),
+        ({"peak": (5,)}, "peak: "),
+        ({"displacement_mm": (-1, 4)}, "displacement_mm is -1 to 4"),
+        (dict.fromkeys(RANGES), "all left out"),
+        ({"tonic_ms": 0}, "tonic_ms is 0"),
+        ({"period_ms": 0}, "period_ms is 0"),
+        ({"noise_floor": -1}, "noise_floor is -1"),
+        ({"tare": 5}, "tare"),
+    ],
+)
+def test_nonsense_gets_one_clear_line(wrong, said):
+    with pytest.raises(taxel.ProblemError, match=said) as error:
+        Moments(**wrong)
+    assert "\n" not in str(error.value)
+
+
+def test_without_a_tare_nothing_is_encoded():
+    for call in (lambda: Moments().stream(ARRAY), lambda: Moments().encode(Frames(np.zeros((1, 3, 4)), [0]))):
+        with pytest.raises(taxel.ProblemError, match="moments without a tare"):
+            call()
