@@ -46,6 +46,7 @@ slow: build
 
 lint: build
 	cargo fmt --all --check
+	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs  # the registry's macro hides them from cargo
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
@@ -57,6 +58,7 @@ lint: build
 
 format:
 	cargo fmt --all
+	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 

@@ -13,6 +13,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pytest
+from encode import test_laws as laws
 from matplotlib.figure import Figure
 
 import taxel
@@ -242,11 +243,6 @@ SOUND: dict[str, Sound] = {
     "taxel.Labels": plain(taxel.Labels, path="here_labels.csv"),
     "taxel.Labels.named": lambda: (taxel.Labels("here_labels.csv").named, {"recording": "walk.mcap"}),
     "taxel.Labels.of": lambda: (taxel.Labels("here_labels.csv").of, {"recording": taxel.open("here_events.npz")}),
-    "taxel.encode.ChangeEvents": plain(
-        taxel.encode.ChangeEvents, noise_floor=3.0, bits=2, previous="last_sent", rounding="floor", period_ms=0.1
-    ),
-    "taxel.encode.ContactArea": plain(taxel.encode.ContactArea, noise_floor=3.0, levels=[2, 4], tare=TARE),
-    "taxel.encode.ContactArea.with_tare": method(taxel.encode.ContactArea(), "with_tare", tare=TARE),
     "taxel.encode.Encoder.encode": method(LEVELS, "encode", x=FRAMES),
     "taxel.encode.Encoder.from_json": plain(taxel.encode.Encoder.from_json, text=LEVELS.to_json()),
     "taxel.encode.Encoder.stream": method(LEVELS, "stream", array=ARRAY),
@@ -255,20 +251,6 @@ SOUND: dict[str, Sound] = {
     "taxel.encode.EncoderStream": plain(taxel.encode.EncoderStream, encoder=LEVELS, array=ARRAY),
     "taxel.encode.EncoderStream.push": fresh(lambda: LEVELS.stream(ARRAY), "push", x=FRAMES),
     "taxel.encode.EncoderStream.advance": fresh(lambda: LEVELS.stream(ARRAY), "advance", t_us=5),
-    "taxel.encode.FA1": plain(
-        taxel.encode.FA1, alpha=0.7, a=20.0, b=0.05, decay="sample", theta_0=1.0, range=None, period_ms=1.0
-    ),
-    "taxel.encode.LevelCrossing": plain(
-        taxel.encode.LevelCrossing,
-        levels=[0.5],
-        release_share=0.5,
-        release_by=None,
-        hold_ms=1.0,
-        tonic_ms=5.0,
-        tonic_level=0.5,
-        running_range=taxel.encode.RunningRange(),
-        period_ms=0.1,
-    ),
     "taxel.encode.RunningRange": plain(
         lambda **given: taxel.encode.LevelCrossing([0.5], running_range=taxel.encode.RunningRange(**given)),
         low=10.0,
@@ -276,9 +258,6 @@ SOUND: dict[str, Sound] = {
         window_s=10.0,
         renew_s=1.0,
         first_window="silent",
-    ),
-    "taxel.encode.ThresholdIzhikevich": plain(
-        taxel.encode.ThresholdIzhikevich, levels=[1.0], published="6.5.1", begin="settled", period_ms=0.1
     ),
     **{f"taxel.learn.{rule.__name__}": plain(rule, **arguments) for rule, arguments in RIVALS},
     "taxel.learn.SKIM": plain(
@@ -530,6 +509,10 @@ SOUND: dict[str, Sound] = {
 
 #: Functions to be called: a function of another kind is the caller's to blame, and its own error comes out.
 CALLED = {"progress", "say", "watch"}
+
+for encoder in laws.ENCODERS.values():
+    # One sound call of each encoder of the registry: its first example.
+    SOUND.setdefault(f"taxel.encode.{type(encoder).__name__}", plain(type(encoder), **encoder.get_params(deep=False)))
 
 #: What is not tried, and why.
 LEFT_OUT = {

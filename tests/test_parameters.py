@@ -80,7 +80,7 @@ def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
     for value in wrong:
         given = int(value) if isinstance(default, int) and math.isfinite(value) else value
         with pytest.raises(taxel.ProblemError) as error:
-            make(kind, **{name: given})
+            make(kind, **{name: [given] * len(default) if isinstance(default, list) else given})
         assert name in str(error.value)
         assert "\n" not in str(error.value)
         if math.isfinite(value) and not (isinstance(default, int) and value < 0):

@@ -4,6 +4,9 @@ import numpy as np
 
 from taxel import Array, Events, Frames, Tare
 
+#: The array of the laws.
+ARRAY = Array(3, 4)
+
 
 def spikes_of(trains):
     """Spikes as sorted (t us, train, value)."""

@@ -1,33 +1,21 @@
 //! Events or frames to spikes, live or whole: the same spikes either way.
 
 mod bracket;
-mod change_events;
-mod contact_area;
-mod fa1;
-mod level_crossing;
 mod loaded;
-mod moments;
 mod power;
 mod running_range;
 mod sampled;
 mod tare;
-mod threshold_izhikevich;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-pub use change_events::{ChangeEvents, Previous, Rounding};
-pub use contact_area::ContactArea;
-pub use fa1::{Decay, Fa1};
-pub use level_crossing::LevelCrossing;
-pub use moments::Moments;
 pub use running_range::{FirstWindow, RunningRange};
 pub use tare::{Tare, TareBuilder};
-pub use threshold_izhikevich::{Begin, Published, ThresholdIzhikevich};
 
 use crate::allowed::{Parameter, Range};
 use crate::parameters::Described;
-use crate::{Array, Error, Events, Frames, Result, Spike, SpikeTrains, Stop, problem};
+use crate::{Array, Error, Events, Result, Spike, SpikeTrains, Stop, problem};
 
 /// An encoder at work: takes what comes, in order of time, and hands on spikes as soon as they are certain.
 ///
@@ -78,22 +66,89 @@ impl Clone for Box<dyn Stream> {
     }
 }
 
-/// Any encoder with its parameters; in JSON an object whose `name` says which.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "name", rename_all = "snake_case")]
-pub enum Encoder {
+/// What an encoder's file says of it.
+trait Law {
+    /// Its parameters, with their defaults and ranges.
+    fn described() -> Described
+    where
+        Self: Sized;
+
+    /// Checks every parameter.
+    fn check(&self) -> Result<()>;
+
+    /// Begins to encode what an array feels; the parameters are checked.
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>>;
+
+    /// On how many trains it speaks for an array of so many taxels.
+    fn trains(&self, taxels: usize) -> usize {
+        taxels
+    }
+
+    /// Whether its spikes carry a signed value.
+    fn signed(&self) -> bool {
+        true
+    }
+
+    /// How much later than the touch itself a spike comes, ms: what its own rule costs.
+    fn latency_ms(&self) -> f64 {
+        0.0
+    }
+
+    /// Takes the taxels' rest; most read none.
+    fn set_tare(&mut self, _tare: &Tare) {}
+}
+
+/// The registry: a line an encoder, `NAME: Kind`, whose file is `encode/NAME.rs` and whose name in JSON is `NAME`.
+macro_rules! encoders {
+    ($($(#[$about:meta])* $name:ident: $Kind:ident,)*) => {
+        $(pub mod $name;)*
+        $(pub use $name::$Kind;)*
+
+        /// Any encoder with its parameters; in JSON an object whose `name` says which.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "name", rename_all = "snake_case")]
+        pub enum Encoder {
+            $($(#[$about])* $Kind($Kind),)*
+        }
+
+        /// The names of all encoders, as JSON has them.
+        pub const NAMES: &[&str] = &[$(stringify!($name)),*];
+
+        impl Encoder {
+            fn law(&self) -> &dyn Law {
+                match self { $(Self::$Kind(e) => e,)* }
+            }
+
+            fn law_mut(&mut self) -> &mut dyn Law {
+                match self { $(Self::$Kind(e) => e,)* }
+            }
+
+            /// The parameters of an encoder, by its name, with their defaults and ranges.
+            #[must_use]
+            pub fn described(name: &str) -> Option<Described> {
+                $(if name == stringify!($name) {
+                    return Some($Kind::described());
+                })*
+                None
+            }
+        }
+    };
+}
+
+// Rustfmt finds no modules in a macro: the Makefile names their files to it.
+encoders! {
     /// Changes since the last sent value, with 1 to 10 bits.
-    ChangeEvents(ChangeEvents),
+    change_events: ChangeEvents,
     /// Plain crossings of levels.
-    LevelCrossing(LevelCrossing),
+    level_crossing: LevelCrossing,
     /// A threshold and a pair of Izhikevich neurons.
-    ThresholdIzhikevich(ThresholdIzhikevich),
+    threshold_izhikevich: ThresholdIzhikevich,
     /// The FA-1 afferent of equations 5.1 to 5.5.
-    Fa1(Fa1),
+    fa1: Fa1,
     /// How many taxels are loaded.
-    ContactArea(ContactArea),
+    contact_area: ContactArea,
     /// How large a touch is, how hard, and where its centre has gone.
-    Moments(Moments),
+    moments: Moments,
 }
 
 impl Encoder {
@@ -121,91 +176,43 @@ impl Encoder {
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        match self {
-            Self::ChangeEvents(e) => e.check(),
-            Self::LevelCrossing(e) => e.check(),
-            Self::ThresholdIzhikevich(e) => e.check(),
-            Self::Fa1(e) => e.check(),
-            Self::ContactArea(e) => e.check(),
-            Self::Moments(e) => e.check(),
-        }
-    }
-
-    /// The parameters of an encoder, by its name, with their defaults and ranges.
-    #[must_use]
-    pub fn described(name: &str) -> Option<Described> {
-        Some(match name {
-            "change_events" => Described::by(&ChangeEvents::default(), &[], ChangeEvents::RANGES),
-            "level_crossing" => Described::by(&LevelCrossing::at(vec![]), &["levels"], LevelCrossing::RANGES),
-            "threshold_izhikevich" => {
-                Described::by(&ThresholdIzhikevich::at(vec![]), &["levels"], ThresholdIzhikevich::RANGES)
-            }
-            "fa1" => Described::by(&Fa1::default(), &[], Fa1::RANGES),
-            "contact_area" => Described::by(&ContactArea::default(), &[], ContactArea::RANGES).or_nothing("tare"),
-            _ => return None,
-        })
+        self.law().check()
     }
 
     /// Begins to encode what an array feels.
     ///
     /// # Errors
     ///
-    /// `Problem` where a parameter makes no sense, or a contact area has no tare or another array's.
+    /// `Problem` where a parameter makes no sense, or an encoder that reads a tare has none or another array's.
     pub fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         self.check()?;
-        match self {
-            Self::ChangeEvents(e) => e.stream(array),
-            Self::LevelCrossing(e) => e.stream(array),
-            Self::ThresholdIzhikevich(e) => e.stream(array),
-            Self::Fa1(e) => e.stream(array),
-            Self::ContactArea(e) => e.stream(array),
-            Self::Moments(e) => e.stream(array),
-        }
+        self.law().stream(array)
     }
 
     /// How much later than the touch itself a spike comes, ms: what the encoder's own rule costs.
     #[must_use]
     pub fn latency_ms(&self) -> f64 {
-        match self {
-            Self::LevelCrossing(e) => e.latency_ms(),
-            Self::ThresholdIzhikevich(e) => e.latency_ms(),
-            Self::ChangeEvents(_) | Self::Fa1(_) | Self::ContactArea(_) | Self::Moments(_) => 0.0,
-        }
+        self.law().latency_ms()
     }
 
     /// On how many trains the encoder speaks for an array.
     #[must_use]
     pub fn trains(&self, array: &Array) -> usize {
-        let channels = sampled::Channels::new(array).len();
-        match self {
-            Self::ChangeEvents(_) | Self::Fa1(_) => channels,
-            Self::LevelCrossing(e) => e.trains(channels),
-            Self::ThresholdIzhikevich(e) => e.trains(channels),
-            Self::ContactArea(e) => e.trains(),
-            Self::Moments(e) => e.trains(),
-        }
+        self.law().trains(sampled::Channels::new(array).len())
     }
 
     /// Whether its spikes carry a signed value, so that a neuron hears each train as two, ON and OFF.
     #[must_use]
     pub fn signed(&self) -> bool {
-        !matches!(self, Self::ContactArea(_) | Self::Moments(_))
-    }
-
-    /// Whether it must be given a tare before it can work: a tare belongs to a board and a day, not to an encoder.
-    #[must_use]
-    pub fn needs_tare(&self) -> bool {
-        matches!(self, Self::ContactArea(ContactArea { tare: None, .. }) | Self::Moments(Moments { tare: None, .. }))
+        self.law().signed()
     }
 
     /// The same encoder with this tare; one that reads none stays as it is.
     #[must_use]
     pub fn with_tare(&self, tare: &Tare) -> Self {
-        match self {
-            Self::ContactArea(e) => Self::ContactArea(ContactArea { tare: Some(tare.clone()), ..e.clone() }),
-            Self::Moments(e) => Self::Moments(Moments { tare: Some(tare.clone()), ..e.clone() }),
-            other => other.clone(),
-        }
+        let mut with = self.clone();
+        with.law_mut().set_tare(tare);
+        with
     }
 
     /// Encodes a whole recording of events.
@@ -234,21 +241,11 @@ impl Encoder {
         collect(stream, out, events.t.first().copied())
     }
 
-    /// Encodes a whole recording of frames.
-    ///
-    /// # Errors
-    ///
-    /// As [`Encoder::encode_events`].
-    pub fn encode_frames(&self, frames: &Frames, stop: Stop<'_>) -> Result<SpikeTrains> {
-        frames.check()?;
-        self.encode_pictures(&frames.array, &frames.t, &frames.values, stop)
-    }
-
     /// Encodes pictures, row by row and one after the other, at `t` us.
     ///
     /// # Errors
     ///
-    /// As [`Encoder::encode_events`].
+    /// As [`Encoder::stream`] and [`Stream::push_frame`]; `Interrupted` where asked to stop.
     pub fn encode_pictures(&self, array: &Array, t: &[i64], values: &[f32], stop: Stop<'_>) -> Result<SpikeTrains> {
         let mut stream = self.stream(array)?;
         let mut out = vec![];
@@ -297,8 +294,6 @@ fn said(json: &str, error: &serde_json::Error) -> Error {
     }
     problem!("encoder {name}: {error}")
 }
-
-const NAMES: [&str; 6] = ["change_events", "level_crossing", "threshold_izhikevich", "fa1", "contact_area", "moments"];
 
 /// us to ms.
 fn ms(t: i64) -> f64 {

@@ -17,6 +17,12 @@ fn check_encoder(encoder: &str) -> PyResult<String> {
     Ok(Encoder::from_json(encoder).map_err(core)?.to_json())
 }
 
+/// The names of all encoders.
+#[pyfunction]
+fn encoder_names() -> Vec<&'static str> {
+    taxel_core::encode::NAMES.to_vec()
+}
+
 /// Trains for an array, whether they are signed, and the latency in ms.
 #[pyfunction]
 fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, bool, f64)> {
@@ -219,6 +225,7 @@ fn check_tare(tare: &str) -> PyResult<String> {
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<EncoderStream>()?;
     module.add_function(wrap_pyfunction!(check_encoder, module)?)?;
+    module.add_function(wrap_pyfunction!(encoder_names, module)?)?;
     module.add_function(wrap_pyfunction!(encoder_about, module)?)?;
     module.add_function(wrap_pyfunction!(encode_events, module)?)?;
     module.add_function(wrap_pyfunction!(encode_frames, module)?)?;

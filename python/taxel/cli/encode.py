@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from taxel._core import ProblemError
+from taxel._core import ProblemError, encoder_names
 from taxel.cli._app import app
 from taxel.cli._listening import SET_HELP, TARE_HELP, encoder_of, open_recording, tare_of, told
 
@@ -20,9 +20,7 @@ __all__ = ["encode"]
 def encode(
     recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
     out: Annotated[Path, typer.Argument(help="Where the spikes go: a .npz that SpikeTrains.load reads.")],
-    encoder: Annotated[
-        str, typer.Option(help="change_events, level_crossing, threshold_izhikevich, fa1 or contact_area.")
-    ],
+    encoder: Annotated[str, typer.Option(help=f"One of {', '.join(encoder_names())}.")],
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,

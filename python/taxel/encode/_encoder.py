@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -38,8 +38,9 @@ class Encoder(Value):
     _by_name: ClassVar[dict[str, type[Encoder]]] = {}
 
     def __init_subclass__(cls) -> None:
-        cls._kind = cls.name
-        Encoder._by_name[cls.name] = cls
+        if "name" in vars(cls):
+            cls._kind = cls.name
+            Encoder._by_name[cls.name] = cls
 
     def _plain(self) -> dict[str, Any]:
         return {"name": self.name} | super()._plain()
@@ -75,7 +76,7 @@ class Encoder(Value):
         """How much later than the touch itself a spike comes, ms: what the encoder's own rule costs."""
         return _core.encoder_about(self._json(), Array(1, 1)._parts())[2]
 
-    def with_tare(self, tare: Tare) -> Encoder:
+    def with_tare(self, tare: Tare) -> Self:
         """Return the same encoder with this tare; one that reads none stays as it is."""
         if not isinstance(tare, Tare):
             raise ProblemError(f"tare is {shown(tare)}: must be a taxel.Tare")

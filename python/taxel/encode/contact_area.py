@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import copy
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
 
-from taxel._arguments import instance, parameters
 from taxel._parameters import defaults
-from taxel.encode._encoder import Encoder
+from taxel.encode._tared import Tared
 from taxel.tare import Tare
 
 __all__ = ["ContactArea"]
@@ -20,7 +16,7 @@ _DEFAULT = defaults("contact_area")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class ContactArea(Encoder):
+class ContactArea(Tared):
     """Say where the number of loaded taxels rises through levels, and where it falls below them.
 
     A taxel is loaded while its held value stands above its tared rest by the noise floor and half a tick; it counts if
@@ -58,21 +54,3 @@ class ContactArea(Encoder):
     noise_floor: float = _DEFAULT.noise_floor
     levels: Sequence[int] = _DEFAULT.levels
     tare: Tare | None = _DEFAULT.tare
-
-    def _json(self) -> str:
-        if self.tare is None:
-            return super()._json()
-        # As it stands: a tare of thousands of taxels need not be read to be handed over.
-        rest = instance("tare", self.tare, Tare).to_json()
-        others = {name: value for name, value in self._plain().items() if name != "tare"}
-        return f'{parameters(others)[:-1]}, "tare": {rest}}}'
-
-    def with_tare(self, tare: Tare) -> ContactArea:
-        """Return the same encoder with this tare."""
-        super().with_tare(tare)
-        return copy.copy(self).set_params(tare=tare)
-
-    @classmethod
-    def _from_values(cls, values: Mapping[str, Any]) -> Self:
-        rest = values.get("tare")
-        return super()._from_values({**values, "tare": rest and Tare.from_json(json.dumps(rest))})

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any, Self
+from dataclasses import dataclass
 
-from taxel._arguments import parameters
-from taxel.encode._encoder import Encoder
+from taxel._parameters import defaults
+from taxel.encode._tared import Tared
 from taxel.tare import Tare
 
 __all__ = ["Moments"]
 
 
-class Moments(Encoder):
+_DEFAULT = defaults("moments")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Moments(Tared):
     """Say where area, total, peak and the way of the centre of a touch pass levels that stand in equal ratios.
 
     Of the taxels that count as `ContactArea` counts them: how many (area), the sum and the largest of their values
@@ -29,13 +32,13 @@ class Moments(Encoder):
     ----------
     noise_floor : float, in the sensor's unit (ticks), 0 or more
         That of the board; 3 in its fast presets.
-    levels : int, 1 to 1000
+    levels : int, from 1 to 1000
         Levels a moment, for a displacement on each side of 0.
-    area : (float, float), taxels, optional
+    area : (float, float), taxels, above 0, optional
         Least and largest level; None leaves the moment out.
-    total, peak : (float, float), in the sensor's unit, optional
+    total, peak : (float, float), in the sensor's unit, above 0, optional
         The same of the sum and of the largest value above rest.
-    displacement_mm : (float, float), mm, optional
+    displacement_mm : (float, float), mm, above 0, optional
         The same of the centre's way, for x and for y.
     tonic_ms : float, ms, whole us, optional
         While beyond a level: a spike when it is reached, then one every `tonic_ms`. None for crossings alone.
@@ -50,56 +53,24 @@ class Moments(Encoder):
 
     Examples
     --------
-    A touch of two taxels, then of three; the middle of the largest level, 4, is never reached.
+    A touch of two taxels, then of three; nothing reaches the largest level, 4.
 
     >>> from taxel import Frames
     >>> rest = Frames([[[50.0, 50.0, 50.0]]] * 2, [0, 1000], unit="ticks")
     >>> frames = Frames([[[50.0, 50, 50]], [[58.0, 58, 50]], [[58.0, 58, 58]]], [0, 200, 400], unit="ticks")
     >>> encoder = Moments(levels=3, area=(1, 4), total=None, peak=None, displacement_mm=(0.3, 5), tonic_ms=None)
-    >>> spikes = encoder.with_tare(Tare.take(rest)).encode(frames)
-    >>> spikes[0], spikes[1], spikes[2], spikes[3]
-    (array([0.2]), array([0.2]), array([]), array([0.4]))
+    >>> [reached.tolist() for reached in encoder.with_tare(Tare.take(rest)).encode(frames)][:4]
+    [[0.2], [0.2], [], [0.4]]
     """
 
     name = "moments"
 
-    def __init__(
-        self,
-        *,
-        noise_floor: float = 3.0,
-        levels: int = 20,
-        area: tuple[float, float] | None = (2.0, 500.0),
-        total: tuple[float, float] | None = (8.0, 20_000.0),
-        peak: tuple[float, float] | None = (4.0, 120.0),
-        displacement_mm: tuple[float, float] | None = (0.2, 20.0),
-        tonic_ms: float | None = 0.5,
-        period_ms: float = 0.1,
-        tare: Tare | None = None,
-    ) -> None:
-        self.noise_floor = noise_floor
-        self.levels = levels
-        self.area = area
-        self.total = total
-        self.peak = peak
-        self.displacement_mm = displacement_mm
-        self.tonic_ms = tonic_ms
-        self.period_ms = period_ms
-        self.tare = tare
-        self._check()
-
-    def _json(self) -> str:
-        if not isinstance(self.tare, Tare):
-            return super()._json()
-        others = parameters({"name": self.name} | {k: v for k, v in self._parameters().items() if k != "tare"})
-        return f'{others[:-1]}, "tare": {self.tare.to_json()}}}'
-
-    def with_tare(self, tare: Tare) -> Moments:
-        """Return the same encoder with this tare."""
-        super().with_tare(tare)
-        return Moments(**{**self._parameters(), "tare": tare})
-
-    @classmethod
-    def _from_parameters(cls, values: dict[str, Any]) -> Self:
-        if values.get("tare") is not None:
-            values["tare"] = Tare.from_json(json.dumps(values["tare"]))
-        return cls(**values)
+    noise_floor: float = _DEFAULT.noise_floor
+    levels: int = _DEFAULT.levels
+    area: tuple[float, float] | None = _DEFAULT.area
+    total: tuple[float, float] | None = _DEFAULT.total
+    peak: tuple[float, float] | None = _DEFAULT.peak
+    displacement_mm: tuple[float, float] | None = _DEFAULT.displacement_mm
+    tonic_ms: float | None = _DEFAULT.tonic_ms
+    period_ms: float = _DEFAULT.period_ms
+    tare: Tare | None = _DEFAULT.tare

@@ -3,9 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
-use super::{Stream, ms};
+use super::{Law, Stream, ms};
 use crate::allowed::{Range, ranges};
 pub use crate::board::Previous;
+use crate::parameters::Described;
 use crate::{Array, Result, Spike, problem};
 
 /// Change events: U = value - previous value in units of the noise floor, saturating at +-(2^bits - 1).
@@ -70,20 +71,14 @@ impl ChangeEvents {
         bits: "", Range::within(1.0, 10.0);
         period_ms: "ms", Range::WHOLE_US;
     }
+}
 
-    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let changes = Changes {
-            floor: self.noise_floor as f32,
-            most: ((1_u32 << self.bits) - 1) as f32,
-            previous: self.previous,
-            rounding: self.rounding,
-            last: vec![],
-            channels: Channels::new(array).len(),
-        };
-        Ok(Box::new(Sampled::new(changes, array, self.period_ms, 0.0)?))
+impl Law for ChangeEvents {
+    fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
     }
 
-    pub(super) fn check(&self) -> Result<()> {
+    fn check(&self) -> Result<()> {
         self.check_ranges()?;
         // Changes are compared in f32.
         if !(self.noise_floor as f32).is_normal() {
@@ -93,6 +88,18 @@ impl ChangeEvents {
             ));
         }
         Ok(())
+    }
+
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let changes = Changes {
+            floor: self.noise_floor as f32,
+            most: ((1_u32 << self.bits) - 1) as f32,
+            previous: self.previous,
+            rounding: self.rounding,
+            last: vec![],
+            channels: Channels::new(array).len(),
+        };
+        Ok(Box::new(Sampled::new(changes, array, self.period_ms, 0.0)?))
     }
 }
 

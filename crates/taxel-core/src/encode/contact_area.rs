@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::loaded::Loaded;
 use super::sampled::{BLOCK, Block, Channels, Source, blocks};
-use super::{Stream, Tare, ms};
+use super::{Law, Stream, Tare, ms};
 use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
 use crate::{Array, Events, Result, Spike, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.
@@ -46,8 +47,14 @@ impl ContactArea {
     ranges! {
         noise_floor: "", Range::FROM_0;
     }
+}
 
-    pub(super) fn check(&self) -> Result<()> {
+impl Law for ContactArea {
+    fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
+    }
+
+    fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.levels.is_empty() {
             return Err(problem!("levels: must hold one number of taxels or more"));
@@ -58,11 +65,7 @@ impl ContactArea {
         self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
 
-    pub(super) fn trains(&self) -> usize {
-        2 * self.levels.len()
-    }
-
-    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         Ok(Box::new(Area {
             levels: self.levels.clone(),
             loaded: Loaded::new("contact area", array, self.tare.as_ref(), self.noise_floor)?,
@@ -73,6 +76,18 @@ impl ContactArea {
             channels: Channels::new(&Array { exists: None, ..array.clone() }),
             source: Source::Unknown,
         }))
+    }
+
+    fn trains(&self, _taxels: usize) -> usize {
+        2 * self.levels.len()
+    }
+
+    fn signed(&self) -> bool {
+        false
+    }
+
+    fn set_tare(&mut self, tare: &Tare) {
+        self.tare = Some(tare.clone());
     }
 }
 

@@ -12,8 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use super::power::power;
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
-use super::{Stream, ms};
+use super::{Law, Stream, ms};
 use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
 use crate::{Array, Result, Spike, problem};
 
 /// The FA-1 afferent exactly as equations 5.1 to 5.5, polarity kept.
@@ -103,12 +104,19 @@ impl Fa1 {
         period_ms: "ms", Range::WHOLE_US;
     }
 
-    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let afferents = Afferents::new(self, Channels::new(array).len());
-        Ok(Box::new(Sampled::new(afferents, array, self.period_ms, 0.0)?.steady()))
+    /// The baseline threshold, in compressed units.
+    #[must_use]
+    pub fn baseline(&self) -> f64 {
+        self.theta_0.unwrap_or_else(|| self.range.unwrap_or(RAMP).powf(self.alpha) / 1024.0)
+    }
+}
+
+impl Law for Fa1 {
+    fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
     }
 
-    pub(super) fn check(&self) -> Result<()> {
+    fn check(&self) -> Result<()> {
         self.check_ranges()?;
         if self.range.is_some() && self.theta_0.is_some() {
             return Err(problem!("theta_0 and range: give one of them"));
@@ -116,10 +124,9 @@ impl Fa1 {
         Ok(())
     }
 
-    /// The baseline threshold, in compressed units.
-    #[must_use]
-    pub fn baseline(&self) -> f64 {
-        self.theta_0.unwrap_or_else(|| self.range.unwrap_or(RAMP).powf(self.alpha) / 1024.0)
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let afferents = Afferents::new(self, Channels::new(array).len());
+        Ok(Box::new(Sampled::new(afferents, array, self.period_ms, 0.0)?.steady()))
     }
 }
 

@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 use super::bracket::Bracket;
 use super::running_range::{RunningRange, Window};
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
-use super::{Stream, check_levels, micros, ms, sort_from};
+use super::{Law, Stream, check_levels, micros, ms, sort_from};
 use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
 use crate::{Array, Result, Spike, problem};
 
 /// Crossings of levels: +1 where a taxel comes to a level, -1 where it falls below its release.
@@ -69,20 +70,21 @@ impl LevelCrossing {
         }
     }
 
-    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
-        let crossings = Crossings::new(self, Channels::new(array).len())?;
-        Ok(Box::new(Sampled::new(crossings, array, self.period_ms, self.latency_ms())?))
+    fn release(&self, level: f64) -> f64 {
+        match (self.release_share, self.release_by) {
+            (_, Some(by)) => level - by,
+            (Some(share), None) => level * share,
+            (None, None) => level,
+        }
+    }
+}
+
+impl Law for LevelCrossing {
+    fn described() -> Described {
+        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
     }
 
-    pub(super) fn latency_ms(&self) -> f64 {
-        self.hold_ms
-    }
-
-    pub(super) fn trains(&self, channels: usize) -> usize {
-        channels * (self.levels.len() + usize::from(self.tonic_ms.is_some()))
-    }
-
-    pub(super) fn check(&self) -> Result<()> {
+    fn check(&self) -> Result<()> {
         check_levels(&self.levels)?;
         self.check_ranges()?;
         if self.hold_ms != 0.0 {
@@ -109,12 +111,17 @@ impl LevelCrossing {
         self.running_range.as_ref().map_or(Ok(()), RunningRange::check)
     }
 
-    fn release(&self, level: f64) -> f64 {
-        match (self.release_share, self.release_by) {
-            (_, Some(by)) => level - by,
-            (Some(share), None) => level * share,
-            (None, None) => level,
-        }
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let crossings = Crossings::new(self, Channels::new(array).len())?;
+        Ok(Box::new(Sampled::new(crossings, array, self.period_ms, self.latency_ms())?))
+    }
+
+    fn trains(&self, channels: usize) -> usize {
+        channels * (self.levels.len() + usize::from(self.tonic_ms.is_some()))
+    }
+
+    fn latency_ms(&self) -> f64 {
+        self.hold_ms
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::Tare;
 use super::sampled::{BLOCK, Block, blocks};
-use crate::wide::wide;
+use crate::vectors::wide;
 use crate::{Array, Result, problem};
 
 /// The smallest f32 that is not below `x`.

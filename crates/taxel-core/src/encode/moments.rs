@@ -7,8 +7,9 @@ use serde::{Deserialize, Serialize};
 
 use super::loaded::Loaded;
 use super::sampled::{BLOCK, Block, Rule, Sampled};
-use super::{Stream, Tare, micros, ms, sort_from};
-use crate::allowed::at_least_0;
+use super::{Law, Stream, Tare, micros, ms, sort_from};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
 use crate::{Array, Result, Spike, problem};
 
 /// Moments of the held picture above rest, each through levels in equal ratios.
@@ -97,31 +98,16 @@ impl Default for Moments {
     }
 }
 
-/// So many levels a moment at most: more would be no finer than the board's ticks.
-const MOST_LEVELS: usize = 1000;
-
 impl Moments {
-    pub(super) fn check(&self) -> Result<()> {
-        at_least_0("noise_floor", self.noise_floor, "")?;
-        if !(1..=MOST_LEVELS).contains(&self.levels) {
-            return Err(problem!("levels is {}: must be 1 to {MOST_LEVELS}", self.levels));
-        }
-        let ranges = self.ranges();
-        if ranges.iter().all(|(_, range)| range.is_none()) {
-            return Err(problem!("area, total, peak and displacement_mm are all left out: give one or more"));
-        }
-        for (name, range) in ranges {
-            if let Some([least, most]) = range
-                && !(least > 0.0 && most > least && most.is_finite())
-            {
-                return Err(problem!("{name} is {least} to {most}: must go from above 0 to more, and be finite"));
-            }
-        }
-        if let Some(tonic) = self.tonic_ms {
-            micros("tonic_ms", tonic)?;
-        }
-        micros("period_ms", self.period_ms)?;
-        self.tare.as_ref().map_or(Ok(()), Tare::check)
+    ranges! {
+        noise_floor: "", Range::FROM_0;
+        levels: "", Range::within(1.0, 1000.0);
+        area: "", Range::ABOVE_0;
+        total: "", Range::ABOVE_0;
+        peak: "", Range::ABOVE_0;
+        displacement_mm: "mm", Range::ABOVE_0;
+        tonic_ms: "ms", Range::WHOLE_US;
+        period_ms: "ms", Range::WHOLE_US;
     }
 
     fn ranges(&self) -> [(&'static str, Option<[f64; 2]>); 4] {
@@ -142,12 +128,30 @@ impl Moments {
         }
         all
     }
+}
 
-    pub(super) fn trains(&self) -> usize {
-        self.all_levels().len() * if self.tonic_ms.is_some() { 3 } else { 2 }
+impl Law for Moments {
+    fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
     }
 
-    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+    fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        let ranges = self.ranges();
+        if ranges.iter().all(|(_, range)| range.is_none()) {
+            return Err(problem!("area, total, peak and displacement_mm are all left out: give one or more"));
+        }
+        for (name, range) in ranges {
+            if let Some([least, most]) = range
+                && most <= least
+            {
+                return Err(problem!("{name} is {least} to {most}: must ascend"));
+            }
+        }
+        self.tare.as_ref().map_or(Ok(()), Tare::check)
+    }
+
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let loaded = Loaded::new("moments", array, self.tare.as_ref(), self.noise_floor)?;
         // There is one, else `Loaded` would not be.
         let rest = self.tare.iter().flat_map(|t| &t.rest).map(|rest| rest.unwrap_or(f64::INFINITY)).collect();
@@ -166,6 +170,18 @@ impl Moments {
         // Place by place: which taxels exist is in `loaded`.
         let places = Array { exists: None, ..array.clone() };
         Ok(Box::new(Sampled::new(passing, &places, self.period_ms, 0.0)?))
+    }
+
+    fn trains(&self, _taxels: usize) -> usize {
+        self.all_levels().len() * if self.tonic_ms.is_some() { 3 } else { 2 }
+    }
+
+    fn signed(&self) -> bool {
+        false
+    }
+
+    fn set_tare(&mut self, tare: &Tare) {
+        self.tare = Some(tare.clone());
     }
 }
 

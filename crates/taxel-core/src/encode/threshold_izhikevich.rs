@@ -4,8 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::bracket::Bracket;
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
-use super::{Stream, check_levels, ms, sort_from};
+use super::{Law, Stream, check_levels, ms, sort_from};
 use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
 use crate::{Array, Result, Spike};
 
 /// A threshold and a pair of Izhikevich neurons: +1 about 16 or 20 ms after a taxel came to a level, -1 after it left.
@@ -77,24 +78,30 @@ impl ThresholdIzhikevich {
         let (published, begin) = (Published::default(), Begin::default());
         Self { levels, published, begin, period_ms: super::stamp_period() }
     }
+}
 
-    pub(super) fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+impl Law for ThresholdIzhikevich {
+    fn described() -> Described {
+        Described::by(&Self::at(vec![]), &["levels"], Self::RANGES)
+    }
+
+    fn check(&self) -> Result<()> {
+        check_levels(&self.levels)?;
+        self.check_ranges()
+    }
+
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         self.check()?;
         let pairs = Pairs::new(self, Channels::new(array).len());
         Ok(Box::new(Sampled::new(pairs, array, self.period_ms, self.latency_ms())?))
     }
 
-    pub(super) fn latency_ms(&self) -> f64 {
-        self.published.latency_ms()
-    }
-
-    pub(super) fn trains(&self, channels: usize) -> usize {
+    fn trains(&self, channels: usize) -> usize {
         channels * self.levels.len()
     }
 
-    pub(super) fn check(&self) -> Result<()> {
-        check_levels(&self.levels)?;
-        self.check_ranges()
+    fn latency_ms(&self) -> f64 {
+        self.published.latency_ms()
     }
 }
 

@@ -1,0 +1,103 @@
+"""What the benchmarks of encoders share: scenes, and how an encoder is held against the obvious NumPy.
+
+One core. Frames: 64 x 64 taxels at 5208 Hz (192 us), every taxel with half a tick of noise, a press that comes and
+goes; in ticks, and as pressure with fractions. Events: what a board with noise floor 3 sends of that scene.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from _rounds import measure, ratio, stamp
+
+import taxel
+from taxel import Array, Events, Frames, SpikeTrains, Tare
+from taxel.encode import ChangeEvents
+
+PERIOD_US, FLOOR = 192, 3.0
+
+
+class Scene(NamedTuple):
+    """Pictures in ticks, pictures of pressure, the tare of the taxels at rest, and the board's events."""
+
+    ticks: Frames
+    pressure: Frames
+    tare: Tare
+    events: Events
+
+
+@cache
+def scene(seconds: float) -> Scene:
+    """Return the scene of the benchmarks."""
+    rng = np.random.default_rng(5208)
+    n = round(seconds * 1e6 / PERIOD_US)
+    array, t = Array(64, 64, 2.67), np.arange(n, dtype=np.int64) * PERIOD_US
+    y, x = np.mgrid[:64, :64]
+    press = 60 * np.exp(-((x - 30) ** 2 + (y - 33) ** 2) / 30.0)
+    rest = rng.normal(50, 3, (64, 64))
+    values = np.empty((n, 64, 64), np.float32)
+    for k in range(n):
+        values[k] = rest + max(0.0, np.sin(24 * k / n)) * press + rng.normal(0, 0.5, (64, 64))
+    ticks = Frames(np.clip(np.rint(values), 0, 150), t, unit="ticks", array=array)
+    at_rest = np.broadcast_to(rest, (2, 64, 64))
+    tare = Tare.take(Frames(at_rest, [0, 1], array=array))
+    return Scene(ticks, Frames(0.37 * values, t, unit="kPa", array=array), tare, board_events(ticks))
+
+
+def board_events(frames: Frames) -> Events:
+    """Return what a board with the floor sends: the first picture, then changes against the last sent value."""
+    spikes = ChangeEvents(noise_floor=FLOOR).encode(frames)
+    times, taxels = spikes.to_numpy()
+    k = np.rint(times * 1000 / PERIOD_US).astype(int)
+    order = np.lexsort((taxels, k))
+    k, taxels = np.concatenate([np.zeros(4096, int), k[order]]), np.concatenate([np.arange(4096), taxels[order]])
+    ticks = frames.values.reshape(len(frames), -1)[k, taxels].astype(np.uint16)
+    return Events(frames.t[k], taxels % 64, taxels // 64, np.ones(len(k), bool), array=frames.array, intensity=ticks)
+
+
+def loaded(picture: Any, loaded_from: Any) -> Any:
+    """Return which taxels are loaded and have a loaded neighbour."""
+    wide = np.pad(picture >= loaded_from, 1)
+    rows = wide[:-2] | wide[1:-1] | wide[2:]
+    beside = rows[:, :-2] | rows[:, 2:] | wide[:-2, 1:-1] | wide[2:, 1:-1]
+    return wide[1:-1, 1:-1] & beside
+
+
+def compare(
+    about: str | None,
+    seconds: float,
+    ours: Mapping[str, Callable[[], SpikeTrains]],
+    numpy: Mapping[str, Callable[[], list[Any]]],
+    *,
+    quick: bool,
+    goals: Mapping[str, float],
+    more: int = 0,
+    **facts: Any,
+) -> dict[str, Any]:
+    """Measure an encoder beside NumPy; return seconds, real-time factors and ratios.
+
+    `about` is the benchmark's own words, `goals` times real time on one core by name. Of ours there may be `more`
+    spikes, where the encoder holds the last sample for its latency.
+    """
+    for name, baseline in numpy.items():
+        mine, theirs = len(ours[name]().times), len(baseline())
+        if not 0 <= mine - theirs <= more:
+            raise taxel.Error(f"{name}: {mine} spikes, the NumPy version has {theirs}")
+    runs = {f"taxel, {name}": call for name, call in ours.items()} | {f"numpy, {name}": c for name, c in numpy.items()}
+    results = measure(runs, rounds=2 if quick else 7, work=seconds)
+    ratios = {f"taxel / numpy, {name}": ratio(results, f"taxel, {name}", f"numpy, {name}") for name in numpy}
+    ratios |= {f"{name}, times real time": result["rate"] for name, result in results.items()}
+    return {
+        "question": (about or "").splitlines()[0],
+        **stamp(),
+        "seconds": seconds,
+        **facts,
+        "goals, times real time": dict(goals),
+        "reached": {name: bool(results[f"taxel, {name}"]["rate"] >= goal) for name, goal in goals.items()},
+        "results": results,
+        "ratios": ratios,
+        "stable": all(result["stable"] for result in results.values()),
+    }

@@ -1,0 +1,35 @@
+"""How many times faster than real time change events are, beside the obvious NumPy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from _touch import FLOOR, compare, scene
+
+from taxel import Frames
+from taxel.encode import ChangeEvents
+
+
+def numpy_change(frames: Frames) -> list[Any]:
+    """Return (t, taxel, rise or fall) of changes above the floor since the last sent value."""
+    said, last = [], frames.values[0].copy()
+    for t, picture in zip(frames.t[1:], frames.values[1:], strict=True):
+        moved = picture - last
+        there = np.abs(moved) > FLOOR
+        if there.any():
+            said += [(t, taxel_, np.sign(moved.ravel()[taxel_])) for taxel_ in np.flatnonzero(there)]
+            last[there] = picture[there]
+    return said
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    """Measure; return seconds, real-time factors and ratios."""
+    seconds = 0.25 if quick else 1.0
+    ticks, _, _, events = scene(seconds)
+    ours = {
+        "change events": lambda: ChangeEvents(noise_floor=FLOOR).encode(ticks),
+        "change events, events": lambda: ChangeEvents(noise_floor=2 * FLOOR).encode(events),
+    }
+    numpy = {"change events": lambda: numpy_change(ticks)}
+    return compare(__doc__, seconds, ours, numpy, quick=quick, goals={"change events": 20}, events=len(events))

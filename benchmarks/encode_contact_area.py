@@ -1,0 +1,41 @@
+"""How many times faster than real time the contact area is, beside the obvious NumPy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from _touch import FLOOR, compare, loaded, scene
+
+from taxel import Frames, Tare
+from taxel.encode import ContactArea
+
+LEVELS = (2, 4, 8, 16, 32)
+
+
+def numpy_area(frames: Frames, tare: Tare) -> list[Any]:
+    """Return (t, train) of rises and falls of the number of loaded taxels with a loaded neighbour."""
+    said, before = [], 0
+    loaded_from = tare.rest + FLOOR + 0.5
+    for t, picture in zip(frames.t, frames.values, strict=True):
+        area = int(np.count_nonzero(loaded(picture, loaded_from)))
+        if area != before:
+            said += [(t, k) for k, level in enumerate(LEVELS) if before < level <= area]
+            said += [(t, 5 + k) for k, level in enumerate(LEVELS) if area < level <= before]
+            before = area
+    return said
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    """Measure; return seconds, real-time factors and ratios."""
+    seconds = 0.25 if quick else 1.0
+    ticks, _, tare, events = scene(seconds)
+    ours = {
+        "contact area": lambda: ContactArea(noise_floor=FLOOR, tare=tare).encode(ticks),
+        "contact area, events": lambda: ContactArea(noise_floor=FLOOR, tare=tare).encode(events),
+    }
+    numpy = {"contact area": lambda: numpy_area(ticks, tare)}
+    found = compare(__doc__, seconds, ours, numpy, quick=quick, goals={"contact area": 20}, events=len(events))
+    rate = found["results"]["taxel, contact area, events"]["rate"]
+    found["ratios"]["contact area, million events/s"] = len(events) / seconds * rate / 1e6
+    return found

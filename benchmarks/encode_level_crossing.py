@@ -1,0 +1,34 @@
+"""How many times faster than real time level crossings are, beside the obvious NumPy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from _touch import compare, scene
+
+from taxel import Frames
+from taxel.encode import LevelCrossing
+
+
+def numpy_crossing(frames: Frames, levels: list[float], share: float) -> list[Any]:
+    """Return (t, taxel, level, rise or fall) of crossings with a release."""
+    said = []
+    on_at = np.array(levels, np.float32)[:, None, None]
+    off_at = np.array([share * level for level in levels], np.float32)[:, None, None]
+    above = frames.values[0] >= on_at
+    for t, picture in zip(frames.t[1:], frames.values[1:], strict=True):
+        now = picture >= np.where(above, off_at, on_at)
+        if (now != above).any():
+            said += [(t, *place) for place in np.argwhere(now != above)]
+            above = now
+    return said
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    """Measure; return seconds, real-time factors and ratios."""
+    seconds = 0.25 if quick else 1.0
+    ticks, *_ = scene(seconds)
+    ours = {"level crossing": lambda: LevelCrossing([60.0, 80.0], release_share=0.9).encode(ticks)}
+    numpy = {"level crossing": lambda: numpy_crossing(ticks, [60.0, 80.0], 0.9)}
+    return compare(__doc__, seconds, ours, numpy, quick=quick, goals={"level crossing": 20})

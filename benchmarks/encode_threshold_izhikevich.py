@@ -1,0 +1,54 @@
+"""How many times faster than real time pairs of Izhikevich neurons are, beside the obvious NumPy.
+
+92 channels at 500 Hz, 184 neurons, steps of 0.1 ms, all of which the baseline takes as one vector.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from _touch import compare
+
+from taxel import Frames
+from taxel.encode import ThresholdIzhikevich
+
+
+def numpy_izhikevich(frames: Frames) -> list[Any]:
+    """Return (step, neuron) of a pair a channel; first all ON neurons, then all OFF neurons."""
+    said, steps = [], 20
+    a, b, c, d, gain, dt = 0.005, 0.25, -65.0, 6.0, 0.6, 0.1
+    values = frames.values.reshape(len(frames), -1)
+    first = gain * np.concatenate([values[0] >= 0.5, values[0] < 0.5])
+    v = (-(5 - b) - np.sqrt((5 - b) ** 2 - 0.16 * (140 + first))) / 0.08
+    u = b * v
+    for k, value in enumerate(values):
+        on = value >= 0.5
+        current = gain * np.concatenate([on, ~on])
+        for step in range(steps):
+            v, u = v + dt * (0.04 * v * v + 5.0 * v + 140.0 - u + current), u + dt * a * (b * v - u)
+            fired = v >= 30
+            if fired.any():
+                said += [(k * steps + step, neuron) for neuron in np.flatnonzero(fired)]
+                v[fired] = c
+                u[fired] += d
+    return said
+
+
+def gait(seconds: float, rng: np.random.Generator) -> Frames:
+    """Return 92 channels at 500 Hz that go on and off as the sensors of an insole do."""
+    t = np.arange(round(seconds * 500), dtype=np.int64) * 2000
+    begin, length = rng.uniform(0, 0.3, 92), rng.uniform(0.1, 0.5, 92)
+    within = t[:, None] / 1e6 % 1.1
+    on = (within >= begin) & (within < begin + length)
+    return Frames(on[:, None, :].astype(np.float32), t, unit="counts")
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    """Measure; return seconds, real-time factors and ratios."""
+    seconds, name = 0.25 if quick else 1.0, "Izhikevich, 184 neurons"
+    steps = gait(seconds, np.random.default_rng(5208))
+    ours = {name: lambda: ThresholdIzhikevich([0.5]).encode(steps)}
+    numpy = {name: lambda: numpy_izhikevich(steps)}
+    # Encoders hold the last sample for their latency, the baseline ends with it.
+    return compare(__doc__, seconds, ours, numpy, quick=quick, goals={name: 100}, more=92)

@@ -1,0 +1,79 @@
+"""Change events against equation 5.7, written once more in plain Python."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel.encode import ChangeEvents
+
+from . import oracles
+from .scenes import frames_of, spikes_of, wander
+
+seeds = st.integers(0, 2**32 - 1)
+
+#: What the laws of all encoders are tried on (test_laws.py).
+EXAMPLES = {
+    "change": ChangeEvents(bits=4),
+    "change, last sample": ChangeEvents(previous="last_sample", rounding="floor", period_ms=0.3),
+}
+
+
+def trains_of(encoder, taxels, of):
+    """The numbers of the trains of some taxels."""
+    return taxels
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=seeds,
+    floor=st.sampled_from([0.5, 3.0, 4.0, 7.3]),
+    bits=st.integers(1, 10),
+    previous=st.sampled_from(["last_sent", "last_sample"]),
+    rounding=st.sampled_from(["truncate", "floor"]),
+    ticks=st.booleans(),
+)
+def test_change_events_are_equation_5_7(seed, floor, bits, previous, rounding, ticks):
+    rng = np.random.default_rng(seed)
+    t, values = np.arange(300) * 192, wander(rng, ticks=ticks)
+    given_parameters = {"noise_floor": floor, "bits": bits, "previous": previous, "rounding": rounding}
+    spikes = spikes_of(ChangeEvents(**given_parameters).encode(frames_of(t, values)))
+    assert spikes == oracles.change_events(t, values, **given_parameters)
+    assert spikes
+
+
+def test_the_saturation_of_change_events_is_that_of_their_bits():
+    for bits in range(1, 11):
+        values = [[0.0], [5000.0], [0.0]]
+        spikes = ChangeEvents(noise_floor=1.0, bits=bits).encode(frames_of([0, 100, 200], values))
+        assert spikes.values.tolist() == [2**bits - 1, 1 - 2**bits]
+
+
+def test_a_slow_change_shows_only_against_the_last_sent_value():
+    t, values = np.arange(40) * 192, np.arange(40.0)[:, None]
+    assert len(ChangeEvents().encode(frames_of(t, values))[0]) == 9
+    assert len(ChangeEvents(previous="last_sample").encode(frames_of(t, values))[0]) == 0
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: ChangeEvents(noise_floor=0), "noise_floor is 0"),
+        (lambda: ChangeEvents(noise_floor=float("nan")), "noise_floor is nan"),
+        (lambda: ChangeEvents(noise_floor="3"), "noise_floor: invalid type"),
+        (lambda: ChangeEvents(bits=0), "bits is 0: must be from 1 to 10"),
+        (lambda: ChangeEvents(bits=11), "bits is 11"),
+        (lambda: ChangeEvents(bits=2.5), "bits: invalid type"),
+        (lambda: ChangeEvents(bits=-1), "bits: invalid value"),
+        (lambda: ChangeEvents(previous="last"), "previous: unknown variant `last`, expected `last_sent`"),
+        (lambda: ChangeEvents(rounding=None), "rounding: "),
+        (lambda: ChangeEvents(period_ms=0), "period_ms is 0"),
+        (lambda: ChangeEvents(period_ms=0.00025), "period_ms is 2.5e-4 ms: must be a whole number of us"),
+        (lambda: ChangeEvents(period_ms=1e300), "period_ms is "),
+    ],
+)
+def test_nonsense_gets_one_clear_line(call, said):
+    with pytest.raises(taxel.ProblemError, match=said) as error:
+        call()
+    assert "\n" not in str(error.value)

@@ -1,0 +1,95 @@
+"""Contact area against a plain count."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Events, Frames, Tare
+from taxel.encode import ContactArea
+
+from . import oracles
+from .scenes import ARRAY, rest, spikes_of, touch
+
+seeds = st.integers(0, 2**32 - 1)
+
+#: What the laws of all encoders are tried on (test_laws.py).
+EXAMPLES = {"area": ContactArea(tare=rest(ARRAY), levels=[1, 2, 4, 8])}
+
+
+def turned(encoder):
+    """The trains in their order on an array that is turned by half a turn: no place is in them."""
+    return np.arange(2 * len(encoder.levels))
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=seeds, rows=st.integers(1, 9), columns=st.integers(1, 12), floor=st.sampled_from([0.0, 3.0]))
+def test_contact_area_counts_loaded_taxels_with_loaded_neighbours(seed, rows, columns, floor):
+    rng = np.random.default_rng(seed)
+    array = Array(rows, columns)
+    level = rng.choice([50.0, 56.0, 60.0], (rows, columns))
+    tare = Tare.take(Frames([level, level], [0, 1000], array=array))
+    lift = np.repeat(rng.integers(0, 12, 12), 5)[:, None, None]
+    pictures = np.rint(level + lift * rng.random((60, rows, columns)))
+    t = np.arange(60) * 192
+    encoder = ContactArea(noise_floor=floor, levels=[1, 2, 4, 8, 16, 32], tare=tare)
+    wanted = oracles.contact_area(t, pictures, level, floor, (1, 2, 4, 8, 16, 32))
+    assert spikes_of(encoder.encode(Frames(pictures, t, array=array))) == wanted
+
+
+@settings(max_examples=40, deadline=None)
+@given(seed=seeds)
+def test_contact_area_of_events_is_reckoned_once_a_stamp(seed):
+    rng = np.random.default_rng(seed)
+    array = Array(6, 7)
+    events = touch(rng, array)
+    held, pictures, stamps = np.full((6, 7), -np.inf), [], []
+    for k, at in enumerate(events.t):
+        if events.present[k]:
+            held[events.y[k], events.x[k]] = events.intensity[k]
+        if k + 1 == len(events) or events.t[k + 1] != at:
+            pictures.append(held.copy())
+            stamps.append(at)
+    wanted = oracles.contact_area(stamps, pictures, np.full((6, 7), 55.0))
+    spikes = ContactArea(tare=rest(array)).encode(events)
+    assert len(spikes) == 10
+    assert spikes_of(spikes) == wanted
+
+
+def test_half_a_tick_above_the_floor_loads_a_taxel():
+    tare = rest(Array(1, 2), 50)
+    for value, rises in ((53.4, 0), (53.5, 1), (54.0, 1)):
+        frames = Frames([[[50.0, 50.0]], [[value, value]]], [0, 192], array=tare.array)
+        assert len(ContactArea(tare=tare).encode(frames)[0]) == rises
+
+
+def test_a_lone_taxel_and_one_never_heard_of_are_no_contact():
+    array = Array(3, 3)
+    tare = Tare.take(Events([0, 0], [0, 1], [0, 0], [1, 1], array=array, intensity=[50, 50]), stop_us=1000)
+    assert np.isnan(tare.rest).sum() == 7
+    assert np.isnan(tare.rest[2, 2])
+    alone = Events([0], [0], [0], [1], array=array, intensity=[90])
+    unheard = Events([0, 0], [0, 2], [0, 2], [1, 1], array=array, intensity=[90, 90])
+    both = Events([0, 0], [0, 1], [0, 0], [1, 1], array=array, intensity=[90, 90])
+    assert [len(ContactArea(tare=tare).encode(e).times) for e in (alone, unheard, both)] == [0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: ContactArea(noise_floor=-1), "noise_floor is -1"),
+        (lambda: ContactArea(levels=[]), "levels: must hold"),
+        (lambda: ContactArea(levels=[0, 2]), r"levels are \[0, 2\]"),
+        (lambda: ContactArea(levels=[2, 2]), r"levels are \[2, 2\]"),
+        (lambda: ContactArea(levels=[2.5]), "levels: invalid type"),
+        (lambda: ContactArea(tare=5), "tare is 5: must be a taxel.Tare"),
+        (lambda: ContactArea().encode(Frames(np.zeros((1, 3, 4)), [0])), "without a tare"),
+        (lambda: ContactArea().stream(ARRAY), "without a tare"),
+        (lambda: ContactArea().with_tare(None), "tare is None"),
+    ],
+)
+def test_nonsense_gets_one_clear_line(call, said):
+    with pytest.raises(taxel.ProblemError, match=said) as error:
+        call()
+    assert "\n" not in str(error.value)

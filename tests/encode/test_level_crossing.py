@@ -1,0 +1,129 @@
+"""Level crossings against a plain scan, and running ranges against percentiles."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel.encode import LevelCrossing, RunningRange
+
+from . import oracles
+from .scenes import frames_of, spikes_of, wander
+
+seeds = st.integers(0, 2**32 - 1)
+
+#: What the laws of all encoders are tried on (test_laws.py).
+EXAMPLES = {
+    "crossing": LevelCrossing([50.0, 60.0, 70.0], release_share=0.9),
+    "crossing that holds": LevelCrossing([55.0, 65.0], hold_ms=0.3, tonic_ms=0.7, tonic_level=65.0),
+    "crossing on the running range": LevelCrossing(
+        [0.3, 0.6], hold_ms=0.2, tonic_ms=1.1, running_range=RunningRange(window_s=0.02, renew_s=0.005)
+    ),
+    # Its first window comes late by definition.
+    "crossing, first window by itself": LevelCrossing(
+        [0.3, 0.6], running_range=RunningRange(window_s=0.02, renew_s=0.005, first_window="itself")
+    ),
+}
+
+
+def trains_of(encoder, taxels, of):
+    """The numbers of the trains of some taxels: by taxel and level, then the tonic ones by taxel."""
+    levels = len(encoder.levels)
+    crossings = (taxels[:, None] * levels + np.arange(levels)).ravel()
+    return np.concatenate([crossings, *([of * levels + taxels] if encoder.tonic_ms else [])])
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    seed=seeds,
+    share=st.sampled_from([None, 1.0, 0.9, 0.7]),
+    hold=st.sampled_from([0, 100, 192, 1000, 5000]),
+    tonic=st.sampled_from([None, 300, 5000]),
+)
+def test_level_crossings_are_those_of_a_scan(seed, share, hold, tonic):
+    rng = np.random.default_rng(seed)
+    t, values = 77 + np.cumsum(rng.choice([192, 100, 3333], 200)), wander(rng, 200)
+    levels = [50.0, 60.0, 64.0]
+    encoder = LevelCrossing(
+        levels,
+        release_share=share,
+        hold_ms=hold / 1000,
+        tonic_ms=None if tonic is None else tonic / 1000,
+        tonic_level=None if tonic is None else 60.0,
+    )
+    spikes = encoder.encode(frames_of(t, values))
+    end = t[-1] + hold
+    assert spikes.stop == end / 1000
+    wanted = oracles.level_crossing(
+        t.tolist(), values, levels, int(end), lambda level: level * (share or 1.0), hold, tonic, 60.0
+    )
+    assert spikes_of(spikes) == wanted
+
+
+def test_a_release_by_a_distance_lies_that_far_below_the_level():
+    values = [[0.0], [5.0], [3.1], [3.0], [2.9], [5.0]]
+    spikes = LevelCrossing([5.0], release_by=2.0).encode(frames_of(np.arange(6) * 100, values))
+    assert spikes_of(spikes) == [(100, 0, 1), (400, 0, -1), (500, 0, 1)]
+
+
+@pytest.mark.parametrize("first_window", ["silent", "itself"])
+def test_levels_on_the_running_range_are_percentiles_of_the_past_window(first_window):
+    rng = np.random.default_rng(7)
+    t = 500 + np.arange(900) * 10_000  # 9 s at 100 Hz
+    values = np.abs(np.sin(t[:, None] / 4e5 + np.arange(3))) * [1, 30, 0] + rng.normal(0, 0.02, (900, 3)) * [1, 1, 0]
+    window = RunningRange(low=10, high=95, window_s=2.0, renew_s=1.0, first_window=first_window)
+    levels = [0.1, 0.5]
+    encoder = LevelCrossing(levels, release_share=0.7, running_range=window)
+    values = values.astype(np.float32)
+    ranges = oracles.running_range(t, values, 10, 95, 2_000_000, 1_000_000)
+    ranges[:200] = ranges[200] if first_window == "itself" else np.nan
+    low, high = ranges[:, 0], ranges[:, 1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = np.where(high > low, (values - low) / (high - low), -1.0)
+    first = 0 if first_window == "itself" else 200
+    wanted = oracles.level_crossing(t[first:].tolist(), shares[first:], levels, int(t[-1]), lambda level: level * 0.7)
+    spikes = spikes_of(encoder.encode(frames_of(t, values)))
+    assert spikes == wanted
+    assert len(spikes) > 30
+    assert {train for _, train, _ in spikes} == {0, 1, 2, 3}, "a channel without range is silent"
+
+
+def test_renewals_go_on_over_a_gap_longer_than_the_window():
+    t = np.concatenate([np.arange(300), 2000 + np.arange(300)]) * 10_000
+    values = np.concatenate([np.linspace(0, 1, 300), np.linspace(10, 0, 300)])[:, None]
+    encoder = LevelCrossing([0.5], running_range=RunningRange(window_s=1.0, renew_s=1.0))
+    ranges = oracles.running_range(t, values.astype(np.float32), 10, 95, 1_000_000, 1_000_000)
+    shares = (values - ranges[:, 0]) / (ranges[:, 1] - ranges[:, 0])
+    wanted = oracles.level_crossing(t[100:].tolist(), shares[100:], [0.5], int(t[-1]))
+    assert spikes_of(encoder.encode(frames_of(t, values))) == wanted
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: LevelCrossing([]), "levels: must hold"),
+        (lambda: LevelCrossing(5.0), "levels: invalid type"),
+        (lambda: LevelCrossing([1.0, 1.0]), "levels: 1 after 1, must ascend"),
+        (lambda: LevelCrossing([2.0, float("inf")]), r"levels\[1\] is inf"),
+        (lambda: LevelCrossing([1e300]), "levels hold"),
+        (lambda: LevelCrossing([1.0], release_share=0), "release_share is 0"),
+        (lambda: LevelCrossing([1.0], release_share=1.01), "release_share is 1.01"),
+        (lambda: LevelCrossing([-1.0, 1.0], release_share=0.7), "use release_by"),
+        (lambda: LevelCrossing([1.0], release_by=-1), "release_by is -1"),
+        (lambda: LevelCrossing([1.0], release_by=1, release_share=1), "give one of them"),
+        (lambda: LevelCrossing([1.0], hold_ms=-1), "hold_ms is -1"),
+        (lambda: LevelCrossing([1.0], tonic_ms=0), "tonic_ms is 0"),
+        (lambda: LevelCrossing([1.0], tonic_level=1.0), "without tonic_ms"),
+        (lambda: LevelCrossing([1.0], tonic_ms=5, tonic_level=2.0), "tonic_level is 2: must be one of"),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(low=95, high=10)), "running_range from 95 to 10"),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(high=101)), "high is 101 %: must be from 0 to 100"),
+        (lambda: LevelCrossing([1.0], running_range=RunningRange(renew_s=-1)), "renew_s is -1 s"),
+        (lambda: LevelCrossing([1.0], running_range={"low": 1}), "running_range is .*: must be a taxel.RunningRange"),
+        (lambda: LevelCrossing([1.0], running_range=5), "running_range is 5: must be a taxel.RunningRange"),
+    ],
+)
+def test_nonsense_gets_one_clear_line(call, said):
+    with pytest.raises(taxel.ProblemError, match=said) as error:
+        call()
+    assert "\n" not in str(error.value)
