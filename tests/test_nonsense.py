@@ -172,6 +172,7 @@ SOUND: dict[str, Sound] = {
         taxel.plot.overview,
         {"recording": taxel.open("here_events.npz"), "figure": Figure()},
     ),
+    "taxel.plot.pressure": lambda: (taxel.plot.pressure, {"frames": FRAMES, "above": 0.5, "figure": Figure()}),
     "taxel.plot.pressure_map": plain(taxel.plot.pressure_map, frames=FRAMES, at=200, ax=AXES),
     "taxel.plot.raster": plain(taxel.plot.raster, trains=TRAINS, ax=AXES),
     "taxel.Tare.off": method(TARE, "off", frames=FRAMES),

@@ -15,6 +15,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 
 if TYPE_CHECKING:
+    from taxel.frames import Frames
     from taxel.recording import Recording
 
 __all__ = ["info"]
@@ -29,35 +30,60 @@ _PICTURES = (".png", ".svg", ".pdf")
 def info(
     file: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
     picture: Annotated[
-        Path | None, typer.Option(help="Write rates and a map of the taxels to this .png, .svg or .pdf.")
+        Path | None,
+        typer.Option(help="Write rates, a map of the taxels and the pressure over time to this .png, .svg or .pdf."),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the picture where it exists.")] = False,
+    table: Annotated[
+        Path | None,
+        typer.Option(help="Write contact area, peak, sum and centre of pressure over time to this .csv."),
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace what is written where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Say what is in a recording, what was lost, its rates, and which taxels are dead, stuck or noisy.
+    """Say what is in a recording, what was lost, its rates, how it was pressed, and which taxels are dead or noisy.
 
-    Example: taxel info walk.mcap --picture walk.png
+    Example: taxel info walk.mcap --picture walk.png --table walk.csv
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
     from taxel._files import write_whole  # noqa: PLC0415
+    from taxel._pressure import above_rest  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
     # Shown on a terminal only, and gone when done.
     with Console(stderr=True).status(f"reading {file}"):
         recording = taxel.open(file)
-        said = about(recording)
+        pressed = above_rest(recording)
+        said = about(recording, pressed)
+    if table is not None and table.suffix.lower() != ".csv":
+        raise ProblemError(f"{table}: a table ends in .csv")
+    if table is not None:
+        if pressed is None:
+            raise ProblemError(f"{file}: holds events without intensities, so there is no pressure to write")
+        text = "".join(f"{line}\n" for line in _lines(*pressed))
+        write_whole(table, lambda out: out.write(text.encode()), overwrite=overwrite)
+        said["table"] = str(table)
     if picture is not None:
         import matplotlib as mpl  # noqa: PLC0415  loads slowly
 
+        from taxel.plot import overview, pressure  # noqa: PLC0415
+
         mpl.use("Agg")
-        figure, kind = recording.plot(), picture.suffix.lower()[1:]
+        import matplotlib.pyplot as plt  # noqa: PLC0415
+
+        figure, kind = plt.figure(figsize=(11, 4 if pressed is None else 10), layout="constrained"), picture.suffix[1:]
+        if pressed is None:
+            overview(recording, figure)
+        else:
+            grid = figure.add_gridspec(2, 1, height_ratios=(2, 3))
+            overview(recording, figure.add_subfigure(grid[0]))
+            pressure(*pressed, figure.add_subfigure(grid[1]))
         write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
         said["picture"] = str(picture)
     typer.echo(json.dumps(said) if as_json else _page(said))
 
 
-def about(recording: Recording) -> dict[str, Any]:
+def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[str, Any]:
     """Return all that `taxel info` says, as JSON holds it."""
     from taxel._health import health  # noqa: PLC0415
 
@@ -95,6 +121,7 @@ def about(recording: Recording) -> dict[str, Any]:
             "drift_ppm": clock.drift_ppm,
             "delay_us": {"median": float(late[0]), "p99": float(late[1])},
         }
+    said["pressure"] = None if pressed is None else _pressure(*pressed)
     return said | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
         "detections": {label: len(recording.detections[label]) for label in recording.detections.labels},
@@ -105,6 +132,31 @@ def about(recording: Recording) -> dict[str, Any]:
         "rebuilt": recording.rebuilt,
         "verdict": recording.verdict,
     }
+
+
+def _pressure(frames: Frames, above: float) -> dict[str, Any] | None:
+    """Return the largest contact area, peak and sum with their times, and where the centre went."""
+    if not len(frames):
+        return None
+    series = {"area_mm2": frames.area(above), "peak": frames.peak(), "sum": frames.total()}
+    said: dict[str, Any] = {"unit": frames.unit, "above": above}
+    for name, values in series.items():
+        k = int(values.argmax())
+        said[name] = {"most": float(values[k]), "t_us": int(frames.t[k])}
+    centre = frames.centre(above)
+    centre = centre[~np.isnan(centre).any(axis=1)]
+    limits = {"x": [float(v) for v in (centre[:, 0].min(), centre[:, 0].max())]} if len(centre) else None
+    if limits is not None:
+        limits["y"] = [float(v) for v in (centre[:, 1].min(), centre[:, 1].max())]
+    return said | {"centre_mm": limits}
+
+
+def _lines(frames: Frames, above: float) -> Iterator[str]:
+    """Give the lines of a table of pressure over time; the centre is empty where nothing is loaded."""
+    yield f"t_us,area_mm2,peak_{frames.unit},sum_{frames.unit},centre_x_mm,centre_y_mm"
+    columns = (frames.t, frames.area(above), frames.peak(), frames.total(), *frames.centre(above).T)
+    for t, *values in zip(*(column.tolist() for column in columns), strict=True):
+        yield ",".join([str(t), *("" if np.isnan(value) else f"{value:.10g}" for value in values)])
 
 
 def _peak(t: Any) -> float | None:
@@ -120,8 +172,7 @@ def _page(said: dict[str, Any]) -> str:
     head = f"{said['file']}: .{said['kind']}" + f", from {said['source']}" * bool(said["source"])
     rows = [*_contents(said), *_rates(said), *_losses(said), ("verdict", said["verdict"])]
     lines = [head, *(f"  {name:<20}{value}" for name, value in rows)]
-    if "picture" in said:
-        lines.append(f"picture written to {said['picture']}")
+    lines += [f"{what} written to {said[what]}" for what in ("picture", "table") if what in said]
     return "\n".join(lines)
 
 
@@ -135,6 +186,17 @@ def _contents(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "events", f"{said['events']}, {words}"
     else:
         yield "pictures", f"{said['pictures']} ({said['unit']})"
+    pressed = said["pressure"]
+    if pressed is not None:
+        for name, words, unit in (
+            ("area_mm2", "contact area", "mm2"),
+            ("peak", "peak", pressed["unit"]),
+            ("sum", "sum", pressed["unit"]),
+        ):
+            yield words, f"at most {pressed[name]['most']:g} {unit}, at {pressed[name]['t_us']} us"
+        if pressed["centre_mm"] is not None:
+            x, y = pressed["centre_mm"]["x"], pressed["centre_mm"]["y"]
+            yield "centre of pressure", f"x {x[0]:.1f} to {x[1]:.1f} mm, y {y[0]:.1f} to {y[1]:.1f} mm"
     if said["notes"]:
         yield "notes", str(len(said["notes"]))
     if said["detections"]:

@@ -2,6 +2,6 @@
 
 from taxel.plot.notebook import html
 from taxel.plot.nouns import detections, event_picture, pressure_map, raster
-from taxel.plot.recordings import health_map, overview
+from taxel.plot.recordings import health_map, overview, pressure
 
-__all__ = ["detections", "event_picture", "health_map", "html", "overview", "pressure_map", "raster"]
+__all__ = ["detections", "event_picture", "health_map", "html", "overview", "pressure", "pressure_map", "raster"]

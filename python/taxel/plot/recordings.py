@@ -7,21 +7,22 @@ from typing import TYPE_CHECKING
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import FigureBase
 
 from taxel._arguments import instance
+from taxel.frames import Frames
 from taxel.plot.nouns import axes
 
 if TYPE_CHECKING:
     from taxel._health import Health
     from taxel.recording import Recording
 
-__all__ = ["health_map", "overview"]
+__all__ = ["health_map", "overview", "pressure"]
 
 _COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}
 
 
-def overview(recording: Recording, figure: Figure | None = None) -> Figure:
+def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBase:
     """Draw events a second (or the sum of pressure) over time, and the activity of each taxel."""
     from taxel._health import health  # noqa: PLC0415  health draws itself here
     from taxel.recording import Recording  # noqa: PLC0415  a recording draws itself here
@@ -30,7 +31,7 @@ def overview(recording: Recording, figure: Figure | None = None) -> Figure:
 
     if figure is None:
         figure = plt.figure(figsize=(11, 4), layout="constrained")
-    over, where = instance("figure", figure, Figure).subplots(1, 2, width_ratios=(2, 1))
+    over, where = instance("figure", figure, FigureBase).subplots(1, 2, width_ratios=(2, 1))
     if recording.has_events:
         events = recording.events
         t = events.t / 1e6
@@ -55,6 +56,27 @@ def overview(recording: Recording, figure: Figure | None = None) -> Figure:
             over.axvline(note.t / 1e6, color="grey", linestyle=":", linewidth=0.8)
     over.set(xlabel="board time (s)", title=recording.path.name)
     health_map(found, where)
+    return figure
+
+
+def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = None) -> FigureBase:
+    """Draw contact area, peak, sum and centre of pressure over time; taxels that read more than `above` are loaded."""
+    instance("frames", frames, Frames)
+    if figure is None:
+        figure = plt.figure(figsize=(11, 6), layout="constrained")
+    rows = instance("figure", figure, FigureBase).subplots(4, 1, sharex=True)
+    t, centre = frames.t / 1e6, frames.centre(above)
+    for ax, values, name in (
+        (rows[0], frames.area(above), "contact area (mm2)"),
+        (rows[1], frames.peak(), f"peak ({frames.unit})"),
+        (rows[2], frames.total(), f"sum ({frames.unit})"),
+    ):
+        ax.plot(t, values, color="black", linewidth=0.8)
+        ax.set_ylabel(name)
+    for axis, colour, name in ((0, "#c44e52", "x"), (1, "#4c72b0", "y")):
+        rows[3].plot(t, centre[:, axis], color=colour, linewidth=0.8, label=name)
+    rows[3].set(xlabel="board time (s)", ylabel="centre (mm)")
+    rows[3].legend(loc="upper right")
     return figure
 
 
