@@ -25,7 +25,7 @@ from taxel.frames import Frames
 from taxel.wire import Registers
 
 if TYPE_CHECKING:
-    from matplotlib.figure import FigureBase
+    from matplotlib.figure import Figure
 
 __all__ = ["Clock", "Datagrams", "Note", "Recording", "open_recording"]
 
@@ -333,7 +333,7 @@ class Recording:
             start, stop = max(start, self._window[0]), min(stop, self._window[1])
         return Recording(self._source, (start, max(start, stop)))
 
-    def plot(self) -> FigureBase:
+    def plot(self) -> Figure:
         """Draw what is in it: events (or the sum of pressure) over time, and where on the array."""
         from taxel.plot import overview  # noqa: PLC0415  matplotlib loads slowly
 

@@ -77,7 +77,7 @@ def info(
         else:
             grid = figure.add_gridspec(2, 1, height_ratios=(2, 3))
             overview(recording, figure.add_subfigure(grid[0]))
-            pressure(*pressed, figure.add_subfigure(grid[1]))
+            pressure(*pressed, figure=figure.add_subfigure(grid[1]))
         write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
         said["picture"] = str(picture)
     typer.echo(json.dumps(said) if as_json else _page(said))

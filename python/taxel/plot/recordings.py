@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar, overload
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import FigureBase
+from matplotlib.figure import Figure, FigureBase
 
 from taxel._arguments import instance
 from taxel.frames import Frames
@@ -19,9 +19,15 @@ if TYPE_CHECKING:
 
 __all__ = ["health_map", "overview", "pressure"]
 
+F = TypeVar("F", bound=FigureBase)
+
 _COLOURS = {"dead": "#4c72b0", "stuck": "#dd8452", "noisy": "#c44e52"}
 
 
+@overload
+def overview(recording: Recording, figure: None = None) -> Figure: ...
+@overload
+def overview(recording: Recording, figure: F) -> F: ...
 def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBase:
     """Draw events a second (or the sum of pressure) over time, and the activity of each taxel."""
     from taxel._health import health  # noqa: PLC0415  health draws itself here
@@ -59,6 +65,10 @@ def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBa
     return figure
 
 
+@overload
+def pressure(frames: Frames, above: float = 0.0, figure: None = None) -> Figure: ...
+@overload
+def pressure(frames: Frames, above: float = 0.0, *, figure: F) -> F: ...
 def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = None) -> FigureBase:
     """Draw contact area, peak, sum and centre of pressure over time; taxels that read more than `above` are loaded."""
     instance("frames", frames, Frames)
