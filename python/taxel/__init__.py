@@ -4,7 +4,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from taxel import detect, device, encode, formats, learn, live, metrics, simulate, wire
+from taxel import detect, device, encode, formats, information, learn, live, metrics, simulate, wire
 from taxel._convert import convert
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel._health import Health, health
@@ -52,6 +52,7 @@ __all__ = [
     "encode",
     "formats",
     "health",
+    "information",
     "learn",
     "live",
     "metrics",

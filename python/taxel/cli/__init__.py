@@ -62,6 +62,7 @@ for _command in (
     "encode",
     "export",
     "info",
+    "information",
     "live",
     "record",
     "study",

@@ -1,0 +1,191 @@
+"""``taxel information``: how many bits labelled touches hold, at which period, of how many taxels, when."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from taxel._core import ProblemError
+from taxel.cli._app import app
+from taxel.cli._listening import SET_HELP, open_recording, told
+
+if TYPE_CHECKING:
+    from taxel.information import Answer, Estimate, Point
+
+__all__ = ["information"]
+
+
+@app.command()
+def information(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz or .csv.")],
+    labels: Annotated[
+        Path | None,
+        typer.Option(
+            help="A CSV recording,t_us,label[,stop_us][,group] and columns of parameters: a row is a trial. "
+            "Without it each recording is one, and its folder's name the label."
+        ),
+    ] = None,
+    window_ms: Annotated[
+        float | None, typer.Option(help="How long after contact to look; needed where trials have no stop_us.")
+    ] = None,
+    windows: Annotated[str | None, typer.Option(help="Times after contact, ms, as 10,20,50.")] = None,
+    periods: Annotated[str | None, typer.Option(help="Sampling periods, ms, as 1,2,5.")] = None,
+    taxels: Annotated[str | None, typer.Option(help="Numbers of taxels drawn at random, as 10,30,100.")] = None,
+    pools: Annotated[str | None, typer.Option(help="Taxels of so many by so many taken for one, as 2,4.")] = None,
+    encoder: Annotated[str, typer.Option(help="change_events or fa1.")] = "change_events",
+    values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
+    also: Annotated[str, typer.Option(help="Further classifiers: neighbours, cone_r, tempotron.")] = "neighbours",
+    draws: Annotated[int, typer.Option(help="Draws of the sampling's phase, averaged.")] = 5,
+    folds: Annotated[int, typer.Option(help="Folds; groups are never split.")] = 10,
+    shuffles: Annotated[int, typer.Option(help="Of the labels, for the test against zero.")] = 20,
+    seed: Annotated[int, typer.Option(help="Of phases, folds, taxels and redraws.")] = 0,
+    report: Annotated[Path, typer.Option(help="Where the page with pictures goes.")] = Path("information.html"),
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the page where it exists.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Say how many bits labelled touches hold: by sampling period, time, number of taxels and rate on the wire.
+
+    Example: taxel information drops.mcap --labels drops.csv --window-ms 50
+    """
+    from taxel.information import answer, read_trials, recordings_as_trials  # noqa: PLC0415  starts quickly
+    from taxel.report.information import write_information  # noqa: PLC0415
+
+    if report.exists() and not overwrite:
+        raise FileExistsError(17, "exists already; say --overwrite or another --report", str(report))
+    chosen = _encoder(encoder, values or [])
+    with told(as_json) as tell:
+        opened = []
+        for path in recordings:
+            tell(f"reading {path}")
+            opened.append(open_recording(path))
+        trials = (
+            recordings_as_trials(opened, window_ms=window_ms)
+            if labels is None
+            else read_trials(labels, opened, window_ms=window_ms)
+        )
+        found = answer(
+            trials,
+            encoder=chosen,
+            window_ms=window_ms,
+            windows_ms=_numbers("--windows", windows),
+            periods_ms=_numbers("--periods", periods),
+            taxels=_whole("--taxels", taxels),
+            pools=_whole("--pools", pools),
+            draws=draws,
+            folds=folds,
+            shuffles=shuffles,
+            classifiers=[name for name in also.split(",") if name],
+            seed=seed,
+            progress=lambda what, done, of: tell(f"{what} ({done} of {of})"),
+        )
+        tell("drawing")
+        write_information(report, found, overwrite=overwrite)
+    if as_json:
+        typer.echo(json.dumps({**found.to_dict(), "report": str(report)}))
+        return
+    for line in lines(found):
+        typer.echo(line)
+    typer.echo(f"written to {report}")
+
+
+def lines(found: Answer) -> list[str]:
+    """Return what is printed of an answer, line by line."""
+    sizes = sorted(set(found.labels.values()))
+    each = f"{sizes[0]}" if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
+    groups = f"{found.groups} groups" if found.groups else "no groups"
+    zero = found.zero
+    full = found.full
+    said = [
+        f"{sum(found.labels.values())} trials, {len(found.labels)} labels x {each}, {groups}; labels shuffled: 95 % "
+        f"below {zero.level:.2f} bits, p {zero.p:.2f}",
+        "controls: " + " | ".join(f"{c.name} {_bits(c.found)} ({c.about})" for c in found.controls),
+        f"full: {full.period_ms:g} ms, {full.taxels} taxels, to {full.window_ms:g} ms {_interval(full.found)}"
+        + "".join(f"; pictures {e.bits:.2f}" for p, e in found.frames.items() if p == full.period_ms)
+        + "".join(f"; {name} {e.bits:.2f}" for name, e in found.classifiers.items()),
+    ]
+    said += [f"warning: {text}" for text in full.found.warnings]
+    said += ["", _row("period", "bits", "events", "mb/event", "kb/s", "silent", "95 % of the full?")]
+    said += [_told(f"{p.period_ms:g} ms", p, found) for p in found.by_period]
+    if found.taxels:
+        said += [
+            "",
+            _row(f"taxels at {found.taxels[0].period_ms:g} ms", "bits", "events", "mb/event", "kb/s", "silent", ""),
+        ]
+        said += [_told(f"{p.taxels} {p.kind}", p, found) for p in found.taxels]
+    said += [""]
+    for window in sorted({p.window_ms for p in found.points} - {full.window_ms}):
+        here = [p for p in found.points if p.window_ms == window]
+        told_ = "; ".join(
+            f"{p.period_ms:g} ms {p.found.bits:.2f}" + (f" {p.verdict}" if p.verdict is not None else "") for p in here
+        )
+        said.append(f"to {window:g} ms: {told_}")
+    for name, points in found.parameters.items():
+        said.append(
+            f"{name} ({points[0].found.most:.2f} bits at most): "
+            + "; ".join(f"{p.period_ms:g} ms {p.found.bits:.2f}" for p in points)
+        )
+    if len(found.training) > 1:
+        (n, less), (most, bits) = found.training[-2:]
+        rises = "still rising with trials" if bits - less > 0.02 else "hardly rising with trials"
+        said.append(f"{rises}: {n} -> {most} training trials a label {bits - less:+.2f}: what is said is a floor")
+    said += [f"note: {note}" for note in found.notes]
+    said.append(f"rates are of {found.wire}")
+    return said
+
+
+def _told(name: str, point: Point, found: Answer) -> str:
+    verdict = "the full one" if point.verdict is None else str(point.verdict)
+    if point is found.cheapest:
+        verdict += " <- cheapest"
+    return _row(
+        name,
+        f"{point.found.bits:.2f}",
+        f"{point.events:.4g}",
+        f"{point.millibits_per_event:.3g}",
+        f"{point.kbps:.3g}",
+        f"{100 * point.silent:.0f} %",
+        verdict,
+    )
+
+
+def _row(*cells: str) -> str:
+    name, bits, events, each, rate, silent, verdict = cells
+    return f"{name:<18} {bits:>6} {events:>8} {each:>9} {rate:>8} {silent:>7}  {verdict}".rstrip()
+
+
+def _bits(found: Estimate | None) -> str:
+    return "-" if found is None else f"{found.bits:.2f}"
+
+
+def _interval(found: Estimate) -> str:
+    low, high = found.interval
+    return f"{found.bits:.2f} of {found.most:.2f} bits [{low:.2f} {high:.2f}]"
+
+
+def _encoder(name: str, said: list[str]):  # type: ignore[no-untyped-def]
+    from taxel.cli._listening import encoder_of  # noqa: PLC0415  the command line starts quickly
+
+    if name not in ("change_events", "fa1"):
+        raise ProblemError(f"--encoder {name}: must be change_events or fa1, which have one train a taxel")
+    return None if name == "change_events" and not said else encoder_of(name, said)
+
+
+def _numbers(option: str, said: str | None) -> list[float] | None:
+    if said is None:
+        return None
+    try:
+        return [float(cell) for cell in said.split(",")]
+    except ValueError:
+        raise ProblemError(f"{option} {said}: must be numbers, as 1,2,5") from None
+
+
+def _whole(option: str, said: str | None) -> list[int] | None:
+    found = _numbers(option, said)
+    if found is None:
+        return None
+    if any(not one.is_integer() for one in found):
+        raise ProblemError(f"{option} {said}: must be whole numbers, as 10,30")
+    return [int(one) for one in found]

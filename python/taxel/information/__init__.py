@@ -1,0 +1,55 @@
+"""How many bits touches hold: estimators, classifiers, and the question of chapter 5 asked of one's own sensor."""
+
+from taxel.information.answers import Answer, Control, Point, answer
+from taxel.information.bits import (
+    confusion_matrix,
+    label_entropy,
+    local_information,
+    panzeri_treves,
+    plug_in,
+    quadratic_extrapolation,
+    relevant_responses,
+)
+from taxel.information.estimate import Estimate, ZeroTest, estimate, zero_test
+from taxel.information.folds import folds
+from taxel.information.gram_lda import GramLDA
+from taxel.information.keeping import Verdict, keeps
+from taxel.information.lda import LDA, fold_predictions
+from taxel.information.neighbours import NearestNeighbours, distances_of
+from taxel.information.nested import Nested, nested_predictions, training_curve
+from taxel.information.spiking import ConeRReadout, TempotronReadout
+from taxel.information.trials import LabelledTrial, read_trials, recordings_as_trials
+
+__all__ = [
+    "LDA",
+    "Answer",
+    "ConeRReadout",
+    "Control",
+    "Estimate",
+    "GramLDA",
+    "LabelledTrial",
+    "NearestNeighbours",
+    "Nested",
+    "Point",
+    "TempotronReadout",
+    "Verdict",
+    "ZeroTest",
+    "answer",
+    "confusion_matrix",
+    "distances_of",
+    "estimate",
+    "fold_predictions",
+    "folds",
+    "keeps",
+    "label_entropy",
+    "local_information",
+    "nested_predictions",
+    "panzeri_treves",
+    "plug_in",
+    "quadratic_extrapolation",
+    "read_trials",
+    "recordings_as_trials",
+    "relevant_responses",
+    "training_curve",
+    "zero_test",
+]

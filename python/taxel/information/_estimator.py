@@ -1,0 +1,64 @@
+"""What the room's classifiers share: scikit-learn's manners, without needing scikit-learn."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._core import ProblemError
+from taxel._parameters import Parameters
+from taxel.information._labels import words
+
+__all__ = ["Classifier", "labelled"]
+
+
+class Classifier(Parameters):
+    """Share scikit-learn's manners: `clone` and `cross_val_score` work. The core does not know its parameters."""
+
+    classes_: NDArray[np.generic]
+    _pairwise: ClassVar[bool] = False
+
+    def __init__(self) -> None:
+        self._check()
+
+    def predict(self, x: Any) -> NDArray[Any]:
+        """Return a label a trial."""
+        raise NotImplementedError
+
+    def score(self, x: Any, y: ArrayLike) -> float:
+        """Return the share of trials that are named rightly."""
+        return float(np.mean(self.predict(x) == words("y", y)))
+
+    def __sklearn_tags__(self) -> Any:
+        # Only scikit-learn asks, so it is there already.
+        tags = sys.modules["sklearn.utils"]
+        return tags.Tags(
+            estimator_type="classifier",
+            target_tags=tags.TargetTags(required=True),
+            classifier_tags=tags.ClassifierTags(),
+            input_tags=tags.InputTags(pairwise=self._pairwise),
+        )
+
+    def _fitted(self, name: str) -> Any:
+        if not hasattr(self, name):
+            raise ProblemError(f"{type(self).__name__} was not fitted yet; call fit first")
+        return getattr(self, name)
+
+
+def labelled(y: ArrayLike, trials: int) -> tuple[NDArray[np.generic], NDArray[np.int64]]:
+    """Return the classes and each trial's number among them.
+
+    Raises
+    ------
+    ProblemError : another number of labels than trials, or one class
+    """
+    named = words("y", y)
+    if len(named) != trials:
+        raise ProblemError(f"y has {len(named)} entries: must be {trials}, one a trial")
+    classes, row = np.unique(named, return_inverse=True)
+    if len(classes) < 2:
+        raise ProblemError(f"y names {len(classes)} class: must be two at least")
+    return classes, row

@@ -1,0 +1,39 @@
+"""Labels and groups, one a trial: texts or whole numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._arguments import shown
+from taxel._core import ProblemError
+
+__all__ = ["belonging", "one_label_a_group", "words"]
+
+
+def words(name: str, values: ArrayLike) -> NDArray[np.generic]:
+    """Return labels as a column of texts or whole numbers."""
+    try:
+        column = np.asarray(values)
+    except (ValueError, TypeError):
+        column = np.empty(0, object)
+    if column.ndim == 1 and column.size == 0:
+        return np.empty(0, np.int64)
+    if column.ndim != 1 or column.dtype.kind not in "biuU":
+        raise ProblemError(f"{name} is {shown(values)}: must be texts or whole numbers, one a trial")
+    return column
+
+
+def belonging(groups: ArrayLike, trials: int) -> NDArray[np.int64]:
+    """Return the number of each trial's group."""
+    named = words("groups", groups)
+    if len(named) != trials:
+        raise ProblemError(f"groups has {len(named)} entries: must be {trials}, one a trial")
+    found: NDArray[np.int64] = np.unique(named, return_inverse=True)[1]
+    return found
+
+
+def one_label_a_group(row: NDArray[np.int64], groups: NDArray[np.int64]) -> bool:
+    """Return whether all trials of a group have the same label."""
+    first = np.unique(groups, return_index=True)[1]
+    return bool((row[first][groups] == row).all())

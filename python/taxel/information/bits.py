@@ -1,0 +1,319 @@
+"""Mutual information of a table of counts, in bits: as counted, and corrected for the small number of trials.
+
+A table holds how often each response was given to each label: labels by rows, responses by columns. Every function
+takes one table or a stack of them, and all trials count alike.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._arguments import numbers, shown, whole
+from taxel._core import ProblemError
+from taxel.information._labels import words
+
+__all__ = [
+    "confusion_matrix",
+    "label_entropy",
+    "local_information",
+    "panzeri_treves",
+    "plug_in",
+    "quadratic_extrapolation",
+    "relevant_responses",
+]
+
+
+def confusion_matrix(
+    labels: ArrayLike, responses: ArrayLike, classes: ArrayLike | None = None
+) -> tuple[NDArray[np.int64], NDArray[np.generic]]:
+    """Count how often each response was given to each label.
+
+    Parameters
+    ----------
+    labels, responses : shape (trials,)
+        Of any kind that can be compared: numbers or texts.
+    classes : shape (classes,), optional
+        The order of rows and columns; all labels and responses, sorted, where it is left out.
+
+    Returns
+    -------
+    counts : int64, shape (classes, classes)
+        Row: the label; column: the response.
+    classes : shape (classes,)
+
+    Raises
+    ------
+    ProblemError : no trials, unequal lengths, or what stands in no class
+
+    Examples
+    --------
+    >>> counts, classes = confusion_matrix(["ball", "edge", "edge"], ["ball", "ball", "edge"])
+    >>> counts.tolist(), classes.tolist()
+    ([[1, 0], [1, 1]], ['ball', 'edge'])
+    """
+    truth, said = words("labels", labels), words("responses", responses)
+    if len(truth) != len(said):
+        raise ProblemError(f"responses has {len(said)} entries: must be {len(truth)}, one a label")
+    if not len(truth):
+        raise ProblemError("labels is []: must hold a trial at least")
+    try:
+        every = np.unique(np.concatenate([truth, said]))
+        order = every if classes is None else words("classes", classes)
+    except TypeError:
+        raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers") from None
+    if len(np.unique(order)) != len(order):
+        raise ProblemError("classes names one twice")
+    missing = np.setdiff1d(every, order)
+    if len(missing):
+        raise ProblemError(f"classes does not name {shown(missing[0].item())}")
+    place = np.argsort(order)
+    row, column = (place[np.searchsorted(order[place], x)] for x in (truth, said))
+    counts = np.zeros((len(order), len(order)), np.int64)
+    np.add.at(counts, (row, column), 1)
+    return counts, order
+
+
+def label_entropy(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
+    """Return the labels' entropy in bits: the most that any response can tell.
+
+    Parameters
+    ----------
+    counts : int, shape (..., labels, responses)
+
+    Returns
+    -------
+    float64, shape (...), bits
+
+    Raises
+    ------
+    ProblemError : counts that make no sense
+
+    Examples
+    --------
+    >>> float(label_entropy([[5, 5], [0, 10]]))
+    1.0
+    """
+    return _entropy(_table(counts).sum(-1))
+
+
+def plug_in(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
+    """Return the mutual information of label and response as counted, in bits: too high where trials are few.
+
+    Parameters
+    ----------
+    counts : int, shape (..., labels, responses)
+
+    Returns
+    -------
+    float64, shape (...), bits
+
+    Raises
+    ------
+    ProblemError : counts that make no sense
+
+    Notes
+    -----
+    Thesis 4.1 and 5.6. Two labels that are always taken for each other keep their information.
+
+    Examples
+    --------
+    >>> float(plug_in([[0, 10], [10, 0]]))
+    1.0
+    """
+    table = _table(counts)
+    flat = table.reshape(*table.shape[:-2], -1)
+    found = _entropy(table.sum(-1)) + _entropy(table.sum(-2)) - _entropy(flat)
+    return np.maximum(found, 0.0)
+
+
+def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
+    """Return for each row how many of its responses can occur, by the Bayesian count of Panzeri and Treves.
+
+    Those that occurred are too few, all columns often too many: the count is that number of possible responses under
+    which, after so many trials, one expects to have seen as many as were seen.
+
+    Parameters
+    ----------
+    counts : int, shape (..., responses)
+
+    Returns
+    -------
+    int64, shape (...)
+        From those that occurred to all columns.
+
+    Raises
+    ------
+    ProblemError : counts that make no sense
+
+    Notes
+    -----
+    Panzeri and Treves (1996), Network 7:87. A response that did not occur has a share gamma of the probability, set so
+    that with Laplace's rule over those that did occur the sum is 1.
+
+    Examples
+    --------
+    >>> relevant_responses([[40, 5, 3, 1, 1, 0, 0, 0], [50, 0, 0, 0, 0, 0, 0, 0]]).tolist()
+    [8, 1]
+    """
+    table = _counts(counts)
+    rows = table.reshape(-1, table.shape[-1])
+    trials, seen = rows.sum(-1), (rows > 0).sum(-1)
+    found, most = seen.copy(), table.shape[-1]
+    share = rows / np.maximum(trials, 1)[:, None]
+    off = np.abs(seen - _once(share, trials[:, None]).sum(-1))
+    rising = np.flatnonzero((seen < most) & (trials > 0))
+    for extra in range(1, most):
+        rising = rising[seen[rising] + extra <= most]
+        if not len(rising):
+            break
+        n, r = trials[rising, None], seen[rising, None]
+        # `extra` responses that never came share gamma between them.
+        gamma = extra * -np.expm1(np.log(n / (n + r)) / n)
+        came = np.where(rows[rising] > 0, (1 - gamma) / (n + r) * (rows[rising] + 1), 0.0)
+        expected = _once(came, n).sum(-1) + extra * _once(gamma / extra, n)[:, 0]
+        now = np.abs(seen[rising] - expected)
+        nearer = now < off[rising]
+        rising = rising[nearer]
+        off[rising], found[rising] = now[nearer], seen[rising] + extra
+    return np.asarray(found.reshape(table.shape[:-1]))
+
+
+def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
+    """Return the mutual information in bits, corrected for the number of trials, within 0 and the labels' entropy.
+
+    Parameters
+    ----------
+    counts : int, shape (..., labels, responses)
+
+    Returns
+    -------
+    float64, shape (...), bits
+
+    Raises
+    ------
+    ProblemError : counts that make no sense
+
+    Notes
+    -----
+    Panzeri and Treves (1996), Network 7:87: what counting adds is, to first order, (sum over labels of (R_s - 1) -
+    (R - 1)) / (2 N ln 2), R_s and R by `relevant_responses`. Where errors spread over all other labels it still reads
+    high below some 7 trials a label and response; see `Estimate.warnings`.
+
+    Examples
+    --------
+    >>> round(float(plug_in([[8, 2], [3, 7]])), 3), round(float(panzeri_treves([[8, 2], [3, 7]])), 3)
+    (0.191, 0.155)
+    """
+    table = _table(counts)
+    trials = table.sum((-1, -2))
+    by_label = table.sum(-1)
+    occupied = np.where(by_label > 0, relevant_responses(table) - 1, 0).sum(-1)
+    bias = (occupied - (relevant_responses(table.sum(-2)) - 1)) / (2 * trials * np.log(2))
+    return np.asarray(np.clip(plug_in(table) - bias, 0.0, label_entropy(table)))
+
+
+def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: int = 0) -> float:
+    """Return the mutual information in bits, extrapolated from half and a quarter of the trials to endlessly many.
+
+    A second opinion beside `panzeri_treves`: that both agree is no proof (they err alike where trials are few).
+
+    Parameters
+    ----------
+    counts : int, shape (labels, responses)
+    repetitions : int, 1 or more
+        How often the trials are dealt out anew.
+    seed : int, 0 or more
+
+    Returns
+    -------
+    float, bits, within 0 and the labels' entropy
+
+    Raises
+    ------
+    ProblemError : counts that make no sense, or of fewer than four trials
+
+    Notes
+    -----
+    Strong et al. (1998), Phys. Rev. Lett. 80:197: the parabola in 1/N through the means at N, N/2 and N/4 trials.
+    Parts are dealt out of the answers, so a classifier that would be worse with fewer trials is not seen.
+
+    Examples
+    --------
+    >>> round(quadratic_extrapolation([[80, 20], [30, 70]]), 2)
+    0.19
+    """
+    table = _table(counts)
+    if table.ndim != 2:
+        raise ProblemError(f"counts has shape {table.shape}: must be (labels, responses)")
+    rounds, random = whole("repetitions", repetitions, 1), np.random.default_rng(whole("seed", seed, 0))
+    trials = int(table.sum())
+    if trials < 4:
+        raise ProblemError(f"counts holds {trials} trials: must be 4 at least, to be dealt out in four parts")
+    cells = np.repeat(np.arange(table.size), table.ravel())
+    means = [float(plug_in(table))]
+    for parts in (2, 4):
+        ends = np.linspace(0, trials, parts + 1).astype(int)
+        found = []
+        for _ in range(rounds):
+            dealt = random.permutation(cells)
+            tables = [np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends)]
+            found.append(plug_in(np.reshape(tables, (parts, *table.shape))))
+        means.append(float(np.mean(found)))
+    # Through (1, whole), (2, half), (4, quarter) in units of 1/N: the value at 0.
+    at_zero = (8 * means[0] - 6 * means[1] + means[2]) / 3
+    return float(np.clip(at_zero, 0.0, label_entropy(table)))
+
+
+def local_information(counts: ArrayLike) -> NDArray[np.float64]:
+    """Return log2 p(response | label) / p(response) of each cell, in bits: its mean over trials is `plug_in`.
+
+    Parameters
+    ----------
+    counts : int, shape (..., labels, responses)
+
+    Returns
+    -------
+    float64, the shape of `counts`; 0 in cells that no trial is in
+
+    Raises
+    ------
+    ProblemError : counts that make no sense
+    """
+    table = _table(counts).astype(np.float64)
+    total = table.sum((-1, -2), keepdims=True)
+    expected = table.sum(-1, keepdims=True) * table.sum(-2, keepdims=True)
+    there = table > 0
+    return np.asarray(np.log2(np.divide(table * total, expected, out=np.ones_like(table), where=there)))
+
+
+def _once(p: NDArray[np.float64], trials: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return how probable it is to occur at least once."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(-np.expm1(trials * np.log1p(-np.clip(p, 0.0, 1.0))))
+
+
+def _entropy(counts: NDArray[np.int64]) -> NDArray[np.float64]:
+    total = counts.sum(-1, keepdims=True)
+    p = counts / np.maximum(total, 1)
+    return np.asarray(-(p * np.log2(np.where(p > 0, p, 1.0))).sum(-1) + 0.0)
+
+
+def _counts(counts: ArrayLike) -> NDArray[np.int64]:
+    table: NDArray[np.int64] = numbers("counts", counts, np.int64)
+    if table.ndim < 1 or 0 in table.shape:
+        raise ProblemError(f"counts has shape {table.shape}: must hold a response at least")
+    if table.min() < 0 or table.max() > 2**40:
+        raise ProblemError(f"counts reaches from {table.min()} to {table.max()}: must lie in 0 to 2^40")
+    return table
+
+
+def _table(counts: ArrayLike) -> NDArray[np.int64]:
+    table = _counts(counts)
+    if table.ndim < 2:
+        raise ProblemError(f"counts has shape {table.shape}: must be (labels, responses)")
+    if (table.sum((-1, -2)) == 0).any():
+        raise ProblemError("counts holds no trial")
+    return table

@@ -1,0 +1,93 @@
+"""Whether a cheaper setting keeps enough of the bits of a dearer one: keeps, open, loses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._arguments import instance, number, shown
+from taxel._core import ProblemError
+from taxel.information._labels import belonging
+from taxel.information.estimate import Estimate
+
+__all__ = ["Verdict", "keeps"]
+
+#: One-sided, as each verdict.
+CONFIDENCE = 0.9
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Hold whether a setting keeps a share of another's bits.
+
+    Attributes
+    ----------
+    says : {"keeps", "open", "loses"}
+    margin : float
+        Its bits less the share of the other's.
+    error : float
+        Of the margin, by trial or group, paired.
+    trials_to_settle : int, optional
+        So many would settle an open one, were the margin as it seems; None where it is none, or settled.
+    """
+
+    says: str
+    margin: float
+    error: float
+    trials_to_settle: int | None = None
+
+    def __str__(self) -> str:
+        if self.says != "open":
+            return self.says
+        return "open" if self.trials_to_settle is None else f"open ({self.trials_to_settle} trials)"
+
+
+def keeps(cheap: Estimate, dear: Estimate, *, share: float = 0.95, groups: ArrayLike | None = None) -> Verdict:
+    """Judge whether a setting keeps a share of another's bits, on the same trials.
+
+    Parameters
+    ----------
+    cheap, dear : Estimate
+        Of the same trials, in the same order.
+    share : float, between 0 and 1
+    groups : shape (trials,), optional
+        Pairs are then means of groups.
+
+    Returns
+    -------
+    Verdict
+
+    Raises
+    ------
+    ProblemError : estimates of other trials, or a share that makes no sense
+
+    Notes
+    -----
+    d = i_cheap - share * i_dear by trial, i being log2 p(response | label) / p(response); bounds at 90 %, one-sided, by
+    Student's t. Near the edge the rule "within one standard error" takes too cheap a setting in 44 to 70 % of
+    simulated cases, this one in at most 13 % (from 40 trials a label on); it leaves many open instead.
+    """
+    from scipy.special import stdtrit  # noqa: PLC0415  loads slowly
+
+    a, b = instance("cheap", cheap, Estimate).local, instance("dear", dear, Estimate).local
+    part = number("share", share)
+    if not 0 < part < 1:
+        raise ProblemError(f"share is {shown(share)}: must lie between 0 and 1")
+    if len(a) != len(b):
+        raise ProblemError(f"estimates of {len(a)} and {len(b)} trials: must be of the same")
+    by_trial = a - part * b
+    units: NDArray[np.float64] = by_trial
+    if groups is not None:
+        belongs = belonging(groups, len(a))
+        units = np.bincount(belongs, by_trial) / np.bincount(belongs)
+    margin = cheap.bits - part * dear.bits
+    error = float(units.std(ddof=1) / np.sqrt(len(units))) if len(units) > 1 else np.inf
+    reach = float(stdtrit(max(1, len(units) - 1), CONFIDENCE))
+    if margin > reach * error:
+        return Verdict("keeps", margin, error)
+    if margin < -reach * error:
+        return Verdict("loses", margin, error)
+    wanted = (reach * error / margin) ** 2 * len(a) if margin else np.inf
+    return Verdict("open", margin, error, int(np.ceil(wanted)) if wanted < 1e6 else None)

@@ -1,0 +1,299 @@
+"""Each trial named by training on the other folds, with smoothing and ridge chosen inside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._arguments import instance, numbers, several, shown, whole
+from taxel._core import ProblemError
+from taxel.information._estimator import labelled
+from taxel.information._labels import belonging
+from taxel.information.folds import folds as dealt
+from taxel.information.gram_lda import discriminant, gram_matrix
+
+__all__ = ["RIDGES", "Nested", "majority", "nested_predictions", "training_curve"]
+
+#: Ridges that are tried, in units of the mean variance.
+RIDGES = (10.0, 1.0, 0.1)
+#: Of what the regression says, and of discriminants.
+_DIGITS = 9
+
+
+@dataclass(frozen=True, eq=False)
+class Nested:
+    """Hold what each trial was named while it was in no training set.
+
+    Attributes
+    ----------
+    responses : shape (trials,)
+    folds : int64, shape (trials,)
+        In which each trial was tested.
+    chosen : dict from fold to (int, float)
+        Which matrix and which ridge (or how many neighbours) that fold's training trials chose among themselves.
+    missing : tuple of (fold, class)
+        Training sets without a class: they can never name it.
+    """
+
+    responses: NDArray[np.generic]
+    folds: NDArray[np.int64]
+    chosen: dict[int, tuple[int, float]]
+    missing: tuple[tuple[int, str], ...] = ()
+
+
+def nested_predictions(
+    grams: Sequence[ArrayLike],
+    features: Sequence[int],
+    y: ArrayLike,
+    *,
+    groups: ArrayLike | None = None,
+    count: int = 10,
+    inner: int = 5,
+    ridges: Sequence[float] = RIDGES,
+    neighbours: Sequence[int] = (),
+    seed: int = 0,
+) -> Nested:
+    """Name each trial by linear discriminants of the other folds, chosen among matrices and ridges inside these.
+
+    Parameters
+    ----------
+    grams : sequence of float64, shape (trials, trials)
+        Inner products of all trials, a matrix for each way to see them (each smoothing); those first are preferred
+        where they do as well.
+    features : sequence of int
+        How many features vary in each.
+    y : shape (trials,)
+    groups : shape (trials,), optional
+        What must not be split, neither between folds nor inside them.
+    count, inner : int, 2 or more
+        Folds, and folds among the training trials.
+    ridges : sequence of float, above 0
+        In units of the mean variance over features and trials (of all trials: it knows no label).
+    neighbours : sequence of int, 1 or more
+        So many nearest neighbours are tried instead of discriminants, where any are named.
+    seed : int, 0 or more
+
+    Returns
+    -------
+    Nested
+
+    Raises
+    ------
+    ProblemError : as `taxel.information.folds`, or matrices that make no sense
+
+    Notes
+    -----
+    The discriminants are those of `GramLDA`. Leaving trials out of a ridge regression is a small solve with their part
+    of its residual matrix, so all folds and inner folds cost one inverse a matrix and ridge.
+    """
+    squares, sizes = _matrices(grams, features)
+    trials = len(squares[0])
+    levels = numbers("ridges", ridges, np.float64)
+    if levels.ndim != 1 or not len(levels) or not ((levels > 0) & np.isfinite(levels)).all():
+        raise ProblemError(f"ridges is {shown(ridges)}: must be numbers above 0")
+    nearest = [whole("neighbours", k, 1) for k in several("neighbours", neighbours)]
+    classes, row = labelled(y, trials)
+    fold = dealt(y, count=count, groups=groups, seed=seed)
+    belongs = None if groups is None else belonging(groups, trials)
+    if nearest:
+        ways: _Ways = _Neighbours(squares, row, len(classes), nearest)
+    else:
+        ways = _Discriminants(squares, sizes, row, len(classes), levels)
+    said, chosen, missing = np.empty(trials, np.int64), {}, []
+    for name in range(int(fold.max()) + 1):
+        test, train = np.flatnonzero(fold == name), np.flatnonzero(fold != name)
+        absent = np.setdiff1d(np.arange(len(classes)), row[train])
+        missing += [(name, str(classes[k])) for k in absent]
+        right = np.zeros(ways.count)
+        if ways.count > 1:
+            for part in _inside(row[train], None if belongs is None else belongs[train], inner, seed):
+                held = train[part]
+                right += (ways.named(test, held)[:, len(test) :] == row[held]).sum(1)
+        best = int(right.argmax())
+        said[test] = ways.named(test, np.empty(0, np.int64), best)[0]
+        chosen[name] = ways.way(best)
+    return Nested(classes[said], fold, chosen, tuple(missing))
+
+
+def training_curve(
+    grams: Sequence[ArrayLike],
+    features: Sequence[int],
+    y: ArrayLike,
+    nested: Nested,
+    sizes: Sequence[int],
+    *,
+    seed: int = 0,
+) -> list[NDArray[np.generic]]:
+    """Name all trials once more, trained on so many trials a label only.
+
+    Parameters
+    ----------
+    grams, features, y
+        As they were given to `nested_predictions`.
+    nested : Nested
+        What that returned, by discriminants: folds, matrix and ridge stay as they were chosen.
+    sizes : sequence of int
+        Training trials a label, drawn within each fold's training set.
+    seed : int, 0 or more
+
+    Returns
+    -------
+    list of arrays, shape (trials,), one a size
+
+    Raises
+    ------
+    ProblemError : matrices and labels that do not fit
+    """
+    squares, features = _matrices(grams, features)
+    classes, row = labelled(y, len(squares[0]))
+    random, found = np.random.default_rng(whole("seed", seed, 0)), []
+    used = sorted(set(instance("nested", nested, Nested).chosen.values()))
+    if len(nested.folds) != len(row) or any(matrix >= len(squares) for matrix, _ in used):
+        raise ProblemError("nested is of other trials or matrices")
+    ways = {
+        (matrix, ridge): _Discriminants([squares[matrix]], [features[matrix]], row, len(classes), np.array([ridge]))
+        for matrix, ridge in used
+    }
+    for size in several("sizes", sizes):
+        said = np.empty(len(row), np.int64)
+        for name, way in nested.chosen.items():
+            test, train = np.flatnonzero(nested.folds == name), np.flatnonzero(nested.folds != name)
+            mixed = random.permutation(train)
+            kept = np.concatenate([mixed[row[mixed] == k][: whole("sizes", size, 1)] for k in range(len(classes))])
+            said[test] = ways[way].named(test, np.setdiff1d(train, kept))[0, : len(test)]
+        found.append(classes[said])
+    return found
+
+
+def _matrices(grams: object, features: object) -> tuple[list[NDArray[np.float64]], list[int]]:
+    squares = [gram_matrix(one) for one in several("grams", grams)]
+    if not squares:
+        raise ProblemError("grams is []: must hold a matrix at least")
+    if any(len(one) != len(squares[0]) for one in squares):
+        raise ProblemError(f"grams are of {[len(one) for one in squares]} trials: must all be of the same")
+    sizes = [whole("features", one, 1) for one in several("features", features)]
+    if len(sizes) != len(squares):
+        raise ProblemError(f"features has {len(sizes)} entries: must be {len(squares)}, one a matrix")
+    return squares, sizes
+
+
+def _inside(
+    row: NDArray[np.int64], belongs: NDArray[np.int64] | None, count: int, seed: int
+) -> list[NDArray[np.int64]]:
+    """Return the inner test sets; none where a label cannot be dealt out, so that the first way is taken."""
+    try:
+        fold = dealt(row, count=min(count, len(row)), groups=belongs, seed=seed + 1)
+    except ProblemError:
+        return []
+    return [np.flatnonzero(fold == k) for k in range(int(fold.max()) + 1)]
+
+
+class _Ways:
+    """Name trials that are left out, in every way that is to be chosen among."""
+
+    count: int
+
+    def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
+        """Return by way what `test` and `held` are named when both are left out; shape (ways, trials)."""
+        raise NotImplementedError
+
+    def way(self, number: int) -> tuple[int, float]:
+        """Return the matrix and the ridge or number of neighbours of a way."""
+        raise NotImplementedError
+
+
+class _Discriminants(_Ways):
+    def __init__(
+        self,
+        squares: list[NDArray[np.float64]],
+        features: list[int],
+        row: NDArray[np.int64],
+        classes: int,
+        ridges: NDArray[np.float64],
+    ) -> None:
+        from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
+
+        trials = len(row)
+        self.which = np.zeros((trials, classes))
+        self.which[np.arange(trials), row] = 1.0
+        self.ridges = ridges
+        self.residual = []
+        for square, size in zip(squares, features, strict=True):
+            mean = square.mean(0)
+            centred = square - mean - mean[:, None] + mean.mean()
+            # Where all trials are alike only rounding is left, and must not be taken for what varies.
+            unit = max(float(np.trace(centred)) / size, 1e-9 * float(np.trace(square)) / trials, 1e-300)
+            for ridge in ridges:
+                level = ridge * unit
+                factor, fault = lapack.dpotrf(centred / level + np.eye(trials), lower=1, clean=1)
+                if fault:
+                    raise ProblemError(
+                        "grams: a matrix has a direction of negative length, so it is of no inner product"
+                    )
+                inverse = lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
+                # The regression with an intercept leaves this of the classes; the small solves undo leaving out.
+                self.residual.append(inverse + np.tril(inverse, -1).T - 1 / trials)
+        self.left = [one @ self.which for one in self.residual]
+        self.sums = [self.which.T @ one for one in self.left]
+        self.count = len(self.residual)
+
+    def way(self, number: int) -> tuple[int, float]:
+        return number // len(self.ridges), float(self.ridges[number % len(self.ridges)])
+
+    def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
+        out = np.concatenate([test, held])
+        ways = range(self.count) if only is None else [only]
+        mine = np.ix_(out, out)
+        left = np.stack([self.left[k][out] for k in ways])
+        off = np.linalg.solve(np.stack([self.residual[k][mine] for k in ways]), left)
+        counts = self.which.sum(0) - self.which[out].sum(0)
+        share = counts / counts.sum()
+        # What the regression on the others says of them, summed by class, less the classes' shares.
+        sums = np.diag(counts) - np.stack([self.sums[k] for k in ways]) + np.swapaxes(left, 1, 2) @ off
+        turn, offset = discriminant(sums - counts[:, None] * share, np.broadcast_to(counts, (len(off), len(counts))))
+        # Rounding knows the trial's own label, and would name trials in which nothing varies: ties are to be ties.
+        told = np.round(self.which[out] - off - share, _DIGITS)
+        with np.errstate(divide="ignore"):
+            scores = told @ turn + (offset + np.log(share))[:, None, :]
+        return np.asarray(np.round(scores, _DIGITS).argmax(-1))
+
+
+class _Neighbours(_Ways):
+    def __init__(
+        self, squares: list[NDArray[np.float64]], row: NDArray[np.int64], classes: int, nearest: list[int]
+    ) -> None:
+        self.row, self.classes, self.nearest = row, classes, nearest
+        self.order = []
+        for square in squares:
+            length = np.diag(square)
+            self.order.append(np.argsort(length + length[:, None] - 2 * square, axis=1, kind="stable"))
+        self.count = len(squares) * len(nearest)
+
+    def way(self, number: int) -> tuple[int, float]:
+        return number // len(self.nearest), float(self.nearest[number % len(self.nearest)])
+
+    def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
+        out = np.concatenate([test, held])
+        kept = np.ones(len(self.row), bool)
+        kept[out] = False
+        ways = range(self.count) if only is None else [only]
+        found = np.empty((len(ways), len(out)), np.int64)
+        for k, number in enumerate(ways):
+            order = self.order[number // len(self.nearest)][out]
+            near = order[kept[order]].reshape(len(out), -1)[:, : self.nearest[number % len(self.nearest)]]
+            found[k] = majority(self.row[near], self.classes)
+        return found
+
+
+def majority(near: NDArray[np.int64], classes: int) -> NDArray[np.int64]:
+    """Return the most frequent class of each row; of equals that whose members come first."""
+    votes = np.zeros((len(near), classes))
+    rows = np.repeat(np.arange(len(near)), near.shape[1])
+    np.add.at(votes, (rows, near.ravel()), 1.0)
+    # A vote more weighs more than all places together.
+    place = np.tile(np.linspace(0, 1, near.shape[1]) / (near.shape[1] + 1), len(near))
+    np.add.at(votes, (rows, near.ravel()), -place / near.shape[1])
+    return np.asarray(votes.argmax(1))

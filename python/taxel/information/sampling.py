@@ -1,0 +1,351 @@
+"""What a sensor that samples more slowly would have seen: held values at its own times, and the events among them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._arguments import instance, several
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.encode import FA1, ChangeEvents, Encoder
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.information.trials import LabelledTrial
+
+__all__ = ["HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "pictures_of", "spikes_of"]
+
+#: Events between two kept states of the array.
+_STRIDE = 4096
+#: No touch's beginning is looked for more finely on a grid, us.
+_STEP_US = 100
+
+
+class HeldValues:
+    """Say what every taxel holds at any time: the last picture, or the last intensity that came.
+
+    Events without intensities count as steps of one, up or down, from their beginning on.
+
+    Parameters
+    ----------
+    source : Events or Frames
+    """
+
+    def __init__(self, source: Events | Frames) -> None:
+        self.source, self.array = source, source.array
+        exists = np.ones(self.array.shape, bool) if self.array.exists is None else self.array.exists
+        self.taxels = np.flatnonzero(exists)
+        if isinstance(source, Frames):
+            self._values = source.values.reshape(len(source), -1)
+            return
+        place = np.full(exists.size, -1)
+        place[self.taxels] = np.arange(len(self.taxels))
+        there = np.arange(len(source)) if source.present is None else np.flatnonzero(source.present)
+        order = there[np.argsort(source.t[there], kind="stable")]
+        self._t = source.t[order]
+        self._taxel = place[self.array.index(source.x[order], source.y[order])]
+        if source.intensity is not None:
+            self._level = source.intensity[order].astype(np.float32)
+        else:
+            self._level = _steps(self._taxel, source.p[order])
+        state, self._states = np.zeros(len(self.taxels), np.float32), []
+        for first in range(0, len(order), _STRIDE):
+            self._states.append(state.copy())
+            part = slice(first, first + _STRIDE)
+            state[self._taxel[part]] = self._level[part]
+
+    @property
+    def has_values(self) -> bool:
+        """Whether there are values, and not only steps up and down."""
+        return isinstance(self.source, Frames) or self.source.intensity is not None
+
+    def at(self, times: NDArray[np.int64]) -> NDArray[np.float32]:
+        """Return the held values, shape (times, existing taxels); before the first picture, the first picture.
+
+        Parameters
+        ----------
+        times : int64, us, ascending
+        """
+        if isinstance(self.source, Frames):
+            rows = np.searchsorted(self.source.t, times, side="right") - 1
+            return np.asarray(self._values[np.maximum(rows, 0)][:, self.taxels])
+        ends = np.searchsorted(self._t, times, side="right")
+        first = int(ends[0]) if len(ends) else 0
+        state = self._state(first)
+        found = np.empty((len(times), len(self.taxels)), np.float32)
+        for k, end in enumerate(ends):
+            part = slice(first, int(end))
+            state[self._taxel[part]] = self._level[part]
+            found[k], first = state, int(end)
+        return found
+
+    def _state(self, events: int) -> NDArray[np.float32]:
+        """Return what is held after so many events."""
+        block = min(events // _STRIDE, len(self._states) - 1)
+        if block < 0:
+            return np.zeros(len(self.taxels), np.float32)
+        state = self._states[block].copy()
+        part = slice(block * _STRIDE, events)
+        state[self._taxel[part]] = self._level[part]
+        return state
+
+
+@dataclass(frozen=True, eq=False)
+class Spikes:
+    """Hold the events of all trials as one period and one draw of its phase sees them.
+
+    Attributes
+    ----------
+    period_us : int
+    taxels : int
+        Trains.
+    trial, taxel, bin : int64, shape (spikes,)
+        In the order of bins; bin 0 holds each trial's first event.
+    value : float32, shape (spikes,)
+        +1 or -1, or with more bits the step.
+    first_us : float64, shape (trials,), us
+        When the first event comes after the true contact; infinite in a silent trial.
+    length_us : float64, shape (trials,), us
+        From the true contact to the trial's end.
+    """
+
+    period_us: int
+    taxels: int
+    trial: NDArray[np.int64]
+    taxel: NDArray[np.int64]
+    bin: NDArray[np.int64]
+    value: NDArray[np.float32]
+    first_us: NDArray[np.float64]
+    length_us: NDArray[np.float64]
+
+    @property
+    def trials(self) -> int:
+        """How many trials there are, silent ones among them."""
+        return len(self.first_us)
+
+    def bins_to(self, window_us: float) -> NDArray[np.int64]:
+        """Return how many bins of each trial lie within so much time after the contact and before the trial's end."""
+        stop = np.minimum(window_us, self.length_us)
+        with np.errstate(invalid="ignore"):
+            bins = np.ceil((stop - self.first_us) / self.period_us - 1e-9)
+        return np.where(np.isfinite(self.first_us), np.maximum(np.nan_to_num(bins, neginf=0.0), 0.0), 0.0).astype(
+            np.int64
+        )
+
+    def counts(self, window_us: float) -> NDArray[np.int64]:
+        """Return each trial's events within a window after the contact."""
+        kept = self.bin < self.bins_to(window_us)[self.trial]
+        return np.bincount(self.trial[kept], minlength=self.trials)
+
+    def of(self, taxels: NDArray[np.int64]) -> Spikes:
+        """Return the events of some taxels alone, aligned on the first of theirs."""
+        place = np.full(self.taxels, -1)
+        place[taxels] = np.arange(len(taxels))
+        kept = np.flatnonzero(place[self.taxel] >= 0)
+        trial, bins = self.trial[kept], self.bin[kept]
+        begin = np.full(self.trials, np.iinfo(np.int64).max)
+        np.minimum.at(begin, trial, bins)
+        silent = begin == np.iinfo(np.int64).max
+        first = np.where(silent, np.inf, self.first_us + np.where(silent, 0, begin) * float(self.period_us))
+        return Spikes(
+            self.period_us,
+            len(taxels),
+            trial,
+            place[self.taxel[kept]],
+            bins - begin[trial],
+            self.value[kept],
+            first,
+            self.length_us,
+        )
+
+
+def finest_us(sources: Sequence[Events | Frames]) -> int:
+    """Return the finest period that recordings can show, us: between pictures, or what all stamps are multiples of."""
+    pictures = [int(np.median(np.diff(one.t))) for one in sources if isinstance(one, Frames) and len(one) > 1]
+    stamps = [int(np.gcd.reduce(np.append(one.t, 0))) for one in sources if not isinstance(one, Frames)]
+    return max(1, int(np.gcd.reduce([0, *stamps])), *pictures)
+
+
+def contacts(
+    trials: Sequence[LabelledTrial], held: Sequence[HeldValues], encoder: Encoder, period_us: int, window_us: float
+) -> NDArray[np.float64]:
+    """Return when each touch begins, us: the first event at or after its start at the finest period; NaN without one.
+
+    It is looked for until the trial's end, or for the length of a window; in events at their own times.
+    """
+    found = np.full(len(trials), np.nan)
+    for k, (trial, values) in enumerate(zip(trials, held, strict=True)):
+        stop = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
+        t, step = trial.source.t, max(period_us, _STEP_US)
+        if isinstance(trial.source, Events) and isinstance(encoder, ChangeEvents):
+            grid = np.unique(np.append(t[(t >= trial.start_us) & (t < stop)], trial.start_us - 1))
+        else:
+            grid = np.arange(trial.start_us - step, int(stop), step)
+        bins, _, _ = _encoded(encoder, values, grid, step)
+        if len(bins):
+            found[k] = grid[bins.min()]
+    return found
+
+
+def spikes_of(
+    trials: Sequence[LabelledTrial],
+    held: Sequence[HeldValues],
+    encoder: Encoder,
+    *,
+    period_us: int,
+    contact_us: NDArray[np.float64],
+    window_us: float,
+    random: np.random.Generator,
+    pool: int = 1,
+) -> Spikes:
+    """Sample all trials at one period, each at a phase that is drawn, and encode what is seen.
+
+    Parameters
+    ----------
+    trials : sequence of LabelledTrial
+    held : sequence of HeldValues
+        Of each trial's recording.
+    encoder : Encoder
+        `ChangeEvents` or `FA1`; its `period_ms` is set.
+    period_us : int, us
+    contact_us : float64, shape (trials,), us
+        The true contact; NaN where there is none, and the trial is silent.
+    window_us : float, us
+        How far after it to look.
+    random : numpy.random.Generator
+        Of the phases.
+    pool : int
+        Taxels of so many by so many are taken for one, which holds their mean.
+
+    Returns
+    -------
+    Spikes
+    """
+    several("trials", trials)
+    parts: list[tuple[Any, ...]] = []
+    first = np.full(len(trials), np.inf)
+    length = np.zeros(len(trials))
+    phases = random.random(len(trials))
+    taxels = 1
+    for k, (trial, values) in enumerate(zip(trials, held, strict=True)):
+        pooled = _pooling(values, pool)
+        taxels = len(values.taxels) if pooled is None else pooled[1]
+        if np.isnan(contact_us[k]):
+            continue
+        length[k] = np.inf if trial.stop_us is None else trial.stop_us - contact_us[k]
+        stop = contact_us[k] + min(length[k], window_us)
+        # The first sample lies before the start; the next is the first that may see the touch.
+        begin = trial.start_us - period_us + int(phases[k] * period_us)
+        grid = np.arange(begin, int(np.ceil(stop)), period_us)
+        if len(grid) < 2:
+            continue
+        bins, taxel, value = _encoded(encoder, values, grid, period_us, pooled)
+        late = grid[bins] >= contact_us[k]
+        bins, taxel, value = bins[late], taxel[late], value[late]
+        if not len(bins):
+            continue
+        zero = int(bins.min())
+        first[k] = grid[zero] - contact_us[k]
+        parts.append((np.full(len(bins), k), taxel, bins - zero, value))
+    columns = [np.concatenate(column) for column in zip(*parts, strict=True)] if parts else [np.empty(0, np.int64)] * 4
+    order = np.argsort(columns[2], kind="stable")
+    trial_, taxel_, bin_, value_ = (column[order] for column in columns)
+    return Spikes(period_us, taxels, trial_, taxel_, bin_, value_.astype(np.float32), first, length)
+
+
+def pictures_of(
+    trials: Sequence[LabelledTrial],
+    held: Sequence[HeldValues],
+    spikes: Spikes,
+    contact_us: NDArray[np.float64],
+    bins: int,
+) -> NDArray[np.float32]:
+    """Return what a sensor of pictures would have seen at the same times: the change since before the touch.
+
+    Parameters
+    ----------
+    trials, held, contact_us
+        As given to `spikes_of`.
+    spikes : Spikes
+    bins : int
+
+    Returns
+    -------
+    float32, shape (bins, trials, taxels that ever send an event)
+    """
+    active = np.unique(spikes.taxel)
+    found = np.zeros((bins, len(trials), len(active)), np.float32)
+    for k, values in enumerate(held):
+        if np.isfinite(spikes.first_us[k]):
+            zero = int(contact_us[k] + spikes.first_us[k])
+            seen = values.at(zero + spikes.period_us * np.arange(-1, bins))[:, active]
+            found[:, k] = seen[1:] - seen[0]
+    return found
+
+
+def _encoded(
+    encoder: Encoder,
+    held: HeldValues,
+    grid: NDArray[np.int64],
+    period_us: int,
+    pooled: tuple[NDArray[np.int64], int, NDArray[np.float64]] | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
+    """Return bin, taxel and value of what an encoder says of the values held on a grid of times."""
+    values = held.at(grid)
+    if pooled is not None:
+        where, count, share = pooled
+        sums = np.zeros((len(values), count), np.float32)
+        np.add.at(sums.T, where, values.T)
+        values = (sums * share).astype(np.float32)
+    frames = Frames(values[:, None, :], grid, unit="held", array=Array(1, values.shape[1]))
+    trains = _at_period(encoder, period_us).encode(frames)
+    taxel = np.repeat(np.arange(len(trains)), trains.counts)
+    bins = np.searchsorted(grid, np.rint(trains.times * 1000.0).astype(np.int64))
+    value = np.ones(len(bins), np.float32) if trains.values is None else trains.values
+    return bins, taxel, value
+
+
+def _at_period(encoder: Encoder, period_us: int) -> Encoder:
+    if isinstance(encoder, FA1):
+        return FA1(**{**encoder.get_params(), "period_ms": period_us / 1000.0})
+    return instance("encoder", encoder, ChangeEvents)
+
+
+def _pooling(held: HeldValues, pool: int) -> tuple[NDArray[np.int64], int, NDArray[np.float64]] | None:
+    """Return to which pooled taxel each belongs, how many there are, and one over how many lie in each."""
+    if pool == 1:
+        return None
+    row, column = np.divmod(held.taxels, held.array.columns)
+    cells, where, size = np.unique(
+        (row // pool) * held.array.columns + column // pool, return_inverse=True, return_counts=True
+    )
+    return where, len(cells), 1.0 / size
+
+
+def _steps(taxel: NDArray[np.int64], rises: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Return each taxel's rises less falls up to each event."""
+    order = np.argsort(taxel, kind="stable")
+    step = np.where(rises[order], 1.0, -1.0)
+    total = np.cumsum(step)
+    own = taxel[order]
+    begin = np.flatnonzero(np.diff(own, prepend=-1))
+    before = np.repeat(total[begin] - step[begin], np.diff(np.append(begin, len(own))))
+    found = np.empty(len(taxel), np.float32)
+    found[order] = total - before
+    return found
+
+
+def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:
+    """Return the periods, ascending; refuse one that is finer than the recording."""
+    found = sorted(set(periods_us))
+    if not found:
+        raise ProblemError("periods is []: must name one at least")
+    if found[0] < finest:
+        raise ProblemError(
+            f"period {found[0] / 1000:g} ms is finer than the recordings, which show {finest / 1000:g} ms at best"
+        )
+    return found

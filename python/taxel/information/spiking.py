@@ -1,0 +1,242 @@
+"""Spiking neurons as classifiers: one a class, the one that is driven highest names the trial."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._arguments import instance, number, several, shown, text
+from taxel._core import ProblemError
+from taxel.information._estimator import Classifier, labelled
+from taxel.information.sampling import Spikes
+from taxel.learn import ConeR, Tempotron
+from taxel.spikes import SpikeTrains
+
+__all__ = ["ConeRReadout", "TempotronReadout", "patterns_of", "readout_responses"]
+
+
+class ConeRReadout(Classifier):
+    """Classify by a neuron a class, which `ConeR` teaches to fire at the window's end on its own class and never else.
+
+    Parameters
+    ----------
+    tau : float, ms, above 0
+        Of the neurons.
+    bound : float, mV, above 0
+        The largest weight, either way.
+    max_seconds : float, above 0
+        Of training a neuron; after it the best so far is kept.
+
+    Attributes
+    ----------
+    classes_ : shape (classes,)
+    learners_ : list of ConeR
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    Thesis 6.3.3. The class whose neuron's potential comes highest at the window's end is named.
+    """
+
+    learners_: list[ConeR]
+
+    def __init__(self, *, tau: float = 15.0, bound: float = 0.3, max_seconds: float = 10.0) -> None:
+        self.tau = tau
+        self.bound = bound
+        self.max_seconds = max_seconds
+        super().__init__()
+
+    def _check(self) -> None:
+        for name in ("tau", "bound", "max_seconds"):
+            if not 0 < number(name, getattr(self, name)) < np.inf:
+                raise ProblemError(f"{name} is {shown(getattr(self, name))}: must be above 0, and finite")
+
+    def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
+        """Train a neuron a class.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains and window in each.
+        y : shape (patterns,)
+
+        Raises
+        ------
+        ProblemError : patterns or labels that make no sense
+        """
+        trains = _listed(patterns)
+        self.classes_, row = labelled(y, len(trains))
+        self.learners_ = []
+        for k in range(len(self.classes_)):
+            targets = [[one.stop] if mine == k else [] for one, mine in zip(trains, row, strict=True)]
+            learner = ConeR(
+                tau=self.tau,
+                lb=-self.bound,
+                ub=self.bound,
+                max_seconds=self.max_seconds,
+                after_spike="keep",
+                step_ms=1.0,
+            )
+            self.learners_.append(learner.fit(trains, targets))
+        return self
+
+    def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
+        """Return each class' potential at the window's end, mV, shape (patterns, classes).
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that make no sense
+        """
+        learners = self._fitted("learners_")
+        trains = _listed(patterns)
+        return np.array(
+            [[one.neuron_.potential(one.weights_, s, [s.stop])[0] for one in learners] for s in trains]
+        ).reshape(len(trains), len(learners))
+
+    def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
+        """Return a label a pattern."""
+        return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
+
+
+class TempotronReadout(Classifier):
+    """Classify by a `Tempotron` a class, taught to fire on its own class and on no other.
+
+    Parameters
+    ----------
+    tau : float, ms, above 0
+    epochs : int, 1 or more
+    max_seconds : float, above 0
+        Of training a neuron.
+    seed : int, 0 or more
+
+    Attributes
+    ----------
+    classes_ : shape (classes,)
+    learners_ : list of Tempotron
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    Gütig and Sompolinsky (2006), Nature Neuroscience 9:420. The class of the highest peak is named.
+    """
+
+    learners_: list[Tempotron]
+
+    def __init__(self, *, tau: float = 15.0, epochs: int = 100, max_seconds: float = 10.0, seed: int = 0) -> None:
+        self.tau = tau
+        self.epochs = epochs
+        self.max_seconds = max_seconds
+        self.seed = seed
+        super().__init__()
+
+    def _check(self) -> None:
+        self._learner()
+
+    def _learner(self) -> Tempotron:
+        return Tempotron(tau=self.tau, epochs=self.epochs, max_seconds=self.max_seconds, seed=self.seed)
+
+    def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
+        """Train a neuron a class.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+        y : shape (patterns,)
+
+        Raises
+        ------
+        ProblemError : patterns or labels that make no sense
+        """
+        trains = _listed(patterns)
+        self.classes_, row = labelled(y, len(trains))
+        self.learners_ = []
+        for k in range(len(self.classes_)):
+            self.learners_.append(self._learner().fit(trains, row == k))
+        return self
+
+    def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
+        """Return each class' highest potential, shape (patterns, classes).
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that make no sense
+        """
+        learners = self._fitted("learners_")
+        trains = _listed(patterns)
+        return np.array([[one.peak(one.weights_, s)[0] for one in learners] for s in trains]).reshape(
+            len(trains), len(learners)
+        )
+
+    def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
+        """Return a label a pattern."""
+        return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
+
+
+def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
+    """Return each trial's events as spike trains, ON and OFF of each taxel that ever sends one.
+
+    Parameters
+    ----------
+    spikes : Spikes
+    window_us : float, us
+
+    Returns
+    -------
+    list of SpikeTrains
+        Time 0 is the trial's first event.
+    """
+    kept = np.flatnonzero(spikes.bin < spikes.bins_to(window_us)[spikes.trial])
+    sign = (spikes.value[kept] < 0).astype(np.int64)
+    active, train = np.unique(2 * spikes.taxel[kept] + sign, return_inverse=True)
+    trial, times = spikes.trial[kept], spikes.bin[kept] * (spikes.period_us / 1000.0)
+    order = np.lexsort((times, train, trial))
+    key = trial[order] * len(active) + train[order]
+    offsets = np.searchsorted(key, np.arange(spikes.trials * len(active) + 1))
+    times, found = times[order], []
+    for k in range(spikes.trials):
+        own = offsets[k * len(active) : (k + 1) * len(active) + 1]
+        found.append(SpikeTrains(times[own[0] : own[-1]], own - own[0], 0.0, window_us / 1000.0))
+    return found
+
+
+def readout_responses(
+    name: str, spikes: Spikes, window_us: float, labels: NDArray[np.generic], folds: NDArray[np.int64]
+) -> NDArray[np.generic]:
+    """Name each trial by neurons that were trained on the other folds.
+
+    Parameters
+    ----------
+    name : {"cone_r", "tempotron"}
+    spikes : Spikes
+    window_us : float, us
+    labels : shape (trials,)
+    folds : int64, shape (trials,)
+
+    Returns
+    -------
+    shape (trials,)
+    """
+    text("name", name, ("cone_r", "tempotron"))
+    patterns = patterns_of(spikes, window_us)
+    found = np.empty_like(labels)
+    # Far shorter, and at the window's end nothing would be left of its beginning.
+    tau = max(1.0, window_us / 1000.0 / 3)
+    for fold in np.unique(folds):
+        train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
+        model: Any = ConeRReadout(tau=tau) if name == "cone_r" else TempotronReadout(tau=tau)
+        model.fit([patterns[k] for k in train], labels[train])
+        found[test] = model.predict([patterns[k] for k in test])
+    return found
+
+
+def _listed(patterns: object) -> list[SpikeTrains]:
+    return [instance(f"pattern {k}", one, SpikeTrains) for k, one in enumerate(several("patterns", patterns))]

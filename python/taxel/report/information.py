@@ -1,0 +1,167 @@
+"""The page of ``taxel information``: bits by period, time, taxels, rate, training; who is taken for whom."""
+
+from __future__ import annotations
+
+import os
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import jinja2
+import matplotlib as mpl
+import numpy as np
+from markupsafe import Markup
+
+from taxel._arguments import instance
+from taxel._files import write_whole
+from taxel.demo.pictures import STYLE, svg
+from taxel.information import Answer, Point
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["write_information"]
+
+#: Of verdicts.
+_COLOURS = {"keeps": "#2f6690", "open": "#e8b04b", "loses": "#b5423c", "full": "#2b2b2b"}
+#: Labels whose names still fit a confusion matrix.
+_NAMED = 40
+
+
+def write_information(path: str | os.PathLike[str], answer: Answer, *, overwrite: bool = False) -> Path:
+    """Write an answer as a page with pictures.
+
+    Parameters
+    ----------
+    path : path
+        An .html.
+    answer : Answer
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FileExistsError : the file is there already and `overwrite` is false
+    OSError : the folder is missing, the disk is full ...
+    """
+    found = instance("answer", answer, Answer)
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    template = environment.from_string(
+        files("taxel.report").joinpath("information.html.j2").read_text(encoding="utf-8")
+    )
+    with mpl.rc_context(STYLE):
+        drawn = {"curves": Markup(svg(_curves(found))), "confusion": Markup(svg(_confusion(found)))}
+    text = template.render(
+        answer=found, pictures=drawn, colours=_COLOURS, early=_early(found), labels=sum(found.labels.values())
+    )
+    return write_whole(path, lambda file: file.write(text.encode()), overwrite=overwrite)
+
+
+def _early(found: Answer) -> list[tuple[float, list[Point]]]:
+    windows = sorted({p.window_ms for p in found.points})
+    return [(w, [p for p in found.points if p.window_ms == w]) for w in windows]
+
+
+def _curves(found: Answer) -> Figure:
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(10.5, 9.2), layout="constrained")
+    axes = figure.subplots(3, 2)
+    most = found.full.found.most
+    _by_period(axes[0, 0], found)
+    for period in sorted({p.period_ms for p in found.points}):
+        line = [p for p in found.points if p.period_ms == period]
+        axes[0, 1].plot(
+            [p.window_ms for p in line], [p.found.bits for p in line], marker="o", ms=3, label=f"{period:g} ms"
+        )
+    axes[0, 1].set(xscale="log", xlabel="time since contact, ms", title="when it is known (lines: periods)")
+    axes[0, 1].legend(frameon=False)
+    _by_taxels(axes[1, 0], found)
+    for point in (*found.by_period, *found.taxels):
+        says = "full" if point.verdict is None else point.verdict.says
+        axes[1, 1].plot(point.kbps, point.found.bits, "o" if point.kind == "all" else "s", color=_COLOURS[says], ms=5)
+    for says, colour in _COLOURS.items():
+        axes[1, 1].plot([], [], "o", color=colour, label=says)
+    axes[1, 1].set(xscale="log", xlabel="kbit/s while touched", title="cost (squares: fewer or larger taxels)")
+    axes[1, 1].axhline(0.95 * found.full.found.bits, color="0.7", lw=1, ls=":")
+    axes[1, 1].legend(frameon=False)
+    n, bits = zip(*found.training, strict=True)
+    axes[2, 0].plot(n, bits, marker="o", ms=3, color=_COLOURS["keeps"])
+    axes[2, 0].set(xlabel="training trials a label", title="how much training there was")
+    names = [c.name for c in found.controls if c.found is not None] + ["full"]
+    values = [c.found for c in found.controls if c.found is not None] + [found.full.found]
+    axes[2, 1].barh(names, [v.bits for v in values], color=[*["0.7"] * (len(names) - 1), _COLOURS["keeps"]])
+    for k, value in enumerate(values):
+        axes[2, 1].plot(value.interval, [k, k], color="0.2", lw=1)
+    axes[2, 1].axvline(found.zero.level, color=_COLOURS["loses"], lw=1, ls=":")
+    axes[2, 1].set(xlabel="bits", title="beside it: what else tells (dotted: labels shuffled)")
+    axes[2, 1].set_xlim(0, most)
+    for ax in axes.ravel()[:5]:
+        ax.set_ylabel("bits")
+        ax.set_ylim(0, most * 1.03)
+        ax.axhline(most, color="0.8", lw=1)
+    return figure
+
+
+def _by_period(ax: Axes, found: Answer) -> None:
+    line = found.by_period
+    bits = np.array([p.found.bits for p in line])
+    ends = np.array([p.found.interval for p in line])
+    x = [p.period_ms for p in line]
+    ax.errorbar(
+        x,
+        bits,
+        [bits - ends[:, 0], ends[:, 1] - bits],
+        marker="o",
+        ms=4,
+        capsize=2,
+        color=_COLOURS["keeps"],
+        label="events",
+    )
+    if found.frames:
+        ax.plot(list(found.frames), [e.bits for e in found.frames.values()], "--", color="0.5", label="pictures")
+    for name, points in found.parameters.items():
+        normal = [p.found.bits for p in points]
+        ax.plot(
+            [p.period_ms for p in points], normal, marker=".", lw=1, label=f"{name} (of {points[0].found.most:.2f})"
+        )
+    ax.set(
+        xscale="log", xlabel="sampling period, ms", title=f"how fast one has to look (to {found.full.window_ms:g} ms)"
+    )
+    ax.legend(frameon=False)
+
+
+def _by_taxels(ax: Axes, found: Answer) -> None:
+    for kind, style in (("random", "o-"), ("pooled", "s--")):
+        line = sorted((p for p in found.taxels if p.kind == kind), key=lambda p: p.taxels)
+        if line:
+            ax.plot([p.taxels for p in line], [p.found.bits for p in line], style, ms=4, label=kind)
+    at = found.taxels[0].period_ms if found.taxels else found.full.period_ms
+    every = next(p for p in found.by_period if p.period_ms == at)
+    ax.plot(every.taxels, every.found.bits, "k*", ms=8, label="all")
+    ax.set(xscale="log", xlabel="taxels", title=f"how many taxels ({at:g} ms)")
+    ax.legend(frameon=False)
+
+
+def _confusion(found: Answer) -> Figure:
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    counts = found.full.found.counts.mean(0)
+    share: Any = counts / np.maximum(counts.sum(1, keepdims=True), 1)
+    figure = Figure(figsize=(6.4, 5.4), layout="constrained")
+    ax = figure.subplots()
+    picture = ax.imshow(share, cmap="Blues", vmin=0, vmax=1)
+    names = [str(name) for name in found.full.found.classes]
+    if len(names) <= _NAMED:
+        ax.set_xticks(range(len(names)), names, rotation=45, ha="right")
+        ax.set_yticks(range(len(names)), names)
+    ax.set(xlabel="taken for", ylabel="label", title=f"{found.full.period_ms:g} ms, to {found.full.window_ms:g} ms")
+    figure.colorbar(picture, ax=ax, label="share of the label's trials")
+    return figure

@@ -1,0 +1,306 @@
+"""Sampling and the whole question, on touches whose information is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel.encode import FA1, ChangeEvents
+from taxel.information import LabelledTrial, answer
+from taxel.information.rasters import event_grams, features, frame_grams
+from taxel.information.sampling import HeldValues, Spikes, contacts, finest_us, pictures_of, spikes_of
+from taxel.information.spiking import ConeRReadout, TempotronReadout, patterns_of
+from taxel.information.wire_rate import kilobits_per_second
+
+from .touches import ordered
+
+ENCODER = ChangeEvents(noise_floor=3.0)
+
+
+def trials_of(count, **what):
+    events, rows = ordered(count, **what)
+    return [LabelledTrial(events, label, start) for start, label in rows]
+
+
+def sampled(trials, period_us, seed=0, **what):
+    held = [HeldValues(trials[0].source)] * len(trials)
+    at = contacts(trials, held, ENCODER, 1000, 60_000.0)
+    random = np.random.default_rng(seed)
+    return (
+        held,
+        at,
+        spikes_of(trials, held, ENCODER, period_us=period_us, contact_us=at, window_us=60_000.0, random=random, **what),
+    )
+
+
+@settings(deadline=None, max_examples=25)
+@given(st.lists(st.tuples(st.integers(0, 500), st.integers(0, 3), st.integers(0, 200)), max_size=60), st.data())
+def test_held_values_are_those_of_the_pictures_that_events_make(rows, data):
+    rows.sort()
+    t, x, level = (np.array(column, int) for column in (zip(*rows, strict=True) if rows else ([], [], [])))
+    events = taxel.Events(t, x, np.zeros(len(t), int), np.ones(len(t), bool), array=taxel.Array(1, 4), intensity=level)
+    times = np.sort(np.array(data.draw(st.lists(st.integers(-10, 600), min_size=1, max_size=20)), np.int64))
+    found = HeldValues(events).at(times)
+    for k, at in enumerate(times):
+        expected = np.zeros(4)
+        for when, column, value in rows:
+            if when <= at:
+                expected[column] = value
+        assert np.array_equal(found[k], expected)
+
+
+def test_events_without_values_count_as_steps():
+    events = taxel.Events([0, 5, 5, 9], [0, 0, 1, 0], [0] * 4, [True, True, False, False], array=taxel.Array(1, 2))
+    assert HeldValues(events).at(np.array([0, 5, 9])).tolist() == [[1, 0], [2, -1], [1, -1]]
+    assert not HeldValues(events).has_values
+
+
+def test_many_events_are_held_across_kept_states():
+    random = np.random.default_rng(1)
+    t = np.sort(random.integers(0, 10_000, 9000))
+    events = taxel.Events(
+        t,
+        random.integers(0, 8, 9000),
+        np.zeros(9000, int),
+        np.ones(9000, bool),
+        array=taxel.Array(1, 8),
+        intensity=random.integers(0, 999, 9000),
+    )
+    times = np.array([0, 4_000, 4_001, 9_999, 20_000])
+    frames = [taxel.Frames.from_events(events, 1, int(at), int(at) + 1).values[0].ravel() for at in times]
+    assert np.array_equal(HeldValues(events).at(times), frames)
+    assert np.array_equal(HeldValues(events).at(times[3:]), frames[3:])
+
+
+def test_two_touches_fall_apart_as_often_as_a_drawn_phase_lets_them():
+    """The phase is drawn evenly: a sample falls between two touches 3 ms apart with probability 3 / T."""
+    trials = trials_of(1500)
+    for period in (2000, 5000, 10_000, 20_000):
+        _, _, spikes = sampled(trials, period)
+        apart = np.zeros(1500, bool)
+        apart[spikes.trial[spikes.bin > 0]] = True
+        share = min(1.0, 3000 / period)
+        assert abs(apart.mean() - share) < 4 * np.sqrt(share * (1 - share) / 1500) + 1e-9
+        assert (np.bincount(spikes.trial, minlength=1500) == 2).all()
+        late = spikes.first_us
+        assert ((late >= 0) & (late < period)).all()
+        assert abs(late.mean() - period / 2) < period / 2 * 0.1  # even over the period
+
+
+def test_a_short_window_sees_only_what_was_sampled_in_it_and_silent_trials_stay():
+    _, _, spikes = sampled(trials_of(600), 20_000)
+    assert spikes.trials == 600
+    silent = (spikes.counts(5000.0) == 0).mean()
+    assert abs(silent - 0.75) < 0.08
+    assert (spikes.counts(60_000.0) == 2).all()
+
+
+def grams_by_hand(spikes, window, tau):
+    bins = spikes.bins_to(window)
+    raster = np.zeros((spikes.trials, max(1, bins.max(initial=0)), spikes.taxels))
+    for k, x, b, v in zip(spikes.trial, spikes.taxel, spikes.bin, spikes.value, strict=True):
+        if b < bins[k]:
+            raster[k, b, x] += v
+    decay = np.exp(-spikes.period_us / 1000 / tau) if tau else 0.0
+    for b in range(1, raster.shape[1]):
+        raster[:, b] += decay * raster[:, b - 1]
+    for k in range(spikes.trials):
+        raster[k, bins[k] :] = 0
+    flat = raster.reshape(spikes.trials, -1)
+    return flat @ flat.T
+
+
+@pytest.mark.parametrize("tau", [0.0, 4.0, 100.0])
+def test_inner_products_by_bins_are_those_of_whole_rasters(tau):
+    random = np.random.default_rng(3)
+    n, taxels = 12, 5
+    first = random.uniform(0, 9_000, n)
+    first[4] = np.inf
+    length = random.uniform(30_000, 90_000, n)
+    trial, taxel, bins = (random.integers(0, high, 150) for high in (n, taxels, 20))
+    kept = trial != 4
+    order = np.argsort(bins[kept], kind="stable")
+    value = random.choice([-1.0, 1.0, 3.0], 150).astype(np.float32)
+    spikes = Spikes(5000, taxels, *(c[kept][order] for c in (trial, taxel, bins, value)), first, length)
+    windows = [4_000.0, 20_000.0, 50_000.0, 200_000.0]
+    for window, gram in zip(windows, event_grams(spikes, windows, tau), strict=True):
+        assert np.allclose(gram, grams_by_hand(spikes, window, tau), atol=1e-4)
+    assert features(spikes, 200_000.0) <= taxels * 20
+
+
+def test_pictures_are_taken_at_the_times_of_the_events():
+    trials = trials_of(20)
+    held, at, spikes = sampled(trials, 1000)
+    values = pictures_of(trials, held, spikes, at, 10)
+    assert values.shape == (10, 20, 2)
+    assert (values[0].sum(1) == 100).all()
+    assert (values[9] == 100).all()
+    gram = frame_grams(values, spikes, [60_000.0])[0]
+    assert np.allclose(gram, np.einsum("bnt,bmt->nm", values, values))
+
+
+def test_pooled_taxels_hold_the_mean_and_few_are_aligned_on_their_own_first_event():
+    trials = trials_of(10)
+    _, _, pooled = sampled(trials, 1000, pool=2)
+    assert pooled.taxels == 4
+    assert set(pooled.taxel) == {0}
+    _, _, all_ = sampled(trials, 1000)
+    second = all_.of(np.array([1]))
+    assert (second.bin == 0).all()
+    assert second.taxels == 1
+    late = second.first_us - all_.first_us
+    assert set(np.rint(late)) == {0, 3000}
+
+
+def test_what_a_setting_costs_on_the_wire():
+    spikes = Spikes(
+        1000,
+        400,
+        np.zeros(301, int),
+        np.arange(301),
+        np.r_[np.zeros(300, int), 4],
+        np.ones(301, np.float32),
+        np.array([0.0, np.inf]),
+        np.array([np.inf, np.inf]),
+    )
+    # 301 events; two datagrams for the 300 at once, one for the last; two trials of 10 ms.
+    assert kilobits_per_second(spikes, 10_000.0, values=False) == pytest.approx((301 * 40 + 3 * 224) / 20.0)
+    assert kilobits_per_second(spikes, 10_000.0, values=True) == pytest.approx((301 * 80 + 4 * 224) / 20.0)
+
+
+@pytest.fixture(scope="module")
+def answered():
+    return answer(
+        trials_of(120),
+        encoder=ENCODER,
+        window_ms=60,
+        windows_ms=[2, 10],
+        periods_ms=[1, 2, 10],
+        taxels=[1],
+        pools=[2],
+        draws=2,
+        shuffles=8,
+        seed=1,
+    )
+
+
+def test_order_is_known_at_a_fast_period_and_lost_at_a_slow_one(answered):
+    bits = {(p.period_ms, p.window_ms): p.found.bits for p in answered.points}
+    assert answered.full.period_ms == 1
+    assert bits[1, 60] == bits[2, 60] == bits[1, 2] == 1.0
+    assert bits[10, 60] < 0.4  # a sample falls between in 3 of 10
+    assert {p.period_ms: p.verdict and p.verdict.says for p in answered.by_period} == {1: None, 2: "keeps", 10: "loses"}
+    pooled = next(p for p in answered.taxels if p.kind == "pooled")
+    assert pooled.found.bits < 0.05  # one large taxel cannot tell left from right
+    assert pooled.verdict.says == "loses"
+    assert answered.cheapest.found.bits > 0.9
+    assert answered.cheapest.kbps < answered.full.kbps
+    assert answered.zero.level < 0.15
+    assert answered.classifiers["neighbours"].bits > 0.9
+
+
+def test_pictures_and_controls_stand_beside_it(answered):
+    controls = {c.name: c for c in answered.controls}
+    assert set(controls) == {"before contact", "length", "event count"}
+    assert controls["event count"].found.bits < 0.1
+    assert answered.frames[1.0].bits > 0.9
+    assert any("no groups" in note for note in answered.notes)
+
+
+@pytest.mark.parametrize(("before", "tells"), [("tells", True), ("never mind", False)])
+def test_what_lies_before_the_contact_is_told_apart(before, tells):
+    trials = trials_of(60, before=before)
+    found = answer(
+        trials, encoder=ENCODER, window_ms=60, windows_ms=[60], periods_ms=[1], taxels=[], pools=[], draws=1, shuffles=2
+    )
+    control = next(c for c in found.controls if c.name == "before contact")
+    assert (control.found.bits > 0.8) is tells
+
+
+def test_the_same_question_has_the_same_answer():
+    ask = {"encoder": ENCODER, "window_ms": 20, "windows_ms": [5], "periods_ms": [1, 5], "taxels": [], "pools": []}
+    one, two = (answer(trials_of(40), **ask, draws=2, shuffles=2, seed=5).to_dict() for _ in range(2))
+    assert one == two
+
+
+def test_events_by_fa1_do_as_well():
+    found = answer(
+        trials_of(40),
+        encoder=FA1(range=200.0),
+        window_ms=20,
+        windows_ms=[20],
+        periods_ms=[1],
+        taxels=[],
+        pools=[],
+        draws=1,
+        shuffles=2,
+    )
+    assert found.full.found.bits > 0.9
+
+
+def test_parameters_are_asked_for_like_labels():
+    plain = trials_of(60)
+    random = np.random.default_rng(2)
+    told = [
+        LabelledTrial(
+            t.source, t.label, t.start_us, None, "", {"side": t.label, "day": str(random.integers(2)), "rig": "one"}
+        )
+        for t in plain
+    ]
+    found = answer(
+        told, encoder=ENCODER, window_ms=20, windows_ms=[20], periods_ms=[1], taxels=[], pools=[], draws=1, shuffles=2
+    )
+    assert set(found.parameters) == {"day"}  # the side is the label, and there is one rig
+    assert found.parameters["day"][0].found.bits < 0.2
+
+
+def test_neurons_name_touches_too():
+    trials = trials_of(24)
+    _, _, spikes = sampled(trials, 1000)
+    labels = np.array([t.label for t in trials])
+    patterns = patterns_of(spikes, 60_000.0)
+    assert [len(p.times) for p in patterns] == [2] * 24
+    for model in (ConeRReadout(tau=30.0, bound=2.0), TempotronReadout(tau=5.0, epochs=200)):
+        model.fit(patterns[:16], labels[:16])
+        assert (model.predict(patterns[16:]) == labels[16:]).mean() >= 0.9
+        assert set(model.get_params()) >= {"tau", "max_seconds"}
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        ({"periods_ms": [0.5]}, "finer than the recordings"),
+        ({"window_ms": None}, "has no end"),
+        ({"windows_ms": [80]}, "must lie in"),
+        ({"taxels": [7]}, "2 of the array's ever send an event"),
+        ({"taxels_at_ms": 3}, "one of the periods"),
+        ({"classifiers": ["forest"]}, "must be one of"),
+        ({"encoder": ChangeEvents(noise_floor=1e6)}, "no event in any of them"),
+        ({"encoder": taxel.encode.LevelCrossing([5.0])}, "must be ChangeEvents or FA1"),
+    ],
+)
+def test_what_cannot_be_answered_is_one_clear_error(change, text):
+    frames = taxel.Frames(np.zeros((50, 1, 2)), np.arange(50) * 1000)
+    frames.values[5::10] = 100
+    events = trials_of(20)
+    if "periods_ms" in change:
+        events = [LabelledTrial(frames, "ab"[k % 2], 1000 * k, 1000 * k + 40_000) for k in range(20)]
+    ask = {"encoder": ENCODER, "window_ms": 20, "draws": 1, "shuffles": 1} | change
+    with pytest.raises(taxel.ProblemError, match=text):
+        answer(events, **ask)
+
+
+def test_trials_of_two_arrays_are_refused():
+    other = taxel.Frames(np.zeros((5, 2, 2)), np.arange(5))
+    with pytest.raises(taxel.ProblemError, match="must all be of one"):
+        answer([*trials_of(4), LabelledTrial(other, "left first", 0)], window_ms=20)
+
+
+def test_recordings_show_their_own_period():
+    assert finest_us([taxel.Frames(np.zeros((4, 1, 1)), [0, 2000, 4000, 8000])]) == 2000
+    stamps = [
+        taxel.Events(t, [0] * len(t), [0] * len(t), [True] * len(t), array=taxel.Array(1, 1))
+        for t in ([200, 400, 1000], [800])
+    ]
+    assert finest_us(stamps) == 200

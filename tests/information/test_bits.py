@@ -1,0 +1,144 @@
+"""Estimators against channels whose information is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sklearn.metrics import confusion_matrix as peer_matrix
+from sklearn.metrics import mutual_info_score
+
+import taxel
+from taxel.information import (
+    confusion_matrix,
+    label_entropy,
+    local_information,
+    panzeri_treves,
+    plug_in,
+    quadratic_extrapolation,
+    relevant_responses,
+)
+
+TABLES = st.integers(2, 5).flatmap(
+    lambda k: st.lists(st.lists(st.integers(0, 30), min_size=k, max_size=k), min_size=2, max_size=5)
+)
+
+
+def channel(classes, right, near=False):
+    """A classifier that is right so often; its errors go evenly to all others, or to four neighbours."""
+    p = np.eye(classes) * right
+    if near:
+        for step in (-2, -1, 1, 2):
+            p += np.roll(np.eye(classes), step, axis=1) * (1 - right) / 4
+    else:
+        p += (1 - np.eye(classes)) * (1 - right) / (classes - 1)
+    return p, float(np.mean((p * np.log2(np.where(p > 0, p / p.mean(0), 1.0))).sum(1)))
+
+
+def draws(p, trials, seed, count=1):
+    random = np.random.default_rng(seed)
+    return np.array([[random.multinomial(trials, row) for row in p] for _ in range(count)])
+
+
+@given(TABLES)
+def test_as_counted_it_is_scikit_learns(rows):
+    table = np.array(rows)
+    if not table.sum():
+        return
+    labels, responses = (np.repeat(index, table.ravel()) for index in np.indices(table.shape).reshape(2, -1))
+    assert plug_in(table) == pytest.approx(mutual_info_score(labels, responses) / np.log(2), abs=1e-9)
+    local = local_information(table)
+    assert (local * table).sum() / table.sum() == pytest.approx(float(plug_in(table)), abs=1e-9)
+
+
+@given(TABLES)
+def test_the_corrected_value_lies_within_zero_and_the_labels_entropy(rows):
+    table = np.array(rows)
+    if not table.sum():
+        return
+    assert 0 <= panzeri_treves(table) <= label_entropy(table) + 1e-12
+    seen = (table > 0).sum(-1)
+    counted = relevant_responses(table)
+    assert ((seen <= counted) & (counted <= table.shape[1])).all()
+
+
+@given(TABLES)
+def test_names_of_labels_and_responses_do_not_matter(rows):
+    table = np.array(rows)
+    if not table.sum():
+        return
+    mixed = table[::-1][:, ::-1]
+    assert panzeri_treves(mixed) == pytest.approx(float(panzeri_treves(table)), abs=1e-12)
+
+
+def test_a_stack_of_tables_is_each_table():
+    tables = draws(channel(5, 0.7)[0], 20, 3, 6)
+    assert np.allclose(panzeri_treves(tables), [panzeri_treves(one) for one in tables])
+    assert np.array_equal(relevant_responses(tables), [relevant_responses(one) for one in tables])
+
+
+@pytest.mark.parametrize(
+    ("classes", "trials", "right", "near", "counted", "corrected", "extrapolated"),
+    [  # errors in bits, from other code and seeds: 300 labels x 500 trials once, 18 x 100 the mean of many
+        (300, 500, 0.9, False, 0.275, 0.090, 0.154),
+        (300, 500, 0.3, False, 0.503, 0.073, 0.002),
+        (300, 500, 0.6, True, 0.005, 0.001, 0.000),
+        (18, 100, 0.9, False, 0.112, -0.001, 0.013),
+    ],
+)
+def test_known_channels_before_and_after_the_correction(classes, trials, right, near, counted, corrected, extrapolated):
+    p, true = channel(classes, right, near)
+    tables = draws(p, trials, 11, 1 if classes == 300 else 60)
+    found = {
+        "counted": np.mean(plug_in(tables)),
+        "corrected": np.mean(panzeri_treves(tables)),
+        "extrapolated": np.mean([quadratic_extrapolation(one, repetitions=3, seed=1) for one in tables]),
+    }
+    # What a correction takes off does not depend on the draw; a table of 18 x 100 alone is off by some .03 either way.
+    assert found["counted"] - found["corrected"] == pytest.approx(counted - corrected, abs=0.02)
+    assert found["counted"] - found["extrapolated"] == pytest.approx(counted - extrapolated, abs=0.025)
+    assert found["counted"] - true == pytest.approx(counted, abs=0.02 if classes == 300 else 0.06)
+    assert abs(found["corrected"] - true) < 0.1
+
+
+@pytest.mark.parametrize(("classes", "trials"), [(3, 25), (4, 28), (6, 45), (10, 70)])
+@pytest.mark.parametrize("right", [0.5, 0.8, 0.95])
+def test_seven_trials_a_label_and_response_keep_the_bias_small(classes, trials, right):
+    p, true = channel(classes, right)
+    assert abs(np.mean(panzeri_treves(draws(p, trials, 5, 400))) - true) < 0.055
+
+
+def test_shuffled_tables_tell_little_after_the_correction_and_much_before_it():
+    p = np.full((10, 10), 0.1)
+    tables = draws(p, 40, 2, 200)
+    assert np.mean(plug_in(tables)) > 0.13
+    assert np.mean(panzeri_treves(tables)) < 0.02
+
+
+def test_the_matrix_is_scikit_learns():
+    random = np.random.default_rng(1)
+    names = np.array(["heel", "toe", "ball"])
+    truth, said = names[random.integers(0, 3, 50)], names[random.integers(0, 3, 50)]
+    counts, classes = confusion_matrix(truth, said)
+    assert np.array_equal(counts, peer_matrix(truth, said))
+    assert classes.tolist() == sorted(names)
+    turned, order = confusion_matrix(truth, said, names)
+    assert order.tolist() == names.tolist()
+    assert np.array_equal(turned, peer_matrix(truth, said, labels=names))
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: plug_in([1, 2]),
+        lambda: plug_in([[0, 0], [0, 0]]),
+        lambda: plug_in([[1, -2], [0, 1]]),
+        lambda: panzeri_treves([[0.5, 1]]),
+        lambda: quadratic_extrapolation([[1, 1], [1, 0]]),
+        lambda: confusion_matrix(["a"], ["a", "b"]),
+        lambda: confusion_matrix(["a", 1.5], ["a", "b"], ["b"]),
+        lambda: confusion_matrix([1, 2], [1, 2], [1]),
+    ],
+)
+def test_counts_that_make_no_sense_are_refused(call):
+    with pytest.raises(taxel.ProblemError):
+        call()

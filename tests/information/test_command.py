@@ -1,0 +1,174 @@
+"""`taxel information`, as a lab would use it."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import taxel
+from taxel.cli import app
+from taxel.information import read_trials
+
+from .touches import folder, ordered
+
+QUICK = [
+    "--window-ms",
+    "60",
+    "--periods",
+    "1,10",
+    "--windows",
+    "10",
+    "--draws",
+    "1",
+    "--shuffles",
+    "3",
+    "--taxels",
+    "1",
+]
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["information", *map(str, arguments)])
+
+
+def test_a_recording_and_its_table_give_figures_and_a_page(tmp_path):
+    recording, labels = folder(tmp_path, 60)
+    page = tmp_path / "page.html"
+    done = run(recording, "--labels", labels, *QUICK, "--report", page)
+    assert done.exit_code == 0, done.output
+    said = done.stdout
+    assert "60 trials, 2 labels x" in said
+    assert "full: 1 ms, 2 taxels, to 60 ms 1.00 of 1.00 bits" in said
+    assert "<- cheapest" in said
+    assert "10 ms " in said
+    assert "wire version" in said
+    text = page.read_text()
+    assert "<svg" in text
+    assert "keeps 95 %" in text
+    assert "{{" not in text
+    again = run(recording, "--labels", labels, *QUICK, "--report", page)
+    assert isinstance(again.exception, FileExistsError)
+    assert page.read_text() == text
+
+
+def test_json_holds_all_figures(tmp_path):
+    recording, labels = folder(tmp_path, 60)
+    done = run(recording, "--labels", labels, *QUICK, "--report", tmp_path / "page.html", "--json")
+    said = json.loads(done.stdout)
+    assert said["full"]["bits"] == 1.0
+    assert {(p["period_ms"], p["window_ms"]) for p in said["points"]} == {(1, 10), (1, 60), (10, 10), (10, 60)}
+    assert said["cheapest"]["kbps"] <= said["full"]["kbps"]
+    assert said["report"].endswith("page.html")
+
+
+def test_without_labels_a_recording_is_a_trial_and_its_folder_the_label(tmp_path):
+    events, rows = ordered(24)
+    for k, (start, label) in enumerate(rows):
+        place = tmp_path / label.replace(" ", "-")
+        place.mkdir(exist_ok=True)
+        taxel.convert(events.between(start, start + 200_000), place / f"{k}.npz")
+    recordings = sorted(tmp_path.glob("*/*.npz"))
+    done = run(
+        *recordings,
+        "--window-ms",
+        "20",
+        "--periods",
+        "1,10",
+        "--draws",
+        "1",
+        "--shuffles",
+        "2",
+        "--folds",
+        "4",
+        "--taxels",
+        "1",
+        "--report",
+        tmp_path / "page.html",
+        "--json",
+    )
+    assert done.exit_code == 0, done.exception
+    said = json.loads(done.stdout)
+    assert set(said["labels"]) == {"left-first", "right-first"}
+    assert said["full"]["bits"] > 0.8
+
+
+GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
+    f"touches.npz,{100_000 + 400_000 * k},{'ab'[k % 2]},{200_000 + 400_000 * k},{'uvwxyz'[k % 6]}\n" for k in range(24)
+)
+
+
+@pytest.mark.parametrize(
+    ("table", "arguments", "text"),
+    [
+        ("recording,label\na,b\n", [], "no column t_us"),
+        ("recording,t_us,label,t_us\na,1,b,2\n", [], "column t_us stands there twice"),
+        ("recording,t_us,label\n", [], "names no trial"),
+        (GOOD.replace("touches.npz", "other.npz", 1), [], "line 2: recording 'other.npz' is not among those given"),
+        (GOOD.replace("touches.npz", "other.npz"), [], "is not among those given"),
+        (GOOD.replace("100000,a", "noon,a"), [], "line 2: t_us is 'noon', must be whole us"),
+        (GOOD.replace("100000,a,200000", "99000000,a,99100000"), [], "line 2: t_us 99000000 lies outside touches.npz"),
+        (GOOD.replace("100000,a,200000", "100000,a,90000"), [], "stop 90000 us does not lie after start"),
+        (GOOD.replace(",b,", ",a,"), [], "labels are all 'a'"),
+        (GOOD.replace("touches.npz,100000,a,200000,u", "touches.npz,100000,a,200000,"), [], "group is empty"),
+        (GOOD, ["--folds", "30"], None),
+        (
+            "recording,t_us,label,stop_us\ntouches.npz,100000,a,200000\ntouches.npz,500000,b,600000\n"
+            "touches.npz,900000,a,1000000\ntouches.npz,1300000,b,1400000\n",
+            [],
+            "4 trials for 10 folds",
+        ),
+        (GOOD.replace(",b,", ",c,", 1), [], "label 'c': all its trials lie in group 'v'"),
+        ("recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n", [], "has no stop_us"),
+        (
+            "recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n",
+            ["--window-ms", "450"],
+            "inside its window of 450 ms",
+        ),
+        (GOOD, ["--periods", "fast"], "must be numbers, as 1,2,5"),
+        (GOOD, ["--taxels", "1.5"], "must be whole numbers"),
+        (GOOD, ["--encoder", "level_crossing"], "must be change_events or fa1"),
+        (GOOD, ["--also", "forest"], "must be one of"),
+    ],
+)
+def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
+    events, _ = ordered(24)
+    taxel.convert(events, tmp_path / "touches.npz")
+    (tmp_path / "labels.csv").write_text(table)
+    page = tmp_path / "page.html"
+    quick = ["--draws", "1", "--shuffles", "1", "--taxels", "1", "--pools", "2", *arguments]
+    if "--periods" not in arguments:
+        quick += ["--periods", "5"]
+    done = run(tmp_path / "touches.npz", "--labels", tmp_path / "labels.csv", "--report", page, *quick)
+    if text is None:  # fewer groups than folds: as many folds as groups
+        assert done.exit_code == 0, done.exception
+        return
+    assert isinstance(done.exception, taxel.Error), done.output
+    assert text in str(done.exception)
+    assert "\n" not in str(done.exception)
+    assert not page.exists()
+
+
+def test_parameters_and_groups_are_read(tmp_path):
+    events, _ = ordered(4)
+    taxel.convert(events, tmp_path / "touches.npz")
+    (tmp_path / "labels.csv").write_text(
+        "label,radius,recording,t_us,group,stop_us\nball,25,touches.npz,100000,monday,200000\n"
+        "edge,35,touches.npz,500000,tuesday,\n"
+    )
+    trials = read_trials(tmp_path / "labels.csv", [taxel.open(tmp_path / "touches.npz")], window_ms=50)
+    assert [(t.label, t.start_us, t.stop_us, t.group, dict(t.parameters)) for t in trials] == [
+        ("ball", 100_000, 200_000, "monday", {"radius": "25"}),
+        ("edge", 500_000, None, "tuesday", {"radius": "35"}),
+    ]
+    assert np.array_equal(trials[0].source.t, events.t)
+
+
+def test_a_recording_that_the_table_does_not_name_is_said(tmp_path):
+    recording, labels = folder(tmp_path, 20)
+    events, _ = ordered(4)
+    taxel.convert(events, tmp_path / "forgotten.npz")
+    done = run(
+        recording, tmp_path / "forgotten.npz", "--labels", labels, "--window-ms", "20", "--report", tmp_path / "p"
+    )
+    assert "says nothing of" in str(done.exception)

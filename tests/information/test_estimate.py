@@ -1,0 +1,170 @@
+"""The interval, the test of zero, the warnings, and the verdicts."""
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel.information import Estimate, estimate, folds, keeps, zero_test
+
+from .test_bits import channel
+
+
+def answers(p, trials, random):
+    labels = np.repeat(np.arange(len(p)), trials)
+    return labels, np.array([random.choice(len(p), p=p[label]) for label in labels])
+
+
+def test_the_interval_holds_the_truth_about_as_often_as_is_said_from_a_hundred_trials_on():
+    p, true = channel(3, 0.8)
+    random = np.random.default_rng(7)
+    held = 0
+    for k in range(80):
+        low, high = estimate(*answers(p, 100, random), redraws=150, seed=k).interval
+        held += low <= true <= high
+    assert 0.86 <= held / 80 <= 1.0  # 95 % is said; below a hundred trials a label it holds less often
+
+
+def test_groups_that_answer_alike_widen_the_interval():
+    labels = np.repeat([0, 1], 120)
+    groups = np.tile(np.repeat(np.arange(6), 20), 2)
+    said = np.where((groups < 2), 1 - labels, labels)  # two of six people are taken the other way round ...
+    said = np.where(groups == 2, 0, said)  # ... and one tells nothing
+    alone, together = estimate(labels, said), estimate(labels, said, groups=groups)
+    assert together.bits == alone.bits
+    assert np.diff(together.interval) > 2 * np.diff(alone.interval)
+
+
+def test_a_perfect_answer_keeps_all_bits_and_warns_of_little_else_than_few_trials():
+    labels = np.repeat(["a", "b", "c"], 40)
+    found = estimate(labels, labels)
+    assert found.bits == pytest.approx(np.log2(3))
+    assert found.interval[1] == pytest.approx(np.log2(3))
+    assert found.warnings == ()
+    few = estimate(labels[::10], labels[::10])
+    assert "4 trials of a label" in few.warnings[0]
+
+
+def test_several_draws_are_averaged():
+    labels = np.repeat([0, 1], 30)
+    one, other = np.where(np.arange(60) % 5 == 0, 1 - labels, labels), labels
+    both = estimate(labels, [one, other])
+    assert both.bits == pytest.approx((estimate(labels, one).bits + estimate(labels, other).bits) / 2)
+    assert both.counts.shape == (2, 2, 2)
+
+
+def test_shuffling_tells_something_from_nothing():
+    random = np.random.default_rng(3)
+    x = random.normal(size=(60, 4))
+    labels = np.repeat([0, 1], 30)
+    fold = folds(labels, count=5)
+
+    def nearest_mean(values):
+        def answer(y):
+            said = np.empty(60, int)
+            for k in range(5):
+                means = [values[(fold != k) & (y == c)].mean(0) for c in (0, 1)]
+                far = [((values[fold == k] - m) ** 2).sum(1) for m in means]
+                said[fold == k] = np.argmin(far, axis=0)
+            return said
+
+        return answer
+
+    for shift, there in ((0.0, False), (2.0, True)):
+        answer = nearest_mean(x + shift * labels[:, None])
+        found = estimate(labels, answer(labels)).bits
+        test = zero_test(answer, labels, found, shuffles=40, seed=1)
+        assert (test.p < 0.05) is there
+        assert (found > test.level) is there
+
+
+def test_whole_groups_are_shuffled_where_each_has_one_label():
+    groups = np.repeat(np.arange(8), 5)
+    labels = (groups % 2).astype(int)
+    seen = []
+    zero_test(lambda y: seen.append(y) or y, labels, 1.0, groups=groups, shuffles=5)
+    for y in seen:
+        assert all(len(set(y[groups == g])) == 1 for g in range(8))
+    within = []
+    mixed = np.tile([0, 1, 0, 1, 1], 8)
+    zero_test(lambda y: within.append(y) or y, mixed, 1.0, groups=groups, shuffles=5)
+    for y in within:
+        assert all(y[groups == g].sum() == 3 for g in range(8))
+
+
+def test_verdicts_are_of_the_same_trials():
+    random = np.random.default_rng(5)
+    labels, dear = answers(channel(4, 0.9)[0], 150, random)
+    worse = np.where(random.random(len(labels)) < 0.4, random.integers(0, 4, len(labels)), dear)
+    a, b, c = (estimate(labels, said, redraws=2) for said in (dear, worse, np.roll(dear, 0)))
+    assert keeps(c, a).says == "keeps"
+    lost = keeps(b, a)
+    assert lost.says == "loses"
+    assert lost.trials_to_settle is None
+    near = np.where(np.arange(len(labels)) % 60 == 0, (labels + 1) % 4, dear)
+    verdict = keeps(estimate(labels, near, redraws=2), a, share=0.95)
+    assert verdict.says in ("keeps", "open")
+    edge = np.where(np.arange(len(labels)) % 21 == 0, (labels + 1) % 4, dear)
+    open_ = keeps(estimate(labels, edge, redraws=2), a, share=0.9)
+    assert open_.says == "open"
+    assert open_.trials_to_settle > len(labels)
+    by_group = keeps(estimate(labels, edge, redraws=2), a, share=0.9, groups=np.arange(len(labels)) % 5)
+    assert by_group.margin == open_.margin
+    assert by_group.error != open_.error
+
+
+def test_the_rule_rarely_takes_a_setting_that_is_too_cheap():
+    """Just below the edge the paired bound says keeps in at most one of ten, as simulated beforehand."""
+    random = np.random.default_rng(9)
+    p_dear, dear_bits = channel(4, 0.95)
+    right = next(r for r in np.arange(0.95, 0.8, -0.002) if channel(4, r)[1] < 0.94 * dear_bits)
+    p_cheap, _ = channel(4, right)
+    said = []
+    for _ in range(60):
+        labels, dear = answers(p_dear, 60, random)
+        _, cheap = answers(p_cheap, 60, random)
+        said.append(keeps(*(estimate(labels, x, redraws=2) for x in (cheap, dear))).says)
+    assert said.count("keeps") <= 9
+    assert "loses" in said
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: estimate(["a", "a"], ["a", "b"]), "must be two at least"),
+        (lambda: estimate(["a", "b"], ["a"]), "one a label"),
+        (lambda: estimate(["a", "b"], ["a", "b"], groups=["x"]), "one a trial"),
+        (lambda: estimate(["a", "b"], [1, 2]), "two kinds"),
+        (lambda: estimate(["a", "b"], ["a", "b"], confidence=1.0), "between 0 and 1"),
+        (lambda: folds(["a"] * 5, count=2), "must be two at least"),
+        (lambda: folds(["a", "b"] * 2, count=10), "4 trials for 10 folds"),
+        (
+            lambda: folds(["a", "a", "b", "b"], count=2, groups=["x", "y", "z", "z"]),
+            "'b': all its trials lie in group 'z'",
+        ),
+        (lambda: folds(["a", "a", "b"], count=2), "label 'b' has one trial"),
+    ],
+)
+def test_what_cannot_be_told_is_one_clear_error(call, text):
+    with pytest.raises(taxel.ProblemError, match=text):
+        call()
+
+
+def test_folds_are_even_and_groups_stay_whole():
+    random = np.random.default_rng(2)
+    labels = random.integers(0, 4, 203)
+    fold = folds(labels, count=10, seed=4)
+    assert np.ptp(np.bincount(fold)) <= 1
+    assert all(np.ptp(np.bincount(fold[labels == k], minlength=10)) <= 1 for k in range(4))
+    groups = random.integers(0, 23, 203)
+    whole = folds(labels, count=10, groups=groups, seed=4)
+    assert all(len(set(whole[groups == g])) == 1 for g in np.unique(groups))
+    assert len(set(whole)) == 10
+    assert np.array_equal(whole, folds(labels, count=10, groups=groups, seed=4))
+
+
+def test_estimates_of_other_trials_are_not_compared():
+    a = estimate([0, 1, 0, 1], [0, 1, 0, 1], redraws=2)
+    b = estimate([0, 1], [0, 1], redraws=2)
+    assert isinstance(a, Estimate)
+    with pytest.raises(taxel.ProblemError, match="of the same"):
+        keeps(a, b)

@@ -1,0 +1,234 @@
+"""Discriminants against scikit-learn's, from features, from sums by fold and from inner products."""
+
+import warnings
+
+import numpy as np
+import pytest
+from sklearn.base import clone
+from sklearn.discriminant_analysis import LinearDiscriminantAnalysis
+from sklearn.model_selection import cross_val_score
+from sklearn.neighbors import KNeighborsClassifier
+
+import taxel
+from taxel.information import (
+    LDA,
+    GramLDA,
+    NearestNeighbours,
+    distances_of,
+    fold_predictions,
+    folds,
+    nested_predictions,
+    training_curve,
+)
+from taxel.information.lda import ClassMoments
+
+
+def clouds(trials, features, classes, seed, apart=1.0):
+    random = np.random.default_rng(seed)
+    y = random.integers(0, classes, trials)
+    y[:classes] = np.arange(classes)
+    y[classes : 2 * classes] = np.arange(classes)
+    x = random.normal(size=(classes, features))[y] * apart + random.normal(size=(trials, features))
+    return x @ (np.eye(features) + 0.3 * random.normal(size=(features, features))), y
+
+
+def apart(ours, theirs):
+    """How far two discriminants differ, but for what is common to all classes."""
+    d = ours - theirs
+    return np.abs(d - d[:, :1]).max()
+
+
+@pytest.mark.parametrize(("trials", "features", "classes"), [(400, 30, 5), (60, 10, 3), (50, 200, 4), (31, 30, 3)])
+def test_discriminants_are_scikit_learns_svd(trials, features, classes):
+    x, y = clouds(trials, features, classes, 1)
+    new = clouds(100, features, classes, 2)[0]
+    ours, theirs = LDA().fit(x, y), LinearDiscriminantAnalysis(solver="svd").fit(x, y)
+    assert apart(ours.decision_function(new), theirs.decision_function(new)) < 1e-5
+    assert np.array_equal(ours.predict(new), theirs.predict(new))
+
+
+@pytest.mark.parametrize("ridge", [0.01, 0.5, 20.0])
+def test_a_ridge_is_scikit_learns_shrinkage_also_from_inner_products(ridge):
+    for trials, features in ((90, 12), (60, 300)):
+        x, _ = clouds(trials, features, 3, 5)
+        y = np.arange(trials) % 3  # equally many: shrinkage scales discriminants against priors
+        x += np.eye(3, features)[y]
+        new = clouds(40, features, 3, 6)[0]
+        theirs = LinearDiscriminantAnalysis(solver="lsqr", shrinkage=ridge / (1 + ridge)).fit(x, y).predict(new)
+        ours = LDA(ridge=ridge).fit(x, y)
+        assert np.array_equal(ours.predict(new), theirs)
+        gram = GramLDA(features=features, ridge=ridge).fit(x @ x.T, y)
+        assert apart(gram.decision_function(new @ x.T), ours.decision_function(new)) < 1e-8
+        primal = LDA(ridge=ridge)
+        primal.classes_ = np.arange(3)
+        primal._from(ClassMoments.of(x, y, 3))
+        assert apart(primal.decision_function(new), ours.decision_function(new)) < 1e-8
+
+
+def test_features_that_never_vary_or_tell_each_other_are_as_in_scikit_learn():
+    x, y = clouds(200, 8, 3, 3)
+    x = np.column_stack([x, np.zeros(200), x[:, 0], x[:, 1] - x[:, 2], np.full(200, 7.0)])
+    with pytest.warns(UserWarning, match="8 of 10 directions"):
+        ours = LDA().fit(x, y)
+    theirs = LinearDiscriminantAnalysis().fit(x, y)
+    assert ours.rank_ == 8
+    assert apart(ours.decision_function(x), theirs.decision_function(x)) < 1e-8
+    silent = x[:, :9].copy()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert LDA().fit(silent, y).rank_ == 8
+
+
+def test_values_far_from_zero_keep_their_digits():
+    x, y = clouds(300, 6, 3, 4)
+    fold = folds(y, count=5)
+    assert np.array_equal(LDA().fit(x + 1e7, y).predict(x + 1e7), LDA().fit(x, y).predict(x))
+    assert np.array_equal(fold_predictions(x + 1e7, y, fold), fold_predictions(x, y, fold))
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.float64])
+def test_folds_from_sums_are_folds_trained_one_by_one(dtype, tmp_path):
+    random = np.random.default_rng(8)
+    y = random.integers(0, 6, 700)
+    x = (random.random((700, 50)) < 0.1).astype(np.int8) - (random.random((700, 50)) < 0.1)
+    x[:, :6] |= (y[:, None] == np.arange(6)) & (random.random((700, 6)) < 0.5)
+    x[:, 49] = 0
+    x = x.astype(dtype)
+    fold = folds(y, count=7, seed=1)
+    expected = np.empty_like(y)
+    for k in range(7):
+        model = LinearDiscriminantAnalysis().fit(x[fold != k].astype(float), y[fold != k])
+        expected[fold == k] = model.predict(x[fold == k].astype(float))
+    told = []
+    found = fold_predictions(x, y, fold, progress=lambda done, of: told.append((done, of)))
+    assert np.array_equal(found, expected)
+    assert told == [(k, 14) for k in range(1, 15)]
+    assert np.array_equal(fold_predictions(x, y, fold, keep="total"), expected)
+    np.save(tmp_path / "x.npy", x)
+    assert np.array_equal(fold_predictions(np.load(tmp_path / "x.npy", mmap_mode="r"), y, fold), expected)
+
+
+def test_sums_of_spikes_in_float32_are_exact():
+    random = np.random.default_rng(4)
+    x = random.integers(-1, 2, (5000, 20)).astype(np.int8)
+    y = random.integers(0, 3, 5000)
+    single, double = (ClassMoments.of(x, y, 3, dtype=dtype) for dtype in (np.float32, np.float64))
+    assert np.array_equal(single.scatter, double.scatter)
+    parts = ClassMoments.of(x, y, 3, rows=np.arange(1234)) + ClassMoments.of(x, y, 3, rows=np.arange(1234, 5000))
+    assert np.array_equal(parts.scatter, double.scatter)
+    assert np.array_equal((parts - parts).sums, np.zeros((3, 20)))
+
+
+def test_scikit_learn_can_clone_and_cross_validate_ours():
+    x, y = clouds(120, 5, 3, 9)
+    assert clone(LDA(ridge=0.5)).get_params() == {"ridge": 0.5, "priors": "training"}
+    ours = cross_val_score(LDA(), x, y, cv=4)
+    assert np.allclose(ours, cross_val_score(LinearDiscriminantAnalysis(), x, y, cv=4))
+    near = cross_val_score(NearestNeighbours(neighbours=3), distances_of(x @ x.T), y, cv=4)
+    assert near.mean() > 0.5
+    gram = cross_val_score(GramLDA(features=5, ridge=0.1), x @ x.T, y, cv=4)
+    assert np.allclose(gram, cross_val_score(LDA(ridge=0.1), x, y, cv=4), atol=0.03)
+
+
+def test_neighbours_are_scikit_learns():
+    x, y = clouds(80, 4, 3, 12)
+    new = clouds(40, 4, 3, 13)[0]
+    across = np.sqrt(((new[:, None] - x) ** 2).sum(-1))
+    own = distances_of(x @ x.T)
+    assert np.allclose(own, np.sqrt(((x[:, None] - x) ** 2).sum(-1)), atol=1e-6)
+    for k in (1, 3):
+        theirs = KNeighborsClassifier(k, weights="uniform").fit(x, y).predict(new)
+        ours = NearestNeighbours(neighbours=k).fit(own, y).predict(across)
+        votes = np.sort([np.bincount(y[np.argsort(d)[:k]], minlength=3) for d in across], axis=1)
+        clear = votes[:, -1] > votes[:, -2]
+        assert np.array_equal(ours[clear], theirs[clear])
+        nearest = y[np.argmin(across, axis=1)]
+        assert np.array_equal(ours[~clear], nearest[~clear])
+
+
+def test_leaving_folds_out_of_one_inverse_is_training_each_anew():
+    """Nested choice and all: against GramLDA, trained on each training set by itself."""
+    x, y = clouds(120, 400, 4, 21, apart=0.25)
+    grams = [x @ x.T, (x[:, :40] @ x[:, :40].T)]
+    sizes, ridges = [400, 40], (1.0, 0.1)
+    found = nested_predictions(grams, sizes, y, count=5, inner=3, ridges=ridges, seed=3)
+
+    def trained(gram, size, ridge, train, test):
+        level = ridge * np.trace(gram - gram.mean(0)) / size
+        part = gram[np.ix_(train, train)]
+        which = np.eye(4)[y[train]]
+        within = np.trace(part) - np.trace((which / which.sum(0)).T @ part @ which)
+        model = GramLDA(features=size, ridge=level * size / within).fit(part, y[train])
+        return model.predict(gram[np.ix_(test, train)])
+
+    for k in range(5):
+        train, test = np.flatnonzero(found.folds != k), np.flatnonzero(found.folds == k)
+        inner = folds(y[train], count=3, seed=4)
+        right = {}
+        for g, (gram, size) in enumerate(zip(grams, sizes, strict=True)):
+            for ridge in ridges:
+                right[g, ridge] = sum(
+                    (trained(gram, size, ridge, train[inner != j], train[inner == j]) == y[train[inner == j]]).sum()
+                    for j in range(3)
+                )
+        best = max(right, key=lambda way: right[way])
+        assert found.chosen[k] == best
+        said = trained(grams[best[0]], sizes[best[0]], best[1], train, test)
+        assert np.array_equal(found.responses[test], said)
+    curve = training_curve(grams, sizes, y, found, [1000, 3], seed=1)
+    assert np.array_equal(curve[0], found.responses)
+    assert (curve[1] == y).mean() < (curve[0] == y).mean()
+
+
+def test_nothing_is_learnt_from_the_trials_that_are_tested():
+    """Labels without any pattern, the best of many ways chosen inside the folds: no better than chance."""
+    random = np.random.default_rng(17)
+    right = []
+    for seed in range(12):
+        x = random.normal(size=(60, 500))
+        y = random.permutation(np.arange(60) % 3)
+        grams = [x @ x.T, x[:, :50] @ x[:, :50].T, x[:, 50:90] @ x[:, 50:90].T]
+        right.append((nested_predictions(grams, [500, 50, 40], y, count=6, inner=3, seed=seed).responses == y).mean())
+    assert abs(np.mean(right) - 1 / 3) < 0.06
+
+
+def test_neighbours_are_chosen_inside_the_folds_too():
+    x, y = clouds(90, 6, 3, 30, apart=2.0)
+    found = nested_predictions([x @ x.T], [6], y, count=5, neighbours=(1, 5, 9))
+    assert (found.responses == y).mean() > 0.7
+    assert {ridge for _, ridge in found.chosen.values()} <= {1.0, 5.0, 9.0}
+
+
+def test_a_class_that_a_training_set_lacks_is_said():
+    y = np.array([0, 0, 0, 1, 1, 1, 2, 2, 2, 2])
+    groups = np.array([0, 1, 2, 0, 1, 2, 3, 3, 3, 4])
+    random = np.random.default_rng(1)
+    x = random.normal(size=(10, 30)) + np.eye(3, 30)[y]
+    found = nested_predictions([x @ x.T], [30], y, groups=groups, count=2, inner=2)
+    assert found.missing == ()
+    assert set(found.responses) <= {0, 1, 2}
+    one = np.array([0] * 6 + [1] * 6 + [2] * 6)
+    apart_ = np.array([0, 1, 2, 3, 4, 5] * 2 + [6, 6, 6, 7, 7, 7])
+    x = random.normal(size=(18, 30)) + 3 * np.eye(3, 30)[one]
+    both = nested_predictions([x @ x.T], [30], one, groups=apart_, count=2, inner=2)
+    assert isinstance(both.missing, tuple)
+
+
+@pytest.mark.parametrize(
+    ("call", "text"),
+    [
+        (lambda: LDA(ridge=-1), "0 or more"),
+        (lambda: LDA().fit([[1.0, np.nan], [2.0, 3.0]], [0, 1]), r"x\[0, 1\] is not finite"),
+        (lambda: LDA().fit(np.ones((6, 2)), [0, 1] * 3), "no feature varies"),
+        (lambda: LDA().fit(np.ones((6, 2)), [0] * 6), "must be two at least"),
+        (lambda: LDA().predict([[1.0]]), "not fitted"),
+        (lambda: GramLDA(features=3).fit([[1.0, 2.0], [3.0, 1.0]], [0, 1]), "not symmetric"),
+        (lambda: fold_predictions(np.eye(4), [0, 1, 0, 1], [0, 0, 0, 0]), "two at least"),
+        (lambda: nested_predictions([np.eye(4)], [4, 4], [0, 1, 0, 1], count=2), "one a matrix"),
+        (lambda: nested_predictions([np.eye(4)], [4], [0, 1, 0, 1], count=2, ridges=[0.0]), "above 0"),
+        (lambda: LDA().set_params(rigde=1.0), "no parameter 'rigde'"),
+    ],
+)
+def test_what_cannot_be_learnt_is_one_clear_error(call, text):
+    with pytest.raises(taxel.ProblemError, match=text):
+        call()
