@@ -88,7 +88,7 @@ def beside(seed):
         kernel=str(random.choice(["alpha", "double_exponential"])),
         theta_plus=float(random.choice([0.0, 0.05, 0.2])),
         after_spike=str(random.choice(["keep", "ignore", "reset"])),
-        lambdas=[(0, 1, 0), (1, 0, 0), (2, 2, 200)][random.integers(3)],
+        lambdas=[(0, 1, 0), (1, 0, 0), (2, 2, 200), (0, 0, 1)][random.integers(4)],
         lb=-2,
         ub=2,
     )
@@ -109,7 +109,7 @@ def lifted(seed):
     return cone, lists, wanted
 
 
-KINDS = {"paused": paused, "beside": beside}
+KINDS = {"paused": paused, "beside": beside, "lifted": lifted}
 
 
 @pytest.mark.parametrize("kind", KINDS)

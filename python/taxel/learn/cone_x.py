@@ -124,8 +124,8 @@ class ConeX:
     ----------
     status_ : {"solved", "infeasible", "stopped"}
         "solved": every target is met to 1e-12 mV (in proportion where theta_0 is not 0.3 mV), silence keeps at least
-        half its margin, and no weights have an objective smaller by more than `tolerance`. "infeasible":
-        `certificate_` proves it. "stopped": neither is known.
+        half its margin, and no weights that keep all of it have an objective smaller by more than `tolerance` of it, or
+        by more than 1e-10 of what B is without weights. "infeasible": `certificate_` proves it. "stopped": neither is known.
     weights_ : float64, shape (trains,), mV
         The best so far where stopped; NaN where infeasible.
     objective_ : float
@@ -133,8 +133,8 @@ class ConeX:
     parts_ : dict
         Its terms: l1, l2, B.
     gap_ : float
-        Proven relative distance of the objective to the least one, whatever the engine said; 0 where the objective is
-        below 1e-10 of that of no weights.
+        How far, relative to it, the objective can lie above the least one over all weights that keep the whole margin:
+        a proven bound, whatever the engine said. (In continuous time these weights keep `margin_`, a little less.)
     margin_ : Margin
         The margin that holds, at least half of what was asked for; on the grid, as `mv`, the least threshold -
         potential over the silent points.

@@ -30,7 +30,7 @@ const BROKEN_SHARE: f64 = 2e-16;
 const KEPT_SHARE: f64 = 0.5;
 /// The margin and the slope in continuous time where none is given, mV and mV/ms.
 const MARGIN: f64 = 1e-3;
-/// An objective below this share of what no weights at all have is 0: every lift is reached.
+/// An objective that is known to this share of what B is of no weights at all is known: every lift may be reached.
 pub(super) const NOTHING: f64 = 1e-10;
 /// Rounds end without a verdict after so many.
 const MOST_ROUNDS: usize = 1000;
@@ -222,7 +222,7 @@ pub struct Fit {
     pub objective: f64,
     /// Its terms: l1, l2, B.
     pub parts: [f64; 3],
-    /// Proven relative distance to the least objective.
+    /// Proven relative distance to the least objective of weights that keep the whole margin.
     pub gap: f64,
     /// How far the worst row is broken: targets missed, silence with half its margin, mV.
     pub violation: f64,
@@ -447,11 +447,13 @@ impl Problem {
         let parts = self.objective.parts(&weights);
         let objective: f64 = parts.iter().sum();
         let nothing = NOTHING * self.objective.b * dot(&self.objective.wanted, &self.objective.wanted);
-        let gap = if objective > nothing { (objective - least).max(0.0) / objective } else { 0.0 };
+        let above = (objective - least).max(0.0);
+        let gap = if above > 0.0 { above / objective } else { 0.0 };
+        let known = gap <= self.parameters.tolerance || above <= nothing;
         let (missed, broken) = (self.missed(&weights)?, self.worst(&weights));
         let kept = missed <= MET && broken <= self.rounding(&weights);
         Ok(Fit {
-            status: if ended && kept && gap <= self.parameters.tolerance { Status::Solved } else { Status::Stopped },
+            status: if ended && kept && known { Status::Solved } else { Status::Stopped },
             margin: self.margin(&weights),
             weights,
             objective,

@@ -34,6 +34,8 @@ const FEW: usize = 32;
 const QUEUE: usize = 16;
 /// Block exchanges in one call of `solve`, after which single steps go on.
 const EXCHANGES: usize = 60;
+/// Looks at all rows in one call of `solve`, of each row and bound: each raises the dual, unless rounding is in the way.
+const MOST_ROUNDS: usize = 10;
 /// How many of them in a row may leave the dual below its best before they look where they step.
 const BOLD: usize = 3;
 
@@ -293,10 +295,12 @@ impl DualActiveSet {
         let (mut exchanges, mut bold) = (EXCHANGES, BOLD);
         let mut best: Option<(f64, Vec<usize>, Vec<f64>)> = None;
         let mut undecided: Vec<usize> = Vec::new();
+        let mut rounds = MOST_ROUNDS * (self.live.len() + self.lower.len());
         loop {
-            if stop.asked() {
+            if stop.asked() || rounds == 0 {
                 return Ok(Verdict::Stopped);
             }
+            rounds -= 1;
             self.measure(false);
             let mut candidates = self.violated();
             candidates.retain(|c| !undecided.contains(&c.0));

@@ -7,6 +7,7 @@
 mod dense;
 mod interior;
 mod polish;
+mod proximal;
 #[cfg(test)]
 mod tests;
 
@@ -129,6 +130,9 @@ pub(super) fn minimise(
     for aim in TRIES {
         let near = interior.solve(&mut state, aim, stop);
         best.improve(&near.point, near.guess, tolerance, stop)?;
+        if best.gap() > tolerance && program.is_lift_alone() {
+            best.proximal(&near.point.weights, tolerance, stop)?;
+        }
         if best.gap() <= tolerance || stop.asked() {
             return Ok(best.found(Engine::Native, stop.asked(), state));
         }
@@ -209,7 +213,7 @@ impl<'a> Best<'a> {
     fn gap(&self) -> f64 {
         if !self.met {
             f64::INFINITY
-        } else if self.objective <= NOTHING * self.program.at_zero() {
+        } else if self.objective - self.bound <= NOTHING * self.program.at_zero() {
             0.0
         } else {
             relative(self.objective, self.bound)
@@ -392,6 +396,10 @@ impl Program {
 
     fn met(&self, w: &[f64]) -> bool {
         w.iter().all(|w| w.is_finite()) && self.missing(w) <= polish::MET * (self.width() as f64).sqrt().max(10.0)
+    }
+
+    fn is_lift_alone(&self) -> bool {
+        self.l1 == 0.0 && self.l2 == 0.0 && self.lift > 0.0
     }
 
     fn at_zero(&self) -> f64 {
