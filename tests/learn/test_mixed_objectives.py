@@ -108,7 +108,7 @@ def test_the_objective_is_the_least_and_the_bound_lies_below_it(lambdas, reset, 
     nothing = 1e-9 * share[2] * np.sum((cone.kappa * theta) ** 2)
     assert cone.objective_ == pytest.approx(least, rel=1e-7, abs=nothing)
     assert cone.objective_ * (1 - cone.gap_) <= least * (1 + 1e-9) + nothing
-    assert cone.gap_ <= 1e-8
+    assert cone.gap_ <= 1e-8 or cone.gap_ * cone.objective_ <= 0.1 * nothing
     assert np.abs(at @ w - theta).max() <= 1e-12
     assert (silent @ w - limit).max() <= 1e-12
     assert np.abs(w).max() <= 2.0

@@ -125,7 +125,8 @@ class ConeX:
     status_ : {"solved", "infeasible", "stopped"}
         "solved": every target is met to 1e-12 mV (in proportion where theta_0 is not 0.3 mV), silence keeps at least
         half its margin, and no weights that keep all of it have an objective smaller by more than `tolerance` of it, or
-        by more than 1e-10 of what B is without weights. "infeasible": `certificate_` proves it. "stopped": neither is known.
+        by more than 1e-10 of what B is without weights. "infeasible": `certificate_` proves it. "stopped": neither is
+        known.
     weights_ : float64, shape (trains,), mV
         The best so far where stopped; NaN where infeasible.
     objective_ : float

@@ -50,8 +50,7 @@ impl Program {
             let near = bounds.iter().zip(centre).map(|(bound, w)| bound - w);
             near.chain(std::iter::repeat_n(beyond, targets)).collect()
         };
-        let mut engine =
-            DualActiveSet::new(&room(&self.lower, f64::NEG_INFINITY), &room(&self.upper, f64::INFINITY))?;
+        let mut engine = DualActiveSet::new(&room(&self.lower, f64::NEG_INFINITY), &room(&self.upper, f64::INFINITY))?;
         let mut row = vec![0.0; n + targets];
         let mut state = |coefficients: &[f64], limit: f64, of: Option<usize>| {
             row[n..].fill(0.0);
