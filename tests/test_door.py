@@ -7,6 +7,7 @@ import sys
 import threading
 import time
 
+import numpy as np
 import pytest
 
 import taxel
@@ -67,3 +68,80 @@ def test_another_thread_runs_while_a_call_waits():
         _core.knock("wait")
     timer.join()
     assert woken
+
+
+def together(work, threads=6):
+    """Do work in several threads at once; raise what any of them raises."""
+    failed, begin = [], threading.Barrier(threads)
+
+    def run(number):
+        begin.wait()
+        try:
+            work(number)
+        except BaseException as error:
+            failed.append(error)
+
+    started = [threading.Thread(target=run, args=(number,)) for number in range(threads)]
+    for thread in started:
+        thread.start()
+    for thread in started:
+        thread.join()
+    if failed:
+        raise failed[0]
+
+
+def test_a_decoder_may_be_used_from_several_threads():
+    decoder, data = taxel.wire.Decoder(), bytes.fromhex("c000050304") * 20_000
+
+    def push(_):
+        for _ in range(20):
+            decoder.push(data)
+            assert decoder.counts.skipped == 0
+
+    together(push)
+    decoder.finish()
+    assert decoder.counts.changes == 6 * 20 * 20_000
+
+
+def test_a_board_may_be_used_from_several_threads():
+    board = taxel.device.Board()
+    ticks = np.full((64, 64), 100, np.uint16)
+
+    def scan(_):
+        for _ in range(20):
+            board.frame(ticks)
+            assert isinstance(board.counts, dict)
+
+    together(scan)
+    assert board.time_us > 0
+
+
+def test_a_window_may_be_used_from_several_threads():
+    pattern = taxel.SpikeTrains.from_lists([[k / 7.0 + 2 * n for n in range(40)] for k in range(30)], stop=100.0)
+    window = taxel.learn.OnlineConeR(window=50)
+
+    def add(_):
+        for _ in range(5):
+            window.partial_fit(pattern, [50.0])
+
+    together(add)
+    assert window.patterns_ == 30
+
+
+def test_what_progress_raises_ends_a_fit_that_keeps_its_best():
+    """A fit stopped at its first round is not solved: it did not run on."""
+    rng = np.random.default_rng(3)
+    trains = taxel.SpikeTrains.from_lists([np.sort(rng.uniform(0, 2000, 12)) for _ in range(150)], stop=2000.0)
+    targets = [np.arange(100.0, 1900.0, 45.0)]
+    cone = taxel.learn.ConeX()
+    told = []
+
+    def progress(*said):
+        told.append(said)
+        raise LookupError("enough")
+
+    with pytest.raises(LookupError, match="enough"):
+        cone.fit([trains], targets, progress=progress)
+    assert len(told) == 1
+    assert cone.status_ == "stopped"
+    assert taxel.learn.ConeX().fit([trains], targets).status_ != "stopped"

@@ -96,12 +96,12 @@ def decode(
     Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
     """
     decoder = Decoder(array=array, pairing=pairing, differences=differences)
-    events = decoder.push(data)
-    rest = decoder.finish()
     if pairing == "taxel":
-        rest.markers = events.markers
-        return rest
-    return decoder._joined(events, rest)
+        markers = decoder.push(data).markers
+        events = decoder.finish()
+        events.markers = markers
+        return events
+    return decoder._take(data, None, last=True)
 
 
 @dataclass(frozen=True)
@@ -185,7 +185,16 @@ class Columns:
     def __repr__(self) -> str:
         return f"Columns(room for {len(self)} events)"
 
-    def _parts(self) -> tuple[NDArray[Any], ...]:
+    def _parts(
+        self,
+    ) -> tuple[
+        NDArray[np.int64],
+        NDArray[np.uint16],
+        NDArray[np.uint16],
+        NDArray[np.uint16],
+        NDArray[np.uint8],
+        NDArray[np.uint8],
+    ]:
         p, present = self.p.view(np.uint8), self.present.view(np.uint8)
         return self.t, self.x, self.y, self.intensity, p, present
 
@@ -261,9 +270,13 @@ class Decoder:
         ------
         ProblemError : `data` is not bytes, or `arrived` not a whole number
         """
+        return self._take(data, arrived, last=False)
+
+    def _take(self, data: Any, arrived: int | None, *, last: bool) -> Events:
+        """Return the events of bytes, which may be the last ones, in memory of their own."""
         data = _bytes(data)
-        columns = Columns(self._core.most_rows(len(data)))
-        events = self.push_into(columns, data, arrived)
+        columns = Columns(len(data) // 5 + 2)
+        events = self._fill(columns, data, arrived, last=last)
         n = len(events)
         # Give back what no event needed: half of it where every change has an intensity.
         for name in ("t", "x", "y", "p", "intensity", "present"):
@@ -295,9 +308,12 @@ class Decoder:
         ------
         ProblemError : too little room, or as `push`
         """
-        data = _bytes(data)
+        return self._fill(instance("columns", columns, Columns), _bytes(data), arrived, last=False)
+
+    def _fill(self, columns: Columns, data: NDArray[np.uint8], arrived: int | None, *, last: bool) -> Events:
+        """Fill columns; end the stream behind the last bytes."""
         when = None if arrived is None else whole("arrived", arrived)
-        rows, paired, markers = self._core.fill(data, when, instance("columns", columns, Columns)._parts())
+        rows, paired, markers = self._core.fill(data, when, columns._parts(), last)
         return Events._unchecked(
             columns.t[:rows],
             columns.x[:rows],
@@ -321,20 +337,6 @@ class Decoder:
     def counts(self) -> Counts:
         """What was seen and dropped so far."""
         return Counts(*self._core.counts())
-
-    def _joined(self, events: Events, rest: Events) -> Events:
-        """Return events with the one that waited."""
-        if not len(rest):
-            return events
-        parts = [np.concatenate([getattr(events, name), getattr(rest, name)]) for name in ("t", "x", "y", "p")]
-        pairs: tuple[Any, Any] = (None, None)
-        if events.intensity is not None:
-            none = np.zeros(len(rest), np.uint16)
-            pairs = (
-                np.concatenate([events.intensity, none]),
-                np.concatenate([events.present, none.astype(np.bool_)]),
-            )
-        return Events._unchecked(parts[0], parts[1], parts[2], parts[3], self.array, *pairs, events.markers)
 
     def __repr__(self) -> str:
         c = self.counts

@@ -117,23 +117,32 @@ impl Events {
     ///
     /// `Problem`, naming the column or the event.
     pub fn check(&self) -> Result<()> {
-        let n = self.t.len();
-        for (name, len) in [("x", self.x.len()), ("y", self.y.len()), ("p", self.p.len())] {
-            if len != n {
-                return Err(problem!("events: {name} has {len} entries, t has {n}: they must be equal"));
-            }
-        }
-        if let Some(i) = &self.intensity
-            && (i.ticks.len() != n || i.present.len() != n)
-        {
-            return Err(problem!("events: intensity has {} entries, t has {n}: they must be equal", i.ticks.len()));
-        }
-        let (columns, rows) = (self.array.columns, self.array.rows);
-        for (k, (&x, &y)) in self.x.iter().zip(&self.y).enumerate() {
-            if x >= columns || y >= rows {
-                return Err(problem!("event {k}: taxel x={x}, y={y} lies outside {rows} rows x {columns} columns"));
-            }
-        }
-        Ok(())
+        let pairs = self.intensity.as_ref().map(|i| (i.ticks.len(), i.present.len()));
+        check(&self.array, self.t.len(), &self.x, &self.y, self.p.len(), pairs)
     }
+}
+
+/// [`Events::check`] for columns wherever they lie; of t, p and a pair of ticks and present their lengths matter.
+///
+/// # Errors
+///
+/// `Problem`, naming the column or the event.
+pub fn check(array: &Array, t: usize, x: &[u16], y: &[u16], p: usize, intensity: Option<(usize, usize)>) -> Result<()> {
+    for (name, len) in [("x", x.len()), ("y", y.len()), ("p", p)] {
+        if len != t {
+            return Err(problem!("events: {name} has {len} entries, t has {t}: they must be equal"));
+        }
+    }
+    if let Some((ticks, present)) = intensity
+        && (ticks != t || present != t)
+    {
+        return Err(problem!("events: intensity has {ticks} entries, t has {t}: they must be equal"));
+    }
+    let (columns, rows) = (array.columns, array.rows);
+    for (k, (&x, &y)) in x.iter().zip(y).enumerate() {
+        if x >= columns || y >= rows {
+            return Err(problem!("event {k}: taxel x={x}, y={y} lies outside {rows} rows x {columns} columns"));
+        }
+    }
+    Ok(())
 }

@@ -126,39 +126,42 @@ impl SpikeTrains {
     ///
     /// `Problem`, naming train and spike.
     pub fn check(&self) -> Result<()> {
-        if !(self.start.is_finite() && self.stop.is_finite() && self.start <= self.stop) {
-            return Err(problem!("window {} to {} ms: start must not lie after stop", self.start, self.stop));
-        }
-        let sound = self.offsets.first() == Some(&0)
-            && self.offsets.last() == Some(&self.times.len())
-            && self.offsets.is_sorted();
-        if !sound {
-            return Err(problem!("offsets must ascend from 0 to the number of spikes, {}", self.times.len()));
-        }
-        if self.values.as_ref().is_some_and(|v| v.len() != self.times.len()) {
-            return Err(problem!("values: must be one a spike, {}", self.times.len()));
-        }
-        for n in 0..self.len() {
-            let train = self.train(n);
-            for (k, &t) in train.iter().enumerate() {
-                if !t.is_finite() {
-                    return Err(problem!("train {n}, spike {k}: time is {t}, must be finite"));
-                }
-                if k > 0 && t < train[k - 1] {
-                    return Err(problem!(
-                        "train {n}, spike {k}: {t} ms comes after {} ms, times must ascend",
-                        train[k - 1]
-                    ));
-                }
-                if t < self.start || t > self.stop {
-                    return Err(problem!(
-                        "train {n}, spike {k}: {t} ms lies outside the window {} to {} ms",
-                        self.start,
-                        self.stop
-                    ));
-                }
+        check(&self.times, &self.offsets, self.values.as_ref().map(Vec::len), self.start, self.stop)
+    }
+}
+
+/// [`SpikeTrains::check`] for columns wherever they lie; of the values their number matters.
+///
+/// # Errors
+///
+/// `Problem`, naming train and spike.
+pub fn check(times: &[f64], offsets: &[usize], values: Option<usize>, start: f64, stop: f64) -> Result<()> {
+    if !(start.is_finite() && stop.is_finite() && start <= stop) {
+        return Err(problem!("window {} to {} ms: start must not lie after stop", start, stop));
+    }
+    let sound = offsets.first() == Some(&0) && offsets.last() == Some(&times.len()) && offsets.is_sorted();
+    if !sound {
+        return Err(problem!("offsets must ascend from 0 to the number of spikes, {}", times.len()));
+    }
+    if values.is_some_and(|len| len != times.len()) {
+        return Err(problem!("values: must be one a spike, {}", times.len()));
+    }
+    for (n, ends) in offsets.windows(2).enumerate() {
+        let train = &times[ends[0]..ends[1]];
+        for (k, &t) in train.iter().enumerate() {
+            if !t.is_finite() {
+                return Err(problem!("train {n}, spike {k}: time is {t}, must be finite"));
+            }
+            if k > 0 && t < train[k - 1] {
+                return Err(problem!(
+                    "train {n}, spike {k}: {t} ms comes after {} ms, times must ascend",
+                    train[k - 1]
+                ));
+            }
+            if t < start || t > stop {
+                return Err(problem!("train {n}, spike {k}: {t} ms lies outside the window {} to {} ms", start, stop));
             }
         }
-        Ok(())
     }
+    Ok(())
 }

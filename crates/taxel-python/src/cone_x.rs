@@ -123,18 +123,12 @@ impl ConeXProblem {
         let multipliers = slice("multipliers", &multipliers)?;
         let rows = start.iter().map(to_row).collect::<PyResult<Vec<_>>>()?;
         let start: Vec<(Row, f64)> = rows.into_iter().zip(multipliers.iter().copied()).collect();
-        let mut raised = None;
-        let mut report = |r: Round| {
-            if let (Some(progress), None) = (&progress, &raised) {
-                let called =
-                    Python::attach(|py| progress.call1(py, (r.round, r.rows, r.broken, r.objective)).map(drop));
-                raised = called.err();
-            }
-        };
-        let (fit, signal) = enter_keeping(py, max_seconds, |stop| self.0.fit(&start, &mut report, stop))?;
-        if let Some(error) = raised {
-            return Err(error);
-        }
+        let (fit, signal) = enter_keeping(py, max_seconds, |stop, teller| {
+            let mut report = |r: Round| {
+                teller.tell(progress.as_ref(), |py, told| told.call1(py, (r.round, r.rows, r.broken, r.objective)));
+            };
+            self.0.fit(&start, &mut report, stop)
+        })?;
         let Fit { status, weights, objective, parts, gap, violation, margin, engine, rounds, held, certificate } = fit;
         let status = match status {
             Status::Solved => "solved",

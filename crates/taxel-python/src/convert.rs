@@ -96,11 +96,14 @@ pub(crate) fn from_events(py: Python<'_>, events: Events) -> EventsOut<'_> {
 pub(crate) type SpikesIn<'py> =
     (PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, i64>, Option<PyReadonlyArray1<'py, f32>>, f64, f64);
 
+/// Where trains begin and end.
+pub(crate) fn to_offsets(offsets: &PyReadonlyArray1<'_, i64>) -> PyResult<Vec<usize>> {
+    let below = |o| ProblemError::new_err(format!("offsets: {o} is below 0"));
+    slice("offsets", offsets)?.iter().map(|&o| usize::try_from(o).map_err(|_| below(o))).collect()
+}
+
 pub(crate) fn to_spikes((times, offsets, values, start, stop): SpikesIn<'_>) -> PyResult<SpikeTrains> {
-    let offsets = slice("offsets", &offsets)?
-        .iter()
-        .map(|&o| usize::try_from(o).map_err(|_| ProblemError::new_err(format!("offsets: {o} is below 0"))))
-        .collect::<PyResult<_>>()?;
+    let offsets = to_offsets(&offsets)?;
     let values = values.map(|v| slice("values", &v).map(<[f32]>::to_vec)).transpose()?;
     let trains = SpikeTrains { times: slice("times", &times)?.to_vec(), offsets, values, start, stop };
     trains.check().map_err(crate::errors::core)?;

@@ -1,14 +1,12 @@
 //! Scoring and readouts for Python.
 
-use std::sync::{Mutex, MutexGuard};
-
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::detect::{Detection, Readout, ReadoutStream as CoreStream, Reference, Spread, score as score_core};
 use taxel_core::encode::Tare;
 
 use crate::convert::{ArrayParts, EventsIn, array, slice, to_array, to_events};
-use crate::enter::enter;
+use crate::enter::{Shared, enter};
 use crate::errors::{ProblemError, core};
 use crate::parameters::parsed;
 
@@ -157,27 +155,20 @@ fn readout_run_frames<'py>(
 
 /// A readout at work.
 #[pyclass(frozen)]
-struct ReadoutStream(Mutex<CoreStream>);
-
-impl ReadoutStream {
-    fn lock(&self) -> MutexGuard<'_, CoreStream> {
-        // A panic inside is reported by the door; the stream after it is no worse than after an error.
-        self.0.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
-    }
-}
+struct ReadoutStream(Shared<CoreStream>);
 
 #[pymethods]
 impl ReadoutStream {
     #[new]
     fn new(readout: &str, array: ArrayParts, frame_us: f64, tare: Option<&str>) -> PyResult<Self> {
         let ((readout, tare), array) = (parse(readout, tare)?, to_array(array)?);
-        Ok(Self(Mutex::new(readout.stream(&array, frame_us, tare.as_ref()).map_err(core)?)))
+        Ok(Self(Shared::new(readout.stream(&array, frame_us, tare.as_ref()).map_err(core)?)))
     }
 
     fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<DetectionsOut<'py>> {
         let events = to_events(events)?;
         let mut found = vec![];
-        enter(py, |_| self.lock().push_events(&events, &mut found))?;
+        self.0.enter(py, |readout, _| readout.push_events(&events, &mut found))?;
         Ok(from_detections(py, found))
     }
 
@@ -190,32 +181,32 @@ impl ReadoutStream {
     ) -> PyResult<DetectionsOut<'py>> {
         let array = to_array(array)?;
         let (t, values) = (slice("t", &t)?, slice("values", &values)?);
-        let found = enter(py, |stop| self.lock().push_pictures(&array, t, values, stop))?;
+        let found = self.0.enter(py, |readout, stop| readout.push_pictures(&array, t, values, stop))?;
         Ok(from_detections(py, found))
     }
 
     fn advance<'py>(&self, py: Python<'py>, t: i64) -> PyResult<DetectionsOut<'py>> {
         let mut found = vec![];
-        enter(py, |_| self.lock().advance(t, &mut found))?;
+        self.0.enter(py, |readout, _| readout.advance(t, &mut found))?;
         Ok(from_detections(py, found))
     }
 
     /// Up to where everything has been said, us.
     #[getter]
-    fn now(&self) -> Option<i64> {
-        self.lock().now()
+    fn now(&self, py: Python<'_>) -> Option<i64> {
+        self.0.look(py, |readout| readout.now())
     }
 
     /// How many events came late.
     #[getter]
-    fn late(&self) -> u64 {
-        self.lock().late()
+    fn late(&self, py: Python<'_>) -> u64 {
+        self.0.look(py, |readout| readout.late())
     }
 
     /// Each neuron's potential now, mV.
     #[getter]
-    fn potentials(&self) -> Vec<(String, f64)> {
-        self.lock().potentials().map(|(label, mv)| (label.to_owned(), mv)).collect()
+    fn potentials(&self, py: Python<'_>) -> Vec<(String, f64)> {
+        self.0.look(py, |readout| readout.potentials().map(|(label, mv)| (label.to_owned(), mv)).collect())
     }
 }
 

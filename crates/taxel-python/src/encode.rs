@@ -1,14 +1,12 @@
 //! Encoders and the tare for Python; parameters cross as JSON.
 
-use std::sync::{Mutex, MutexGuard};
-
 use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use taxel_core::encode::{Encoder, Stream, Tare, TareBuilder};
 use taxel_core::{Array, Error, Spike, SpikeTrains, problem};
 
 use crate::convert::{ArrayParts, EventsIn, SpikesOut, from_spikes, slice, to_array, to_events};
-use crate::enter::enter;
+use crate::enter::{Shared, enter};
 use crate::errors::core;
 
 /// Checks an encoder; gives it back with every default filled in.
@@ -67,10 +65,10 @@ fn pictures<'a>(
 }
 
 /// An encoder at work.
-#[pyclass]
+#[pyclass(frozen)]
 struct EncoderStream {
     array: Array,
-    at_work: Mutex<AtWork>,
+    at_work: Shared<AtWork>,
 }
 
 struct AtWork {
@@ -92,26 +90,19 @@ impl AtWork {
     }
 }
 
-impl EncoderStream {
-    fn lock(&self) -> MutexGuard<'_, AtWork> {
-        // A panic inside an encoder is reported by the door; the stream after it is no worse than after an error.
-        self.at_work.lock().unwrap_or_else(std::sync::PoisonError::into_inner)
-    }
-}
-
 #[pymethods]
 impl EncoderStream {
     #[new]
     fn new(encoder: &str, array: ArrayParts) -> PyResult<Self> {
         let (encoder, array) = (Encoder::from_json(encoder).map_err(core)?, to_array(array)?);
         let stream = encoder.stream(&array).map_err(core)?;
-        Ok(Self { array, at_work: Mutex::new(AtWork { stream, known: None }) })
+        Ok(Self { array, at_work: Shared::new(AtWork { stream, known: None }) })
     }
 
     fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<SpikesOut<'py>> {
         let events = to_events(events)?;
-        let trains = enter(py, |_| {
-            let (mut at_work, mut out) = (self.lock(), vec![]);
+        let trains = self.at_work.enter(py, |at_work, _| {
+            let mut out = vec![];
             at_work.stream.push_events(&events, &mut out)?;
             let latest = events.t.iter().max().map(|&t| t as f64 / 1000.0);
             at_work.piece(&out, events.t.first().copied(), latest)
@@ -136,8 +127,8 @@ impl EncoderStream {
             )));
         }
         let (t, values) = pictures(&given, &t, &values)?;
-        let trains = enter(py, |_| {
-            let (mut at_work, mut out) = (self.lock(), vec![]);
+        let trains = self.at_work.enter(py, |at_work, _| {
+            let mut out = vec![];
             for (&t, picture) in t.iter().zip(values.chunks_exact(given.len())) {
                 at_work.stream.push_frame(t, picture, &mut out)?;
             }
@@ -148,13 +139,13 @@ impl EncoderStream {
 
     /// How many events came too far behind the time come to.
     #[getter]
-    fn late(&self) -> u64 {
-        self.lock().stream.late()
+    fn late(&self, py: Python<'_>) -> u64 {
+        self.at_work.look(py, |at_work| at_work.stream.late())
     }
 
     fn advance<'py>(&self, py: Python<'py>, t: i64) -> PyResult<SpikesOut<'py>> {
-        let trains = enter(py, |_| {
-            let (mut at_work, mut out) = (self.lock(), vec![]);
+        let trains = self.at_work.enter(py, |at_work, _| {
+            let mut out = vec![];
             at_work.stream.advance(t, &mut out);
             at_work.piece(&out, None, Some(t as f64 / 1000.0))
         })?;
@@ -162,8 +153,8 @@ impl EncoderStream {
     }
 
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<SpikesOut<'py>> {
-        let trains = enter(py, |_| {
-            let (mut at_work, mut out) = (self.lock(), vec![]);
+        let trains = self.at_work.enter(py, |at_work, _| {
+            let mut out = vec![];
             let end = at_work.stream.finish(&mut out);
             at_work.piece(&out, None, end)
         })?;

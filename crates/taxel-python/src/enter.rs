@@ -1,7 +1,7 @@
-//! The one door: lets the GIL go, hears Ctrl-C, turns a panic into an error.
+//! The one door: lets the GIL go, hears Ctrl-C, tells Python how work comes on, turns a panic into an error.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Mutex;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
@@ -20,42 +20,122 @@ where
     T: Send,
     E: IntoPyErr + Send,
 {
+    enter_telling(py, |stop, _| work(stop))
+}
+
+/// As [`enter`], for work that tells Python functions how it comes on.
+pub(crate) fn enter_telling<T, E>(
+    py: Python<'_>,
+    work: impl FnOnce(Stop<'_>, Teller<'_>) -> Result<T, E> + Send,
+) -> PyResult<T>
+where
+    T: Send,
+    E: IntoPyErr + Send,
+{
     match guarded(py, None, work) {
-        (_, Some(signal)) => Err(signal),
+        (_, Some(raised)) => Err(raised),
         (outcome, None) => outcome,
     }
 }
 
-/// As [`enter`], for work that keeps the best so far when it is stopped: by Ctrl-C, or after `max_seconds`.
+/// As [`enter_telling`], for work that keeps the best so far when it is stopped: by Ctrl-C, by what a function raises that
+/// is told, or after `max_seconds`.
 ///
-/// Gives its result together with the signal's exception, which the caller raises once the result is kept.
+/// Gives its result together with the exception that stopped it, which the caller raises once the result is kept.
 pub(crate) fn enter_keeping<T, E>(
     py: Python<'_>,
     max_seconds: Option<f64>,
-    work: impl FnOnce(Stop<'_>) -> Result<T, E> + Send,
+    work: impl FnOnce(Stop<'_>, Teller<'_>) -> Result<T, E> + Send,
 ) -> PyResult<(T, Option<Py<PyAny>>)>
 where
     T: Send,
     E: IntoPyErr + Send,
 {
     match guarded(py, max_seconds, work) {
-        (Ok(value), signal) => Ok((value, signal.map(|s| s.into_value(py).into_any()))),
-        (Err(_), Some(signal)) => Err(signal),
+        (Ok(value), raised) => Ok((value, raised.map(|r| r.into_value(py).into_any()))),
+        (Err(_), Some(raised)) => Err(raised),
         (Err(error), None) => Err(error),
     }
 }
 
-/// What the work gave, and the exception of a signal that came meanwhile.
+/// Tells Python functions how work comes on. What one raises ends the work, as Ctrl-C does, and is raised again; after it
+/// nothing more is told.
+#[derive(Clone, Copy)]
+pub(crate) struct Teller<'a>(&'a Mutex<Option<PyErr>>);
+
+impl Teller<'_> {
+    /// Calls a function, where there is one.
+    pub(crate) fn tell(
+        self,
+        told: Option<&Py<PyAny>>,
+        call: impl FnOnce(Python<'_>, &Py<PyAny>) -> PyResult<Py<PyAny>>,
+    ) {
+        let Some(told) = told else { return };
+        if !self.raised()
+            && let Err(error) = Python::attach(|py| call(py, told).map(drop))
+        {
+            self.keep(error);
+        }
+    }
+
+    fn raised(self) -> bool {
+        unpoisoned(self.0).is_some()
+    }
+
+    fn keep(self, error: PyErr) {
+        unpoisoned(self.0).get_or_insert(error);
+    }
+}
+
+/// What several Python threads may use: one at a time, and the others wait without the GIL.
+pub(crate) struct Shared<T>(Mutex<T>);
+
+impl<T: Send> Shared<T> {
+    pub(crate) fn new(value: T) -> Self {
+        Self(Mutex::new(value))
+    }
+
+    /// Through the door, as [`enter`].
+    pub(crate) fn enter<R, E>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut T, Stop<'_>) -> Result<R, E> + Send,
+    ) -> PyResult<R>
+    where
+        R: Send,
+        E: IntoPyErr + Send,
+    {
+        enter(py, |stop| work(&mut self.lock(), stop))
+    }
+
+    /// A short look, or a short change: without the GIL all the same, since who works in it may be asking for the GIL.
+    pub(crate) fn look<R: Send>(&self, py: Python<'_>, look: impl FnOnce(&mut T) -> R + Send) -> R {
+        py.detach(|| look(&mut self.lock()))
+    }
+
+    /// The value itself, to be called without the GIL.
+    pub(crate) fn lock(&self) -> MutexGuard<'_, T> {
+        unpoisoned(&self.0)
+    }
+}
+
+/// What a mutex holds. A panic is reported by the door; what it left is no worse than after an error.
+fn unpoisoned<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What the work gave, and what was raised meanwhile: a signal's exception, or a told function's.
 fn guarded<T, E>(
     py: Python<'_>,
     max_seconds: Option<f64>,
-    work: impl FnOnce(Stop<'_>) -> Result<T, E> + Send,
+    work: impl FnOnce(Stop<'_>, Teller<'_>) -> Result<T, E> + Send,
 ) -> (PyResult<T>, Option<PyErr>)
 where
     T: Send,
     E: IntoPyErr + Send,
 {
-    let signal: Mutex<Option<PyErr>> = Mutex::new(None);
+    let raised: Mutex<Option<PyErr>> = Mutex::new(None);
+    let teller = Teller(&raised);
     let begun = Instant::now();
     let asked = Mutex::new(begun);
     let outcome = py.detach(|| {
@@ -63,19 +143,17 @@ where
             if max_seconds.is_some_and(|most| begun.elapsed().as_secs_f64() >= most) {
                 return true;
             }
-            let Ok(mut last) = asked.try_lock() else { return false };
-            if last.elapsed() < ASK_EVERY {
-                return signal.lock().is_ok_and(|s| s.is_some());
-            }
-            *last = Instant::now();
-            if let Err(error) = Python::attach(|py| py.check_signals())
-                && let Ok(mut slot) = signal.lock()
+            if let Ok(mut last) = asked.try_lock()
+                && last.elapsed() >= ASK_EVERY
             {
-                *slot = Some(error);
+                *last = Instant::now();
+                if let Err(error) = Python::attach(|py| py.check_signals()) {
+                    teller.keep(error);
+                }
             }
-            signal.lock().is_ok_and(|s| s.is_some())
+            teller.raised()
         };
-        catch_unwind(AssertUnwindSafe(|| work(Stop::when(&stop))))
+        catch_unwind(AssertUnwindSafe(|| work(Stop::when(&stop), teller)))
     });
     let outcome = match outcome {
         Ok(Ok(value)) => Ok(value),
@@ -89,5 +167,5 @@ where
             Err(Error::new_err(format!("a bug in taxel, please report it: {said}")))
         }
     };
-    (outcome, signal.into_inner().unwrap_or(None))
+    (outcome, raised.into_inner().unwrap_or_else(PoisonError::into_inner))
 }

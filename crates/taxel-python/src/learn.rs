@@ -1,16 +1,13 @@
 //! Learners.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::learn as core_learn;
 use taxel_core::learn::{ConeR, Engine, Fit, Problem, Round, Shares, Status};
-use taxel_core::{Stop, problem};
+use taxel_core::problem;
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
-use crate::enter::{enter, enter_keeping};
+use crate::enter::{Shared, enter, enter_keeping};
 use crate::errors::core;
 use crate::parameters::parsed;
 
@@ -84,32 +81,20 @@ impl ConeRProblem {
         let parameters = to_cone_r(parameters)?;
         let start = start.as_ref().map(to_start).transpose()?;
         let start = start.as_ref().map(|(weights, multipliers)| (*weights, multipliers.as_ref()));
-        let raised = Mutex::new(None);
-        let failed = AtomicBool::new(false);
-        let mut report = |r: Round| {
-            if let (Some(progress), false) = (&progress, failed.load(Ordering::Relaxed)) {
-                let called = Python::attach(|py| progress.call1(py, (r.round, r.rows, r.objective, r.gap)).map(drop));
-                if let (Err(error), Ok(mut slot)) = (called, raised.lock()) {
-                    *slot = Some(error);
-                    failed.store(true, Ordering::Relaxed);
-                }
-            }
-        };
-        let (fit, signal) = enter_keeping(py, parameters.max_seconds, |stop| {
-            let either = || stop.asked() || failed.load(Ordering::Relaxed);
-            self.0.fit(&parameters, start, &mut report, Stop::when(&either))
+        let (fit, raised) = enter_keeping(py, parameters.max_seconds, |stop, teller| {
+            let mut report = |r: Round| {
+                teller.tell(progress.as_ref(), |py, told| told.call1(py, (r.round, r.rows, r.objective, r.gap)));
+            };
+            self.0.fit(&parameters, start, &mut report, stop)
         })?;
-        if let Some(error) = raised.into_inner().unwrap_or(None) {
-            return Err(error);
-        }
-        Ok((fit_out(py, fit), signal))
+        Ok((fit_out(py, fit), raised))
     }
 }
 
 /// A sliding window of patterns and its last fit.
-#[pyclass]
+#[pyclass(frozen)]
 struct OnlineConeR {
-    window: core_learn::OnlineConeR,
+    window: Shared<core_learn::OnlineConeR>,
     max_seconds: Option<f64>,
 }
 
@@ -119,26 +104,27 @@ impl OnlineConeR {
     fn new(parameters: &str, window: usize) -> PyResult<Self> {
         let parameters = to_cone_r(parameters)?;
         let window = core_learn::OnlineConeR::new(&parameters, window).map_err(core)?;
-        Ok(Self { window, max_seconds: parameters.max_seconds })
+        Ok(Self { window: Shared::new(window), max_seconds: parameters.max_seconds })
     }
 
     #[getter]
-    fn patterns(&self) -> usize {
-        self.window.patterns()
+    fn patterns(&self, py: Python<'_>) -> usize {
+        self.window.look(py, |window| window.patterns())
     }
 
     #[getter]
-    fn silent_rows(&self) -> usize {
-        self.window.silent_rows()
+    fn silent_rows(&self, py: Python<'_>) -> usize {
+        self.window.look(py, |window| window.silent_rows())
     }
 
-    fn add(&mut self, pattern: SpikesIn<'_>, targets: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
-        self.window.add(&to_spikes(pattern)?, slice("targets", &targets)?).map_err(core)
+    fn add(&self, py: Python<'_>, pattern: SpikesIn<'_>, targets: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+        let (pattern, targets) = (to_spikes(pattern)?, slice("targets", &targets)?);
+        self.window.enter(py, |window, stop| window.add(&pattern, targets, stop))
     }
 
     /// A fit, and the exception of a signal that ended it early.
-    fn fit<'py>(&mut self, py: Python<'py>) -> PyResult<(FitOut<'py>, Option<Py<PyAny>>)> {
-        let (fit, signal) = enter_keeping(py, self.max_seconds, |stop| self.window.fit(&mut |_| {}, stop))?;
+    fn fit<'py>(&self, py: Python<'py>) -> PyResult<(FitOut<'py>, Option<Py<PyAny>>)> {
+        let (fit, signal) = enter_keeping(py, self.max_seconds, |stop, _| self.window.lock().fit(&mut |_| {}, stop))?;
         Ok((fit_out(py, fit), signal))
     }
 }

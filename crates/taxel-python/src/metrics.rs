@@ -9,7 +9,7 @@ use taxel_core::problem;
 use taxel_core::vectors::Instructions;
 
 use crate::convert::{array, slice};
-use crate::enter::enter;
+use crate::enter::{enter, enter_telling};
 use crate::errors::core;
 use crate::parameters::parsed;
 
@@ -85,25 +85,15 @@ fn pairwise<'py>(
     let (metric, a, b) = (to_metric(metric)?, Held::new(a)?, b.map(Held::new).transpose()?);
     let (a, b) = (a.patterns()?, b.as_ref().map(Held::patterns).transpose()?);
     let instructions = to_instructions(vectors)?;
-    let raised = std::sync::Mutex::new(None);
-    let outcome = enter(py, |stop| {
+    let distances = enter_telling(py, |stop, teller| {
         let mut report = |done: usize, all: usize| {
-            let Some(progress) = &progress else { return };
-            if let Err(error) = Python::attach(|py| progress.call1(py, (done, all)).map(drop))
-                && let Ok(mut slot) = raised.lock()
-            {
-                *slot = Some(error);
-            }
+            teller.tell(progress.as_ref(), |py, told| told.call1(py, (done, all)));
         };
-        let asked = || stop.asked() || raised.lock().is_ok_and(|r| r.is_some());
-        let mut work = Work::new(threads, taxel_core::Stop::when(&asked), &mut report);
+        let mut work = Work::new(threads, stop, &mut report);
         work.instructions = instructions;
         metric.pairwise(&a, b.as_ref(), &mut work)
-    });
-    if let Ok(Some(error)) = raised.into_inner() {
-        return Err(error);
-    }
-    Ok(array(py, outcome?))
+    })?;
+    Ok(array(py, distances))
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

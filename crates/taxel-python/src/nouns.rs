@@ -2,19 +2,31 @@
 
 use pyo3::prelude::*;
 
-use crate::convert::{EventsIn, SpikesIn, SpikesOut, from_spikes, to_events, to_spikes};
+use taxel_core::{events, spikes};
+
+use crate::convert::{EventsIn, SpikesIn, SpikesOut, from_spikes, slice, to_array, to_offsets, to_spikes};
 use crate::enter::enter;
 
 /// Checks spike trains; raises where train or spike make no sense.
 #[pyfunction]
-fn check_spikes(trains: SpikesIn<'_>) -> PyResult<()> {
-    to_spikes(trains).map(drop)
+fn check_spikes(py: Python<'_>, trains: SpikesIn<'_>) -> PyResult<()> {
+    let (times, offsets, values, start, stop) = trains;
+    let (times, offsets) = (slice("times", &times)?, to_offsets(&offsets)?);
+    let values = values.as_ref().map(|v| slice("values", v).map(<[f32]>::len)).transpose()?;
+    enter(py, |_| spikes::check(times, &offsets, values, start, stop))
 }
 
 /// Checks events; raises where a column is short or an event lies outside its array.
 #[pyfunction]
-fn check_events(events: EventsIn<'_>) -> PyResult<()> {
-    to_events(events).map(drop)
+fn check_events(py: Python<'_>, events: EventsIn<'_>) -> PyResult<()> {
+    let (array, t, x, y, p, intensity, _) = events;
+    let array = to_array(array)?;
+    let (t, x, y, p) = (slice("t", &t)?.len(), slice("x", &x)?, slice("y", &y)?, slice("p", &p)?.len());
+    let pairs = match &intensity {
+        None => None,
+        Some((ticks, present)) => Some((slice("intensity", ticks)?.len(), slice("present", present)?.len())),
+    };
+    enter(py, |_| events::check(&array, t, x, y, p, pairs))
 }
 
 /// Splits signed trains into all ON trains, then all OFF trains.

@@ -1,8 +1,5 @@
 //! The rules that learn by epochs.
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::learn::rivals::{Ended, Rival, Skim, SteppedNeuron, Tempotron, Trained};
@@ -23,27 +20,12 @@ fn train<'py>(
     progress: Option<Py<PyAny>>,
     work: impl FnOnce(&mut dyn FnMut(usize, f64), Stop<'_>) -> CoreResult<Trained> + Send,
 ) -> PyResult<TrainedOut<'py>> {
-    let raised: Mutex<Option<PyErr>> = Mutex::new(None);
-    let over = AtomicBool::new(false);
-    let (trained, interrupt) = enter_keeping(py, max_seconds, |stop| {
+    let (trained, interrupt) = enter_keeping(py, max_seconds, |stop, teller| {
         let mut report = |epoch: usize, right: f64| {
-            let Some(progress) = &progress else { return };
-            if over.load(Ordering::Relaxed) {
-                return;
-            }
-            if let Err(error) = Python::attach(|py| progress.call1(py, (epoch, right)).map(drop)) {
-                over.store(true, Ordering::Relaxed);
-                if let Ok(mut slot) = raised.lock() {
-                    *slot = Some(error);
-                }
-            }
+            teller.tell(progress.as_ref(), |py, told| told.call1(py, (epoch, right)));
         };
-        let ask = || over.load(Ordering::Relaxed) || stop.asked();
-        work(&mut report, Stop::when(&ask))
+        work(&mut report, stop)
     })?;
-    if let Some(error) = raised.into_inner().unwrap_or(None) {
-        return Err(error);
-    }
     let ended = match trained.ended {
         Ended::Right => "right",
         Ended::Epochs => "epochs",

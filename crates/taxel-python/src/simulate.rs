@@ -1,18 +1,17 @@
 //! Simulated touch, and the board that feels it, as fast as it goes.
 
 use std::net::SocketAddr;
-use std::sync::Mutex;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::board::{Board, session};
 use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor, Stage, Taxels};
 use taxel_core::wire::{Decoder, Registers};
-use taxel_core::{Array, Error, Events, Result, Stop, problem};
+use taxel_core::{Array, Error, Events, Result, problem};
 use taxel_live::emulate::{Emulator, EmulatorOptions, Report};
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
-use crate::enter::enter;
+use crate::enter::{enter, enter_telling};
 use crate::errors::core;
 use crate::parameters::read;
 
@@ -104,8 +103,7 @@ fn play<'py>(
     watch: Py<PyAny>,
 ) -> PyResult<(EventsOut<'py>, u64, u64)> {
     let (array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
-    let raised: Mutex<Option<PyErr>> = Mutex::new(None);
-    let played = enter(py, |stop| {
+    let (events, datagrams, words) = enter_telling(py, |stop, teller| {
         let mut stage = ready(&array, registers, sensor, seed, &acts)?;
         let commands = session(&registers, tare_ms, stage.frames() as u64)?;
         let mut board = Board::new(registers, &array)?;
@@ -127,16 +125,13 @@ fn play<'py>(
         let touch = |ticks: &mut [u16]| {
             done += 1;
             if done.is_multiple_of(second) {
-                tell(&raised, &watch, done as f64 / frames as f64);
+                teller.tell(Some(&watch), |py, told| told.call1(py, (done as f64 / frames as f64,)));
             }
             stage.frame(ticks)
         };
-        let ends = || stop.asked() || raised.lock().is_ok_and(|slot| slot.is_some());
-        board.play(touch, &commands, hear, Stop::when(&ends))?;
+        board.play(touch, &commands, hear, stop)?;
         Ok::<_, Error>((events, datagrams, words))
-    });
-    raised.into_inner().ok().flatten().map_or(Ok(()), Err)?;
-    let (events, datagrams, words) = played?;
+    })?;
     Ok((from_events(py, events), datagrams, words))
 }
 
@@ -161,8 +156,7 @@ fn emulate(
 ) -> PyResult<String> {
     let (array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
     let (to, control) = (address(to)?, control.map(address).transpose()?);
-    let raised: Mutex<Option<PyErr>> = Mutex::new(None);
-    let report = enter(py, |stop| {
+    enter_telling(py, |stop, teller| {
         let mut stage = ready(&array, registers, sensor, seed, &acts)?;
         let commands = session(&registers, tare_ms, stage.frames() as u64)?;
         let mut board = Board::new(registers, &array)?;
@@ -171,7 +165,8 @@ fn emulate(
         board.arm(&first)?;
         let options = EmulatorOptions { control, commands, ..EmulatorOptions::to(to) };
         let mut emulator = Emulator::open(board, &array, options)?;
-        tell(&raised, &begun, emulator.control_address().map(|a| a.to_string()));
+        let control = emulator.control_address().map(|a| a.to_string());
+        teller.tell(Some(&begun), |py, told| told.call1(py, (control,)));
         let mut failed = Ok(());
         let mut touch = |ticks: &mut [u16]| {
             stage.frame(ticks).unwrap_or_else(|error| {
@@ -179,24 +174,11 @@ fn emulate(
                 false
             })
         };
-        let ends = || stop.asked() || raised.lock().is_ok_and(|slot| slot.is_some());
-        let report = emulator.run(&mut touch, |report| tell(&raised, &watch, json(report)), Stop::when(&ends))?;
+        let say = |report: &Report| teller.tell(Some(&watch), |py, told| told.call1(py, (json(report),)));
+        let report = emulator.run(&mut touch, say, stop)?;
         failed?;
         Ok::<_, taxel_live::Error>(json(&report))
-    })?;
-    match raised.into_inner() {
-        Ok(Some(error)) => Err(error),
-        _ => Ok(report),
-    }
-}
-
-/// Calls a Python function; what it raises is kept, the first of all.
-fn tell<'a>(raised: &Mutex<Option<PyErr>>, callback: &Py<PyAny>, said: impl for<'py> IntoPyObject<'py> + 'a) {
-    if let Err(error) = Python::attach(|py| callback.call1(py, (said,)).map(drop))
-        && let Ok(mut slot) = raised.lock()
-    {
-        slot.get_or_insert(error);
-    }
+    })
 }
 
 fn address(text: &str) -> PyResult<SocketAddr> {

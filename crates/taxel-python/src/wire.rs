@@ -4,11 +4,11 @@ use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use taxel_core::board::{Board, IntensityWord, Previous};
-use taxel_core::wire::{self, Command, Counts, Decoder, Pairing, Registers, Room, STAMP_US};
-use taxel_core::{Error, Marker};
+use taxel_core::wire::{self, Command, Counts, Decoder, Pairing, Registers, Room};
+use taxel_core::{Error, Marker, problem};
 
 use crate::convert::{ArrayParts, EventsIn, EventsOut, from_events, slice, to_array, to_events};
-use crate::enter::enter;
+use crate::enter::{Shared, enter};
 use crate::errors::{ProblemError, core};
 use crate::parameters::parsed;
 
@@ -33,29 +33,26 @@ type ColumnsIn<'py> = (
 type FilledOut = (usize, bool, Vec<(i64, bool)>);
 
 /// Turns bytes into events as they come.
-#[pyclass(module = "taxel._core")]
-struct WireDecoder(Decoder);
+#[pyclass(module = "taxel._core", frozen)]
+struct WireDecoder(Shared<Decoder>);
 
 #[pymethods]
 impl WireDecoder {
     #[new]
     fn new(array: ArrayParts, pairing: &str, differences: bool) -> PyResult<Self> {
         let pairing: Pairing = parsed("pairing", &format!("{pairing:?}"))?;
-        Ok(Self(Decoder::new(to_array(array)?).pairing(pairing).differences(differences)))
+        Ok(Self(Shared::new(Decoder::new(to_array(array)?).pairing(pairing).differences(differences))))
     }
 
-    /// How many rows the next bytes can give at most.
-    fn most_rows(&self, bytes: usize) -> usize {
-        self.0.most_rows(bytes)
-    }
-
-    /// Fills columns from their first row on; returns rows, whether ticks were written, markers.
+    /// Fills columns from their first row on, and ends the stream with the `last` bytes; returns rows, whether ticks were
+    /// written, markers.
     fn fill(
-        &mut self,
+        &self,
         py: Python<'_>,
         data: PyReadonlyArray1<'_, u8>,
         arrived: Option<i64>,
         columns: ColumnsIn<'_>,
+        last: bool,
     ) -> PyResult<FilledOut> {
         let data = slice("data", &data)?;
         let (mut t, mut x, mut y, mut ticks, mut p, mut present) = columns;
@@ -67,13 +64,12 @@ impl WireDecoder {
         let p = p.as_slice_mut().map_err(contiguous)?;
         let present = present.as_slice_mut().map_err(contiguous)?;
         let room = [x.len(), y.len(), ticks.len(), p.len(), present.len()].into_iter().fold(t.len(), usize::min);
-        let most = self.0.most_rows(data.len());
-        if room < most {
-            let text = format!("columns have room for {room} rows: {} bytes may need {most}", data.len());
-            return Err(ProblemError::new_err(text));
-        }
-        let decoder = &mut self.0;
-        let (rows, paired, markers) = enter(py, |stop| {
+        let (rows, paired, markers) = self.0.enter(py, |decoder, stop| {
+            let most = decoder.most_rows(data.len());
+            if room < most {
+                let len = data.len();
+                return Err(problem!("columns have room for {room} rows: {len} bytes may need {most}"));
+            }
             let (mut rows, mut paired, mut markers): (usize, bool, Vec<Marker>) = (0, false, vec![]);
             for piece in data.chunks(PIECE) {
                 stop.check()?;
@@ -90,27 +86,35 @@ impl WireDecoder {
                 paired = filled.paired;
                 rows += filled.rows;
             }
+            if last {
+                let room = Room::new(
+                    &mut t[rows..room],
+                    [&mut x[rows..room], &mut y[rows..room], &mut ticks[rows..room]],
+                    [&mut p[rows..room], &mut present[rows..room]],
+                )?;
+                rows += decoder.finish_filling(room, paired)?;
+            }
             Ok::<_, Error>((rows, paired, markers))
         })?;
         Ok((rows, paired, markers.iter().map(|m| (m.t, m.start)).collect()))
     }
 
     /// Releases the change that waits for its intensity.
-    fn end_of_datagram<'py>(&mut self, py: Python<'py>) -> EventsOut<'py> {
-        from_events(py, self.0.end_of_datagram())
+    fn end_of_datagram<'py>(&self, py: Python<'py>) -> EventsOut<'py> {
+        from_events(py, self.0.look(py, Decoder::end_of_datagram))
     }
 
     /// Ends the stream; returns the rest.
-    fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<EventsOut<'py>> {
-        let decoder = &mut self.0;
-        let events = enter(py, |_| Ok::<_, Error>(decoder.finish()))?;
+    fn finish<'py>(&self, py: Python<'py>) -> PyResult<EventsOut<'py>> {
+        let events = self.0.enter(py, |decoder, _| Ok::<_, Error>(decoder.finish()))?;
         Ok(from_events(py, events))
     }
 
     /// The counts, in the order of `wire_count_names`.
-    fn counts(&self) -> [u64; 11] {
-        let Counts { bytes, words, skipped, short, changes, intensities, .. } = *self.0.counts();
-        let Counts { unpaired, markers, contradictory, outside, back, .. } = *self.0.counts();
+    fn counts(&self, py: Python<'_>) -> [u64; 11] {
+        let counts = self.0.look(py, |decoder| *decoder.counts());
+        let Counts { bytes, words, skipped, short, changes, intensities, .. } = counts;
+        let Counts { unpaired, markers, contradictory, outside, back, .. } = counts;
         [bytes, words, skipped, short, changes, intensities, unpaired, markers, contradictory, outside, back]
     }
 }
@@ -186,8 +190,8 @@ fn registers_commands(source: &str, target: &str, array: ArrayParts) -> PyResult
 }
 
 /// The emulated board.
-#[pyclass(module = "taxel._core")]
-struct WireBoard(Board);
+#[pyclass(module = "taxel._core", frozen)]
+struct WireBoard(Shared<Board>);
 
 #[pymethods]
 impl WireBoard {
@@ -197,43 +201,44 @@ impl WireBoard {
         let previous: Previous = parsed("previous", &format!("{previous:?}"))?;
         let intensity: IntensityWord = parsed("intensity", &format!("{intensity:?}"))?;
         let board = Board::new(registers, &to_array(array)?).map_err(core)?;
-        Ok(Self(board.previous(previous).intensity(intensity).queue(queue)))
+        Ok(Self(Shared::new(board.previous(previous).intensity(intensity).queue(queue))))
     }
 
-    fn greeting(&self) -> String {
-        self.0.greeting()
+    fn greeting(&self, py: Python<'_>) -> String {
+        self.0.look(py, |board| board.greeting())
     }
 
-    fn registers(&self) -> PyResult<String> {
-        to_json(self.0.registers())
+    fn registers(&self, py: Python<'_>) -> PyResult<String> {
+        self.0.look(py, |board| to_json(board.registers()))
     }
 
-    fn time_us(&self) -> f64 {
-        self.0.time_us()
+    fn time_us(&self, py: Python<'_>) -> f64 {
+        self.0.look(py, |board| board.time_us())
     }
 
     /// Takes command bytes; returns status lines.
-    fn command(&mut self, data: PyReadonlyArray1<'_, u8>) -> PyResult<String> {
-        Ok(self.0.command(slice("data", &data)?))
+    fn command(&self, py: Python<'_>, data: PyReadonlyArray1<'_, u8>) -> PyResult<String> {
+        let data = slice("data", &data)?;
+        self.0.enter(py, |board, _| Ok::<_, Error>(board.command(data)))
     }
 
-    fn record(&mut self, start: bool) {
-        self.0.record(start);
+    fn record(&self, py: Python<'_>, start: bool) {
+        self.0.look(py, |board| board.record(start));
     }
 
-    fn faults(&mut self) -> String {
-        self.0.faults()
+    fn faults(&self, py: Python<'_>) -> String {
+        self.0.look(py, Board::faults)
     }
 
     /// Scans one frame; returns the datagrams, of which the sink takes at most so many.
     fn frame<'py>(
-        &mut self,
+        &self,
         py: Python<'py>,
         ticks: PyReadonlyArray1<'py, u16>,
         most: usize,
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
-        let (ticks, board, mut sent) = (slice("ticks", &ticks)?, &mut self.0, vec![]);
-        let datagrams = enter(py, move |_| {
+        let (ticks, mut sent) = (slice("ticks", &ticks)?, vec![]);
+        let datagrams = self.0.enter(py, |board, _| {
             board.frame(ticks, |datagram| {
                 let room = sent.len() < most;
                 if room {
@@ -247,15 +252,14 @@ impl WireBoard {
     }
 
     /// The counts as JSON.
-    fn counts(&self) -> PyResult<String> {
-        to_json(self.0.counts())
+    fn counts(&self, py: Python<'_>) -> PyResult<String> {
+        self.0.look(py, |board| to_json(board.counts()))
     }
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<WireDecoder>()?;
     module.add_class::<WireBoard>()?;
-    module.add("WIRE_STAMP_US", STAMP_US)?;
     module.add_function(wrap_pyfunction!(wire_encode, module)?)?;
     module.add_function(wrap_pyfunction!(command_bytes, module)?)?;
     module.add_function(wrap_pyfunction!(command_read, module)?)?;

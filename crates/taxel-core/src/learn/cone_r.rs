@@ -333,8 +333,8 @@ impl Problem {
     }
 
     /// Lays out one pattern, which may be without targets: others will follow.
-    pub(super) fn of_one(parameters: &ConeR, pattern: &SpikeTrains, targets: &[f64]) -> Result<Self> {
-        Self::laid_out(parameters, std::slice::from_ref(pattern), &[targets.to_vec()], Stop::never())
+    pub(super) fn of_one(parameters: &ConeR, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<Self> {
+        Self::laid_out(parameters, std::slice::from_ref(pattern), &[targets.to_vec()], stop)
     }
 
     fn laid_out(parameters: &ConeR, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Self> {
@@ -374,9 +374,9 @@ impl Problem {
     }
 
     /// Adds one more pattern; gives how many silent and free rows it has.
-    pub(super) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64]) -> usize {
+    pub(super) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<usize> {
         let before = self.silent.len();
-        self.silent.push(self.base.layout(), pattern, targets);
+        self.silent.push(self.base.layout(), pattern, targets, stop)?;
         let (neuron, delta_t) = (&self.base.neuron, self.base.delta_t());
         let rows = target_rows(neuron, delta_t, std::slice::from_ref(pattern), &[targets.to_vec()]);
         let number = self.patterns.len();
@@ -385,7 +385,7 @@ impl Problem {
             Arc::make_mut(&mut self.targets).push(TargetRow { pattern: number, ..row });
             self.lift(self.targets.len() - 1, 1.0);
         }
-        self.silent.len() - before
+        Ok(self.silent.len() - before)
     }
 
     /// Takes the first pattern away; gives how many silent and free rows, and how many targets, went with it.

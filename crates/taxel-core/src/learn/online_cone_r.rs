@@ -48,26 +48,26 @@ impl OnlineConeR {
     ///
     /// # Errors
     ///
-    /// `Problem` for a pattern or targets that make no sense (names them); the window is then as before.
-    pub fn add(&mut self, pattern: &SpikeTrains, targets: &[f64]) -> Result<()> {
+    /// `Problem` for a pattern or targets that make no sense (names them), `Interrupted`; the window is then as before.
+    pub fn add(&mut self, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<()> {
         let parameters = &self.parameters;
         check_example(&parameters.neuron, self.seen, pattern, targets)?;
         parameters.check_horizon(self.seen, targets)?;
         if let Some(problem) = &mut self.problem {
             problem.check_trains(self.seen, pattern)?;
+            let silent = problem.silent_and_free_rows();
+            let rows = problem.push(pattern, targets, stop)?;
+            if let Some((_, shares)) = &mut self.last {
+                shares.make_room(silent, rows);
+            }
             if self.seen >= self.window {
                 let (rows, targets_gone) = problem.drop_first();
                 if let Some((_, shares)) = &mut self.last {
                     shares.drop_first(rows, problem.silent_and_free_rows(), targets_gone);
                 }
             }
-            let silent = problem.silent_and_free_rows();
-            let rows = problem.push(pattern, targets);
-            if let Some((_, shares)) = &mut self.last {
-                shares.make_room(silent, rows);
-            }
         } else {
-            self.problem = Some(Problem::of_one(parameters, pattern, targets)?);
+            self.problem = Some(Problem::of_one(parameters, pattern, targets, stop)?);
         }
         self.seen += 1;
         Ok(())

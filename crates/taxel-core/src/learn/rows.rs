@@ -191,13 +191,19 @@ impl SilentRows {
         };
         for (pattern, targets) in patterns.iter().zip(targets) {
             stop.check()?;
-            rows.push(layout, pattern, targets);
+            rows.push(layout, pattern, targets, stop)?;
         }
         Ok(rows)
     }
 
-    /// Adds the rows of one more pattern.
-    pub(super) fn push(&mut self, layout: Layout<'_>, pattern: &SpikeTrains, targets: &[f64]) {
+    /// Adds the rows of one more pattern; where the caller stops it, they are as before.
+    pub(super) fn push(
+        &mut self,
+        layout: Layout<'_>,
+        pattern: &SpikeTrains,
+        targets: &[f64],
+        stop: Stop<'_>,
+    ) -> Result<()> {
         let Layout { neuron, horizon, margin, near_ms } = layout;
         let step = self.step_ms;
         let time = |point: f64| pattern.start + point * step;
@@ -205,26 +211,27 @@ impl SilentRows {
         let end = horizon.unwrap_or(last);
         let points = (((end - pattern.start) / step + EDGE).floor() + 1.0).max(0.0) as usize;
         let first = self.limit.len();
-        let mut next = 0;
+        let (mut next, mut limit) = (0, vec![]);
         for k in 0..points {
+            if k % 4096 == 0 {
+                stop.check()?;
+            }
             let t = time(k as f64);
             while next < targets.len() && targets[next] + neuron.refractory + EDGE < t {
                 next += 1;
             }
             let free = next < targets.len() && targets[next] - EDGE <= t;
-            self.limit.push(if free { f64::INFINITY } else { threshold(neuron, pattern.start, targets, t) - margin });
+            limit.push(if free { f64::INFINITY } else { threshold(neuron, pattern.start, targets, t) - margin });
         }
         let point_after = |t: f64| {
             let k = ((t - pattern.start) / step).floor() as u32;
             if time(f64::from(k)) > t { k } else { k + 1 }
         };
-        for &t in targets {
-            let after = (point_after(t) as usize).min(points);
-            let near = (near_ms / step).ceil() as usize;
-            self.before_targets.push(first + after.saturating_sub(near + 1)..first + after);
-        }
         let mut inputs = Vec::with_capacity(pattern.times.len());
-        for spike in pattern.by_time() {
+        for (k, spike) in pattern.by_time().iter().enumerate() {
+            if k % 4096 == 0 {
+                stop.check()?;
+            }
             let point = ((spike.t - pattern.start) / step).ceil();
             // An input on a point itself is felt behind it; where its kernel begins above 0, from the next point on.
             let late = time(point) - spike.t <= 0.0 && self.shape.input().b != 0.0;
@@ -240,7 +247,14 @@ impl SilentRows {
             AfterSpike::Keep | AfterSpike::Ignore => vec![],
         };
         let stations = stations(&inputs, &resets);
+        for &t in targets {
+            let after = (point_after(t) as usize).min(points);
+            let near = (near_ms / step).ceil() as usize;
+            self.before_targets.push(first + after.saturating_sub(near + 1)..first + after);
+        }
+        self.limit.append(&mut limit);
         self.sheets.push(Sheet { inputs, stations, first, points, targets: targets.len() });
+        Ok(())
     }
 
     /// Takes the rows of the first pattern away; the others are numbered anew from 0.

@@ -271,11 +271,16 @@ impl Decoder {
 
     /// As [`Self::finish`]; appends.
     pub fn finish_into(&mut self, out: &mut Events) {
-        self.give_up_partial();
         self.end_of_datagram_into(out);
         if let Some(by_taxel) = &mut self.by_taxel {
             by_taxel.finish_into(out);
         }
+        self.as_new();
+    }
+
+    /// Forgets half a word and the time, but not the counts.
+    fn as_new(&mut self) {
+        self.give_up_partial();
         self.clock = Clock::default();
         if let Some(held) = &mut self.held {
             held.fill(0);
@@ -301,6 +306,24 @@ impl Decoder {
             return Err(problem!("columns have room for {} rows: {} bytes may need {most}", room.len(), bytes.len()));
         }
         Ok(self.fill_columns(bytes, arrived, room, paired, markers))
+    }
+
+    /// As [`Self::finish`], into columns that are filled; gives how many rows more. With [`Pairing::Taxel`] all events wait
+    /// for the end, so there it is [`Self::finish`] that gives them.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where a row waits and there is no room for it.
+    pub fn finish_filling(&mut self, room: Room<'_>, paired: bool) -> Result<usize> {
+        if self.waiting.is_some() && room.len() == 0 {
+            return Err(problem!("columns have no room for the event that waits: they need one row more"));
+        }
+        let mut filling = Filling { room, rows: 0, paired, open: false };
+        if let Some(change) = self.waiting.take() {
+            filling.change(change);
+        }
+        self.as_new();
+        Ok(filling.rows)
     }
 
     fn fill_columns(
