@@ -15,7 +15,8 @@ from taxel import _core, wire
 from taxel._arguments import flag, path, shown, text
 from taxel._core import ProblemError
 from taxel._files import whole_file, write_whole
-from taxel._tables import array_said, write_csv, write_npz
+from taxel._remarks import Remarks
+from taxel._tables import write_csv, write_npz
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording import Datagrams, Recording, _Source, open_recording, period_us
@@ -93,12 +94,12 @@ def convert(
     recording = source if isinstance(source, Recording) else None
     table = _table(source, frames_hz)
     if kind in (".npz", ".csv"):
-        about, lost = _about(recording)
+        remarks, lost = _remarks_of(recording)
         if kind == ".npz":
-            write_whole(place, lambda file: write_npz(file, table, about), overwrite=overwrite)
+            write_whole(place, lambda file: write_npz(file, table, remarks), overwrite=overwrite)
             return lost
         write_whole(place, lambda file: write_csv(file, table), overwrite=overwrite)
-        return lost + _not_in_csv(table, about)
+        return lost + _not_in_csv(table, remarks)
     if isinstance(table, Frames):
         raise ProblemError(f"{place}: a {kind} holds events and no pictures; write pictures to .npz or .csv")
     # Of a slice the bytes are not known: they are made of its events.
@@ -123,24 +124,20 @@ def _table(source: Recording | Events | Frames, frames_hz: float | None) -> Even
     return Frames.from_events(source, period_us("frames_hz", frames_hz))
 
 
-def _about(recording: Recording | None) -> tuple[dict[str, Any], list[str]]:
-    """Return what stands beside a table, as JSON holds it, and what is lost without datagrams."""
+def _remarks_of(recording: Recording | None) -> tuple[Remarks, list[str]]:
+    """Return what stands beside a table, and what is lost without datagrams."""
     if recording is None:
-        return {}, []
-    found = recording.detections
-    about = {
-        "source": recording.source or recording.path.name,
-        "registers": recording._source.registers,
-        "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in recording.notes],
-        "detections": [
-            [0, str(label), int(t), int(known), None if np.isnan(slope) else float(slope)]
-            for label, t, known, slope in zip(found.label, found.t, found.known, found.slope, strict=True)
-        ],
-        "counts": recording.counts,
-        "verdict": recording.verdict,
-    }
+        return Remarks(), []
+    remarks = Remarks(
+        source=recording.source or recording.path.name,
+        registers=recording._source.registers,
+        notes=recording.notes,
+        detections=recording.detections,
+        counts=recording.counts,
+        verdict=recording.verdict,
+    )
     lost = {"mcap": ["raw datagrams with their arrival times"], "lsa": ["raw bytes (words that are no events)"]}
-    return about, lost.get(recording.kind, [])
+    return remarks, lost.get(recording.kind, [])
 
 
 def _sensor(table: Events | Frames) -> str:
@@ -149,25 +146,25 @@ def _sensor(table: Events | Frames) -> str:
     return f'the sensor ({array.rows} x {array.columns} taxels{some}, {array.pitch_mm:g} mm apart, "{array.name}")'
 
 
-def _not_in_csv(table: Events | Frames, about: dict[str, Any]) -> list[str]:
+def _not_in_csv(table: Events | Frames, remarks: Remarks) -> list[str]:
     lost = [_sensor(table)]
     if isinstance(table, Frames):
         lost += [f"the unit ({table.unit})"] * (table.unit != "counts")
     else:
         lost += [f"{len(table.markers)} markers of start and stop"] * bool(table.markers)
-    return lost + _remarks(about)
+    return lost + _said(remarks)
 
 
 def _not_in_lsa(table: Events, recording: Recording | None) -> list[str]:
     lost = [_sensor(table)] * (table.array != type(table.array).thesis())
     if recording is not None and recording.kind == "mcap":
         lost.append("arrival times, and where datagrams begin")
-    return lost + _remarks(_about(recording)[0])
+    return lost + _said(_remarks_of(recording)[0])
 
 
-def _remarks(about: dict[str, Any]) -> list[str]:
-    names = ("notes", "detections", "registers")
-    return [f"{len(about[n])} {n}" if n != "registers" else "the board's registers" for n in names if about.get(n)]
+def _said(remarks: Remarks) -> list[str]:
+    counts = {"notes": len(remarks.notes), "detections": len(remarks.detections)}
+    return [f"{n} {name}" for name, n in counts.items() if n] + ["the board's registers"] * bool(remarks.registers)
 
 
 def _encoded(events: Events) -> tuple[bytes, list[str]]:
@@ -198,7 +195,7 @@ def _write_mcap(
     arrived = datagrams.arrived_ns - min(0, earliest)
     registers = None if recording is None else recording._source.registers
     header = {
-        "array": array_said(events.array),
+        "array": events.array._geometry(),
         "registers": registers,
         "difference": origin is not None and origin.differences,
         "origin_us": first_us,

@@ -49,12 +49,16 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
     Raises
     ------
     FileExistsError : the file is there already and `overwrite` is false
+    PermissionError : the file is there already and write-protected
     OSError : the folder is missing, the disk is full ...
     """
     place = Path(checked_path("path", path))
     overwrite = flag("overwrite", overwrite)
     if not overwrite and os.path.lexists(place):
         raise FileExistsError(errno.EEXIST, "exists already; say so where it may be overwritten", str(place))
+    # Moving another file there asks the folder alone; what somebody protected stays, from the superuser too.
+    if place.exists() and not (place.stat().st_mode & 0o222 and os.access(place, os.W_OK)):
+        raise PermissionError(errno.EACCES, "is write-protected", str(place))
     if not place.parent.is_dir():
         raise FileNotFoundError(errno.ENOENT, "no such folder", str(place.parent))
     try:

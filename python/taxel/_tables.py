@@ -8,37 +8,35 @@ cannot hold: the sensor, registers, notes, detections and what was lost.
 from __future__ import annotations
 
 import io
-import json
+import math
 import re
 import zipfile
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._arguments import shown
 from taxel._core import FormatError, ProblemError
+from taxel._limits import COLUMNS, DESCRIPTION, TAXELS, UNPACKED, unpacked
+from taxel._limits import table as limited
+from taxel._remarks import Remarks
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["array_said", "read_csv", "read_npz", "write_csv", "write_npz"]
+__all__ = ["read_csv", "read_npz", "table_of", "write_csv", "write_npz"]
 
 _EVENTS = ("t_us", "x", "y", "p")
-_TAXEL = re.compile(r"x(\d+)y(\d+)")
+_COLUMNS = ("t", "x", "y", "p", "intensity", "present", "markers", "values", "unit", "about")
+_TAXEL = re.compile(r"x(\d{1,5})y(\d{1,5})")
 
 
-def array_said(array: Array) -> dict[str, Any]:
-    """Return a sensor as files describe it."""
-    exists = None if array.exists is None else [bool(e) for e in array.exists.ravel()]
-    said: dict[str, Any] = {"rows": array.rows, "columns": array.columns, "pitch_mm": array.pitch_mm}
-    said["name"] = array.name
-    return said if exists is None else {**said, "exists": exists}
-
-
-def write_npz(file: BinaryIO, table: Events | Frames, about: dict[str, Any]) -> None:
+def write_npz(file: BinaryIO, table: Events | Frames, remarks: Remarks) -> None:
     """Write a .npz."""
-    said = json.dumps({"array": array_said(table.array), **about})
     if isinstance(table, Events):
         columns: dict[str, Any] = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
         if table.intensity is not None:
@@ -46,41 +44,82 @@ def write_npz(file: BinaryIO, table: Events | Frames, about: dict[str, Any]) -> 
         columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
     else:
         columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
-    np.savez_compressed(file, about=np.array(said), **columns)
+    np.savez_compressed(file, about=np.array(replace(remarks, array=table.array).to_json()), **columns)
 
 
-def read_npz(path: Path, array: Array | None) -> tuple[Events | Frames, dict[str, Any]]:
+def read_npz(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:
     """Read a .npz of ours, or one with the columns ``t x y p`` or ``values t``."""
     try:
-        with np.load(path, allow_pickle=False) as file:
-            columns = {name: file[name] for name in file.files}
-    except (zipfile.BadZipFile, ValueError, EOFError, KeyError, NotImplementedError) as error:
+        columns = _unpacked(path)
+    except (OSError, FormatError):
+        raise
+    # What numpy and zipfile raise on damage is no closed list: zlib.error, TokenError, struct.error ...
+    except Exception as error:
         raise FormatError(f"{path}: a .npz that cannot be unpacked ({_line(error)}); write it again") from None
-    try:
-        about = json.loads(str(columns.get("about", "{}")))
-        sensor = array
-        if sensor is None and "array" in about:
-            said = about["array"]
-            parts = (said["rows"], said["columns"], said["pitch_mm"], said["name"], said.get("exists"))
-            sensor = Array._from_parts(parts)
-    except (ValueError, KeyError, TypeError, ProblemError) as error:
-        raise FormatError(f"{path}, array about: {_line(error)}; must be JSON as taxel writes it") from None
+    return table_of(path, columns, array)
+
+
+def table_of(path: Path, columns: dict[str, NDArray[Any]], array: Array | None) -> tuple[Events | Frames, Remarks]:
+    """Make a table of the columns of a file, with the remarks that stand beside them."""
+    remarks = Remarks.from_json(f"{path}, array about", str(columns.get("about", "{}")))
+    sensor = array or remarks.array
     try:
         if "values" in columns and "t" in columns:
             unit = str(columns.get("unit", "counts"))
-            return Frames(columns["values"], columns["t"], unit=unit, array=sensor), about
-        missing = [name for name in ("t", "x", "y", "p") if name not in columns]
+            return limited(path, Frames(columns["values"], columns["t"], unit=unit, array=sensor)), remarks
+        missing = [name for name in _COLUMNS[:4] if name not in columns]
         if missing:
             names = ", ".join(columns) or "nothing"
             raise FormatError(
                 f"{path}: holds {names}: {missing[0]} is missing; must be t, x, y, p (events) or values, t (pictures)"
             )
-        t, x, y, p = (columns[name] for name in ("t", "x", "y", "p"))
+        t, x, y, p = (columns[name] for name in _COLUMNS[:4])
         markers = [(int(at), bool(start)) for at, start in columns.get("markers", np.empty((0, 2)))]
         extra = {name: columns[name] for name in ("intensity", "present") if name in columns}
-        return Events(t, x, y, p, array=sensor or _around(x, y), markers=markers, **extra), about
-    except (ProblemError, ValueError, TypeError) as error:
+        return limited(path, Events(t, x, y, p, array=sensor or _around(x, y), markers=markers, **extra)), remarks
+    except (ProblemError, ValueError, TypeError, OverflowError) as error:
         raise FormatError(f"{path}: {_line(error)}") from None
+
+
+def _unpacked(path: Path) -> dict[str, NDArray[Any]]:
+    """Read the arrays of a .npz that are ours, once all have said how large they are."""
+    columns = {}
+    with zipfile.ZipFile(path) as archive:
+        members = {name.removesuffix(".npy"): name for name in archive.namelist()}
+        wanted = [name for name in _COLUMNS if name in members]
+        total = 0
+        for name in wanted:
+            with archive.open(members[name]) as file:
+                shape, dtype = _described(file)
+                begin = file.tell()
+            place = f"{path}, array {name}"
+            if dtype.hasobject:
+                raise FormatError(f"{place}: holds Python objects; must be numbers or text")
+            size = math.prod(shape) * dtype.itemsize
+            total += size
+            # Python keeps a character in 4 bytes.
+            unpacked(place, size, 4 * DESCRIPTION if name in {"about", "unit"} else UNPACKED)
+            unpacked(place, total)
+            there = archive.getinfo(members[name]).file_size - begin
+            if size != there:
+                raise FormatError(f"{place}: says that it holds {size} bytes ({shape}, {dtype}); there are {there}")
+        for name in wanted:
+            with archive.open(members[name]) as file:
+                columns[name] = np.lib.format.read_array(file, allow_pickle=False)
+    # A column of another name is not read, but stands in the error of what is missing.
+    return columns or {name: np.empty(0) for name in list(members)[:8]}
+
+
+def _described(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Read the shape and the kind that an array says it has."""
+    read = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}
+    version = np.lib.format.read_magic(file)
+    if version[0] not in read:
+        raise ValueError(f"version {version[0]} of the description; there are 1 and 2")
+    shape, _, dtype = read[version[0]](file)
+    if any(isinstance(n, bool) or n < 0 for n in shape):
+        raise ValueError(f"shape {shape}")
+    return shape, dtype
 
 
 def write_csv(file: BinaryIO, table: Events | Frames) -> None:
@@ -105,10 +144,13 @@ def write_csv(file: BinaryIO, table: Events | Frames) -> None:
         file.write("\n".join(map(",".join, zip(*(r.tolist() for r in rows), strict=True))).encode() + b"\n")
 
 
-def read_csv(path: Path, array: Array | None) -> tuple[Events | Frames, dict[str, Any]]:
+def read_csv(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:
     """Read a .csv of events or of pictures."""
     raw = path.read_bytes().replace(b"\r\n", b"\n").removeprefix(b"\xef\xbb\xbf")
     head, _, body = raw.partition(b"\n")
+    columns = head.count(b",") + 1
+    if columns > COLUMNS:
+        raise FormatError(f"{path}, line 1: {columns} columns; at most {COLUMNS} are read")
     try:
         names = [name.strip() for name in head.decode().split(",")]
     except UnicodeDecodeError:
@@ -118,12 +160,12 @@ def read_csv(path: Path, array: Array | None) -> tuple[Events | Frames, dict[str
         raise FormatError(f"{path}, line 1: {said}: must be t_us,x,y,p[,intensity], or t_us and a column a taxel")
     if tuple(names[:4]) == _EVENTS:
         if names[4:] not in ([], ["intensity"]):
-            raise FormatError(f"{path}, line 1: {names[4]!r} after p: only intensity may follow")
-        return _csv_events(path, names, body, array), {}
-    repeated = [name for name in names if names.count(name) > 1]
-    if repeated:
-        raise FormatError(f"{path}, line 1: column {repeated[0]!r} stands there twice")
-    return _csv_frames(path, names, body, array), {}
+            raise FormatError(f"{path}, line 1: {shown(names[4])} after p: only intensity may follow")
+        return limited(path, _csv_events(path, names, body, array)), Remarks()
+    repeated = next((name for name, n in Counter(names).items() if n > 1), None)
+    if repeated is not None:
+        raise FormatError(f"{path}, line 1: column {shown(repeated)} stands there twice")
+    return limited(path, _csv_frames(path, names, body, array)), Remarks()
 
 
 def _csv_events(path: Path, names: list[str], body: bytes, array: Array | None) -> Events:
@@ -153,7 +195,7 @@ def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) 
         places = [(int(m[1]), int(m[2])) for m in found if m is not None]
     elif any(found):
         odd = next(name for name, m in zip(names[1:], found, strict=True) if m is None)
-        raise FormatError(f"{path}, line 1: column {odd!r} among taxels: must be named like x3y5")
+        raise FormatError(f"{path}, line 1: column {shown(odd)} among taxels: must be named like x3y5")
     else:
         shape = (1, len(names) - 1) if array is None else array.shape
         if shape[0] * shape[1] != len(names) - 1:
@@ -164,7 +206,7 @@ def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) 
     x, y = np.array(places).T
     if array is None:
         rows, columns = int(y.max()) + 1, int(x.max()) + 1
-        if rows * columns > max(1 << 16, 4 * len(places)):
+        if rows * columns > TAXELS or len(table) * rows * columns > max(1 << 24, 16 * table.size):
             raise FormatError(f"{path}, line 1: {len(places)} columns for {rows} x {columns} taxels: most are missing")
         exists = np.zeros((rows, columns), bool)
         exists[y, x] = True
@@ -172,6 +214,11 @@ def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) 
     elif x.max() >= array.columns or y.max() >= array.rows:
         k = int(np.flatnonzero((x >= array.columns) | (y >= array.rows))[0])
         raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {array.rows} x {array.columns} taxels")
+    large = np.argwhere(np.abs(table[:, 1:]) > np.finfo(np.float32).max)
+    if len(large):
+        k, c = large[0]
+        raise FormatError(f"{path}, line {k + 2}, column {names[c + 1]}: {table[k, c + 1]:g}; must fit 32 bits")
+    unpacked(str(path), 4 * len(table) * array.rows * array.columns)
     values = np.zeros((len(table), *array.shape), np.float32)
     values[:, y, x] = table[:, 1:]
     try:
@@ -193,7 +240,7 @@ def _numbers(path: Path, names: list[str], body: bytes, dtype: type[Any]) -> NDA
         where = "" if place is None else f", line {_line_number(body, row)}"
         if place is not None and place[2] is not None and int(place[2]) <= len(names):
             where += f", column {names[int(place[2]) - 1]}"
-        said = re.sub(r" at row .*|; use `usecols`.*", "", str(error).split("\n", maxsplit=1)[0])
+        said = re.sub(r" at row .*|; use `usecols`.*", "", _line(error))
         raise FormatError(f"{path}{where}: {said}; must be {len(names)} numbers a line") from None
     if table.shape[1] != len(names):
         raise FormatError(f"{path}, line 2: {table.shape[1]} numbers; must be {len(names)} numbers a line")
@@ -222,6 +269,8 @@ def _around(x: NDArray[Any], y: NDArray[Any]) -> Array:
     thesis = Array.thesis()
     if not len(x):
         return thesis
+    if min(x.min(), y.min()) < 0 or max(x.max(), y.max()) >= 65_535:
+        raise ProblemError("x and y: must lie in 0 to 65534")
     rows, columns = max(thesis.rows, int(y.max()) + 1), max(thesis.columns, int(x.max()) + 1)
     return thesis if (rows, columns) == thesis.shape else Array(rows, columns)
 
@@ -238,4 +287,5 @@ def _shortest(value: np.float32) -> str:
 
 
 def _line(error: BaseException) -> str:
-    return str(error).split("\n", maxsplit=1)[0]
+    said = str(error).split("\n", maxsplit=1)[0]
+    return said if len(said) <= 200 else f"{said[:197]}..."

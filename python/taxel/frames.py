@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["Frames"]
 
-#: Of pictures made from events: 16 GiB.
-MOST_VALUES = 2**32
+#: Of pictures made from events: 4 GiB.
+MOST_VALUES = 2**30
 
 
 class Frames:
@@ -92,11 +92,11 @@ class Frames:
         pictures = max(0, -((first - end) // period))
         if pictures * array.rows * array.columns > MOST_VALUES:
             raise ProblemError(
-                f"{pictures} pictures from {first} to {end} us would not fit the memory: take a shorter stretch or a "
-                f"period longer than {period} us"
+                f"{pictures} pictures from {first} to {end} us: at most {MOST_VALUES} values are made at once; take a "
+                f"shorter stretch or a period longer than {period} us"
             )
         t = np.arange(pictures, dtype=np.int64) * period + first
-        values = np.zeros((len(t), array.rows * array.columns), np.float32)
+        values = _zeros(len(t), array)
         there = np.flatnonzero(events.present)
         order = there[np.argsort(events.t[there], kind="stable")]
         index = array.index(events.x[order], events.y[order])
@@ -231,3 +231,10 @@ class Frames:
     def __repr__(self) -> str:
         time = f"{self.t[0]} to {self.t[-1]} us" if len(self) else "no time"
         return f"Frames({len(self)} pictures of {self.array.rows} x {self.array.columns} taxels, {time}, {self.unit})"
+
+
+def _zeros(pictures: int, array: Array) -> NDArray[np.float32]:
+    try:
+        return np.zeros((pictures, array.rows * array.columns), np.float32)
+    except MemoryError as error:
+        raise ProblemError(f"{pictures} pictures of {array!r} do not fit the memory ({error})") from None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -17,6 +16,7 @@ from taxel import _arguments as arguments
 from taxel import _core
 from taxel._arguments import flag, instance, number, shown, text, window
 from taxel._core import FormatError, ProblemError
+from taxel._remarks import Note, Remarks, array_of, detections_of, notes_of
 from taxel._tables import read_csv, read_npz
 from taxel.array import Array
 from taxel.detections import Detections
@@ -52,24 +52,6 @@ _STRANGERS = {
     b"\x93NUMPY": "a single NumPy array; save its columns t, x, y, p with numpy.savez",
 }
 _ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv"}
-
-
-@dataclass(frozen=True)
-class Note:
-    """Hold what a person wrote down while recording.
-
-    Parameters
-    ----------
-    text : str
-    t : int, us, optional
-        The board's time, where it was known.
-    at_ns : int, ns since 1970
-        The host's time.
-    """
-
-    text: str
-    t: int | None
-    at_ns: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +300,7 @@ class Recording:
 
     @property
     def rebuilt(self) -> dict[str, int]:
-        """What reading had to put up with: torn bytes at the end, gaps, bytes skipped there, bad chunks."""
+        """What reading had to put up with: torn bytes at the end, gaps, bytes skipped there, bad and large chunks."""
         return self._source.rebuilt
 
     def between(self, start: float, stop: float) -> Recording:
@@ -394,12 +376,15 @@ def open_recording(
     with place.open("rb") as file:
         head = file.read(16)
     kind = _kind(place, head)
-    if kind == "mcap":
-        return Recording(_Mcap(place, pairing))
-    if kind == "lsa":
-        return Recording(_Lsa(place, array or Array.thesis(), pairing, differences))
-    table = read_npz(place, array) if kind == "npz" else read_csv(place, array)
-    return Recording(_Table(place, kind, *table))
+    try:
+        if kind == "mcap":
+            return Recording(_Mcap(place, pairing))
+        if kind == "lsa":
+            return Recording(_Lsa(place, array or Array.thesis(), pairing, differences))
+        table = read_npz(place, array) if kind == "npz" else read_csv(place, array)
+        return Recording(_Table(place, kind, *table))
+    except MemoryError as error:
+        raise FormatError(f"{place}: needs more memory than there is ({error})") from None
 
 
 def period_us(name: str, rate_hz: float) -> int:
@@ -516,9 +501,9 @@ class _Source:
 class _Table(_Source):
     """A table of events or pictures, all in memory."""
 
-    def __init__(self, path: Path, kind: str, table: Events | Frames, about: Mapping[str, Any]) -> None:
-        super().__init__(path, kind, table.array, str(about.get("source", "")))
-        self._table, self._about = table, about
+    def __init__(self, path: Path, kind: str, table: Events | Frames, remarks: Remarks) -> None:
+        super().__init__(path, kind, table.array, remarks.source)
+        self._table, self._remarks = table, remarks
 
     @property
     def events(self) -> Events | None:
@@ -530,23 +515,24 @@ class _Table(_Source):
 
     @property
     def registers(self) -> dict[str, Any] | None:
-        return self._about.get("registers")
+        held = self._remarks.registers
+        return None if held is None else dict(held)
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        return tuple(Note(n["text"], n["t_us"], n["at_ns"]) for n in self._about.get("notes", ()))
+        return self._remarks.notes
 
     @property
     def detections(self) -> Detections:
-        return _detections(self._about.get("detections", ()))
+        return self._remarks.detections
 
     @property
     def counts(self) -> dict[str, Any]:
-        return dict(self._about.get("counts", {}))
+        return dict(self._remarks.counts)
 
     @property
     def verdict(self) -> str:
-        return str(self._about.get("verdict") or super().verdict)
+        return self._remarks.verdict or super().verdict
 
 
 class _Lsa(_Source):
@@ -624,11 +610,11 @@ class _Mcap(_Source):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        return tuple(Note(n["text"], n["t_us"], n["at_ns"]) for n in self._remarks["notes"])
+        return notes_of(self._remarks["notes"])
 
     @property
     def detections(self) -> Detections:
-        return _detections(self._remarks["detections"])
+        return detections_of(self._remarks["detections"])
 
     @property
     def clock(self) -> Clock:
@@ -680,6 +666,8 @@ class _Mcap(_Source):
     def verdict(self) -> str:
         rebuilt = self.rebuilt
         bad = []
+        if rebuilt["large_chunks"]:
+            bad.append(f"{rebuilt['large_chunks']} chunks skipped that say they unpack to more than 64 MiB")
         if rebuilt["bad_chunks"]:
             bad.append(f"{rebuilt['bad_chunks']} bad chunks skipped")
         if rebuilt["gaps"]:
@@ -698,15 +686,3 @@ class _Mcap(_Source):
             # What was received then is more than what the file holds now: the rest is the unfinished end.
             known = _core.recording_verdict(json.dumps({**so_far, "received": 0}))
         return "; ".join([why, *bad, f"until then: {known}"])
-
-
-def array_of(said: Mapping[str, Any]) -> Array:
-    """Return the sensor that a file describes."""
-    return Array._from_parts((said["rows"], said["columns"], said["pitch_mm"], said["name"], said.get("exists")))
-
-
-def _detections(said: Iterable[Sequence[Any]]) -> Detections:
-    """Return detections from records of (host ns, label, t, known, slope); JSON has no NaN."""
-    rows = list(said)
-    slopes = [float("nan") if row[4] is None else float(row[4]) for row in rows]
-    return Detections([row[1] for row in rows], [row[2] for row in rows], [row[3] for row in rows], slopes)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import os
 from pathlib import Path
 
@@ -15,6 +14,17 @@ from hypothesis import strategies as st
 from taxel import FormatError, ProblemError, formats
 from taxel.formats import gaitndd, gaitpdb, moticon, pedar, plate
 
+from .making import (
+    footfall,
+    interpolated,
+    pack_212,
+    write_gaitndd,
+    write_gaitpdb,
+    write_moticon,
+    write_pedar,
+    write_plate,
+)
+
 SHARED = Path(os.environ.get("TAXEL_DATA", Path(__file__).parents[3] / "shared" / "data"))
 
 
@@ -22,118 +32,6 @@ def shared(name: str) -> Path:
     if not (SHARED / name).is_dir():
         pytest.skip(f"no {name} in {SHARED}: set TAXEL_DATA")
     return SHARED / name
-
-
-# files of each format, made here
-
-
-def interpolated(sensors: np.ndarray, start: int, rows: int) -> np.ndarray:
-    """Three image rows from two sensor rows, as the plate's file has them."""
-    s = np.concatenate([sensors, np.zeros((2, *sensors.shape[1:]), sensors.dtype)]).astype(np.int64)
-    image = np.zeros((rows, *sensors.shape[1:]), np.int64)
-    for k in range((len(sensors) + 1) // 2):
-        a, b, c = s[2 * k], s[2 * k + 1], s[2 * k + 2]
-        for row, value in enumerate((a, (a + 2 * b) // 3, (2 * b + c) // 3)):
-            if start + 3 * k + row < rows:
-                image[start + 3 * k + row] = value
-    return image
-
-
-def footfall(seed: int) -> np.ndarray:
-    """Sensors x columns x frames: a blob that rolls from the heel to the toes."""
-    rng = np.random.default_rng(seed)
-    rows, columns, t = np.mgrid[0:20, 0:12, 0:40]
-    load = 300 * np.exp(-(((rows - t / 2.2) / 3) ** 2) - ((columns - 6) / 2.5) ** 2) * np.sin(np.pi * (t + 1) / 41)
-    return np.where(load > 20, load + rng.integers(0, 9, load.shape), 0).astype(np.int64)
-
-
-def write_plate(folder: Path, person: str = "subj900", count: int = 2) -> Path:
-    file = folder / f"{person}.h5"
-    with h5py.File(file, "w") as h5:
-        for k in range(count):
-            image = np.zeros((40, 12, 60), np.uint16)
-            image[:, :, :40] = interpolated(footfall(k), 4 + k, 40)
-            h5[f"img{k:03d}"] = image
-    return file
-
-
-def write_gaitpdb(folder: Path, name: str = "GaCo99_01.txt", change=lambda rows: rows) -> Path:
-    k = np.arange(600)
-    left = np.where(k % 100 < 60, 40.0, 0.0)[:, None] * np.ones(8)
-    right = np.where((k + 50) % 100 < 60, 40.0, 0.0)[:, None] * np.ones(8)
-    values = np.column_stack([k / 100, left, right, left.sum(axis=1), right.sum(axis=1)])
-    rows = change(["\t".join(f"{v:g}" for v in row) for row in values])
-    file = folder / name
-    data = ("\n".join(rows) + "\n").encode()
-    file.write_bytes(gzip.compress(data) if name.endswith(".gz") else data)
-    return file
-
-
-def pack_212(values: np.ndarray) -> bytes:
-    v = np.asarray(values, np.int64) & 0xFFF
-    a, b = v[0::2], v[1::2]
-    return np.stack([a & 255, (a >> 8) | ((b >> 8) << 4), b & 255], axis=1).astype(np.uint8).tobytes()
-
-
-def write_gaitndd(folder: Path, name: str = "control99") -> Path:
-    left = np.where(np.arange(3000) % 300 < 180, 500, -1900)
-    right = left.copy()
-    right[0] = -2048
-
-    def int16(v):
-        return (int(np.where(v == -2048, -32768, v).sum()) + 32768) % 65536 - 32768
-
-    (folder / f"{name}.let").write_bytes(pack_212(left))
-    (folder / f"{name}.rit").write_bytes(pack_212(right))
-    (folder / f"{name}.hea").write_text(
-        f"{name} 2 300 3000\r\n"
-        f"{name}.let 212 3000 12 0 {left[0]} {int16(left)} 0 left-foot\r\n"
-        f"{name}.rit 212 3000 12 0 -32768 {int16(right)} 0 right-foot\r\n"
-    )
-    rows = [[k, 1.0, 1.0, 0.4, 0.4, 40, 40, 0.6, 0.6, 60, 60, 0.2, 20] for k in range(3, 9)]
-    (folder / f"{name}.ts").write_text("\n".join("\t".join(f"{c:.4f}" for c in row) for row in rows) + "\n")
-    return folder / f"{name}.hea"
-
-
-def write_moticon(folder: Path, change=lambda rows: rows) -> Path:
-    names = ["time"]
-    for foot in ("left", "right"):
-        names += [f"{foot} pressure {k}[N/cm²]" for k in range(1, 17)]
-        names += [f"{foot} acceleration {a}[g]" for a in "XYZ"] + [f"{foot} angular {a}[dps]" for a in "XYZ"]
-        names += [f"{foot} total force[N]", f"{foot} center of pressure X[-0.5...+0.5]", f"{foot} cop Y"]
-    names += ["right steps[]", "left steps[]"]
-    rows = []
-    for k in range(200):
-        if k == 120:  # a whole row is missing
-            continue
-        loaded = (k // 50) % 2
-        left = [f"{2.5 * loaded:.2f}"] * 16 + ["0.1"] * 6 + [f"{400.0 * loaded:.2f}", "0", "0"]
-        right = list(left)
-        if k < 10 or k == 60:  # the left foot joins late, and drops out in stance
-            left = [""] * 25
-        marks = ["", {50: "11", 100: "15"}.get(k, "")]
-        rows.append("\t".join([f"{k / 100:.2f}", *left, *right, *marks]))
-    head = ["# Start time: 1.1.2024", "# Sensor insoles: Left SN1, Right SN2", "# " + "\t".join(names)]
-    file = folder / "240101_000000.txt"
-    file.write_text("\n".join(change(head + rows)) + "\n", encoding="utf-8")
-    return file
-
-
-def write_pedar(folder: Path, change=lambda rows: rows) -> Path:
-    head = [
-        "file name:  x.sol\tdate/time 1.1.24",
-        "total time [secs]:  2.00\ttime per frame [secs]:  0.01000\tscanning rate [Hz]:   100",
-        "pressure values in  kPa",
-        "",
-        "time[secs]    \t" + "\t".join(f"{k:7d}" for k in [*range(1, 6), *range(1, 6)]),
-    ]
-    rows = []
-    for k in range(1, 201):
-        load = 100.0 if k % 50 >= 20 else 0.0
-        rows.append(f"{k / 100:12.5f}\t" + "\t".join(f"{load:7.3f}" for _ in range(10)))
-    file = folder / "walk.asc"
-    file.write_bytes("\n".join(change(head + rows)).replace("date", "\u00e4date").encode("latin-1"))
-    return file
 
 
 # plate

@@ -27,6 +27,11 @@ def some_events(n: int = 400, *, seed: int = 1, start: int = 0, intensity: bool 
     return taxel.Events(t, x, y, p, array=taxel.Array.thesis(), markers=markers, **ticks)
 
 
+def some_frames(n: int = 7, shape: tuple[int, int] = (5, 6)) -> taxel.Frames:
+    rng = np.random.default_rng(4)
+    return taxel.Frames(rng.normal(size=(n, *shape)).astype(np.float32), np.arange(n) * 1000 - 2000)
+
+
 def record(
     path: Path,
     events: taxel.Events,

@@ -14,7 +14,7 @@ import taxel
 from taxel import Frames
 from taxel._core import FormatError, ProblemError
 
-from .making import record, some_events
+from .making import record, some_events, some_frames
 
 KINDS = (".mcap", ".lsa", ".npz", ".csv")
 THESIS = taxel.Array.thesis()
@@ -118,11 +118,6 @@ def test_a_npz_keeps_notes_detections_registers_and_the_sensor(tmp_path: Path) -
     events = taxel.Events([0], [1], [2], [True], array=array)
     taxel.convert(events, tmp_path / "mat.npz")
     assert taxel.open(tmp_path / "mat.npz").array == array
-
-
-def some_frames(n: int = 7, shape: tuple[int, int] = (5, 6)) -> taxel.Frames:
-    rng = np.random.default_rng(4)
-    return taxel.Frames(rng.normal(size=(n, *shape)).astype(np.float32), np.arange(n) * 1000 - 2000)
 
 
 @pytest.mark.parametrize(("first", "second"), list(itertools.product((".npz", ".csv"), repeat=2)))

@@ -43,6 +43,21 @@ impl Array {
         Self { rows: 64, columns: 64, pitch_mm: 2.67, name: "thesis 64x64".to_owned(), exists: None }
     }
 
+    /// Checks an array that a file or a caller described.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where there is no row or no column, the pitch is not above 0, or `exists` has another length.
+    pub fn check(&self) -> Result<()> {
+        Self::new(self.rows, self.columns, self.pitch_mm, "")?;
+        match &self.exists {
+            Some(exists) if exists.len() != self.len() => {
+                Err(problem!("exists has {} entries for {} x {} taxels", exists.len(), self.rows, self.columns))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// How many places the grid has, whether a taxel exists there or not.
     #[must_use]
     pub fn len(&self) -> usize {

@@ -7,6 +7,7 @@
 //! A file is readable at any moment: a chunk reaches it whole, at the latest [`FLUSH_EVERY`] after its first datagram,
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
+mod limits;
 mod lsa;
 mod mcap_reader;
 mod mcap_writer;
@@ -17,8 +18,8 @@ use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
-use taxel_core::Array;
 use taxel_core::wire::{self, Registers};
+use taxel_core::{Array, problem};
 
 pub use lsa::{LsaWriter, numbered, read_lsa};
 pub use mcap_reader::{Decoded, Ending, Message, Reader, Rebuilt, Remarks};
@@ -28,7 +29,10 @@ pub use topic::Topic;
 /// How long a datagram waits at most until its chunk is closed and handed to the operating system.
 ///
 /// Half of it is waited on average; the rest of the 100 ms that a kill may cost is left to compression and a busy machine.
-pub const FLUSH_EVERY: Duration = Duration::from_millis(40);
+pub const FLUSH_EVERY: Duration = Duration::from_millis(20);
+
+/// A chunk that has waited so long finds its thread starved: who gives the next message writes it himself.
+pub const LATE: Duration = Duration::from_millis(40);
 
 /// What can be said when nothing was dropped between the socket and the file.
 pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
@@ -109,6 +113,21 @@ pub struct Counts {
     pub converted: Option<String>,
 }
 
+impl Header {
+    /// Checks what a file says of itself.
+    fn check(&self) -> taxel_core::Result<()> {
+        self.array.check()?;
+        let (rows, columns) = (self.array.rows, self.array.columns);
+        if self.array.len() > limits::TAXELS {
+            return Err(problem!("a sensor of {rows} x {columns} taxels; at most {} are read", limits::TAXELS));
+        }
+        if !(-limits::TIME_US..=limits::TIME_US).contains(&self.origin_us) {
+            return Err(problem!("origin_us is {}: must lie within 142 years of 0", self.origin_us));
+        }
+        self.registers.map_or(Ok(()), |registers| registers.check(&self.array))
+    }
+}
+
 impl Counts {
     /// One line: nothing lost after arrival, or what was lost where.
     #[must_use]
@@ -173,11 +192,22 @@ pub fn now_ns() -> i64 {
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
 }
 
-/// Opens a new file for writing; an existing one only where `overwrite` says so.
+/// Refuses a file that somebody protected from being written: from the superuser too, who may write everywhere.
+pub(crate) fn replaceable(path: &Path) -> crate::Result<()> {
+    match std::fs::metadata(path) {
+        Ok(file) if file.permissions().readonly() => {
+            Err(crate::Error::file(path)(std::io::Error::from_raw_os_error(libc::EACCES)))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Opens a new file for writing; an existing one only where `overwrite` says so, and never one that is write-protected.
 fn create(path: &Path, overwrite: bool) -> crate::Result<std::fs::File> {
     let mut options = std::fs::OpenOptions::new();
     options.write(true).read(true);
     if overwrite {
+        replaceable(path)?;
         options.create(true).truncate(true);
     } else {
         options.create_new(true);

@@ -38,6 +38,8 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         _end(_said(error), WRONG_INPUT)
     except OSError as error:
         _end(_said(error), OUTSIDE)
+    except MemoryError as error:
+        _end(f"this needs more memory than there is ({error})", OUTSIDE)
     sys.exit(0)
 
 

@@ -6,12 +6,14 @@ import importlib.util
 import json
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, BinaryIO
 
 import typer
 
 from taxel._core import ProblemError
+from taxel._files import write_whole
 from taxel.cli._app import app
 
 __all__ = ["bench"]
@@ -48,9 +50,8 @@ def bench(
         if not quick:
             place = folder / "results" / f"{stem}.json"
             place.parent.mkdir(exist_ok=True)
-            part = place.with_suffix(".part")
-            part.write_text(json.dumps(result, indent=1) + "\n")
-            part.replace(place)
+            text = json.dumps(result, indent=1) + "\n"
+            write_whole(place, partial(_put, text), overwrite=True)
             if not as_json:
                 typer.echo(f"{stem}: written to {place}")
         if as_json:
@@ -68,6 +69,10 @@ def _changed(folder: Path) -> list[str]:
         check=False,
     )
     return [line[3:] for line in said.stdout.splitlines()]
+
+
+def _put(text: str, file: BinaryIO) -> None:
+    file.write(text.encode())
 
 
 def _load(path: Path) -> Any:

@@ -80,4 +80,7 @@ def trials(path: str | Path, format: str | None = None) -> Iterator[Trial]:  # n
     if len(names) != 1:
         said = "no known format" if not names else "several formats (" + ", ".join(names) + ")"
         raise FormatError(f"{place}: holds {said}; say format= one of {', '.join(FORMATS)}")
-    yield from FORMATS[names[0]].trials(place)
+    try:
+        yield from FORMATS[names[0]].trials(place)
+    except MemoryError as error:
+        raise FormatError(f"{place}: needs more memory than there is ({error})") from None

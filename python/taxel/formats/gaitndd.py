@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from taxel import _arguments as arguments
 from taxel._core import FormatError, ProblemError
+from taxel._limits import ascending_us, whole_us
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.trial import MARGIN_US, Trial
@@ -57,12 +58,12 @@ def trials(path: str | Path) -> Iterator[Trial]:
         raise FormatError(f"{place}: no NAME.hea with NAME.let in it")
     for header in found:
         rate, samples, signals = _header(header)
-        t = np.rint(np.arange(samples) * (1e6 / rate)).astype(np.int64)
         steps = header.with_suffix(".ts")
         for name, first, checksum in signals:
             file = header.parent / name
             foot = {".let": "left", ".rit": "right"}.get(file.suffix, "")
             values = _samples(file, samples, first, checksum)
+            t = ascending_us(header.name, np.arange(samples) / rate, 0)
             valid = values != NO_SAMPLE
             truth: dict[str, NDArray[np.int64]] = {}
             scored = (0, 0)
@@ -147,8 +148,8 @@ def step_times(path: Path) -> dict[str, NDArray[np.int64]]:
     wrong = np.flatnonzero((np.diff(time, prepend=-np.inf) <= 0) | (stride <= 0) | (swing <= 0) | (swing >= stride))
     if len(wrong):
         raise FormatError(f"{path.name}, line {wrong[0] + 1}: time, left stride and swing do not follow one another")
-    strikes = np.unique(np.rint(np.concatenate([[time[0] - stride[0]], time]) * 1e6).astype(np.int64))
-    return {"contact": strikes, "foot_off": np.rint(off * 1e6).astype(np.int64)}
+    strikes = np.unique(whole_us(path.name, np.concatenate([[time[0] - stride[0]], time])))
+    return {"contact": strikes, "foot_off": whole_us(path.name, off)}
 
 
 def _header(path: Path) -> tuple[float, int, list[tuple[str, int, int]]]:
@@ -160,8 +161,9 @@ def _header(path: Path) -> tuple[float, int, list[tuple[str, int, int]]]:
     signals = int(text.number(record[1], path, k, "number of signals"))
     rate = text.number(record[2].split("/")[0].split("(")[0], path, k, "rate")
     samples = int(text.number(record[3], path, k, "number of samples"))
-    if rate <= 0 or samples < 1 or signals < 1:
-        raise FormatError(f"{path.name}, line {k}: {signals} signals, {rate:g} Hz, {samples} samples; must be above 0")
+    if not 0 < rate <= 1e6 or samples < 1 or signals < 1:
+        said = f"{signals} signals, {rate:g} Hz, {samples} samples"
+        raise FormatError(f"{path.name}, line {k}: {said}; must be above 0, at most 1000000 Hz")
     if len(rows) < 1 + signals:
         raise FormatError(f"{path.name}: {len(rows) - 1} signal lines for {signals} signals")
     found = []

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from taxel import _arguments as arguments
 from taxel._core import FormatError
+from taxel._limits import ascending_us
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.trial import MARGIN_US, Trial
@@ -63,15 +64,9 @@ def trials(path: str | Path) -> Iterator[Trial]:
             raise FormatError(f"{file.name}: must be named such as GaCo02_01.txt")
         person = match[1]
         values = text.numbers([line.split("\t") for line in text.lines(file)], file, 1, _COLUMNS)
-        t = np.rint(values[:, 0] * 1e6).astype(np.int64)
-        back = np.flatnonzero(np.diff(t) <= 0)
-        if len(t) < 2 or len(back):
-            said = (
-                f"line {back[0] + 2}: time {values[back[0] + 1, 0]:g} s does"
-                if len(back)
-                else "fewer than 2 lines: must"
-            )
-            raise FormatError(f"{file.name}, {said} not ascend" if len(back) else f"{file.name}: {said} have more")
+        t = ascending_us(file.name, values[:, 0], 1)
+        if len(t) < 2:
+            raise FormatError(f"{file.name}: fewer than 2 lines: must have more")
         for n, foot in enumerate(("left", "right")):
             total = values[:, 17 + n]
             samples = known[person, foot] if (person, foot) in known else contacts(total)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from taxel import _arguments as arguments
 from taxel._core import FormatError
+from taxel._limits import ascending_us
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.trial import MARGIN_US, Trial
@@ -83,10 +84,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             raise FormatError(f"{file.name}, line {first + k}: {len(row)} cells, must have {len(names)}")
     at = _column(names, r"time\b.*", file, head)
     seconds = text.numbers([[row[at]] for row in rows], file, first, ["time"])[:, 0]
-    t = np.rint(seconds * 1e6).astype(np.int64)
-    back = np.flatnonzero(np.diff(t) <= 0)
-    if len(back):
-        raise FormatError(f"{file.name}, line {first + back[0] + 1}: time {seconds[back[0] + 1]:g} s does not ascend")
+    t = ascending_us(file.name, seconds, first)
     marked = _markers(rows, names, t, file, first)
     for foot in ("left", "right"):
         pressures = [k for k, name in enumerate(names) if re.match(rf"{foot} pressure \d+", name)]
@@ -109,7 +107,9 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
             [text.numbers([[rows[k][c] for c in chosen]], file, first + k, labels)[0] for k in there]
         ).reshape(len(there), len(chosen))
         truth = {
-            event: np.rint(np.array(steps[foot, event]) * 1e6).astype(np.int64) if steps else marked[foot, event]
+            event: ascending_us(f"steps.csv, {file.stem}", np.array(steps[foot, event]))
+            if steps
+            else marked[foot, event]
             for event in ("contact", "foot_off")
         }
         ends = [times for times in truth.values() if len(times)]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from taxel import _arguments as arguments
 from taxel._core import FormatError
+from taxel._limits import ascending_us
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.trial import MARGIN_US, Trial
@@ -28,7 +29,12 @@ _SOURCE = "the insole's own sum, 10 % of its largest: no truth of its own"
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.asc`` whose head names time in seconds."""
     found = sorted(path.glob("*.asc")) if path.is_dir() else [path]
-    return [f for f in found if f.suffix == ".asc" and b"pressure values" in f.open("rb").read(65_536)]
+    return [f for f in found if f.suffix == ".asc" and _is_export(f)]
+
+
+def _is_export(path: Path) -> bool:
+    with path.open("rb") as file:
+        return b"pressure values" in file.read(65_536)
 
 
 def trials(path: str | Path) -> Iterator[Trial]:
@@ -73,7 +79,7 @@ def _read(file: Path) -> Iterator[Trial]:
         )
     rows = [line.split() for line in content[head + 1 :] if line.strip()]
     values = text.numbers(rows, file, head + 2, names)
-    t = np.rint(values[:, 0] * 1e6).astype(np.int64)
+    t = ascending_us(file.name, values[:, 0], head + 2)
     steps = np.diff(t)
     off = np.flatnonzero(np.abs(steps - 1e6 / hertz) > 0.25e6 / hertz)
     if len(off):

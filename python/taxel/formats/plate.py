@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from taxel import _arguments as arguments
 from taxel._core import FormatError, ProblemError
+from taxel._limits import unpacked
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.trial import Trial
@@ -88,6 +89,7 @@ def _image(h5: h5py.File, name: str, file: Path) -> NDArray[np.int32]:
     data = h5[name]
     if not isinstance(data, h5py.Dataset) or data.ndim != 3 or data.dtype.kind not in "ui" or 0 in data.shape:
         raise FormatError(f"{file.name}, {name}: must be whole numbers, rows x columns x frames")
+    unpacked(f"{file.name}, {name}", 4 * math.prod(data.shape))
     image: NDArray[np.int32] = data[...].astype(np.int32)
     if image.min() < 0 or not image.any():
         raise FormatError(f"{file.name}, {name}: {'counts below 0' if image.min() < 0 else 'never loaded'}")

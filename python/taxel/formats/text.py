@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import gzip
-import math
 import re
 import zlib
 from collections.abc import Sequence
@@ -13,7 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._arguments import shown
 from taxel._core import FormatError
+from taxel._limits import TEXT
 
 __all__ = ["lines", "number", "numbers", "table"]
 
@@ -30,9 +31,12 @@ def lines(path: Path) -> list[str]:
     FormatError : not a text, or a damaged gzip file
     """
     try:
-        data = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+        with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as file:
+            data = file.read(TEXT + 1)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise FormatError(f"{path.name}: not a whole gzip file ({error}); get it again") from None
+    if len(data) > TEXT:
+        raise FormatError(f"{path.name}: more than {TEXT} bytes of text; at most that are read")
     if b"\0" in data:
         raise FormatError(f"{path.name}, byte {data.index(0)}: a zero byte; this is not a text file")
     try:
@@ -55,12 +59,13 @@ def number(cell: str, path: Path, line: int, what: str) -> float:
         value = float(text)
     except ValueError:
         if _DECIMAL_COMMA.fullmatch(text):
-            said = f"has a decimal comma ({text!r}); export with decimal points"
+            said = f"has a decimal comma ({shown(text)}); export with decimal points"
         else:
-            said = f"is {text!r}, not a number" if text else "is empty, not a number"
+            said = f"is {shown(text)}, not a number" if text else "is empty, not a number"
         raise FormatError(f"{path.name}, line {line}: {what} {said}") from None
-    if not math.isfinite(value) or "_" in text:
-        raise FormatError(f"{path.name}, line {line}: {what} is {text!r}, not a finite number")
+    # Pictures hold 32 bits.
+    if not abs(value) <= np.finfo(np.float32).max or "_" in text:
+        raise FormatError(f"{path.name}, line {line}: {what} is {shown(text)}, not a finite number")
     return value
 
 
@@ -77,7 +82,7 @@ def numbers(rows: Sequence[Sequence[str]], path: Path, first_line: int, names: S
             raise FormatError(f"{path.name}, line {first_line + k}: {len(row)} cells, must have {columns}")
     try:
         values = np.array(rows, dtype=np.float64).reshape(len(rows), columns)
-        if np.isfinite(values).all():
+        if (np.abs(values) <= np.finfo(np.float32).max).all():
             return values
     except ValueError:
         pass  # the slow way below says where
@@ -100,7 +105,7 @@ def table(path: Path, columns: Sequence[str]) -> list[dict[str, str]]:
     header = rows[0]
     missing = [c for c in columns if c not in header]
     if missing:
-        raise FormatError(f"{path.name}, line 1: no column {missing[0]!r}; there are {', '.join(header)}")
+        raise FormatError(f"{path.name}, line 1: no column {missing[0]!r}; there are {shown(', '.join(header))}")
     found = []
     for k, row in enumerate(rows[1:], start=2):
         if len(row) != len(header):

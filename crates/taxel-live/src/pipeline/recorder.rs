@@ -58,6 +58,7 @@ impl Recorder {
             recorder.kind()?;
         } else {
             named(path)?;
+            recording::replaceable(path)?;
             OpenOptions::new().write(true).open(path).map_err(Error::file(path))?;
         }
         Ok(recorder)

@@ -24,15 +24,17 @@ impl LsaWriter {
     /// `File` where the `.lsa` or its `.lss` exists (and `overwrite` is not set), or the file cannot be created.
     pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
         let done = done(path);
+        if !overwrite && done.exists() {
+            return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
+        }
+        let out = BufWriter::new(create(path, overwrite)?);
         if overwrite {
             match std::fs::remove_file(&done) {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(&done)(error)),
                 _ => {}
             }
-        } else if done.exists() {
-            return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
         }
-        Ok(Self { path: path.to_owned(), overwrite, out: BufWriter::new(create(path, overwrite)?) })
+        Ok(Self { path: path.to_owned(), overwrite, out })
     }
 
     /// Keeps the next bytes.

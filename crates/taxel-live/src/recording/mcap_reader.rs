@@ -19,14 +19,8 @@ use taxel_core::wire::{self, Decoder, Pairing, Registers};
 use taxel_core::{Events, Marker, Stop};
 
 use super::mcap_writer::{BEGIN, END};
-use super::{Counts, Header, Note, Topic};
+use super::{Counts, Header, Note, Topic, limits};
 use crate::{Error, Result};
-
-/// No chunk of a sane file is larger, packed or unpacked; a damaged length must not make us ask for terabytes.
-const LARGEST_CHUNK: usize = 1 << 30;
-
-/// No metadata record of ours is larger.
-const LARGEST_METADATA: u64 = 1 << 24;
 
 /// Opcode, length.
 const RECORD_HEAD: u64 = 9;
@@ -66,6 +60,8 @@ pub struct Rebuilt {
     pub gaps: u64,
     /// Bytes skipped there.
     pub skipped_bytes: u64,
+    /// Chunks left out because they say that they unpack to more than a chunk may.
+    pub large_chunks: u64,
 }
 
 /// One message as it stands in the file.
@@ -149,7 +145,7 @@ impl Reader {
         walk.magic()?;
         walk.records()?;
         let Walk { begin, end, ending, blocks, rebuilt, .. } = walk;
-        let blocks = Blocks { path: path.to_owned(), file, places: blocks };
+        let blocks = Blocks { path: path.to_owned(), file, length, places: blocks };
         // The copy beside the datagrams' channel has a checksum, the others have not.
         let Some(header) = blocks.header()?.or(end).or(begin) else {
             return Err(format(
@@ -157,6 +153,7 @@ impl Reader {
                 "an MCAP file without the header of a taxel recording (metadata record \"taxel\")",
             ));
         };
+        header.check().map_err(|error| format(path, &format!("header: {error}")))?;
         Ok(Self { blocks, header, ending, rebuilt })
     }
 
@@ -186,7 +183,7 @@ impl Reader {
     pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<u64> {
         let mut topics: BTreeMap<u16, Option<Topic>> = BTreeMap::new();
         let (mut bad, mut last) = (0, 0_u64);
-        let mut bytes = Vec::new();
+        let (mut bytes, mut in_datagrams, most) = (Vec::new(), 0, limits::datagrams(self.blocks.length));
         for block in &self.blocks.places {
             stop.check()?;
             let mut wrong = None;
@@ -202,6 +199,18 @@ impl Reader {
                             if topic == Topic::Datagrams {
                                 number = unwrap(last, header.sequence);
                                 last = number;
+                                in_datagrams += data.len() as u64;
+                                if in_datagrams > most {
+                                    wrong = Some(format(
+                                        &self.blocks.path,
+                                        &format!(
+                                            "chunk at byte {}: the datagrams up to here unpack to more than {most} bytes \
+                                             (100 times the file and 64 MiB)",
+                                            block.offset
+                                        ),
+                                    ));
+                                    return false;
+                                }
                             }
                             let at_ns = i64::try_from(header.log_time).unwrap_or(i64::MAX);
                             wrong = take(Message { topic, number, at_ns, data: &data }).err();
@@ -307,6 +316,7 @@ impl Reader {
 struct Blocks {
     path: PathBuf,
     file: File,
+    length: u64,
     places: Vec<Block>,
 }
 
@@ -337,7 +347,7 @@ impl Blocks {
             .with_skip_start_magic(true)
             .with_skip_end_magic(true)
             .with_prevalidate_chunk_crcs(true)
-            .with_record_length_limit(LARGEST_CHUNK);
+            .with_record_length_limit(length.max(limits::CHUNK as usize));
         let mut reader = LinearReader::new_with_options(options);
         let mut given = 0;
         while let Some(event) = reader.next_event() {
@@ -373,13 +383,15 @@ struct Walk<'a> {
     end: Option<Header>,
     ending: Option<Ending>,
     blocks: Vec<Block>,
+    /// What the chunks so far say that they unpack to, bytes.
+    unpacked: u64,
     rebuilt: Rebuilt,
 }
 
 impl<'a> Walk<'a> {
     fn of(path: &'a Path, file: &'a File, length: u64) -> Self {
         let rebuilt = Rebuilt { unfinished: true, ..Rebuilt::default() };
-        Self { path, file, length, begin: None, end: None, ending: None, blocks: vec![], rebuilt }
+        Self { path, file, length, begin: None, end: None, ending: None, blocks: vec![], unpacked: 0, rebuilt }
     }
 
     /// Up to `wanted` bytes at `offset`; fewer at the end of the file.
@@ -406,7 +418,7 @@ impl<'a> Walk<'a> {
     fn records(&mut self) -> Result<()> {
         let mut at = MAGIC.len() as u64;
         while at < self.length {
-            let Some((opcode, length)) = self.sound(at)? else {
+            let Some((opcode, length, size)) = self.sound(at)? else {
                 match self.next_sound(at + 1)? {
                     Some(next) => {
                         self.rebuilt.gaps += 1;
@@ -426,7 +438,21 @@ impl<'a> Walk<'a> {
                     return Ok(());
                 }
                 op::METADATA => self.metadata(at, length)?,
-                op::CHUNK => self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: false }),
+                op::CHUNK if size.max(length) > u64::from(limits::CHUNK) => self.rebuilt.large_chunks += 1,
+                op::CHUNK => {
+                    self.unpacked += size;
+                    let most = limits::unpacked(self.length);
+                    if self.unpacked > most {
+                        let said = "bytes (1000 times the file and 256 MiB)";
+                        return Err(format(
+                            self.path,
+                            &format!(
+                                "chunk at byte {at}: the chunks up to here say that they unpack to more than {most} {said}"
+                            ),
+                        ));
+                    }
+                    self.blocks.push(Block { offset: at, length: RECORD_HEAD + length, bare: false });
+                }
                 op::SCHEMA | op::CHANNEL | op::MESSAGE => match self.blocks.last_mut() {
                     Some(block) if block.bare && block.offset + block.length == at && block.length < 1 << 20 => {
                         block.length += RECORD_HEAD + length;
@@ -440,22 +466,23 @@ impl<'a> Walk<'a> {
         Ok(())
     }
 
-    /// Opcode and length of the record at `at`, where they make sense.
-    fn sound(&self, at: u64) -> Result<Option<(u8, u64)>> {
+    /// Opcode and length of the record at `at`, where they make sense, and what it says that it unpacks to.
+    fn sound(&self, at: u64) -> Result<Option<(u8, u64, u64)>> {
         let head = self.bytes(at, 80)?;
         let (Some(&opcode), Some(length)) = (head.first(), number(&head, 1)) else { return Ok(None) };
         let fits = at.checked_add(RECORD_HEAD).and_then(|a| a.checked_add(length)).is_some_and(|e| e <= self.length);
         // What may stand before the end of the data. A flipped bit in an opcode must not hide a chunk, so lengths that can
         // be checked are.
         let known = match opcode {
-            op::CHUNK => chunk_fits(&head, length),
+            op::CHUNK => chunk(&head, length).is_some(),
             op::MESSAGE_INDEX => head.get(11..15).is_some_and(|b| word(b) + 6 == length),
             op::METADATA => head.get(9..13).is_some_and(|b| word(b) + 8 <= length),
             op::DATA_END => length == 4,
             op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE | op::ATTACHMENT => true,
             _ => false,
         };
-        Ok((fits && known).then_some((opcode, length)))
+        let size = if opcode == op::CHUNK { chunk(&head, length).unwrap_or(0) } else { 0 };
+        Ok((fits && known).then_some((opcode, length, size)))
     }
 
     /// The next place from `at` on where a chunk or a metadata record of ours stands.
@@ -468,9 +495,9 @@ impl<'a> Walk<'a> {
                     continue;
                 }
                 let place = at + k as u64;
-                if let Some((opcode, length)) = self.sound(place)? {
+                if let Some((opcode, length, _)) = self.sound(place)? {
                     let ours = || -> Result<bool> {
-                        Ok(length < LARGEST_METADATA
+                        Ok(length < limits::METADATA
                             && self.bytes(place + RECORD_HEAD + 4, BEGIN.len() as u64)? == BEGIN.as_bytes())
                     };
                     if opcode == op::CHUNK || ours()? {
@@ -484,7 +511,7 @@ impl<'a> Walk<'a> {
     }
 
     fn metadata(&mut self, at: u64, length: u64) -> Result<()> {
-        if length > LARGEST_METADATA {
+        if length > limits::METADATA {
             return Ok(());
         }
         let body = self.bytes(at + RECORD_HEAD, length)?;
@@ -510,19 +537,14 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Whether the lengths inside a chunk's header agree with the record's.
-fn chunk_fits(head: &[u8], length: u64) -> bool {
+/// What a chunk says that it unpacks to, where the lengths inside its header agree with the record's.
+fn chunk(head: &[u8], length: u64) -> Option<u64> {
     // opcode 1, length 8, start 8, end 8, size 8, checksum 4, name of the compression, packed size 8
     const NAME: usize = 37;
-    let Some(name_bytes) = head.get(NAME..NAME + 4).map(|b| word(b) as usize).filter(|&n| n <= 16) else {
-        return false;
-    };
-    let packed = number(head, NAME + 4 + name_bytes);
+    let name_bytes = head.get(NAME..NAME + 4).map(|b| word(b) as usize).filter(|&n| n <= 16)?;
+    let packed = number(head, NAME + 4 + name_bytes)?;
     let rest = (NAME + 4 + name_bytes + 8) as u64 - RECORD_HEAD;
-    let size = number(head, 25);
-    packed.and_then(|p| p.checked_add(rest)) == Some(length)
-        && size.is_some_and(|s| s <= LARGEST_CHUNK as u64)
-        && length <= LARGEST_CHUNK as u64
+    if packed.checked_add(rest) == Some(length) { number(head, 25) } else { None }
 }
 
 /// The 64-bit number at `place`.

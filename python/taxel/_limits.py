@@ -1,0 +1,111 @@
+"""What a file may hold at most: asked before memory is asked for, named in the error, told in docs/files.md.
+
+Files come from strangers and from damaged disks: a few bytes can claim 10^12 values. The limits lie well above what
+sensors of today record. Those of .mcap stand beside its reader (crates/taxel-live/src/recording/limits.rs).
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._core import FormatError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+
+__all__ = [
+    "COLUMNS",
+    "DESCRIPTION",
+    "TAXELS",
+    "TEXT",
+    "TIME_US",
+    "UNPACKED",
+    "ascending_us",
+    "sensor",
+    "table",
+    "unpacked",
+    "whole_us",
+]
+
+#: Taxels of a sensor: 2048 x 2048.
+TAXELS = 1 << 22
+#: Columns of a table of text: a time, and 256 x 256 taxels.
+COLUMNS = (1 << 16) + 1
+#: What the arrays of a file may hold, unpacked: 4 GiB.
+UNPACKED = 1 << 32
+#: Of a text, unpacked: 1 GiB.
+TEXT = 1 << 30
+#: Of a description in JSON: 64 MiB.
+DESCRIPTION = 1 << 26
+#: Of times, us, on both sides of 0: 142 years, so that ns in 64 bits hold them too.
+TIME_US = 1 << 52
+
+
+def unpacked(place: str, size: int, most: int = UNPACKED) -> None:
+    """Refuse what would unpack to more than a file may hold.
+
+    Raises
+    ------
+    FormatError : more bytes than `most`
+    """
+    if size > most:
+        raise FormatError(f"{place}: says that it holds {size} bytes, unpacked; at most {most} are read")
+
+
+def sensor(place: str, array: Array) -> Array:
+    """Return a sensor that a file describes, unless it is too large.
+
+    Raises
+    ------
+    FormatError : more taxels than a file's sensor may have
+    """
+    if array.rows * array.columns > TAXELS:
+        raise FormatError(f"{place}: a sensor of {array.rows} x {array.columns} taxels; at most {TAXELS} are read")
+    return array
+
+
+def table(place: Path | str, held: Events | Frames) -> Events | Frames:
+    """Return events or pictures of a file, unless their sensor is too large or their times are out of all reason.
+
+    Raises
+    ------
+    FormatError : too many taxels, or a time farther from 0 than 142 years
+    """
+    sensor(str(place), held.array)
+    far = np.flatnonzero((held.t < -TIME_US) | (held.t > TIME_US))
+    if len(far):
+        k = int(far[0])
+        raise FormatError(f"{place}, time {k}: {held.t[k]} us; times must lie within {TIME_US} us (142 years) of 0")
+    return held
+
+
+def whole_us(place: str, seconds: NDArray[np.float64], first_line: int = 1) -> NDArray[np.int64]:
+    """Return a file's times in s as whole us.
+
+    Raises
+    ------
+    FormatError : a time farther from 0 than 142 years (names the line)
+    """
+    wrong = np.flatnonzero(~(np.abs(seconds) <= TIME_US * 1e-6))
+    if len(wrong):
+        k = int(wrong[0])
+        raise FormatError(f"{place}, line {first_line + k}: time {seconds[k]:g} s; must lie within 142 years of 0")
+    return np.asarray(np.rint(seconds * 1e6).astype(np.int64))
+
+
+def ascending_us(place: str, seconds: NDArray[np.float64], first_line: int = 1) -> NDArray[np.int64]:
+    """Return a file's column of times in s as whole us.
+
+    Raises
+    ------
+    FormatError : a time that does not ascend, or lies farther from 0 than 142 years (names the line)
+    """
+    t = whole_us(place, seconds, first_line)
+    back = np.flatnonzero(np.diff(t) <= 0)
+    if len(back):
+        k = int(back[0]) + 1
+        raise FormatError(f"{place}, line {first_line + k}: time {seconds[k]:g} s does not ascend")
+    return t

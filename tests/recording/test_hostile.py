@@ -1,0 +1,207 @@
+"""Damaged and hostile files of every format: an answer or one line, in bounded memory and work."""
+
+from __future__ import annotations
+
+import json
+import os
+import struct
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import CompressionType, Writer
+
+import taxel
+from taxel import _limits, formats
+from taxel._core import FormatError
+from taxel.live import Live
+
+from . import hostile
+from .making import record, some_events
+
+SCRIPT = Path(hostile.__file__)
+
+
+def spoil(name: str, seed: int, first: int, count: int, folder: Path) -> None:
+    """Spoil files in a process of their own, whose memory and work are bounded, and look at how each ended."""
+    arguments = [name, str(seed), str(first), str(count), str(folder)]
+    # One thread: a pool of threads asks for memory that the bound would count.
+    alone = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run([sys.executable, SCRIPT, *arguments], check=False, capture_output=True, text=True, env=alone)
+    said = [json.loads(line) for line in done.stdout.splitlines()]
+    wrong = [entry["wrong"] for entry in said if "wrong" in entry]
+    assert not wrong, f"{len(wrong)} of seed {seed}, first: {wrong[0]}"
+    at = [entry["at"] for entry in said if "at" in entry][-1:]
+    assert (done.returncode, said[-1:]) == (0, [{"done": True}]), f"{arguments} ended at {at}: {done.stderr[-2000:]}"
+
+
+def test_every_format_has_files_to_spoil() -> None:
+    """A format without a maker of small files cannot be tried: add write_NAME to tests/formats/making.py."""
+    assert set(formats.FORMATS) <= set(hostile.KINDS)
+
+
+@pytest.mark.parametrize("name", hostile.KINDS)
+def test_a_spoilt_file_is_read_or_refused_in_one_line(name: str, tmp_path: Path) -> None:
+    spoil(name, 1, 0, 30, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3000)
+@pytest.mark.parametrize("name", hostile.KINDS)
+def test_a_thousand_spoilt_files_are_read_or_refused_in_one_line(name: str, tmp_path: Path) -> None:
+    spoil(name, 2, 0, 1000, tmp_path)
+
+
+# files that ask for far more than they hold
+
+
+def refused(path: Path, said: str) -> None:
+    with pytest.raises(FormatError, match=said) as caught:
+        assert taxel.open(path).events is not None
+    assert "\n" not in str(caught.value)
+
+
+def npz(path: Path, name: str, member: bytes) -> Path:
+    """Write events whose array `name` is replaced by other bytes."""
+    taxel.convert(some_events(), path, overwrite=True)
+    with zipfile.ZipFile(path) as archive:
+        members = {n: archive.read(n) for n in archive.namelist()}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for n, content in {**members, f"{name}.npy": member}.items():
+            archive.writestr(n, content)
+    return path
+
+
+def described(descr: str, shape: str) -> bytes:
+    text = f"{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}".encode()
+    return b"\x93NUMPY\x01\x00" + struct.pack("<H", len(text)) + text
+
+
+def test_a_declared_shape_of_a_million_millions_is_refused(tmp_path: Path) -> None:
+    refused(npz(tmp_path / "a.npz", "t", described("<i8", f"({10**12},)")), "array t: says that it holds 8000000000000")
+    refused(npz(tmp_path / "a.npz", "t", described("<i8", "(1000,)")), r"array t: .* 8000 bytes .* there are 0")
+
+
+def test_a_huge_text_in_a_description_is_refused(tmp_path: Path) -> None:
+    huge = described("<U500000000", "()")
+    refused(npz(tmp_path / "a.npz", "about", huge), "array about: says that it holds 2000000000 .* at most 268435456")
+    refused(npz(tmp_path / "a.npz", "about", described("<U2000000000", "()")), "cannot be unpacked")
+
+
+def test_a_sensor_that_is_too_large_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    np.savez(path, t=[0], x=[60_000], y=[60_000], p=[True])
+    refused(path, f"60001 x 60001 taxels; at most {_limits.TAXELS}")
+    huge = {"rows": 65_535, "columns": 65_535, "pitch_mm": 1.0, "name": ""}
+    record(tmp_path / "a.mcap", some_events(), header={"array": huge})
+    refused(tmp_path / "a.mcap", "65535 x 65535 taxels; at most")
+
+
+def test_a_time_out_of_all_reason_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"t_us,x,y,p\n0,1,1,1\n{2**62},1,1,0\n")
+    refused(path, "time 1: .* must lie within .*142 years")
+
+
+def test_a_table_of_very_many_columns_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t_us" + ",a" * 3_000_000 + "\n")
+    refused(path, f"line 1: 3000001 columns; at most {_limits.COLUMNS}")
+    path.write_text("t_us,x0y0,x2000y2000\n" + "".join(f"{k},1,1\n" for k in range(1000)))
+    refused(path, "most are missing")
+
+
+def say_size(path: Path, chunk: int, size: int) -> None:
+    """Write into a chunk what it says that it unpacks to."""
+    data = bytearray(path.read_bytes())
+    at, number = 8, 0
+    while at + 9 <= len(data):
+        if data[at] == 6:
+            if number == chunk:
+                data[at + 25 : at + 33] = struct.pack("<Q", size)
+            number += 1
+        at += 9 + int.from_bytes(data[at + 1 : at + 9], "little")
+    assert number > chunk
+    path.write_bytes(data)
+
+
+@pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
+@pytest.mark.parametrize("size", [1 << 30, 1 << 40, 1 << 63])
+def test_a_chunk_that_says_it_unpacks_to_more_than_a_chunk_may_is_left_out_and_said(
+    tmp_path: Path, compression: str, size: int
+) -> None:
+    path = tmp_path / "a.mcap"
+    record(path, some_events(), compression=compression)
+    say_size(path, 0, size)
+    rec = taxel.open(path)
+    assert rec.rebuilt["large_chunks"] == 1
+    assert "1 chunks skipped that say they unpack to more than 64 MiB" in rec.verdict
+
+
+def packed(path: Path, count: int) -> None:
+    """Write datagrams that pack by hundreds, by a writer that is not ours."""
+    record(path.with_suffix(".own.mcap"), some_events(40))
+    with path.with_suffix(".own.mcap").open("rb") as file:
+        header = next(m.metadata for m in make_reader(file).iter_metadata() if m.name == "taxel")
+    with path.open("wb") as out:
+        writer = Writer(out, chunk_size=8 << 20, compression=CompressionType.ZSTD)
+        writer.start()
+        writer.add_metadata("taxel", header)
+        channel = writer.register_channel(topic="/datagrams", message_encoding="taxel.wire.v1", schema_id=0)
+        for k in range(count):
+            writer.add_message(channel, log_time=k, publish_time=k, data=bytes(65_000), sequence=k)
+        writer.finish()
+
+
+def test_datagrams_that_unpack_to_far_more_than_the_file_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "trap.mcap"
+    packed(path, 1500)
+    assert path.stat().st_size < 200_000
+    refused(path, r"the datagrams up to here unpack to more than \d+ bytes \(100 times the file and 64 MiB\)")
+
+
+def test_what_is_just_within_the_limits_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    packed(path, 900)
+    assert len(taxel.open(path).datagrams()) == 900
+    table = tmp_path / "a.csv"
+    names = ",".join(f"x{k % 256}y{k // 256}" for k in range(_limits.COLUMNS - 1))
+    table.write_text(f"t_us,{names}\n" + ",".join(["0"] * _limits.COLUMNS) + "\n")
+    assert taxel.open(table).frames().values.shape == (1, 256, 256)
+
+
+# what is write-protected, and what stays empty
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".lsa", ".npz", ".csv"])
+def test_a_write_protected_file_is_never_replaced(tmp_path: Path, ending: str) -> None:
+    """A rename asks the folder alone, and the superuser may do all: neither counts."""
+    path = tmp_path / f"a{ending}"
+    path.write_bytes(b"precious")
+    path.chmod(0o444)
+    with pytest.raises(PermissionError, match=f"a{ending}"):
+        taxel.convert(some_events(5), path, overwrite=True)
+    if ending in {".mcap", ".lsa"}:
+        with pytest.raises(PermissionError, match=f"a{ending}"):
+            Live(port=0, host="127.0.0.1", record=path, overwrite=True)
+    assert path.read_bytes() == b"precious"
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
+@pytest.mark.parametrize("ending", [".mcap", ".lsa"])
+def test_a_recording_to_which_nothing_came_leaves_no_file_unless_something_was_noted(
+    tmp_path: Path, ending: str
+) -> None:
+    path = tmp_path / f"a{ending}"
+    with Live(port=0, host="127.0.0.1", record=path) as live:
+        assert live.stop().path is None
+    assert list(tmp_path.iterdir()) == []
+    if ending == ".mcap":
+        with Live(port=0, host="127.0.0.1", record=path) as live:
+            live.note("the board is off")
+            assert live.stop().path == path
+        assert [n.text for n in taxel.open(path).notes] == ["the board is off"]
