@@ -23,6 +23,7 @@ __all__ = [
     "TEXT",
     "TIME_US",
     "UNPACKED",
+    "VALUE",
     "ascending_us",
     "sensor",
     "table",
@@ -40,6 +41,8 @@ UNPACKED = 1 << 32
 TEXT = 1 << 30
 #: Of a description in JSON: 64 MiB.
 DESCRIPTION = 1 << 26
+#: Of a value of a picture, which has 32 bits.
+VALUE = float(np.finfo(np.float32).max)
 #: Of times, us, on both sides of 0: 142 years, so that ns in 64 bits hold them too.
 TIME_US = 1 << 52
 

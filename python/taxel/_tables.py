@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from taxel._arguments import shown
 from taxel._core import FormatError, ProblemError
-from taxel._limits import COLUMNS, DESCRIPTION, TAXELS, UNPACKED, unpacked
+from taxel._limits import COLUMNS, DESCRIPTION, TAXELS, UNPACKED, VALUE, unpacked
 from taxel._limits import table as limited
 from taxel._remarks import Remarks
 from taxel.array import Array
@@ -214,7 +214,7 @@ def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) 
     elif x.max() >= array.columns or y.max() >= array.rows:
         k = int(np.flatnonzero((x >= array.columns) | (y >= array.rows))[0])
         raise FormatError(f"{path}, line 1: column {names[k + 1]!r} lies outside {array.rows} x {array.columns} taxels")
-    large = np.argwhere(np.abs(table[:, 1:]) > np.finfo(np.float32).max)
+    large = np.argwhere(np.abs(table[:, 1:]) > VALUE)
     if len(large):
         k, c = large[0]
         raise FormatError(f"{path}, line {k + 2}, column {names[c + 1]}: {table[k, c + 1]:g}; must fit 32 bits")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from taxel._arguments import shown
 from taxel._core import FormatError
-from taxel._limits import TEXT
+from taxel._limits import TEXT, VALUE
 
 __all__ = ["lines", "number", "numbers", "table"]
 
@@ -64,7 +64,7 @@ def number(cell: str, path: Path, line: int, what: str) -> float:
             said = f"is {shown(text)}, not a number" if text else "is empty, not a number"
         raise FormatError(f"{path.name}, line {line}: {what} {said}") from None
     # Pictures hold 32 bits.
-    if not abs(value) <= np.finfo(np.float32).max or "_" in text:
+    if not abs(value) <= VALUE or "_" in text:
         raise FormatError(f"{path.name}, line {line}: {what} is {shown(text)}, not a finite number")
     return value
 
@@ -82,7 +82,7 @@ def numbers(rows: Sequence[Sequence[str]], path: Path, first_line: int, names: S
             raise FormatError(f"{path.name}, line {first_line + k}: {len(row)} cells, must have {columns}")
     try:
         values = np.array(rows, dtype=np.float64).reshape(len(rows), columns)
-        if (np.abs(values) <= np.finfo(np.float32).max).all():
+        if (np.abs(values) <= VALUE).all():
             return values
     except ValueError:
         pass  # the slow way below says where

@@ -588,8 +588,8 @@ mod tests {
         let path = std::env::temp_dir().join(format!("taxel-starved-{}.mcap", std::process::id()));
         let how = WriterOptions { overwrite: true, ..WriterOptions::default() };
         let writer = Writer::alone(&path, &header(), how).unwrap();
-        for k in 0..20 {
-            writer.datagram(i64::from(k), u64::from(k.unsigned_abs()), &[7; 1400]).unwrap();
+        for k in 0..20_u32 {
+            writer.datagram(i64::from(k), u64::from(k), &[7; 1400]).unwrap();
             std::thread::sleep(LATE / 4);
         }
         // What a kill would leave now. The last that was late, at the latest one in ten, took all before it along.
