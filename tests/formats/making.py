@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 import gzip
+import os
 from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
+
+SHARED = Path(os.environ.get("TAXEL_DATA", Path(__file__).parents[3] / "shared" / "data"))
+
+
+def shared(name: str) -> Path:
+    if not (SHARED / name).is_dir():
+        pytest.skip(f"no {name} in {SHARED}: set TAXEL_DATA")
+    return SHARED / name
 
 
 def interpolated(sensors: np.ndarray, start: int, rows: int) -> np.ndarray:

@@ -27,7 +27,7 @@ def footfall(shift: int = 0, late: float = 1.0) -> Trial:
     return Trial(
         name="x/1",
         person="x",
-        frames=Frames(values, np.arange(60) * 2000, unit="counts", array=Array(40, 30, 5.08)),
+        recorded=Frames(values, np.arange(60) * 2000, unit="counts", array=Array(40, 30, 5.08)),
         truth={"contact": np.array([0])},
         source="made here",
         about={"row_mm": 7.62, "column_mm": 5.08},

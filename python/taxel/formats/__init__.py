@@ -1,4 +1,4 @@
-"""Other people's files: one module a format, each giving trials (pictures and what happened when).
+"""Other people's files: one module a format, each giving trials (pictures or events, and what happened when).
 
 Examples
 --------
@@ -11,15 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from taxel._arguments import path as checked_path
 from taxel._arguments import text as checked_text
 from taxel._core import FormatError
-from taxel.formats import gaitndd, gaitpdb, moticon, pedar, plate
 from taxel.formats.trial import Trial
 
-__all__ = ["FORMATS", "Format", "Trial", "gaitndd", "gaitpdb", "moticon", "pedar", "plate", "trials"]
+__all__ = ["FORMATS", "Format", "Trial", "trials"]
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,22 @@ class Format:
     trials: Callable[[str | Path], Iterator[Trial]]
 
 
-#: Every format by name, in the order in which a folder is tried.
+def _of(name: str) -> Format:
+    """Return what the module of a format says: its first line, `files` and `trials`."""
+    module = import_module(f"taxel.formats.{name}")
+    return Format((module.__doc__ or "").split("\n", maxsplit=1)[0], module.files, module.trials)
+
+
+#: Every format by name, in the order in which a folder is tried: a new one is a module of that name, and a name here.
 FORMATS = {
-    "plate": Format("footscan-type plate, barefoot, one footfall a trial (HDF5)", plate.files, plate.trials),
-    "gaitpdb": Format("8 + 8 force sensors under the feet (PhysioNet gaitpdb)", gaitpdb.files, gaitpdb.trials),
-    "gaitndd": Format("one force channel a foot (PhysioNet gaitndd, WFDB 212)", gaitndd.files, gaitndd.trials),
-    "moticon": Format("Moticon OpenGo insoles, 16 + 16 sensors (text export)", moticon.files, moticon.trials),
-    "pedar": Format("novel pedar insoles, 99 + 99 sensors (.asc)", pedar.files, pedar.trials),
+    name: _of(name)
+    for name in (
+        "plate",
+        "gaitpdb",
+        "gaitndd",
+        "moticon",
+        "pedar",
+    )
 }
 
 

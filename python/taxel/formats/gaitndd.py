@@ -75,7 +75,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
             yield Trial(
                 name=f"{header.stem} {foot}".strip(),
                 person=header.stem,
-                frames=Frames(
+                recorded=Frames(
                     values[valid].astype(np.float32)[:, None, None],
                     t[valid],
                     unit="raw",

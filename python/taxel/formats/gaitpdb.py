@@ -83,7 +83,7 @@ def trials(path: str | Path) -> Iterator[Trial]:
             yield Trial(
                 name=f"{file.name.split('.')[0]} {foot}",
                 person=person,
-                frames=Frames(
+                recorded=Frames(
                     values[:, None, 1 + 8 * n : 9 + 8 * n], t, unit="N", array=Array(1, 8, name="gaitpdb foot")
                 ),
                 truth=truth,

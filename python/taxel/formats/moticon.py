@@ -116,7 +116,7 @@ def _read(file: Path, steps: dict[tuple[str, str], list[float]] | None) -> Itera
         yield Trial(
             name=f"{file.stem} {foot}",
             person=about.get("Sensor insoles", "moticon"),
-            frames=Frames(
+            recorded=Frames(
                 values[:, None, :-1],
                 t[there],
                 unit="N/cm2",

@@ -94,7 +94,7 @@ def _read(file: Path) -> Iterator[Trial]:
         yield Trial(
             name=f"{file.stem} {foot}",
             person=file.stem,
-            frames=Frames(
+            recorded=Frames(
                 pressure[:, None, :],
                 t,
                 unit=unit[1] if unit else "kPa",

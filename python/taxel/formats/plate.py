@@ -115,7 +115,7 @@ def _trial(
     return Trial(
         name=f"{person}/{number:02d}",
         person=person,
-        frames=Frames(values, np.arange(end) * FRAME_US, unit="counts", array=array),
+        recorded=Frames(values, np.arange(end) * FRAME_US, unit="counts", array=array),
         truth={e: np.array([frame[e] * FRAME_US]) for e in ("contact", "heel_off", "foot_off")},
         source=_SOURCE,
         about={"row_mm": ROW_MM, "column_mm": COLUMN_MM, **(about or {})},

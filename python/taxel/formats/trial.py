@@ -1,4 +1,4 @@
-"""A trial: the pictures of one foot, and when things happened."""
+"""A trial: what one sensor recorded once, and when things happened."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from taxel import _arguments as arguments
 from taxel._core import ProblemError
+from taxel.events import Events
 from taxel.frames import Frames
 
 __all__ = ["MARGIN_US", "Trial"]
@@ -20,38 +21,38 @@ MARGIN_US = 100_000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trial:
-    """Hold one recording of one foot: its pictures, and the reference times of its events.
+    """Hold one recording of one sensor: its pictures or events, and the reference times of what happened.
 
     Parameters
     ----------
     name : str
         "subj003/17", "GaCo02_01 left": no two trials of a folder share it.
     person : str
-    frames : Frames
+    recorded : Frames or Events
         Pictures that are missing in the file are missing here too: their times jump.
     truth : mapping from event to int64 times, us
         Ascending; "contact", "heel_off", "foot_off" where the recording knows them.
     source : str
-        Where the truth comes from, in one sentence; it stands beside every figure.
+        Where the truth comes from, in one sentence; it stands beside every figure. "" where there is none.
     foot : str
         "left", "right", or "" where the recording does not say.
     group : str
         "healthy", "patient", or "".
     scored : (int, int), us, optional
-        Within it the truth is complete; outside nothing may be counted as false. All pictures where it is left out.
-    series : mapping from name to float64, shape (pictures,)
+        Within it the truth is complete; outside nothing may be counted as false. All of it where it is left out.
+    series : mapping from name to float64, shape (pictures,) or (events,)
         Further columns of the file, such as the total force that the maker reckoned.
     about : mapping
         What else is known: condition, speed, age ...
 
     Raises
     ------
-    ProblemError : truth that does not ascend, or a column of another length than the pictures
+    ProblemError : truth that does not ascend, or a column of another length than the recording
     """
 
     name: str
     person: str
-    frames: Frames
+    recorded: Frames | Events
     truth: Mapping[str, NDArray[np.int64]]
     source: str
     foot: str = ""
@@ -61,7 +62,8 @@ class Trial:
     about: Mapping[str, str | float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        arguments.instance("frames", self.frames, Frames)
+        if not isinstance(self.recorded, Frames | Events):
+            raise ProblemError(f"recorded is {arguments.shown(self.recorded)}: must be taxel.Frames or taxel.Events")
         for event, times in self.truth.items():
             arguments.column(event, times, np.int64)
             back = np.flatnonzero(np.diff(times) <= 0)
@@ -69,12 +71,36 @@ class Trial:
                 k = int(back[0])
                 raise ProblemError(f"{self.name}: {event} {k + 1} at {times[k + 1]} us is not after {times[k]} us")
         for name, column in self.series.items():
-            if len(column) != len(self.frames):
-                raise ProblemError(f"{self.name}: {name} has {len(column)} values for {len(self.frames)} pictures")
+            if len(column) != len(self.recorded):
+                raise ProblemError(f"{self.name}: {name} has {len(column)} values for {self.recorded!r}")
         if self.scored is None:
-            t = self.frames.t
-            object.__setattr__(self, "scored", (int(t[0]), int(t[-1])) if len(t) else (0, 0))
+            t = self.recorded.t
+            object.__setattr__(self, "scored", (int(t.min()), int(t.max())) if len(t) else (0, 0))
+
+    @property
+    def frames(self) -> Frames:
+        """The pictures.
+
+        Raises
+        ------
+        ProblemError : the trial holds events
+        """
+        if not isinstance(self.recorded, Frames):
+            raise ProblemError(f"{self.name}: holds events and no pictures")
+        return self.recorded
+
+    @property
+    def events(self) -> Events:
+        """The events.
+
+        Raises
+        ------
+        ProblemError : the trial holds pictures
+        """
+        if not isinstance(self.recorded, Events):
+            raise ProblemError(f"{self.name}: holds pictures and no events")
+        return self.recorded
 
     def __repr__(self) -> str:
         events = ", ".join(f"{len(times)} {event}" for event, times in self.truth.items()) or "no truth"
-        return f"Trial({self.name}: {self.frames!r}, {events})"
+        return f"Trial({self.name}: {self.recorded!r}, {events})"

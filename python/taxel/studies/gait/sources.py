@@ -18,7 +18,7 @@ from taxel import formats
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.encode import Encoder
-from taxel.formats import Trial
+from taxel.formats import Trial, plate
 from taxel.frames import Frames
 from taxel.studies.gait import insole
 from taxel.studies.gait.pieces import Piece
@@ -273,14 +273,14 @@ def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
     """Encode a person's footfalls as one row with random silences, and take it apart again into pieces."""
     rng = np.random.default_rng([int.from_bytes(hashlib.sha256(cuts[0].person.encode()).digest()[:4])])
     order = rng.permutation(len(cuts))
-    step = formats.plate.FRAME_US // 1000
+    step = plate.FRAME_US // 1000
     silences = rng.integers(SILENCE_MS[0] // step, SILENCE_MS[1] // step + 1, len(cuts)) * step
     lengths = np.array([(len(c.values) - 1) * step for c in cuts])
     begins = np.cumsum(silences + np.concatenate([[0], lengths[order][:-1]]))
     values = np.zeros(((int(begins[-1] + lengths[order[-1]]) + END_MS) // step, insole.TAXELS), np.float32)
     for at, k in zip(begins, order, strict=True):
         values[at // step : at // step + len(cuts[k].values)] = cuts[k].values
-    t = np.arange(len(values)) * formats.plate.FRAME_US
+    t = np.arange(len(values)) * plate.FRAME_US
     frames = Frames(values[:, None, :], t, unit="counts", array=Array(1, insole.TAXELS, name="insole"))
     spikes = encoder.encode(frames).split_by_sign()
     total, heel = values.sum(axis=1, dtype=np.float64), values[:, insole.HEEL].sum(axis=1, dtype=np.float64)
@@ -338,7 +338,7 @@ def _boxed(trial: Trial) -> Trial:
     loaded = np.any(trial.frames.values, axis=0)
     rows, columns = np.flatnonzero(np.any(loaded, axis=1)), np.flatnonzero(np.any(loaded, axis=0))
     y, x = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
-    return replace(trial, frames=trial.frames.region(x, y))
+    return replace(trial, recorded=trial.frames.region(x, y))
 
 
 def _moved(spikes: Any, by: float, stop: float) -> Any:

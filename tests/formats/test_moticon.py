@@ -1,0 +1,60 @@
+"""Each trap of the format on files made here, and on Moticon OpenGo as published, where that is there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taxel import FormatError, formats
+from taxel.formats import moticon
+
+from .making import (
+    shared,
+    write_moticon,
+)
+
+
+def test_moticon_rows_that_are_missing_for_a_foot_are_missing_not_zero(tmp_path):
+    write_moticon(tmp_path)
+    left, right = formats.trials(tmp_path)
+    assert (len(left.frames), len(right.frames)) == (199 - 11, 199)
+    assert left.frames.t[0] == 100_000
+    assert 600_000 not in left.frames.t
+    assert 1_200_000 not in right.frames.t
+    assert left.frames.values[left.frames.t == 610_000].min() == 2.5
+    assert [list(left.truth[e]) for e in ("contact", "foot_off")] == [[500_000], [1_000_000]]
+    assert left.series["total"].max() == 400
+
+
+def test_moticon_reports_are_taken_where_they_are(tmp_path):
+    write_moticon(tmp_path)
+    (tmp_path / "steps.csv").write_text("recording,foot,contact_s,toe_off_s\n240101_000000,left,0.503,1.004\n")
+    left, _ = formats.trials(tmp_path)
+    assert [list(left.truth[e]) for e in ("contact", "foot_off")] == [[503_000], [1_004_000]]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda r: [*r[:20], r[20] + "\t", *r[21:]], "line 21: 54 cells, must have 53"),
+        (lambda r: [*r[:20], r[20].replace("0.00\t", "\t", 1), *r[21:]], "line 21: .* is empty, other cells"),
+        (lambda r: [*r[:20], r[20].replace("0.17", "0,17"), *r[21:]], "line 21: time has a decimal comma"),
+        (lambda r: [r[0], r[1], r[2].replace("left pressure", "left force"), *r[3:]], "no column 'left pressure 1'"),
+    ],
+)
+def test_a_spoilt_moticon_line_is_named(tmp_path, change, said):
+    write_moticon(tmp_path, change)
+    with pytest.raises(FormatError, match=f"240101_000000.txt, line \\d+.*{said}|{said}"):
+        list(formats.trials(tmp_path))
+
+
+def test_moticon_markers_and_reports_agree_within_6_ms(tmp_path):
+    folder = shared("insole_moticon")
+    for file in moticon.files(folder):
+        (tmp_path / file.name).symlink_to(file)
+    counts = []
+    for marked, told in zip(moticon.trials(tmp_path), moticon.trials(folder), strict=True):
+        for event in ("contact", "foot_off"):
+            counts.append(len(told.truth[event]))
+            assert np.abs(marked.truth[event] - told.truth[event]).max() <= 6500
+    assert counts == [7, 7, 7, 7, 9, 9, 9, 9]
