@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build demo test slow lint format bench docs clean
+.PHONY: help check setup build demo test slow lint format registers bench docs clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -61,6 +61,10 @@ format:
 	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+# The tables of the board's registers, from their one source.
+registers: setup
+	$(BIN)/python tools/registers.py
 
 # The peers that are large, or that want an older NumPy, are installed for the benchmarks alone.
 $(VENV)/.peers: $(VENV)/.installed

@@ -2,95 +2,68 @@
 //!
 //! "Line" is the driven line, the outer step of the scan (the manual's "row", on the sensor a column); "step" is the
 //! inner one, the multiplexer's (the manual's "col"). The manual's names are aliases when reading JSON and in
-//! [`Registers::set`].
+//! [`Registers::set`]. Fields, rules and presets are made from `registers.toml`.
 
-use serde::{Deserialize, Serialize};
+mod table;
+
+pub use table::{POWER_LAW, POWER_LAW_FRACTION, PRESETS, Registers};
 
 use crate::wire::Command;
 use crate::{Array, Error, Result, problem};
 
-/// Sense lines of the thesis' array, shared out over the converter's channels in steps.
-pub const SENSE_LINES: u16 = 64;
-
-/// Below this, a step may be read before it has settled, in 10 ns (0.2 us, thesis 4.4.1).
-pub const SETTLING: u16 = 20;
+/// Sense lines that a board of the thesis' build has, however many of them the array uses; larger arrays have their rows.
+const SENSE_LINES: u16 = 64;
 
 /// Registers whose order of writing matters.
 const TIMING: [u8; 4] = [1, 2, 3, 4];
 
-/// The presets by name; frames/s are 5208.33, 2000.64 and 20 833.3.
-///
-/// Reading: only 300 with 4 steps, and 5208 Hz, are certain (manual, thesis 4.4.1); the split within a step is ours.
-pub const PRESETS: [(&str, Registers); 3] = [
-    ("5.2 kHz", preset(300, 300, 75, 55, 150, 3, 16)),
-    ("2 kHz", preset(781, 780, 195, 175, 510, 10, 16)),
-    ("20.8 kHz", preset(75, 75, 75, 55, 150, 3, 64)),
-];
-
-const fn preset(
-    line_period: u32,
-    line_read: u32,
-    step_period: u16,
-    step_read: u16,
-    ramp: u16,
-    noise_floor: u8,
-    channels: u8,
-) -> Registers {
-    Registers {
-        random_lines: false,
-        mechanoreceptor: false,
-        invert_comparator: false,
-        frame_sync: true,
-        line_period,
-        line_read,
-        step_period,
-        step_read,
-        ramp,
-        noise_floor,
-        lines: 64,
-        record: false,
-        channels,
-    }
+/// Where a field lies, and what it may hold (Table 5.5).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+pub struct Field {
+    /// taxel's name.
+    pub name: &'static str,
+    /// The manual's.
+    pub manual: &'static str,
+    /// "flag" for one that is on or off.
+    pub unit: &'static str,
+    /// What it is for.
+    pub text: &'static str,
+    /// Which of the eight.
+    pub register: u8,
+    /// Its lowest bit.
+    pub shift: u32,
+    /// Its bits, shifted down.
+    pub mask: u32,
+    /// What is added to the bits.
+    pub offset: u32,
+    /// The least value.
+    pub least: u32,
+    /// The greatest value.
+    pub greatest: u32,
 }
 
-/// What the registers hold, in the registers' own units.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Registers {
-    /// Lines are driven in random order.
-    #[serde(alias = "use_rand_row")]
-    pub random_lines: bool,
-    /// The comparator's mode; the manual: "unused for now".
-    #[serde(alias = "comparator_mode")]
-    pub mechanoreceptor: bool,
-    /// A falling edge ends a sample.
-    pub invert_comparator: bool,
-    /// All events of a frame carry the time of its start.
-    #[serde(alias = "use_frame_sync")]
-    pub frame_sync: bool,
-    /// Time from one driven line to the next, 10 ns.
-    #[serde(alias = "row_change_period")]
-    pub line_period: u32,
-    /// Part of it in which the line is read, 10 ns.
-    #[serde(alias = "row_read_duration")]
-    pub line_read: u32,
-    /// Time from one multiplexer step to the next, 10 ns.
-    #[serde(alias = "col_change_period")]
-    pub step_period: u16,
-    /// Part of it in which the channels are read, 10 ns.
-    #[serde(alias = "col_read_duration")]
-    pub step_read: u16,
-    /// How long the ramp rises, ticks of 1/300 us.
-    #[serde(alias = "ramp_time")]
-    pub ramp: u16,
-    /// Smallest difference that does not make an event, ticks of 1/300 us.
-    pub noise_floor: u8,
-    /// Driven lines, 1 to 64 (the register `nrows` holds one less).
-    pub lines: u8,
-    /// A recording runs.
-    pub record: bool,
-    /// Channels of the converter, 16 or 64: the board's build, not a register.
-    pub channels: u8,
+/// A set of registers by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Preset {
+    /// What it is called.
+    pub name: &'static str,
+    /// For how many sense lines it is made.
+    pub sense_lines: u16,
+    /// What the registers hold.
+    pub registers: Registers,
+}
+
+/// What the rules know of an array on a board.
+struct Scanned {
+    steps: u32,
+    driven_lines: u16,
+    sense_lines: u16,
+}
+
+/// All fields, in the order of the registers.
+#[must_use]
+pub fn fields() -> &'static [Field] {
+    &table::FIELDS
 }
 
 /// A write that the rules forbid; nothing has changed.
@@ -98,7 +71,7 @@ pub struct Registers {
 pub struct Refusal {
     /// The register that was to be written.
     pub register: u8,
-    /// Which rule of the reference (1 to 4; 5 and 6 only warn).
+    /// Which rule of the reference (5 and 6 only warn).
     pub rule: u8,
     /// Rule and numbers, in one line.
     pub text: String,
@@ -113,7 +86,7 @@ impl From<Refusal> for Error {
 impl Default for Registers {
     /// What the board holds at reset. Reading: the first preset, for with zeros every first write would be refused.
     fn default() -> Self {
-        PRESETS[0].1
+        PRESETS[0].registers
     }
 }
 
@@ -124,19 +97,37 @@ impl Registers {
     ///
     /// `Problem` where there is none, with the names that there are.
     pub fn preset(name: &str) -> Result<Self> {
-        match PRESETS.iter().find(|(known, _)| *known == name) {
-            Some((_, registers)) => Ok(*registers),
+        match PRESETS.iter().find(|preset| preset.name == name) {
+            Some(preset) => Ok(preset.registers),
             None => {
-                let names: Vec<_> = PRESETS.iter().map(|(known, _)| format!("{known:?}")).collect();
+                let names: Vec<_> = PRESETS.iter().map(|preset| format!("{:?}", preset.name)).collect();
                 Err(problem!("preset {name:?}: there are {}", names.join(", ")))
             }
         }
     }
 
-    /// Multiplexer steps in a line: 4 with 16 channels, 1 with 64.
+    /// What a board of that array and so many channels holds at reset.
+    ///
+    /// Up to 64 lines the first preset; beyond, version 2 and a preset of 128 lines, its lines and steps fitted to the array.
     #[must_use]
-    pub fn steps(&self) -> u32 {
-        u32::from(SENSE_LINES) / u32::from(self.channels.max(1))
+    pub fn at_reset(array: &Array, channels: u8) -> Self {
+        let large = sense_lines(array) > SENSE_LINES || array.columns > SENSE_LINES;
+        let fits =
+            |preset: &&Preset| (preset.sense_lines > SENSE_LINES) == large && preset.registers.channels == channels;
+        let mut registers = PRESETS.iter().find(fits).map_or_else(Self::default, |preset| preset.registers);
+        registers.channels = channels;
+        registers.lines = array.columns.min(if large { 256 } else { SENSE_LINES });
+        if large {
+            registers.line_read = registers.line_read.max(registers.steps(array) * u32::from(registers.step_period));
+            registers.line_period = registers.line_period.max(registers.line_read);
+        }
+        registers
+    }
+
+    /// Multiplexer steps in a line: on a board of 64 sense lines 4 with 16 channels, 1 with 64.
+    #[must_use]
+    pub fn steps(&self, array: &Array) -> u32 {
+        u32::from(sense_lines(array)).div_ceil(u32::from(self.channels.max(1)))
     }
 
     /// A frame's length, 10 ns: lines times line period.
@@ -149,39 +140,6 @@ impl Registers {
     #[must_use]
     pub fn frame_us(&self) -> f64 {
         self.frame_10ns() as f64 / 100.0
-    }
-
-    /// Register `n` as the board holds it; 0 where it has no such register.
-    #[must_use]
-    pub fn word(&self, n: u8) -> u32 {
-        match n {
-            0 => {
-                u32::from(self.random_lines)
-                    | u32::from(self.mechanoreceptor) << 1
-                    | u32::from(self.invert_comparator) << 2
-                    | u32::from(self.frame_sync) << 3
-            }
-            1 => self.line_period,
-            2 => self.line_read,
-            3 => u32::from(self.step_period) | u32::from(self.step_read) << 16,
-            4 => u32::from(self.ramp),
-            5 => u32::from(self.noise_floor) << 8 | u32::from(self.lines.wrapping_sub(1) & 0x3f) << 16,
-            7 => u32::from(self.record) << 16,
-            _ => 0,
-        }
-    }
-
-    /// Which bits register `n` has; the others are reserved and must be 0.
-    #[must_use]
-    pub fn mask(n: u8) -> u32 {
-        match n {
-            0 => 0xf,
-            1..=3 => u32::MAX,
-            4 => 0xffff,
-            5 => 0x003f_ff00,
-            7 => 1 << 16,
-            _ => 0,
-        }
     }
 
     /// Sets register `command.register` as a whole, as the board does.
@@ -205,26 +163,6 @@ impl Registers {
         Ok(())
     }
 
-    /// Sets a register's fields, whatever the rules say.
-    fn store(&mut self, register: u8, value: u32) {
-        let bit = |n: u32| value >> n & 1 == 1;
-        match register {
-            0 => {
-                self.random_lines = bit(0);
-                self.mechanoreceptor = bit(1);
-                self.invert_comparator = bit(2);
-                self.frame_sync = bit(3);
-            }
-            1 => self.line_period = value,
-            2 => self.line_read = value,
-            3 => (self.step_period, self.step_read) = (value as u16, (value >> 16) as u16),
-            4 => self.ramp = value as u16,
-            5 => (self.noise_floor, self.lines) = ((value >> 8) as u8, (value >> 16 & 0x3f) as u8 + 1),
-            7 => self.record = bit(16),
-            _ => {}
-        }
-    }
-
     /// Checks all rules.
     ///
     /// # Errors
@@ -234,86 +172,43 @@ impl Registers {
         if !matches!(self.channels, 16 | 64) {
             return Err(Error::Device(format!("{} channels: the converter has 16 or 64", self.channels)));
         }
-        if !(1..=64).contains(&self.lines) {
-            return Err(Error::Device(format!("{} lines do not fit nrows: must be 1 to 64 (rule 4)", self.lines)));
-        }
         self.rules(0, array).map_err(Error::from)
     }
 
-    /// The rules that refuse (1 to 4), in the reference's order but with "at least 1" first.
+    /// The rules that refuse, in the order in which the board tries them: first that every value lies in its range.
     fn rules(&self, register: u8, array: &Array) -> std::result::Result<(), Refusal> {
-        let refuse = |rule: u8, text: String| Err(Refusal { register, rule, text: format!("{text} (rule {rule})") });
-        let periods = [
-            ("line_period", self.line_period),
-            ("line_read", self.line_read),
-            ("step_period", self.step_period.into()),
-            ("step_read", self.step_read.into()),
-            ("ramp", self.ramp.into()),
-        ];
-        if let Some((name, _)) = periods.iter().find(|(_, value)| *value == 0) {
-            return refuse(4, format!("{name} is 0: must be 1 or more"));
+        for field in fields() {
+            let value = self.get(field);
+            if value < field.least || value > field.greatest {
+                let text = if field.least == 1 && field.offset == 0 && value == 0 {
+                    format!("{} is 0: must be 1 or more (rule 4)", field.name)
+                } else {
+                    format!(
+                        "{} {value} does not fit: must be {} to {} (rule 4)",
+                        field.name, field.least, field.greatest
+                    )
+                };
+                return Err(Refusal { register, rule: 4, text });
+            }
         }
-        if u16::from(self.lines) > array.columns {
-            return refuse(4, format!("{} lines: the array has {} columns to drive", self.lines, array.columns));
+        let scanned = Scanned { steps: self.steps(array), driven_lines: array.columns, sense_lines: array.rows };
+        match table::refused(self, &scanned) {
+            Some((rule, text)) => Err(Refusal { register, rule, text }),
+            None => Ok(()),
         }
-        if self.line_read > self.line_period {
-            return refuse(
-                1,
-                format!("line_read {} us is longer than line_period {} us", us(self.line_read), us(self.line_period)),
-            );
-        }
-        if self.step_read > self.step_period {
-            return refuse(
-                1,
-                format!("step_read {} us is longer than step_period {} us", us(self.step_read), us(self.step_period)),
-            );
-        }
-        let steps = self.steps();
-        if steps * u32::from(self.step_period) > self.line_read {
-            return refuse(
-                2,
-                format!(
-                    "{steps} x step_period {} us is longer than line_read {} us",
-                    us(self.step_period),
-                    us(self.line_read)
-                ),
-            );
-        }
-        if u32::from(self.ramp) >= 3 * u32::from(self.step_read) {
-            return refuse(
-                3,
-                format!(
-                    "ramp {} ticks is not shorter than step_read {} us = {} ticks",
-                    self.ramp,
-                    us(self.step_read),
-                    3 * u32::from(self.step_read)
-                ),
-            );
-        }
-        Ok(())
     }
 
-    /// What is allowed but hardly meant (rules 5 and 6), one line each.
+    /// What is allowed but hardly meant, one line each.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
-        let mut warnings = vec![];
-        let settling = self.step_period.saturating_sub(self.step_read);
-        if settling < SETTLING {
-            warnings.push(format!(
-                "step_period {} us leaves {} us before step_read {} us: taxels settle in {} us (rule 5)",
-                us(self.step_period),
-                us(settling),
-                us(self.step_read),
-                us(SETTLING)
-            ));
-        }
-        if u16::from(self.noise_floor) >= self.ramp {
-            warnings.push(format!(
-                "noise_floor {} ticks is not below ramp {} ticks: no event can ever come (rule 6)",
-                self.noise_floor, self.ramp
-            ));
-        }
-        warnings
+        table::warned(self).into_iter().map(|(_, text)| text).collect()
+    }
+
+    /// What a field holds, in its own unit.
+    fn get(&self, field: &Field) -> u32 {
+        let bits = self.word(field.register) >> field.shift & field.mask;
+        // Of a count of lines the bits alone cannot say 0.
+        if field.name == "lines" { self.lines.into() } else { bits + field.offset }
     }
 
     /// The writes that lead from these registers to `target`, in an order in which no write is refused on the way:
@@ -368,24 +263,27 @@ impl Registers {
     /// # Errors
     ///
     /// `Problem` where there is no such field; `Device` with the rule that would be broken. Then nothing has changed.
-    pub fn set_all(&mut self, fields: &[(impl AsRef<str>, u32)], array: &Array) -> Result<()> {
+    pub fn set_all(&mut self, values: &[(impl AsRef<str>, u32)], array: &Array) -> Result<()> {
         let mut next = *self;
-        for (name, value) in fields {
+        for (name, value) in values {
             let (name, value) = (name.as_ref(), *value);
             if name == "channels" {
                 next.channels = value.min(u32::from(u8::MAX)) as u8;
                 continue;
             }
-            let Some(field) = FIELDS.iter().find(|f| f.name == name || f.manual == name) else {
-                let names: Vec<_> = FIELDS.iter().map(|f| f.name).collect();
+            let Some(field) = fields().iter().find(|f| f.name == name || f.manual == name) else {
+                let names: Vec<_> = fields().iter().map(|f| f.name).collect();
                 return Err(problem!("register {name:?}: there are {}, channels", names.join(", ")));
             };
-            // Of the two names, only the manual's `nrows` counts lines less one.
-            let stored = if name == "lines" { value.wrapping_sub(1) } else { value };
-            if stored > field.mask {
-                let (low, high) = if name == "lines" { (1, 64) } else { (0, field.mask) };
-                return Err(Error::Device(format!("{name} {value} does not fit: must be {low} to {high} (rule 4)")));
+            // The manual's name counts as the register does, ours what is meant.
+            let offset = if name == field.name { field.offset } else { 0 };
+            let (least, greatest) = (field.least - field.offset + offset, field.greatest - field.offset + offset);
+            if value < least || value > greatest {
+                return Err(Error::Device(format!(
+                    "{name} {value} does not fit: must be {least} to {greatest} (rule 4)"
+                )));
             }
+            let stored = value - offset;
             let rest = next.word(field.register) & !(field.mask << field.shift);
             next.store(field.register, rest | stored << field.shift);
         }
@@ -396,9 +294,9 @@ impl Registers {
 
     fn shown(&self, register: u8) -> String {
         match register {
-            1 => format!("line_period {} us", us(self.line_period)),
-            2 => format!("line_read {} us", us(self.line_read)),
-            3 => format!("step_period {} us, step_read {} us", us(self.step_period), us(self.step_read)),
+            1 => format!("line_period {} us", us(self.line_period.into())),
+            2 => format!("line_read {} us", us(self.line_read.into())),
+            3 => format!("step_period {} us, step_read {} us", us(self.step_period.into()), us(self.step_read.into())),
             4 => format!("ramp {} ticks", self.ramp),
             5 => format!("noise_floor {} ticks, {} lines", self.noise_floor, self.lines),
             _ => format!("REG{register}=0x{:08X}", self.word(register)),
@@ -406,38 +304,15 @@ impl Registers {
     }
 }
 
-/// Where a field lies (Table 5.5).
-struct Field {
-    name: &'static str,
-    manual: &'static str,
-    register: u8,
-    shift: u32,
-    mask: u32,
+/// The sense lines that a board for this array converts.
+pub(crate) fn sense_lines(array: &Array) -> u16 {
+    array.rows.max(SENSE_LINES)
 }
-
-const fn field(name: &'static str, manual: &'static str, register: u8, shift: u32, mask: u32) -> Field {
-    Field { name, manual, register, shift, mask }
-}
-
-const FIELDS: [Field; 12] = [
-    field("random_lines", "use_rand_row", 0, 0, 1),
-    field("mechanoreceptor", "comparator_mode", 0, 1, 1),
-    field("invert_comparator", "invert_comparator", 0, 2, 1),
-    field("frame_sync", "use_frame_sync", 0, 3, 1),
-    field("line_period", "row_change_period", 1, 0, u32::MAX),
-    field("line_read", "row_read_duration", 2, 0, u32::MAX),
-    field("step_period", "col_change_period", 3, 0, 0xffff),
-    field("step_read", "col_read_duration", 3, 16, 0xffff),
-    field("ramp", "ramp_time", 4, 0, 0xffff),
-    field("noise_floor", "noise_floor", 5, 8, 0xff),
-    field("lines", "nrows", 5, 16, 0x3f),
-    field("record", "record", 7, 16, 1),
-];
 
 /// 10 ns units as us, with two places.
-fn us(units: impl Into<u32>) -> String {
-    let units: u32 = units.into();
-    format!("{}.{:02}", units / 100, units % 100)
+fn us(units: i64) -> String {
+    let sign = if units < 0 { "-" } else { "" };
+    format!("{sign}{}.{:02}", units.abs() / 100, units.abs() % 100)
 }
 
 #[cfg(test)]
@@ -450,9 +325,10 @@ mod tests {
 
     #[test]
     fn presets_keep_the_rules_and_their_rates() {
-        let rates = [5208.33, 2000.64, 20_833.3];
-        for ((name, registers), rate) in PRESETS.iter().zip(rates) {
-            assert_eq!(registers.check(&thesis()), Ok(()), "{name}");
+        let rates = [5208.33, 2000.64, 20_833.3, 5208.33, 1000.32, 2003.21, 5208.33, 1302.08];
+        for (Preset { name, sense_lines, registers }, rate) in PRESETS.iter().zip(rates) {
+            let array = Array::new(*sense_lines, *sense_lines, 1.0, "of the preset's size").unwrap();
+            assert_eq!(registers.check(&array), Ok(()), "{name}");
             assert!(registers.warnings().is_empty(), "{name}");
             assert!((1e6 / registers.frame_us() / rate - 1.0).abs() < 1e-5, "{name}");
         }
@@ -461,13 +337,11 @@ mod tests {
 
     #[test]
     fn a_set_comes_back_from_its_eight_words() {
-        for (_, preset) in PRESETS {
-            let mut board = Registers { channels: preset.channels, ..PRESETS[0].1 };
-            if preset.channels == 64 {
-                board = PRESETS[2].1;
-            }
-            for command in board.commands_to(&preset, &thesis()).unwrap() {
-                board.write(command, &thesis()).unwrap();
+        for Preset { sense_lines, registers: preset, .. } in PRESETS {
+            let array = Array::new(sense_lines, sense_lines, 1.0, "of the preset's size").unwrap();
+            let mut board = Registers::at_reset(&array, preset.channels);
+            for command in board.commands_to(&preset, &array).unwrap() {
+                board.write(command, &array).unwrap();
             }
             assert_eq!(board, preset);
         }
@@ -475,7 +349,7 @@ mod tests {
 
     #[test]
     fn slowing_down_writes_upwards_and_speeding_up_downwards() {
-        let (fast, slow) = (PRESETS[0].1, PRESETS[1].1);
+        let (fast, slow) = (PRESETS[0].registers, PRESETS[1].registers);
         let order = |from: Registers, to: Registers| -> Vec<u8> {
             from.commands_to(&to, &thesis()).unwrap().iter().map(|c| c.register).collect()
         };
@@ -517,7 +391,7 @@ mod tests {
                 "ramp 165 ticks is not shorter than step_read 0.55 us = 165 ticks (rule 3); the board keeps ramp 150 ticks",
             ),
             (4, 0, 4, "ramp is 0: must be 1 or more (rule 4); the board keeps ramp 150 ticks"),
-            (4, 1 << 16, 4, "REG4=0x00010000 sets reserved bits: they must be 0 (rule 4)"),
+            (7, 1, 4, "REG7=0x00000001 sets reserved bits: they must be 0 (rule 4)"),
             (6, 9, 4, "REG6=0x00000009 sets reserved bits: they must be 0 (rule 4)"),
         ];
         for (register, value, rule, text) in cases {
@@ -530,6 +404,37 @@ mod tests {
         let refusal = Registers::default().write(Command { register: 5, value: 8 << 16 }, &small).unwrap_err();
         assert_eq!(refusal.rule, 4);
         assert!(refusal.text.starts_with("9 lines: the array has 8 columns to drive"));
+    }
+
+    #[test]
+    fn a_board_of_any_size_resets_to_registers_that_keep_the_rules() {
+        for (rows, columns) in
+            [(1, 1), (8, 8), (64, 64), (65, 3), (3, 65), (100, 100), (128, 128), (256, 256), (512, 128)]
+        {
+            let array = Array::new(rows, columns, 1.0, "any").unwrap();
+            for channels in [16, 64] {
+                let registers = Registers::at_reset(&array, channels);
+                assert_eq!(registers.check(&array), Ok(()), "{rows} x {columns}, {channels} channels");
+                assert!(registers.warnings().is_empty());
+                assert_eq!(registers.lines, columns);
+                assert_eq!(registers.wire_version, if rows > 64 || columns > 64 { 2 } else { 1 });
+            }
+        }
+        let large = Array::new(128, 128, 1.0, "large").unwrap();
+        assert_eq!(Registers::at_reset(&large, 64), Registers::preset("128 x 128, 1 kHz").unwrap());
+        assert_eq!(Registers::at_reset(&large, 16), Registers::preset("128 x 128, 1.3 kHz").unwrap());
+        let version_1 = Registers { wire_version: 1, ..Registers::at_reset(&large, 64) };
+        assert!(version_1.check(&large).unwrap_err().to_string().ends_with("choose version 2 (rule 8)"));
+        let hasty = Registers { step_period: 73, step_read: 53, ..Registers::preset("20.8 kHz").unwrap() };
+        assert!(hasty.check(&thesis()).unwrap_err().to_string().ends_with("wants 0.74 us (rule 7)"));
+    }
+
+    #[test]
+    fn a_file_that_knows_nothing_of_version_2_is_read() {
+        let old = r#"{"random_lines":false,"mechanoreceptor":false,"invert_comparator":false,"frame_sync":true,
+            "line_period":300,"line_read":300,"step_period":75,"step_read":55,"ramp":150,"noise_floor":3,"lines":64,
+            "record":false,"channels":16}"#;
+        assert_eq!(serde_json::from_str::<Registers>(old).unwrap(), Registers::default());
     }
 
     #[test]
@@ -550,8 +455,9 @@ mod tests {
         a.set("lines", 32, &thesis()).unwrap();
         b.set("nrows", 31, &thesis()).unwrap();
         assert_eq!(a, b);
-        assert!(a.set("lines", 0, &thesis()).unwrap_err().to_string().contains("must be 1 to 64"));
-        assert!(a.set("lines", 65, &thesis()).unwrap_err().to_string().contains("must be 1 to 64"));
+        assert!(a.set("lines", 0, &thesis()).unwrap_err().to_string().contains("must be 1 to 256"));
+        assert!(a.set("lines", 65, &thesis()).unwrap_err().to_string().contains("the array has 64 columns"));
+        assert!(a.set("nrows", 256, &thesis()).unwrap_err().to_string().contains("must be 0 to 255"));
         assert!(a.set("speed", 1, &thesis()).unwrap_err().to_string().contains("there are random_lines, "));
     }
 

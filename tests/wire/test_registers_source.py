@@ -1,0 +1,122 @@
+"""registers.toml is the one source: what is made from it is up to date, and its rules agree wherever they are read."""
+
+import json
+import random
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import taxel
+from taxel.wire import PRESETS, Registers
+
+ROOT = Path(__file__).parents[2]
+PANEL = "crates/taxel-live/web/registers.js"
+MADE = (
+    "crates/taxel-core/src/wire/registers/table.rs",
+    "crates/taxel-live/src/recording/schemas/Registers.json",
+    PANEL,
+    "docs/registers.md",
+)
+
+
+def test_what_is_made_from_the_source_is_up_to_date(tmp_path):
+    if shutil.which("rustfmt") is None:
+        pytest.skip("no rustfmt on this machine to write the table as the formatter has it")
+    shutil.copy(ROOT / "registers.toml", tmp_path)
+    subprocess.run([sys.executable, ROOT / "tools/registers.py", tmp_path], check=True)
+    for name in MADE:
+        assert (tmp_path / name).read_text() == (ROOT / name).read_text(), f"{name}: say `make registers`"
+
+
+def settings(draw):
+    """Draw settings on both sides of every rule, for arrays on both sides of 64 lines."""
+
+    def edge(value):
+        return max(0, value + draw.choice([-1, 0, 0, 0, 1, 5, 40]))
+
+    channels = draw.choice([16, 64])
+    rows, columns = draw.choice([1, 8, 63, 64, 65, 128, 200]), draw.choice([1, 8, 64, 65, 128, 256])
+    steps = -(-max(rows, 64) // channels)
+    step_read = edge(draw.choice([1, 20, 55, 175, 370]))
+    step_period = edge(draw.choice([step_read, step_read + 20, 26, 74, 75]))
+    line_read = edge(steps * step_period)
+    values = {
+        "line_period": edge(draw.choice([line_read, 10 * line_read])),
+        "line_read": line_read,
+        "step_period": step_period,
+        "step_read": step_read,
+        "ramp": edge(3 * step_read),
+        "noise_floor": draw.randrange(256),
+        "lines": max(1, edge(columns)) if columns < 256 else 256,
+        "wire_version": draw.choice([1, 2]),
+        "channels": channels,
+    }
+    if draw.random() < 0.2:
+        values["noise_floor"] = min(255, values["ramp"])
+    return rows, columns, values
+
+
+def by_rust(rows, columns, values):
+    array = taxel.Array(rows, columns)
+    base = json.loads(taxel._core.registers_preset(PRESETS[0])) | values
+    try:
+        given = list(values.items())
+        taxel._core.registers_with(json.dumps(base), [(n, v) for n, v in given if n != "channels"], array._parts())
+    except taxel.DeviceError as error:
+        return str(error)
+    return None
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_rules_agree_in_rust_and_in_the_panel(seed, tmp_path):
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("no node on this machine to run the panel's rules")
+    draw = random.Random(seed)
+    drawn = [settings(draw) for _ in range(2000)]
+    drawn = [
+        (r, c, v) for r, c, v in drawn if min(v[n] for n in ("line_period", "ramp", "step_read", "step_period")) >= 1
+    ]
+    default = Registers()
+    cases = []
+    for rows, columns, values in drawn:
+        held = default._held | values
+        held = {name: int(value) for name, value in held.items()}
+        steps = -(-max(rows, 64) // values["channels"])
+        cases.append(held | {"steps": steps, "driven_lines": columns, "sense_lines": rows})
+    (tmp_path / "cases.json").write_text(json.dumps(cases))
+    script = (
+        f"import {{ refused, warned }} from {json.dumps((ROOT / PANEL).as_uri())};\n"
+        "import { readFileSync } from 'node:fs';\n"
+        f"const cases = JSON.parse(readFileSync({json.dumps(str(tmp_path / 'cases.json'))}, 'utf8'));\n"
+        "const texts = (said) => said.map((s) => s.text);\n"
+        "console.log(JSON.stringify(cases.map((v) => [texts(refused(v)), texts(warned(v))])));\n"
+    )
+    (tmp_path / "run.mjs").write_text(script)
+    said = subprocess.run([node, tmp_path / "run.mjs"], check=True, capture_output=True, text=True).stdout
+    seen = set()
+    for (rows, columns, values), (refused, warned) in zip(drawn, json.loads(said), strict=True):
+        ours = by_rust(rows, columns, values)
+        assert ours == (refused[0] if refused else None), (rows, columns, values)
+        if ours is None:
+            assert list(_warnings(rows, columns, values)) == warned
+        seen.update(re.findall(r"\(rule (\d)\)", " ".join([*refused[:1], *warned])))
+    assert seen == set("12345678"), "every rule was tried on both sides"
+
+
+def _warnings(rows, columns, values):
+    held = json.loads(taxel._core.registers_preset(PRESETS[0])) | values
+    return taxel._core.registers_check(json.dumps(held), taxel.Array(rows, columns)._parts())
+
+
+def test_a_field_that_does_not_fit_is_refused_alike():
+    with pytest.raises(taxel.DeviceError, match=r"lines 65: |65 lines: the array has 64 columns"):
+        Registers(lines=65)
+    with pytest.raises(taxel.DeviceError, match=r"lines 257 does not fit: must be 1 to 256 \(rule 4\)"):
+        Registers(lines=257)
+    with pytest.raises(taxel.DeviceError, match=r"wire_version 3 does not fit: must be 1 to 2 \(rule 4\)"):
+        Registers(wire_version=3)

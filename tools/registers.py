@@ -1,0 +1,512 @@
+"""Make the tables of Rust, JavaScript and the docs from registers.toml (`make registers`).
+
+Usage: python tools/registers.py [ROOT]. Python reads Rust's table. A test holds the files against what this makes.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from typing import Any
+
+HEAD = "Made from registers.toml by tools/registers.py (`make registers`): edit that."
+OPPOSITE = {ast.LtE: ">", ast.Lt: ">=", ast.GtE: "<", ast.Gt: "<=", ast.Eq: "!=", ast.NotEq: "=="}
+OPERATOR = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
+#: What a rule may name beside the fields, and its unit.
+OF_THE_ARRAY = {"steps": "number", "driven_lines": "number", "sense_lines": "number"}
+
+Table = dict[str, Any]
+
+
+def read(path: Path) -> Table:
+    """Return the source with every value filled in."""
+    source = tomllib.loads(path.read_text())
+    for field in source["field"]:
+        field.setdefault("offset", 0)
+        field.setdefault("least", field["offset"])
+        field.setdefault("greatest", 2 ** field["bits"] - 1 + field["offset"])
+    for rule in source["rule"]:
+        rule.setdefault("warns", False)
+    return source
+
+
+def rust_type(field: Table) -> str:
+    """Return the smallest type that holds a field."""
+    if field["unit"] == "flag":
+        return "bool"
+    return next(f"u{bits}" for bits in (8, 16, 32) if field["greatest"] < 2**bits)
+
+
+def value(node: ast.expr) -> str:
+    """Write arithmetic as Rust and JavaScript both read it."""
+    match node:
+        case ast.Name(id=name):
+            return name
+        case ast.Constant(value=number):
+            return str(number)
+        case ast.BinOp(left=left, op=op, right=right):
+            low = isinstance(op, ast.Mult)
+            sides = [value(side) for side in (left, right)]
+            sides = [f"({s})" if low and " " in s else s for s in sides]
+            return f"{sides[0]} {OPERATOR[type(op)]} {sides[1]}"
+    raise ValueError(f"registers.toml: {ast.unparse(node)} is no arithmetic")
+
+
+def broken(node: ast.expr, *, inner: bool = False, equal: str = "==") -> str:
+    """Write when a rule does not hold: its negation, which says no more than it has to."""
+    match node:
+        case ast.BoolOp(op=op, values=values):
+            word = " || " if isinstance(op, ast.And) else " && "
+            said = word.join(broken(part, inner=True, equal=equal) for part in values)
+            return f"({said})" if inner else said
+        case ast.Compare(left=left, ops=[op], comparators=[right]):
+            sign = OPPOSITE[type(op)]
+            sign = {"==": equal, "!=": equal.replace("==", "!=")}.get(sign, sign) if equal != "==" else sign
+            return f"{value(left)} {sign} {value(right)}"
+    raise ValueError(f"registers.toml: {ast.unparse(node)} is no comparison")
+
+
+def parsed(text: str) -> ast.expr:
+    """Read one expression."""
+    return ast.parse(text, mode="eval").body
+
+
+def names(text: str) -> set[str]:
+    """Return what an expression names."""
+    return {node.id for node in ast.walk(parsed(text)) if isinstance(node, ast.Name)}
+
+
+def template(text: str, units: dict[str, str]) -> list[tuple[str, str, str]]:
+    """Cut a text into (words before, expression, unit)."""
+    pieces = []
+    while "{" in text:
+        before, _, rest = text.partition("{")
+        inside, _, text = rest.partition("}")
+        expression, _, unit = inside.partition(":")
+        pieces.append((before, expression, unit or units[expression]))
+    return [*pieces, (text, "", "")]
+
+
+def formatted(expression: str, unit: str) -> tuple[str, str]:
+    """Return a function's name that writes a value in its unit, and the words behind it."""
+    written = value(parsed(expression))
+    return {"10 ns": f"us({written})", "ticks": written, "number": written}[unit], {
+        "10 ns": " us",
+        "ticks": " ticks",
+        "number": "",
+    }[unit]
+
+
+def rust_preset(source: Table, preset: Table) -> str:
+    """Write a preset as a constant."""
+    entries = []
+    for field in source["field"]:
+        held = preset["values"].get(field["name"], field["default"])
+        entries.append(f"{field['name']}: {str(bool(held)).lower() if field['unit'] == 'flag' else held},")
+    body = "\n            ".join(entries)
+    return (
+        f'    Preset {{\n        name: "{preset["name"]}",\n        sense_lines: {preset["sense_lines"]},\n'
+        f"        registers: Registers {{\n            {body}\n        }},\n    }},"
+    )
+
+
+def rust_rules(source: Table, *, warns: bool) -> str:
+    """Write the rules that refuse, or those that warn."""
+    units = {field["name"]: field["unit"] for field in source["field"]} | OF_THE_ARRAY
+    lines = []
+    for rule in source["rule"]:
+        if rule["warns"] != warns:
+            continue
+        pieces = template(rule["text"], units)
+        shown, arguments = "", []
+        for before, expression, unit in pieces:
+            shown += before
+            if expression:
+                written, words = formatted(expression, unit)
+                shown += "{}" + words
+                arguments.append(written)
+        text = f'"{shown} (rule {rule["number"]})"'
+        found = f"({rule['number']}, format!(\n            {text},\n            {', '.join(arguments)}\n        ))"
+        give = f"said.push({found});" if warns else f"return Some({found});"
+        lines.append(f"    if {broken(parsed(rule['holds']))} {{\n        {give}\n    }}")
+    return "\n".join(lines)
+
+
+def used(source: Table, *, warns: bool) -> list[str]:
+    """Return the names that these rules use, in the fields' order."""
+    rules = [rule for rule in source["rule"] if rule["warns"] == warns]
+    units = {field["name"]: field["unit"] for field in source["field"]} | OF_THE_ARRAY
+    expressions = [rule["holds"] for rule in rules]
+    expressions += [e for rule in rules for _, e, _ in template(rule["text"], units) if e]
+    named = set().union(*(names(e) for e in expressions))
+    return [name for name in units if name in named]
+
+
+def rust_values(source: Table, *, warns: bool) -> str:
+    """Bind the names that the rules use."""
+    fields = {field["name"] for field in source["field"]}
+    lines = []
+    for name in used(source, warns=warns):
+        given = f"registers.{name}" if name in fields else f"scanned.{name}"
+        lines.append(f"    let {name} = i64::from({given});")
+    return "\n".join(lines)
+
+
+def power_law(source: Table) -> list[int]:
+    """Return ticks to the power of alpha, rounded, in fixed point."""
+    law = source["power_law"]
+    return [round(tick ** law["exponent"] * 2 ** law["fraction_bits"]) for tick in range(law["entries"])]
+
+
+def rust_field(f: Table) -> str:
+    """Write where a field lies."""
+    return (
+        f'    Field {{\n        name: "{f["name"]}",\n        manual: "{f["manual"]}",\n'
+        f'        unit: "{f["unit"]}",\n        text: "{f["text"]}",\n        register: {f["register"]},\n'
+        f"        shift: {f['low']},\n        mask: {2 ** f['bits'] - 1:#x},\n        offset: {f['offset']},\n"
+        f"        least: {f['least']},\n        greatest: {f['greatest']},\n    }},"
+    )
+
+
+def rust(source: Table) -> str:
+    """Write the table that the core reads, as the formatter has it."""
+    command = ["rustfmt", "--edition", "2024", "--config-path", str(Path(__file__).parents[1])]
+    return subprocess.run(command, input=rust_table(source), capture_output=True, text=True, check=True).stdout
+
+
+def rust_table(source: Table) -> str:
+    """Write the table that the core reads."""
+    fields = source["field"]
+    struct, defaults = [], []
+    for field in fields:
+        # The manual's count is less one: as a name for the field it would be wrong by that.
+        rename = (
+            ""
+            if field["manual"] == field["name"] or field["offset"]
+            else f'    #[serde(alias = "{field["manual"]}")]\n'
+        )
+        if field.get("later"):
+            rename += f'    #[serde(default = "at_reset::{field["name"]}")]\n'
+            defaults.append(
+                f"    pub(super) const fn {field['name']}() -> {rust_type(field)} {{\n        {field['default']}\n    }}"
+            )
+        unit = "" if field["unit"] in ("flag", "lines", "channels", "version") else f" [{field['unit']}]"
+        struct.append(f"    /// {field['text']}{unit}\n{rename}    pub {field['name']}: {rust_type(field)},")
+    words, masks, stores = [], [], []
+    for register in range(8):
+        here = [f for f in fields if f.get("register") == register]
+        if not here:
+            continue
+        parts, takes, mask = [], [], 0
+        for f in here:
+            bits = 2 ** f["bits"] - 1
+            mask |= bits << f["low"]
+            held = f"u32::from(self.{f['name']})" if rust_type(f) != "u32" else f"self.{f['name']}"
+            if f["offset"]:
+                held = f"({held}.wrapping_sub({f['offset']}) & {bits:#x})"
+            parts.append(held + (f" << {f['low']}" if f["low"] else ""))
+            cut = f"value >> {f['low']}" if f["low"] else "value"
+            if f["bits"] < 32:
+                cut = f"({cut}) & {bits:#x}" if f["low"] else f"{cut} & {bits:#x}"
+            if rust_type(f) == "bool":
+                taken = f"{cut} == 1"
+            elif f["offset"]:
+                taken = f"({cut}) as {rust_type(f)} + {f['offset']}"
+            else:
+                taken = cut if rust_type(f) == "u32" else f"({cut}) as {rust_type(f)}"
+            takes.append(f"                self.{f['name']} = {taken};")
+        words.append(f"            {register} => {' | '.join(parts)},")
+        masks.append(f"            {register} => {mask:#x},")
+        stores.append(f"            {register} => {{\n" + "\n".join(takes) + "\n            }")
+    rows = [rust_field(f) for f in fields if "register" in f]
+    newline = "\n"
+    law = power_law(source)
+    table = newline.join("    " + " ".join(f"{entry}," for entry in law[k : k + 12]) for k in range(0, len(law), 12))
+    return f"""//! {HEAD}
+
+use serde::{{Deserialize, Serialize}};
+
+use super::{{Field, Preset, Scanned, us}};
+
+/// What the registers hold, in the registers' own units (Table 5.5).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Registers {{
+{newline.join(struct)}
+}}
+
+/// What fields that older files lack hold at reset.
+mod at_reset {{
+{newline.join(defaults)}
+}}
+
+pub(super) const FIELDS: [Field; {len(rows)}] = [
+{newline.join(rows)}
+];
+
+/// The presets, in the order of the reference; the first for an array's size is what its board holds at reset.
+pub const PRESETS: [Preset; {len(source["preset"])}] = [
+{newline.join(rust_preset(source, preset) for preset in source["preset"])}
+];
+
+impl Registers {{
+    /// Register `n` as the board holds it; 0 where it has no such register.
+    #[must_use]
+    pub fn word(&self, n: u8) -> u32 {{
+        match n {{
+{newline.join(words)}
+            _ => 0,
+        }}
+    }}
+
+    /// Which bits register `n` has; the others are reserved and must be 0.
+    #[must_use]
+    pub fn mask(n: u8) -> u32 {{
+        match n {{
+{newline.join(masks)}
+            _ => 0,
+        }}
+    }}
+
+    /// Sets a register's fields, whatever the rules say.
+    pub(super) fn store(&mut self, register: u8, value: u32) {{
+        match register {{
+{newline.join(stores)}
+            _ => {{}}
+        }}
+    }}
+}}
+
+/// The first rule that refuses these registers, with its numbers.
+pub(super) fn refused(registers: &Registers, scanned: &Scanned) -> Option<(u8, String)> {{
+{rust_values(source, warns=False)}
+{rust_rules(source, warns=False)}
+    None
+}}
+
+/// What is allowed but hardly meant.
+pub(super) fn warned(registers: &Registers) -> Vec<(u8, String)> {{
+    let mut said = vec![];
+{rust_values(source, warns=True)}
+{rust_rules(source, warns=True)}
+    said
+}}
+
+/// Bits behind the point of [`POWER_LAW`].
+pub const POWER_LAW_FRACTION: u32 = {source["power_law"]["fraction_bits"]};
+
+/// Ticks to the power of {source["power_law"]["exponent"]} (5.1), in fixed point, as the logic looks it up.
+pub const POWER_LAW: [u32; {len(law)}] = [
+{table}
+];
+"""
+
+
+def javascript(source: Table) -> str:
+    """Write the module that the panel loads."""
+    units = {field["name"]: field["unit"] for field in source["field"]} | OF_THE_ARRAY
+    fields = []
+    for f in source["field"]:
+        at = f", register: {f['register']}, low: {f['low']}" if "register" in f else ""
+        default = str(bool(f["default"])).lower() if f["unit"] == "flag" else f["default"]
+        fields.append(
+            f'  {{ name: "{f["name"]}", manual: "{f["manual"]}"{at}, bits: {f["bits"]}, offset: {f["offset"]}, '
+            f'unit: "{f["unit"]}", default: {default}, least: {f["least"]}, greatest: {f["greatest"]}, '
+            f'text: "{f["text"]}" }},'
+        )
+    presets = []
+    for p in source["preset"]:
+        held = ", ".join(f"{name}: {value}" for name, value in p["values"].items())
+        presets.append(
+            f'  {{ name: "{p["name"]}", sense_lines: {p["sense_lines"]}, values: {{ {held} }} }},'.replace("{  }", "{}")
+        )
+
+    def rules(*, warns: bool) -> str:
+        lines = []
+        for rule in source["rule"]:
+            if rule["warns"] != warns:
+                continue
+            said = ""
+            for before, expression, unit in template(rule["text"], units):
+                said += before
+                if expression:
+                    written, words = formatted(expression, unit)
+                    said += f"${{{written}}}{words}"
+            condition = broken(parsed(rule["holds"]), equal="===")
+            lines.append(
+                f"  if ({condition}) said.push({{ rule: {rule['number']}, text: `{said} (rule {rule['number']})` }});"
+            )
+        named = ", ".join(used(source, warns=warns))
+        return f"  const {{ {named} }} = v;\n" + "\n".join(lines)
+
+    newline = "\n"
+    return f"""// {HEAD}
+
+/**
+ * @typedef {{object}} Field
+ * @property {{string}} name
+ * @property {{string}} manual the manual's name
+ * @property {{number}} [register] none: the board's build
+ * @property {{number}} [low] lowest bit
+ * @property {{number}} bits
+ * @property {{number}} offset what is added to the bits
+ * @property {{string}} unit
+ * @property {{number | boolean}} default at reset
+ * @property {{number}} least
+ * @property {{number}} greatest
+ * @property {{string}} text
+ *
+ * @typedef {{Record<string, number>}} Values every field by name, in its unit, with steps, driven_lines and sense_lines
+ * @typedef {{{{ rule: number, text: string }}}} Said
+ */
+
+/** @type {{readonly Field[]}} */
+export const FIELDS = [
+{newline.join(fields)}
+];
+
+/** @type {{readonly {{ name: string, sense_lines: number, values: Record<string, number> }}[]}} */
+export const PRESETS = [
+{newline.join(presets)}
+];
+
+/**
+ * 10 ns units as us, with two places.
+ * @param {{number}} units
+ * @returns {{string}}
+ */
+const us = (units) => (units / 100).toFixed(2);
+
+/**
+ * Every rule that refuses these registers, in the order in which the board tries them; it says the first.
+ * @param {{Values}} v
+ * @returns {{Said[]}}
+ */
+export function refused(v) {{
+  /** @type {{Said[]}} */
+  const said = [];
+  for (const {{ name, least, greatest, unit }} of FIELDS) {{
+    if (unit !== "flag" && (v[name] < least || v[name] > greatest)) {{
+      said.push({{ rule: 4, text: `${{name}} ${{v[name]}} does not fit: must be ${{least}} to ${{greatest}} (rule 4)` }});
+    }}
+  }}
+{rules(warns=False)}
+  return said;
+}}
+
+/**
+ * What is allowed but hardly meant.
+ * @param {{Values}} v
+ * @returns {{Said[]}}
+ */
+export function warned(v) {{
+  /** @type {{Said[]}} */
+  const said = [];
+{rules(warns=True)}
+  return said;
+}}
+"""
+
+
+def docs(source: Table) -> str:
+    """Write the page of the docs."""
+    rows = []
+    for f in source["field"]:
+        high = f.get("low", 0) + f["bits"] - 1
+        where = f"REG{f['register']}[{high}:{f['low']}]" if "register" in f else "the board's build"
+        where = where.replace(f"[{f.get('low')}:{f.get('low')}]", f"[{f.get('low')}]")
+        limits = f"{f['least']} to {f['greatest']}" if f["unit"] != "flag" else "off, on"
+        default = ("on" if f["default"] else "off") if f["unit"] == "flag" else f["default"]
+        rows.append(f"| `{f['name']}` | `{f['manual']}` | {where} | {f['unit']} | {default} | {limits} | {f['text']} |")
+    rules = [
+        f"| {r['number']} | {'warns' if r['warns'] else 'refuses'} | `{r['holds']}` |"
+        for r in sorted(source["rule"], key=lambda r: r["number"])
+    ]
+    keys = ("line_period", "line_read", "step_period", "step_read", "ramp", "noise_floor", "lines", "channels")
+    default = {f["name"]: f["default"] for f in source["field"]}
+    presets = []
+    for p in source["preset"]:
+        held = default | p["values"]
+        rate = 1e8 / (held["lines"] * held["line_period"])
+        cells = " | ".join(str(held[key]) for key in keys)
+        presets.append(f"| {p['name']} | {cells} | {held['wire_version']} | {rate:.2f} |")
+    law = source["power_law"]
+    newline = "\n"
+    return f"""<!-- {HEAD} -->
+# Registers
+
+The board has eight 32-bit registers (thesis, Appendix 1, Table 5.5), each set as a whole by five bytes on the serial line
+(`taxel.wire.Command`). A *line* is the driven line, the outer step of the scan; a *step* is the multiplexer's, the inner
+one. The manual's names are aliases everywhere, in the manual's units.
+
+| field | the manual's name | where | unit | at reset | range | what it is |
+|---|---|---|---|---|---|---|
+{newline.join(rows)}
+
+All other bits are reserved and written 0. REG6 holds nothing: writing a register's number (0 to 7) to it reads that register
+back, writing 8 makes the board greet again.
+
+## Rules
+
+The logic checks nothing; host and emulated board do, before a write. `steps` is how many multiplexer steps a line has,
+`driven_lines` and `sense_lines` are the array's columns and rows. Rule 4 is also that every value lies in its range.
+
+| rule | | what must hold |
+|---|---|---|
+{newline.join(rules)}
+
+## Presets
+
+| preset | {" | ".join(f"`{key}`" for key in keys)} | wire | frames/s |
+|---|{"---|" * (len(keys) + 2)}
+{newline.join(presets)}
+
+A board of up to 64 lines resets to the first; a larger one to version 2 and *128 x 128, 1 kHz*, with 16 channels to
+*128 x 128, 1.3 kHz*, its lines and steps fitted to the array.
+
+## FA-1 on the board
+
+With `mechanoreceptor` set each taxel is the FA-1 afferent of 5.4.2, in whole numbers of 2^-{law["fraction_bits"]}. The compression 5.1
+is a table of {law["entries"]} entries, `round(ticks ** {law["exponent"]} * 2 ** {law["fraction_bits"]})`; ticks beyond it count as the
+last. theta_0 is `threshold_rest` 1/1024; a spike raises the threshold by `threshold_jump * theta_0 / 256`, a quiet frame lowers
+it by `threshold_decay * theta_0 / 1024` while it lies above theta_0, else sets it to theta_0; both are rounded down. The first
+frame in this mode counts as what had always been. An event is a spike: `Pol` is its sign, the intensity word the size of the
+integral in 1/1024, 65535 at most. A spike that finds the queue full is dropped and counted; the afferent has fired all the same.
+"""
+
+
+def schema(source: Table) -> str:
+    """Write the schema that recordings carry."""
+    properties = {}
+    for f in source["field"]:
+        kind: Table = {"type": "boolean"} if f["unit"] == "flag" else {"type": "integer", "minimum": f["least"]}
+        unit = "" if f["unit"] in ("flag", "lines", "channels", "version") else f" [{f['unit']}]"
+        properties[f["name"]] = kind | {"description": f["text"] + unit}
+    title = {"title": "taxel.Registers", "description": "What the board's registers hold", "type": "object"}
+    return json.dumps(title | {"properties": properties}, indent=2) + "\n"
+
+
+MADE = {
+    "crates/taxel-core/src/wire/registers/table.rs": rust,
+    "crates/taxel-live/web/registers.js": javascript,
+    "crates/taxel-live/src/recording/schemas/Registers.json": schema,
+    "docs/registers.md": docs,
+}
+
+
+def main() -> None:
+    """Write every file."""
+    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parents[1]
+    source = read(root / "registers.toml")
+    for name, make in MADE.items():
+        path = root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(make(source))
+
+
+if __name__ == "__main__":
+    main()
