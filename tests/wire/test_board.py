@@ -105,7 +105,7 @@ def test_read_back_and_damage_on_the_serial_line():
         (lambda: Board().command("text"), "data is 'text': must be bytes"),
         (lambda: Board(7), "registers is 7: must be a taxel.Registers"),
         (lambda: Board(array=7), "array is 7: must be a taxel.Array"),
-        (lambda: Board(array=taxel.Array(65, 64)), "array of 65 x 64 taxels: the board scans up to 64 x 64"),
+        (lambda: Board(array=taxel.Array(257, 256)), "array of 257 x 256 taxels: has more than 65536 positions"),
         (lambda: Board(previous="mean"), "previous is 'mean': must be one of 'last_sent', 'last_sample'"),
         (lambda: Board(intensity=1), "intensity is 1"),
         (lambda: Board(queue=-1), "queue is -1"),
@@ -120,4 +120,4 @@ def test_nonsense_is_refused_in_one_line(call, text):
 
 def test_a_preset_for_more_lines_than_the_array_has_is_refused():
     with pytest.raises(taxel.DeviceError, match="64 lines: the array has 8 columns to drive"):
-        Board(array=taxel.Array(8, 8))
+        Board(Registers.preset("5.2 kHz"), taxel.Array(8, 8))

@@ -1,14 +1,17 @@
-//! Bytes to events and back: the board's wire, version 1 (thesis, Appendix 1, sections 3 to 5).
+//! Bytes to events and back: the board's wire, version 1 (thesis, Appendix 1, sections 3 to 5) and version 2 (ours).
 //!
 //! Nothing here does I/O: push bytes as they come, in pieces of any size, and take events. Socket, file and emulated
 //! board are shells around it.
 
 pub mod command;
 pub mod decoder;
+pub mod receiver;
 pub mod registers;
 pub mod v1;
+pub mod v2;
 
 pub use command::{Command, CommandReader};
 pub use decoder::{Counts, Decoder, Filled, Pairing, Room};
+pub use receiver::{Receiver, Took};
 pub use registers::{Refusal, Registers};
 pub use v1::{STAMP_US, WORD_BYTES, Word, decode, encode};

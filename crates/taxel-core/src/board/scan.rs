@@ -1,14 +1,18 @@
 //! In which order the board looks at its taxels.
 
-use crate::wire::registers::SENSE_LINES;
+use crate::Array;
+use crate::wire::Registers;
 
 /// The sense lines that convert together, step after step, each in the order of the channels.
 ///
-/// Step s puts sense line 4 c + s on channel c of 16; with 64 channels there is one step, and line c is on channel c.
+/// Step s puts sense line (steps x c + s) on channel c; of these only the array's rows are there.
 #[must_use]
-pub(crate) fn sense_lines(channels: u8) -> Vec<Vec<u16>> {
-    let steps = SENSE_LINES / u16::from(channels);
-    (0..steps).map(|step| (0..u16::from(channels)).map(|channel| steps * channel + step).collect()).collect()
+pub(crate) fn sense_lines(registers: &Registers, array: &Array) -> Vec<Vec<u16>> {
+    let steps = registers.steps(array) as u16;
+    let channels = u16::from(registers.channels);
+    let line =
+        |step: u16| (0..channels).map(move |channel| steps * channel + step).filter(|&y| y < array.rows).collect();
+    (0..steps).map(line).collect()
 }
 
 /// The 16-bit shift register that shuffles the driven lines (Fibonacci; taps 16, 14, 13, 11: all 65 535 states).

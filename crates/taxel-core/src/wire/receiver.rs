@@ -1,0 +1,271 @@
+//! One sender's datagrams to events, whichever version of the wire it speaks.
+
+use crate::wire::decoder::{Counts, Decoder};
+use crate::wire::v1::{FIRST, WORD_BYTES};
+use crate::wire::v2::{self, Header, Heard};
+use crate::{Array, Events};
+
+/// For so long nothing but whole words of version 1 must come before a sender of version 2 counts as changed, us.
+const CHANGED_AFTER_US: i64 = 1_000_000;
+
+/// What a datagram told beside its events.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Took {
+    /// The version that the sender speaks after it.
+    pub version: u8,
+    /// Whether that changed by it.
+    pub changed: bool,
+    /// Whether the board was reset before it.
+    pub reset: bool,
+    /// Nothing before this comes any more with a higher number, us (version 2).
+    pub until: Option<i64>,
+    /// Numbers that have not come so far (version 2).
+    pub missing: u64,
+}
+
+/// Hears one sender (address and port).
+///
+/// It speaks version 1 until its first intact datagram of version 2. From then on what is of version 1 is refused and counted, until
+/// [`Self::expect`], or a second of nothing but whole words of version 1, says that the board changed. Time goes on over a
+/// change by the host's clock.
+#[derive(Debug, Clone)]
+pub struct Receiver {
+    array: Array,
+    version: u8,
+    one: Decoder,
+    two: v2::Decoder,
+    /// What is added to times of version 1, once known after a change.
+    offset: Option<i64>,
+    /// The latest time, and when it was heard.
+    latest: Option<(i64, Option<i64>)>,
+    /// Since when nothing but whole words of version 1 has come.
+    whole_since: Option<i64>,
+    refused: u64,
+    changes: u64,
+}
+
+impl Receiver {
+    /// A receiver of a sender that speaks `version` at first; `one` decodes what is of version 1, and has the array.
+    #[must_use]
+    pub fn new(one: Decoder, version: u8) -> Self {
+        let array = one.array().clone();
+        let two = v2::Decoder::new(array.clone());
+        Self { array, version, one, two, offset: Some(0), latest: None, whole_since: None, refused: 0, changes: 0 }
+    }
+
+    /// The version that the sender speaks.
+    #[must_use]
+    pub fn version(&self) -> u8 {
+        self.version
+    }
+
+    /// What was heard of version 1.
+    #[must_use]
+    pub fn one(&self) -> &Decoder {
+        &self.one
+    }
+
+    /// What was heard of version 2.
+    #[must_use]
+    pub fn two(&self) -> &v2::Decoder {
+        &self.two
+    }
+
+    /// What was counted of version 1.
+    #[must_use]
+    pub fn counts(&self) -> &Counts {
+        self.one.counts()
+    }
+
+    /// Bytes of version 1 that were refused because the sender speaks version 2.
+    #[must_use]
+    pub fn refused(&self) -> u64 {
+        self.refused
+    }
+
+    /// How often the sender changed its version.
+    #[must_use]
+    pub fn changes(&self) -> u64 {
+        self.changes
+    }
+
+    /// Says that the host told the board to speak this version.
+    pub fn expect(&mut self, version: u8, out: &mut Events) {
+        if version != self.version {
+            self.change(version, out);
+        }
+    }
+
+    /// Takes a datagram; appends its events, and for each event of `out` whether a state repaired it.
+    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events, repaired: &mut Vec<bool>) -> Took {
+        let (before, heard) = (self.version, out.len());
+        let mut took = Took::default();
+        let second = datagram.first() == Some(&v2::MAGIC) && (self.version == 2 || Header::read(datagram).is_ok());
+        if second {
+            if self.version == 1 {
+                self.change(2, out);
+                if let Some((latest, heard)) = self.latest {
+                    self.two.go_on_from(latest, heard);
+                }
+            }
+            if let Heard::Intact { until, missing, reset } = self.two.push(datagram, arrived, out, repaired) {
+                self.whole_since = None;
+                (took.until, took.missing, took.reset) = (until, missing, reset);
+            }
+        } else if self.version == 2 && !self.changed_back(datagram, arrived) {
+            self.refused += datagram.len() as u64;
+        } else {
+            if self.version == 2 {
+                self.change(1, out);
+                self.offset = None;
+            }
+            let rows = out.len();
+            let markers = out.markers.len();
+            self.one.push_into(datagram, arrived, out);
+            self.one.end_of_datagram_into(out);
+            self.carry(rows, markers, arrived, out);
+            repaired.resize(out.len(), false);
+        }
+        if let Some(&t) = out.t[heard..].last() {
+            let latest = self.latest.map_or(t, |(latest, _)| latest.max(t));
+            self.latest = Some((latest, arrived));
+        }
+        took.version = self.version;
+        took.changed = self.version != before;
+        took
+    }
+
+    /// Ends the stream: gives what waits.
+    pub fn finish_into(&mut self, out: &mut Events, repaired: &mut Vec<bool>) {
+        let (rows, markers) = (out.len(), out.markers.len());
+        self.one.finish_into(out);
+        self.carry(rows, markers, None, out);
+        repaired.resize(out.len(), false);
+    }
+
+    /// Whether whole words of version 1, and nothing else, have come for long enough.
+    fn changed_back(&mut self, datagram: &[u8], arrived: Option<i64>) -> bool {
+        let whole = !datagram.is_empty()
+            && datagram.len().is_multiple_of(WORD_BYTES)
+            && datagram.iter().enumerate().all(|(k, byte)| (byte & FIRST != 0) == k.is_multiple_of(WORD_BYTES));
+        let (true, Some(now)) = (whole, arrived) else {
+            self.whole_since = None;
+            return false;
+        };
+        let since = *self.whole_since.get_or_insert(now);
+        now - since >= CHANGED_AFTER_US
+    }
+
+    fn change(&mut self, version: u8, out: &mut Events) {
+        self.one.end_of_datagram_into(out);
+        (self.version, self.whole_since) = (version, None);
+        self.changes += 1;
+    }
+
+    /// Moves times of version 1 behind what was heard before the change.
+    fn carry(&mut self, rows: usize, markers: usize, arrived: Option<i64>, out: &mut Events) {
+        let first = out.t.get(rows).copied().or_else(|| out.markers.get(markers).map(|m| m.t));
+        let Some(first) = first else { return };
+        let offset = *self.offset.get_or_insert_with(|| match self.latest {
+            Some((latest, heard)) => {
+                let passed = arrived.zip(heard).map_or(0, |(now, then)| now.saturating_sub(then).max(0));
+                latest + passed - first
+            }
+            None => 0,
+        });
+        if offset != 0 {
+            out.t[rows..].iter_mut().for_each(|t| *t += offset);
+            out.markers[markers..].iter_mut().for_each(|m| m.t += offset);
+        }
+    }
+
+    /// The sensor.
+    #[must_use]
+    pub fn array(&self) -> &Array {
+        &self.array
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::board::Board;
+    use crate::wire::{Command, Registers};
+
+    fn play(board: &mut Board, frames: u16, mut each: impl FnMut(&[u8])) {
+        for _ in 0..frames {
+            let ticks = vec![20 + 10 * (board.counts().frames % 2) as u16; 4096];
+            board
+                .frame(&ticks, |datagram| {
+                    each(datagram);
+                    true
+                })
+                .unwrap();
+        }
+    }
+
+    fn speak(board: &mut Board, version: u8) {
+        let registers = Registers { wire_version: version, ..*board.registers() };
+        board.command(&Command { register: 0, value: registers.word(0) }.to_bytes());
+    }
+
+    #[test]
+    fn a_sender_that_changes_its_version_is_heard_and_time_goes_on() {
+        let array = Array::thesis();
+        let mut board = Board::new(Registers::default(), &array).unwrap();
+        let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
+        let (mut events, mut repaired) = (Events::empty(array), vec![]);
+        let (mut now, mut changes) = (5_000_000, vec![]);
+        for version in [1, 2, 1] {
+            speak(&mut board, version);
+            for _ in 0..6000 {
+                play(&mut board, 1, |datagram| {
+                    let took = receiver.push(datagram, Some(now), &mut events, &mut repaired);
+                    if took.changed {
+                        changes.push((took.version, now));
+                    }
+                });
+                now += 192;
+                // Keep the test's memory small: the last event shows where time is.
+                if events.len() > 20_000 {
+                    let last = events.piece(events.len() - 1..events.len());
+                    events = last;
+                    repaired.truncate(1);
+                }
+            }
+        }
+        assert_eq!(changes.iter().map(|c| c.0).collect::<Vec<_>>(), [2, 1]);
+        let begun = 5_000_000 + 12_000 * 192;
+        assert!((1_000_000..1_001_000).contains(&(changes[1].1 - begun)), "a second later: {}", changes[1].1 - begun);
+        assert!(receiver.refused() > 0);
+        let (t, expected) = (*events.t.last().unwrap(), 18_000 * 192);
+        assert!((t - expected).abs() < 2000, "{t} for {expected}");
+    }
+
+    #[test]
+    fn what_the_host_asked_for_is_believed_at_once() {
+        let array = Array::thesis();
+        let mut board = Board::new(Registers { wire_version: 2, ..Registers::default() }, &array).unwrap();
+        let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
+        let (mut events, mut repaired) = (Events::empty(array), vec![]);
+        play(&mut board, 3, |datagram| drop(receiver.push(datagram, Some(0), &mut events, &mut repaired)));
+        assert_eq!((receiver.version(), receiver.changes()), (2, 1));
+        speak(&mut board, 1);
+        receiver.expect(1, &mut events);
+        let heard = events.len();
+        play(&mut board, 2, |datagram| drop(receiver.push(datagram, Some(400), &mut events, &mut repaired)));
+        assert_eq!((receiver.version(), receiver.refused()), (1, 0));
+        assert_eq!(events.len(), heard + 2 * 4096);
+    }
+
+    #[test]
+    fn a_damaged_datagram_changes_no_version() {
+        let array = Array::thesis();
+        let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
+        let (mut events, mut repaired) = (Events::empty(array), vec![]);
+        let mut damaged = vec![v2::MAGIC, 0x21];
+        damaged.resize(40, 7);
+        receiver.push(&damaged, Some(0), &mut events, &mut repaired);
+        assert_eq!((receiver.version(), receiver.counts().skipped), (1, 40));
+    }
+}

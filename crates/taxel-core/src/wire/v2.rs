@@ -1,0 +1,273 @@
+//! Version 2 of the wire: datagrams that stand alone, say whose they are and which, and when time has gone on.
+//!
+//! `docs/wire-v2.md` specifies it. Little-endian throughout; byte 0 has its top bit clear, so that the first byte tells the
+//! version. A datagram is a header, a body of words of one kind, a promise (*span*) and a checksum.
+//!
+//! | bytes | field |
+//! |---|---|
+//! | 0 | 0x54 |
+//! | 1 | version (2) in the high four bits, kind in the low four |
+//! | 2-3 | board |
+//! | 4-7 | sequence: one more a datagram, 0 at reset |
+//! | 8-13 | base time, us since reset |
+//! | 14-15 | session: a number that each reset draws anew |
+//! | 16 | stride: position = line << stride \| row |
+//! | 17 | flags: 0 frame sync, 1 values are differences, 2 events were dropped since the last datagram |
+//! | 18 ... | body |
+//! | n-6, n-5 | span: no datagram of a higher sequence holds anything before base + span us; 0 = unknown |
+//! | n-4 ... | CRC-32C of all bytes before |
+
+mod decoder;
+mod packer;
+mod stream;
+
+pub use decoder::{Counts, Decoder, Heard, Status};
+pub use packer::{Packer, Settings};
+pub use stream::StreamReader;
+
+/// The first byte of a datagram.
+pub const MAGIC: u8 = 0x54;
+
+/// Bytes before the body.
+pub const HEADER_BYTES: usize = 18;
+
+/// Bytes behind the body: span and checksum.
+pub const TRAILER_BYTES: usize = 6;
+
+/// Bytes of a datagram at most: what an Ethernet frame carries over UDP, with room to spare.
+pub const DATAGRAM_BYTES: usize = 1400;
+
+/// The latest offset from the base that a word says, us: later times begin a new datagram. Its words could otherwise be taken
+/// for a control word by a reader that looks at all words alike.
+pub const LATEST_OFFSET: u64 = 32_511;
+
+/// The base time has 48 bits: 8.9 years.
+const BASE_BITS: u32 = 48;
+
+/// What a datagram's body holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Changes without values: 16-bit words of polarity and 15 bits of skip.
+    Changes,
+    /// Changes with values to 255: polarity, 7 bits of skip, 8 of value.
+    Small,
+    /// Changes with values to 65 535: 32-bit words of polarity, 15 bits of skip, 16 of value.
+    Large,
+    /// Markers: offset from the base (us, 32 bits), code (16), argument (16).
+    Markers,
+    /// The board's own totals, 64 bits each, in the order of [`Status`].
+    Status,
+    /// As [`Kind::Small`], values told again.
+    SmallStates,
+    /// As [`Kind::Large`], values told again.
+    LargeStates,
+}
+
+impl Kind {
+    /// The kind of a number; none of one that is not known (yet).
+    #[must_use]
+    pub fn of(number: u8) -> Option<Self> {
+        Some(match number {
+            0 => Self::Changes,
+            1 => Self::Small,
+            2 => Self::Large,
+            3 => Self::Markers,
+            4 => Self::Status,
+            6 => Self::SmallStates,
+            7 => Self::LargeStates,
+            _ => return None,
+        })
+    }
+
+    /// Its number.
+    #[must_use]
+    pub fn number(self) -> u8 {
+        match self {
+            Self::Changes => 0,
+            Self::Small => 1,
+            Self::Large => 2,
+            Self::Markers => 3,
+            Self::Status => 4,
+            Self::SmallStates => 6,
+            Self::LargeStates => 7,
+        }
+    }
+
+    /// Bytes of a word, bits of its skip, bits of its value; none of a kind that names no taxels.
+    #[must_use]
+    pub(crate) fn layout(self) -> Option<Layout> {
+        Some(match self {
+            Self::Changes => Layout { bytes: 2, skip: 15, value: 0 },
+            Self::Small | Self::SmallStates => Layout { bytes: 2, skip: 7, value: 8 },
+            Self::Large | Self::LargeStates => Layout { bytes: 4, skip: 15, value: 16 },
+            Self::Markers | Self::Status => return None,
+        })
+    }
+}
+
+/// How a word is divided, from its top bit down: polarity, skip, value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Layout {
+    pub(crate) bytes: usize,
+    pub(crate) skip: u32,
+    pub(crate) value: u32,
+}
+
+impl Layout {
+    /// The skip that makes a control word.
+    pub(crate) const fn control(self) -> u32 {
+        (1 << self.skip) - 1
+    }
+
+    /// A control word moves by so many positions a step, and by so many steps at most.
+    pub(crate) const fn advance(self) -> (i64, i64) {
+        (1 << (self.skip - 1), 1 << self.value)
+    }
+}
+
+/// A marker's code.
+pub(crate) const START: u16 = 1;
+/// A marker's code.
+pub(crate) const STOP: u16 = 2;
+
+/// What stands around a body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Header {
+    /// The kind's number, known or not.
+    pub kind: u8,
+    /// Which board.
+    pub board: u16,
+    /// Which datagram of its session.
+    pub sequence: u32,
+    /// us since reset.
+    pub base: u64,
+    /// Which reset.
+    pub session: u16,
+    /// position = line << stride | row.
+    pub stride: u8,
+    /// Bit 0 frame sync, 1 differences, 2 dropped; others mean nothing yet.
+    pub flags: u8,
+    /// us; 0 promises nothing.
+    pub span: u16,
+}
+
+/// All events of a frame carry its time.
+pub const FRAME_SYNC: u8 = 1;
+/// Values are differences from the last one sent.
+pub const DIFFERENCES: u8 = 2;
+/// Events were dropped since the last datagram.
+pub const DROPPED: u8 = 4;
+
+/// Why bytes are no datagram of version 2.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Refused {
+    /// Too short for header and trailer.
+    #[error("shorter than 24 bytes")]
+    Short,
+    /// Another first byte, or another version.
+    #[error("begins with another byte or version")]
+    Foreign,
+    /// The checksum disagrees.
+    #[error("its checksum disagrees")]
+    Checksum,
+}
+
+impl Header {
+    /// Reads a datagram's header and body.
+    ///
+    /// # Errors
+    ///
+    /// [`Refused`], saying why it is none.
+    pub fn read(datagram: &[u8]) -> Result<(Self, &[u8]), Refused> {
+        if datagram.first().is_some_and(|&byte| byte != MAGIC) || datagram.get(1).is_some_and(|byte| byte >> 4 != 2) {
+            return Err(Refused::Foreign);
+        }
+        if datagram.len() < HEADER_BYTES + TRAILER_BYTES {
+            return Err(Refused::Short);
+        }
+        let (rest, sum) = datagram.split_at(datagram.len() - 4);
+        if crc32c::crc32c(rest).to_le_bytes() != sum {
+            return Err(Refused::Checksum);
+        }
+        let (header, rest) = rest.split_at(HEADER_BYTES);
+        let (body, span) = rest.split_at(rest.len() - 2);
+        let u16_at = |at: usize| u16::from_le_bytes([header[at], header[at + 1]]);
+        let byte = |at: usize| u64::from(header[at]);
+        let base = (8..14).rev().fold(0, |base, at| base << 8 | byte(at));
+        let sequence = u32::from_le_bytes([header[4], header[5], header[6], header[7]]);
+        let header = Self {
+            kind: header[1] & 0xf,
+            board: u16_at(2),
+            sequence,
+            base,
+            session: u16_at(14),
+            stride: header[16],
+            flags: header[17],
+            span: u16::from_le_bytes([span[0], span[1]]),
+        };
+        Ok((header, body))
+    }
+
+    /// Writes a datagram.
+    pub fn write(&self, body: &[u8], out: &mut Vec<u8>) {
+        out.clear();
+        out.extend([MAGIC, 2 << 4 | self.kind & 0xf]);
+        out.extend(self.board.to_le_bytes());
+        out.extend(self.sequence.to_le_bytes());
+        out.extend(&(self.base & ((1 << BASE_BITS) - 1)).to_le_bytes()[..6]);
+        out.extend(self.session.to_le_bytes());
+        out.extend([self.stride, self.flags]);
+        out.extend(body);
+        out.extend(self.span.to_le_bytes());
+        let sum = crc32c::crc32c(out);
+        out.extend(sum.to_le_bytes());
+    }
+}
+
+/// The stride of an array: the fewest bits that name each of its rows.
+#[must_use]
+pub fn stride(rows: u16) -> u8 {
+    (u16::BITS - rows.saturating_sub(1).leading_zeros()) as u8
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_checksum_is_castagnolis() {
+        assert_eq!(crc32c::crc32c(b"123456789"), 0xe306_9283);
+    }
+
+    #[test]
+    fn a_header_comes_back_and_any_flipped_bit_is_seen() {
+        let header = Header {
+            kind: 1,
+            board: 0xbeef,
+            sequence: 0xfedc_ba98,
+            base: 0x1234_5678_9abc,
+            session: 0x4321,
+            stride: 7,
+            flags: 5,
+            span: 192,
+        };
+        let mut bytes = vec![];
+        header.write(&[1, 2, 3, 4], &mut bytes);
+        assert_eq!(Header::read(&bytes), Ok((header, &[1, 2, 3, 4][..])));
+        for bit in 0..8 * bytes.len() {
+            let mut flipped = bytes.clone();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            assert!(Header::read(&flipped).is_err(), "bit {bit}");
+        }
+        for length in 0..bytes.len() {
+            assert!(Header::read(&bytes[..length]).is_err(), "{length} bytes");
+        }
+    }
+
+    #[test]
+    fn the_stride_names_each_row() {
+        let strides: Vec<u8> =
+            [1, 2, 3, 63, 64, 65, 128, 129, 256, u16::MAX].iter().map(|&rows| stride(rows)).collect();
+        assert_eq!(strides, [0, 1, 2, 6, 6, 7, 7, 8, 8, 16]);
+    }
+}

@@ -1,0 +1,280 @@
+//! Events to datagrams of version 2, as the board sends them.
+
+use super::{
+    DATAGRAM_BYTES, DIFFERENCES, DROPPED, FRAME_SYNC, HEADER_BYTES, Header, Kind, LATEST_OFFSET, Layout, START, STOP,
+    Status, TRAILER_BYTES, stride,
+};
+use crate::{Array, Result, problem};
+
+/// Bytes of a body at most.
+const BODY_BYTES: usize = DATAGRAM_BYTES - HEADER_BYTES - TRAILER_BYTES;
+
+/// For so long after an event every frame is promised, us.
+const RESTLESS_US: u64 = 100_000;
+
+/// What a board's datagrams have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Settings {
+    /// Which board.
+    pub board: u16,
+    /// Which reset.
+    pub session: u16,
+    /// What its events are sent as: changes, small or large ones.
+    pub kind: Kind,
+    /// All events of a frame carry its time.
+    pub frame_sync: bool,
+    /// Values are differences.
+    pub differences: bool,
+    /// For how long events may wait for company, us; 0 sends each frame at its end.
+    pub hold_us: u64,
+    /// How often time is promised where nothing happens, us.
+    pub heartbeat_us: u64,
+}
+
+/// Gathers events into datagrams; gives each to a sink, with how many events it holds.
+///
+/// Times are us since reset and never step back; within one time and line, rows ascend.
+#[derive(Debug, Clone)]
+pub struct Packer {
+    settings: Settings,
+    stride: u8,
+    word: Layout,
+    sequence: u32,
+    dropped: bool,
+    body: Vec<u8>,
+    events: usize,
+    base: u64,
+    at: u64,
+    position: i64,
+    /// Nothing before this comes any more.
+    promised: u64,
+    last_event: Option<u64>,
+    datagram: Vec<u8>,
+}
+
+impl Packer {
+    /// A packer at reset.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the array's positions need more than 16 bits, or the kind is none of events.
+    pub fn new(settings: Settings, array: &Array) -> Result<Self> {
+        let stride = stride(array.rows);
+        if u32::from(array.columns) << stride > 1 << 16 {
+            let (rows, columns) = (array.rows, array.columns);
+            return Err(problem!(
+                "array of {rows} x {columns} taxels: has more than 65536 positions (columns times rows, these up to a power of 2)"
+            ));
+        }
+        let word = layout(settings.kind)?;
+        Ok(Self {
+            settings,
+            stride,
+            word,
+            sequence: 0,
+            dropped: false,
+            body: Vec::with_capacity(BODY_BYTES),
+            events: 0,
+            base: 0,
+            at: 0,
+            position: -1,
+            promised: 0,
+            last_event: None,
+            datagram: Vec::with_capacity(DATAGRAM_BYTES),
+        })
+    }
+
+    /// Goes on with other settings; nothing may wait ([`Self::flush`]), and the kind must be one of events.
+    pub(crate) fn follow(&mut self, settings: Settings) {
+        debug_assert_eq!(self.events, 0);
+        if let Ok(word) = layout(settings.kind) {
+            (self.settings, self.word) = (settings, word);
+        }
+    }
+
+    /// How many events wait in the datagram that fills.
+    #[must_use]
+    pub fn waiting(&self) -> usize {
+        self.events
+    }
+
+    /// Says that an event was dropped: the next datagram carries the flag.
+    pub fn dropped(&mut self) {
+        self.dropped = true;
+    }
+
+    /// Adds an event.
+    pub fn event(&mut self, t: u64, (x, y): (u16, u16), p: bool, value: u16, sink: &mut impl FnMut(&[u8], usize)) {
+        let position = i64::from(x) << self.stride | i64::from(y);
+        if self.events > 0 && (t - self.base > LATEST_OFFSET || self.body.len() + self.bytes(t, position) > BODY_BYTES)
+        {
+            self.send(t, sink);
+        }
+        if self.events == 0 {
+            (self.base, self.at, self.position) = (t, t, -1);
+        }
+        let word = self.word;
+        if t != self.at || position <= self.position {
+            put(&mut self.body, word, true, word.control(), 0);
+            let offset = ((t - self.base) as u32).to_le_bytes();
+            self.body.extend(&offset[..word.bytes]);
+            (self.at, self.position) = (t, -1);
+        }
+        add(&mut self.body, word, position - self.position - 1, p, value);
+        self.position = position;
+        self.events += 1;
+        self.last_event = Some(t);
+    }
+
+    /// Says that everything before `now` was added, and that this is said again at `next`; sends what is due: events, or a
+    /// heartbeat.
+    pub fn over(&mut self, now: u64, next: u64, sink: &mut impl FnMut(&[u8], usize)) {
+        if self.events > 0 {
+            if next - self.base > self.settings.hold_us {
+                self.send(now, sink);
+            }
+            return;
+        }
+        let restless = self.last_event.is_some_and(|t| now - t <= RESTLESS_US);
+        if now > self.promised && (restless || now - self.promised >= self.settings.heartbeat_us) {
+            self.base = now.saturating_sub(u64::from(u16::MAX)).max(self.promised);
+            self.send(now, sink);
+        }
+    }
+
+    /// Sends what waits, whatever the hold.
+    pub fn flush(&mut self, now: u64, sink: &mut impl FnMut(&[u8], usize)) {
+        if self.events > 0 {
+            self.send(now, sink);
+        }
+    }
+
+    /// Sends start or stop of a recording, behind what waits.
+    pub fn marker(&mut self, t: u64, start: bool, sink: &mut impl FnMut(&[u8], usize)) {
+        self.flush(t, sink);
+        let mut body = vec![0; 4];
+        body.extend((if start { START } else { STOP }).to_le_bytes());
+        body.extend([0, 0]);
+        self.base = t;
+        self.write(Kind::Markers, &body, 0, 0, sink);
+    }
+
+    /// Sends the board's totals; how many datagrams went before is known here.
+    pub fn status(&mut self, t: u64, status: &Status, sink: &mut impl FnMut(&[u8], usize)) {
+        self.flush(t, sink);
+        let totals = [status.frames, status.events, status.dropped, self.sequence.into(), status.faults];
+        let body: Vec<u8> = totals.iter().flat_map(|total| total.to_le_bytes()).collect();
+        self.base = t;
+        self.write(Kind::Status, &body, 0, 0, sink);
+    }
+
+    /// Tells values again: taxels by ascending position, each with the value that the board compares with.
+    pub fn states(
+        &mut self,
+        t: u64,
+        taxels: impl Iterator<Item = ((u16, u16), u16)>,
+        sink: &mut impl FnMut(&[u8], usize),
+    ) {
+        self.flush(t, sink);
+        let (kind, word) = match self.settings.kind {
+            Kind::Small => (Kind::SmallStates, Layout { bytes: 2, skip: 7, value: 8 }),
+            _ => (Kind::LargeStates, Layout { bytes: 4, skip: 15, value: 16 }),
+        };
+        let (mut body, mut last) = (Vec::with_capacity(BODY_BYTES), -1);
+        self.base = t;
+        for ((x, y), value) in taxels {
+            let position = i64::from(x) << self.stride | i64::from(y);
+            if body.len() + steps(word, position - last - 1) * word.bytes > BODY_BYTES {
+                self.write(kind, &body, 0, 0, sink);
+                body.clear();
+                last = -1;
+            }
+            add(&mut body, word, position - last - 1, false, value);
+            last = position;
+        }
+        if !body.is_empty() {
+            self.write(kind, &body, 0, 0, sink);
+        }
+    }
+
+    /// What an event takes.
+    fn bytes(&self, t: u64, position: i64) -> usize {
+        let again = t != self.at || position <= self.position;
+        let gap = if again { position } else { position - self.position - 1 };
+        self.word.bytes * (steps(self.word, gap) + if again { 2 } else { 0 })
+    }
+
+    /// Sends the body, with the promise that nothing before `now` comes any more.
+    fn send(&mut self, now: u64, sink: &mut impl FnMut(&[u8], usize)) {
+        let body = std::mem::take(&mut self.body);
+        let span = now - self.base;
+        self.write(self.settings.kind, &body, span.min(u64::from(u16::MAX)) as u16, self.events, sink);
+        self.promised = self.promised.max(self.base + span.min(u64::from(u16::MAX)));
+        self.body = body;
+        self.body.clear();
+        self.events = 0;
+        if span > u64::from(u16::MAX) {
+            // A promise longer than 16 bits is an empty datagram with a later base.
+            self.base = now - u64::from(u16::MAX);
+            self.write(self.settings.kind, &[], u16::MAX, 0, sink);
+            self.promised = now;
+        }
+    }
+
+    fn write(&mut self, kind: Kind, body: &[u8], span: u16, events: usize, sink: &mut impl FnMut(&[u8], usize)) {
+        let Settings { board, session, frame_sync, differences, .. } = self.settings;
+        let flag = |on: bool, bit: u8| if on { bit } else { 0 };
+        let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
+        let header = Header {
+            kind: kind.number(),
+            board,
+            sequence: self.sequence,
+            base: self.base,
+            session,
+            stride: self.stride,
+            flags: flag(frame_sync, FRAME_SYNC)
+                | flag(differences && !states, DIFFERENCES)
+                | flag(std::mem::take(&mut self.dropped), DROPPED),
+            span,
+        };
+        self.sequence = self.sequence.wrapping_add(1);
+        header.write(body, &mut self.datagram);
+        sink(&self.datagram, events);
+    }
+}
+
+/// How the words of a kind of events are laid out.
+fn layout(kind: Kind) -> Result<Layout> {
+    match kind {
+        Kind::Changes | Kind::Small | Kind::Large => kind.layout(),
+        _ => None,
+    }
+    .ok_or_else(|| problem!("events are sent as changes, small or large ones"))
+}
+
+/// Words that a gap and its event take.
+fn steps(word: Layout, gap: i64) -> usize {
+    let (step, most) = word.advance();
+    if gap < i64::from(word.control()) { 1 } else { 1 + ((gap / step) as u64).div_ceil(most as u64) as usize }
+}
+
+/// Adds an event `gap` positions behind the one expected.
+fn add(body: &mut Vec<u8>, word: Layout, mut gap: i64, p: bool, value: u16) {
+    let (step, most) = word.advance();
+    if gap >= i64::from(word.control()) {
+        let mut left = gap / step;
+        gap -= left * step;
+        while left > 0 {
+            let now = left.min(most);
+            put(body, word, false, word.control(), (now - 1) as u32);
+            left -= now;
+        }
+    }
+    let largest = (1_u32 << word.value) - 1;
+    put(body, word, p, gap as u32, u32::from(value).min(largest));
+}
+
+fn put(body: &mut Vec<u8>, word: Layout, p: bool, skip: u32, value: u32) {
+    let bits = u32::from(p) << (word.skip + word.value) | skip << word.value | value;
+    body.extend(&bits.to_le_bytes()[..word.bytes]);
+}

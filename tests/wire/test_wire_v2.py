@@ -1,0 +1,137 @@
+"""Version 2 from Python: the shared vectors, any network, two threads, and the slow reader as oracle."""
+
+import json
+import random
+import threading
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import taxel
+from taxel.device import Board
+from taxel.wire import Registers
+from taxel.wire_v2 import Decoder, StreamReader
+
+from .oracle_v2 import Reader, datagram, words
+
+DATA = Path(__file__).parent.parent / "data" / "wire_v2"
+VECTORS = sorted(path.stem for path in DATA.glob("*.json"))
+
+
+def rows(heard):
+    for h in heard:
+        e = h.events
+        values = [None] * len(e) if e.intensity is None else np.where(e.present, e.intensity, -1).tolist()
+        yield from zip(e.t.tolist(), e.x.tolist(), e.y.tolist(), e.p.tolist(), values, h.repaired.tolist(), strict=True)
+
+
+@pytest.mark.parametrize("name", VECTORS)
+def test_a_vector_means_what_its_json_says(name):
+    meaning = json.loads((DATA / f"{name}.json").read_text())
+    data, given_, at = (DATA / f"{name}.bin").read_bytes(), [], 0
+    while at < len(data):
+        end = at + 2 + int.from_bytes(data[at : at + 2], "little")
+        given_.append(data[at + 2 : end])
+        at = end
+    decoder = Decoder(array=taxel.Array(meaning["rows"], meaning["columns"]))
+    heard = [decoder.push(d) for d in given_]
+    assert [list(row) for row in rows(heard)] == meaning["events"]
+    assert [list(m) for h in heard for m in h.events.markers] == meaning["markers"]
+    counts = asdict(decoder.counts)
+    assert {name: counts[name] for name in meaning["counts"]} == meaning["counts"]
+
+
+@given(seed=st.integers(0, 2**32 - 1), kind=st.sampled_from([0, 1, 2, 6, 7]), stride=st.integers(0, 9))
+def test_any_words_of_the_slow_writer_are_read(seed, kind, stride):
+    """Times in any order within the reach of an offset, rows ascending within a line."""
+    draw = random.Random(seed)
+    columns = min(256, 2 ** (16 - stride))
+    base, top = draw.randrange(2**48 - 40_000), (0, 255, 65_535, 0, 0, 0, 255, 65_535)[kind]
+    events = []
+    for _ in range(draw.randrange(6)):
+        t, x = base + draw.choice([0, 0, 1, 192, 32_511]), draw.randrange(columns)
+        rows_ = sorted(draw.sample(range(2**stride), draw.randrange(min(2**stride, 8) + 1)))
+        events += [(t, x, y, draw.random() < 0.5, draw.randrange(top + 1)) for y in rows_]
+    data = datagram(kind, words(kind, events, base=base, stride=stride), base=base, stride=stride, flags=0)
+    decoder, reader = Decoder(array=taxel.Array(2**stride, columns)), Reader(2**stride, columns)
+    reader.push(data)
+    assert list(rows([decoder.push(data)])) == reader.events
+    if kind < 6:
+        assert [e[:4] for e in reader.events] == [(t, x, y, bool(p)) for t, x, y, p, _ in events]
+
+
+@given(data=st.binary(max_size=80), sealed=st.booleans())
+def test_any_bytes_are_survived_and_counted(data, sealed):
+    if sealed and len(data) >= 20:
+        base = int.from_bytes(data[1:7], "little")
+        data = datagram(data[0] & 15, data[20:], base=base, stride=data[8], flags=data[9])
+    decoder = Decoder()
+    heard = decoder.push(data)
+    c = decoder.counts
+    assert heard.intact == (c.intact == 1)
+    assert c.datagrams == 1 == c.intact + c.repeated + c.old + c.short + c.foreign + c.checksum
+
+
+def test_a_large_board_is_heard():
+    array = taxel.Array(128, 128)
+    board = Board(Registers(array=array, channels=64), array)
+    assert board.greeting.strip() == "taxel-board v2 128x128 64ch"
+    decoder, ticks = Decoder(array=array), np.random.default_rng(1).integers(30, 1000, 16_384).astype(np.uint16)
+    heard = [decoder.push(d) for d in board.frame(ticks)]
+    assert sum(len(h.events) for h in heard) == 16_384
+    assert (decoder.held.reshape(-1) == ticks).all()
+
+
+def test_two_threads_may_use_one_decoder():
+    board, decoder = Board(Registers(wire_version=2)), Decoder()
+    sent = [d for k in range(40) for d in board.frame(np.full(4096, 20 + 10 * (k % 2), np.uint16))]
+    failed = []
+
+    def half(part):
+        try:
+            for d in part:
+                decoder.push(d)
+        except Exception as error:
+            failed.append(error)
+
+    threads = [threading.Thread(target=half, args=(sent[k::2],)) for k in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failed
+    assert decoder.counts.events == 40 * 4096
+    assert decoder.counts.missing == 0
+
+
+def test_the_boards_totals_close_the_sums():
+    board, decoder, lost = Board(Registers(wire_version=2)), Decoder(), 0
+    draw, made, status_lost = random.Random(2), 0, 0
+    for k in range(12_000):
+        for d in board.frame(np.full(4096, 20 if k % 500 else 40, np.uint16)):
+            made += 1
+            if draw.random() < 0.1:
+                lost += 1
+                status_lost += d[1] == 0x24
+                continue
+            decoder.push(d)
+    status, counts = decoder.status, decoder.counts
+    assert status is not None
+    assert status.datagrams < made
+    assert counts.intact + lost == made
+    assert lost - 50 <= counts.missing <= lost
+
+
+def test_nonsense_is_one_line():
+    with pytest.raises(taxel.ProblemError, match=r"datagram is|data is"):
+        Decoder().push("text")
+    with pytest.raises(taxel.ProblemError, match="array"):
+        Decoder(array=3)
+    with pytest.raises(taxel.ProblemError, match="arrived"):
+        Decoder().push(b"", arrived=1.5)
+    with pytest.raises(taxel.ProblemError, match="data is"):
+        StreamReader().push(3)
