@@ -441,27 +441,6 @@ SOUND: dict[str, Sound] = {
     "taxel.open": plain(taxel.open, path="here_events.npz", array=ARRAY, pairing="direct", differences=False),
     "taxel.Recording.between": lambda: (taxel.open("here_events.npz").between, {"start": 0, "stop": 300}),
     "taxel.Recording.frames": lambda: (taxel.open("here_events.npz").frames, {"rate_hz": 1000.0}),
-    "taxel.cut": lambda: (
-        taxel.cut,
-        {
-            "recording": taxel.open("here_events.npz"),
-            "start_us": 0,
-            "stop_us": 300,
-            "columns": slice(0, 2),
-            "rows": slice(0, 2),
-            "label": None,
-            "before_us": 10.0,
-            "after_us": 10.0,
-        },
-    ),
-    "taxel.merge": lambda: (
-        taxel.merge,
-        {"recordings": [taxel.open("here_events.npz")] * 2, "gap_us": 1000.0, "beside": True},
-    ),
-    "taxel.Recording.with_notes": lambda: (
-        taxel.open("here_events.npz").with_notes,
-        {"notes": [taxel.Note("heel", 100, 0)]},
-    ),
     "taxel.convert": plain(
         taxel.convert, source=EVENTS, target="there.npz", frames_hz=1000.0, compression="none", overwrite=True
     ),
@@ -480,6 +459,9 @@ SOUND: dict[str, Sound] = {
     "taxel.wire.Decoder.push_into": fresh(
         taxel.wire.Decoder, "push_into", columns=taxel.wire.Columns(100), data=BYTES, arrived=5
     ),
+    "taxel.wire_v2.Decoder": plain(taxel.wire_v2.Decoder, array=ARRAY),
+    "taxel.wire_v2.Decoder.push": fresh(taxel.wire_v2.Decoder, "push", datagram=BYTES, arrived=5),
+    "taxel.wire_v2.StreamReader.push": fresh(taxel.wire_v2.StreamReader, "push", data=BYTES),
     "taxel.wire.Registers": plain(taxel.wire.Registers, array=None, noise_floor=4, line_period=3.0),
     "taxel.wire.Registers.commands_to": method(REGISTERS, "commands_to", target=REGISTERS),
     "taxel.wire.Registers.preset": plain(taxel.wire.Registers.preset, name="2 kHz", array=None),
@@ -725,6 +707,10 @@ LEFT_OUT = {
     "taxel.simulate.EmulatorReport": "a result",
     "taxel.simulate.emulate": "plays in real time; its arguments are those of play, tried there",
     "taxel.wire.Counts": "a result",
+    "taxel.wire_v2.Counts": "a result",
+    "taxel.wire_v2.Heard": "a result",
+    "taxel.wire_v2.Status": "a result",
+    "taxel.wire_v2.StreamReader": "takes nothing",
 }
 
 

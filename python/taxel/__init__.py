@@ -4,12 +4,10 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from taxel import detect, device, encode, formats, information, learn, live, metrics, simulate, wire
+from taxel import detect, device, encode, formats, information, learn, live, metrics, simulate, wire, wire_v2
 from taxel._convert import convert
 from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
 from taxel._health import Health, health
-from taxel._opening import open_any as open  # noqa: A004  taxel.open is a recording's
-from taxel._parts import cut, merge
 from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
@@ -18,6 +16,7 @@ from taxel.frames import Frames
 from taxel.labels import Label, Labels
 from taxel.neuron import Neuron
 from taxel.recording import Clock, Datagrams, Note, Recording
+from taxel.recording import open_recording as open  # noqa: A004  taxel.open is a recording's
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
@@ -48,7 +47,6 @@ __all__ = [
     "SpikeTrains",
     "Tare",
     "convert",
-    "cut",
     "detect",
     "device",
     "encode",
@@ -57,12 +55,12 @@ __all__ = [
     "information",
     "learn",
     "live",
-    "merge",
     "metrics",
     "open",
     "plot",
     "simulate",
     "wire",
+    "wire_v2",
 ]
 
 

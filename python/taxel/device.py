@@ -27,12 +27,12 @@ class Board:
     Parameters
     ----------
     registers : Registers, optional
-        What it holds after reset; the preset "5.2 kHz" where it is left out.
+        What it holds after reset; where it is left out, of a board of 64 x 64 taxels the preset "5.2 kHz".
     array : Array, optional
-        Up to 64 x 64 taxels; the thesis' where it is left out.
+        Up to 65 536 positions; the thesis' where it is left out.
     previous : {"last_sent", "last_sample"}
         What a new value is compared with.
-    intensity : {"value", "difference"}
+    intensity : {"value", "difference", "nothing"}
         What an intensity word holds.
     queue : int, words, 0 or more
         A taxel whose two words find no room is dropped and counted.
@@ -58,16 +58,16 @@ class Board:
         array: Array | None = None,
         *,
         previous: Literal["last_sent", "last_sample"] = "last_sent",
-        intensity: Literal["value", "difference"] = "value",
+        intensity: Literal["value", "difference", "nothing"] = "value",
         queue: int = 16_384,
     ) -> None:
         self.array = Array._of(array)
-        start = Registers() if registers is None else instance("registers", registers, Registers)
+        start = Registers(array=self.array) if registers is None else instance("registers", registers, Registers)
         self._core = _core.WireBoard(
             start._json(),
             self.array._parts(),
             text("previous", previous, ("last_sent", "last_sample")),
-            text("intensity", intensity, ("value", "difference")),
+            text("intensity", intensity, ("value", "difference", "nothing")),
             whole("queue", queue, 0, 2**32),
         )
 
@@ -84,7 +84,7 @@ class Board:
 
         Returns
         -------
-        list of bytes, at most 280 words of 5 bytes each
+        list of bytes, at most 1400 each
 
         Raises
         ------

@@ -389,20 +389,12 @@ class Command:
         return cls(*_core.command_read(_bytes(data)))
 
 
+#: The fields as registers.toml has them, by name.
+_FIELDS: dict[str, Any] = {field["name"]: field for field in json.loads(_core.registers_fields())}
 #: Fields in units of 10 ns in the registers, in us here.
-_TIMES = ("line_period", "line_read", "step_period", "step_read")
-_FLAGS = ("random_lines", "mechanoreceptor", "invert_comparator", "frame_sync", "record")
-_MANUAL = {
-    "use_rand_row": "random_lines",
-    "comparator_mode": "mechanoreceptor",
-    "use_frame_sync": "frame_sync",
-    "row_change_period": "line_period",
-    "row_read_duration": "line_read",
-    "col_change_period": "step_period",
-    "col_read_duration": "step_read",
-    "ramp_time": "ramp",
-    "nrows": "lines",
-}
+_TIMES = tuple(name for name, field in _FIELDS.items() if field["unit"] == "10 ns")
+_FLAGS = tuple(name for name, field in _FIELDS.items() if field["unit"] == "flag")
+_MANUAL = {field["manual"]: name for name, field in _FIELDS.items() if field["manual"] != name}
 
 
 class Registers:
@@ -421,11 +413,15 @@ class Registers:
         How long the ramp rises.
     noise_floor : int, ticks
         A difference above it makes an event.
-    lines : int, 1 to 64
+    lines : int, 1 to 256
         Driven lines.
     random_lines, mechanoreceptor, invert_comparator, frame_sync, record : bool
+    wire_version : {1, 2}
+        Version 1 names 64 x 64 taxels at most.
+    threshold_rest, threshold_jump, threshold_decay : int, in 1/1024, 1/256 theta_0, 1/1024 theta_0
+        FA-1 on the board, where `mechanoreceptor` is set.
     channels : {16, 64}
-        Of the converter: the board's build, not a register. A line has 4 steps with 16, one with 64.
+        Of the converter: the board's build, not a register. A line of 64 taxels has 4 steps with 16, one with 64.
     array : Array, optional
         The sensor; the thesis' 64 x 64 where it is left out.
 
@@ -436,7 +432,8 @@ class Registers:
 
     Notes
     -----
-    Table 5.5; what is left out is as in the preset "5.2 kHz", which the board holds at reset.
+    Table 5.5 and the page *Registers*; what is left out is as a board of this array holds it at reset: up to 64 x 64
+    taxels the preset "5.2 kHz".
 
     Examples
     --------
@@ -453,7 +450,9 @@ class Registers:
     _held: dict[str, Any]
 
     def __init__(self, *, array: Array | None = None, **fields: float) -> None:
-        self._set(json.loads(_core.registers_preset(PRESETS[0])), fields, array)
+        sensor = Array._of(array)
+        channels = whole("channels", fields.get("channels", 16), 0, 255)
+        self._set(json.loads(_core.registers_at_reset(sensor._parts(), channels)), fields, sensor)
 
     def _set(self, held: dict[str, Any], fields: dict[str, float], array: Array | None) -> None:
         self.array = Array._of(array)
@@ -528,7 +527,7 @@ class Registers:
             return held[name] / 100 if name in _TIMES else held[name]
         if name in _MANUAL and held:
             value = held[_MANUAL[name]]
-            return value - 1 if name == "nrows" else int(value)
+            return int(value) - _FIELDS[_MANUAL[name]]["offset"]
         raise AttributeError(f"Registers have no {name!r}")
 
     def __dir__(self) -> Sequence[str]:

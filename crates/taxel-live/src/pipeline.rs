@@ -136,6 +136,14 @@ pub struct Counters {
     pub decoded: u64,
     /// What the decoder saw in them.
     pub wire: wire::Counts,
+    /// The version of the wire that the board speaks.
+    pub wire_version: u8,
+    /// What was heard and missed of version 2.
+    pub wire_v2: wire::v2::Counts,
+    /// Bytes of version 1 that were refused, because the board speaks version 2.
+    pub wire_refused: u64,
+    /// How often the board changed its version.
+    pub wire_changes: u64,
     /// Events that it gave.
     pub events: u64,
     /// Events that the readout has heard.
@@ -266,11 +274,12 @@ impl Live {
         });
         let (say, said) = channel::bounded(SAID_WAITING);
         let decoder = Decoder::new(options.array.clone()).differences(options.differences);
+        let sender = wire::Receiver::new(decoder, 1);
         let listens = !matches!(ear, Ear::Deaf);
         let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![], begun: Instant::now() };
         let theirs = Arc::clone(&shared);
         let decode_options = options.clone();
-        live.spawn("taxel-decode", move || decode::run(&theirs, decoder, &decode_options, listens))?;
+        live.spawn("taxel-decode", move || decode::run(&theirs, sender, &decode_options, listens))?;
         if listens {
             let reader = read::Reader::new(ear, sinks, say, &options);
             live.spawn("taxel-readout", move || reader.run(&shared))?;

@@ -34,7 +34,7 @@ pub const FLUSH_EVERY: Duration = Duration::from_millis(20);
 /// A chunk that has waited so long finds its thread starved: who gives the next message writes it himself.
 pub const LATE: Duration = Duration::from_millis(40);
 
-/// What can be said when nothing was dropped between the socket and the file.
+/// What can be said of version 1 when nothing was dropped between the socket and the file.
 pub const NOTHING_LOST: &str = "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)";
 
 /// What a recording says of itself, from its first byte on.
@@ -108,6 +108,9 @@ pub struct Counts {
     pub dropped_by_queue: u64,
     /// What the decoder could not use of the bytes that came, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
+    /// Of a board that speaks version 2: datagrams that it sent and that never came intact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub missing: Option<u64>,
     /// What the recording that this one was converted from said.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub converted: Option<String>,
@@ -137,6 +140,7 @@ impl Counts {
             (self.dropped_by_kernel, "messages dropped by the kernel"),
             (self.dropped_by_queue, "datagrams dropped by taxel's queue"),
             (missing, "datagrams received but not recorded"),
+            (self.missing.unwrap_or(0), "datagrams lost or damaged on the way"),
         ]
         .iter()
         .filter(|(n, _)| *n > 0)
@@ -148,7 +152,13 @@ impl Counts {
             .filter(|(_, n)| **n > 0)
             .map(|(cause, n)| format!("{n} {}", cause.replace('_', " ")))
             .collect();
-        let mut line = if lost.is_empty() { NOTHING_LOST.to_owned() } else { format!("LOST: {}", lost.join(", ")) };
+        let mut line = if lost.is_empty() && self.missing.is_some() {
+            "nothing lost".to_owned()
+        } else if lost.is_empty() {
+            NOTHING_LOST.to_owned()
+        } else {
+            format!("LOST: {}", lost.join(", "))
+        };
         if !damage.is_empty() {
             line = format!("{line}; in the bytes that came: {}", damage.join(", "));
         }
@@ -172,6 +182,22 @@ pub fn damage(counts: &wire::Counts) -> BTreeMap<String, u64> {
     ]
     .map(|(cause, n)| (cause.to_owned(), n))
     .into()
+}
+
+/// The same of a board that speaks version 2, where it does; and how many of its datagrams are missing.
+#[must_use]
+pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String, u64>, u64)> {
+    let causes = [
+        ("datagrams_damaged", counts.checksum + counts.short + counts.foreign),
+        ("datagrams_repeated", counts.repeated + counts.old),
+        ("taxels_outside_the_array", counts.outside),
+        ("datagrams_of_an_unknown_kind", counts.unknown_kind),
+        ("malformed_bodies", counts.malformed),
+        ("times_that_the_board_dropped_events", counts.dropped),
+        ("resets", counts.resets),
+        ("events_repaired", counts.repaired),
+    ];
+    (counts.intact > 0).then(|| (causes.map(|(cause, n)| (cause.to_owned(), n)).into(), counts.missing))
 }
 
 /// Something written down while recording.

@@ -18,6 +18,7 @@ mod recording;
 mod rivals;
 mod simulate;
 mod wire;
+mod wire_v2;
 
 use pyo3::prelude::*;
 
@@ -39,5 +40,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     rivals::register(module)?;
     simulate::register(module)?;
     wire::register(module)?;
+    wire_v2::register(module)?;
     Ok(())
 }

@@ -44,7 +44,7 @@ impl Chosen {
             Value::String(name) => {
                 let preset = Registers::preset(name).map_err(core)?;
                 // A smaller array has fewer lines to drive.
-                let lines = u8::try_from(array.columns).map_or(preset.lines, |columns| preset.lines.min(columns));
+                let lines = preset.lines.min(array.columns);
                 Ok(Registers { lines, ..preset })
             }
             held => Registers::deserialize(held).map_err(|e| ProblemError::new_err(format!("registers: {e}"))),

@@ -137,7 +137,7 @@ fn play<'py>(
 
 /// Plays acts to a board that arms, is tared and starts, in real time, and sends its datagrams to `to`; gives the report.
 ///
-/// `control` is where the board takes commands by TCP; `begun` hears that address once the board is ready, `watch` a
+/// `wire` is the version of the wire that it speaks; `control` is where the board takes commands by TCP; `begun` hears that address once the board is ready, `watch` a
 /// report, as JSON, ten times a second. What either raises ends the play.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -150,11 +150,13 @@ fn emulate(
     seed: u64,
     acts: Vec<ActIn<'_>>,
     tare_ms: f64,
+    wire: u8,
     control: Option<&str>,
     begun: Py<PyAny>,
     watch: Py<PyAny>,
 ) -> PyResult<String> {
-    let (array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
+    let (array, acts) = (to_array(parts)?, to_acts(acts)?);
+    let registers = Registers { wire_version: wire, ..Registers::preset(preset).map_err(core)? };
     let (to, control) = (address(to)?, control.map(address).transpose()?);
     enter_telling(py, |stop, teller| {
         let mut stage = ready(&array, registers, sensor, seed, &acts)?;

@@ -147,13 +147,25 @@ fn command_read(data: PyReadonlyArray1<'_, u8>) -> PyResult<(u8, u32)> {
 /// The presets' names.
 #[pyfunction]
 fn registers_presets() -> Vec<&'static str> {
-    wire::registers::PRESETS.iter().map(|(name, _)| *name).collect()
+    wire::registers::PRESETS.iter().map(|preset| preset.name).collect()
+}
+
+/// All fields as JSON, in the order of the registers: names, units, ranges, texts.
+#[pyfunction]
+fn registers_fields() -> PyResult<String> {
+    to_json(&wire::registers::fields())
 }
 
 /// A preset, as JSON.
 #[pyfunction]
 fn registers_preset(name: &str) -> PyResult<String> {
     to_json(&Registers::preset(name).map_err(core)?)
+}
+
+/// What a board of an array and so many channels holds at reset, as JSON.
+#[pyfunction]
+fn registers_at_reset(array: ArrayParts, channels: u8) -> PyResult<String> {
+    to_json(&Registers::at_reset(&to_array(array)?, channels))
 }
 
 /// Sets fields by name, in the registers' own units; returns the new set as JSON.
@@ -264,6 +276,8 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(command_bytes, module)?)?;
     module.add_function(wrap_pyfunction!(command_read, module)?)?;
     module.add_function(wrap_pyfunction!(registers_presets, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_fields, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_at_reset, module)?)?;
     module.add_function(wrap_pyfunction!(registers_preset, module)?)?;
     module.add_function(wrap_pyfunction!(registers_with, module)?)?;
     module.add_function(wrap_pyfunction!(registers_check, module)?)?;

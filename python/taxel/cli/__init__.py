@@ -58,7 +58,6 @@ def _said(error: OSError) -> str:
 for _command in (
     "bench",
     "convert",
-    "cut",
     "demo",
     "detect",
     "emulate",
@@ -67,7 +66,6 @@ for _command in (
     "info",
     "information",
     "live",
-    "merge",
     "record",
     "study",
     "train",

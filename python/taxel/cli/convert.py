@@ -16,11 +16,10 @@ __all__ = ["convert"]
 
 @app.command()
 def convert(
-    source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
+    source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
     target: Annotated[Path, typer.Argument(help="The new file; its ending says the kind.")],
     frames: Annotated[
-        float | None,
-        typer.Option(metavar="HZ", help="Write pictures at this rate (.npz, .csv, .h5), not events."),
+        float | None, typer.Option(metavar="HZ", help="Write pictures at this rate (.npz, .csv) instead of events.")
     ] = None,
     compression: Annotated[str, typer.Option(help="Of a .mcap: none, lz4 or zstd.")] = "none",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target where it exists.")] = False,

@@ -33,6 +33,7 @@ def emulate(
         float, typer.Option(min=0, max=60, help="How long the noise floor is 0 before the start marker, s.")
     ] = 0.05,
     preset: Annotated[str, typer.Option(help='The registers: "5.2 kHz", "2 kHz", "20.8 kHz".')] = "5.2 kHz",
+    wire: Annotated[int, typer.Option(min=1, max=2, help="The version of the wire that the board speaks.")] = 1,
     control: Annotated[
         int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")
     ] = None,
@@ -84,6 +85,7 @@ def emulate(
             seed=seed,
             preset=preset,
             tare_ms=tare_ms,
+            wire=2 if wire == 2 else 1,
             control=listens,
             begun=begun,
             watch=watch,

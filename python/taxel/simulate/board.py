@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,6 +191,7 @@ def emulate(
     tare_ms: float = 50.0,
     array: Array | None = None,
     sensor: Mapping[str, float] | None = None,
+    wire: Literal[1, 2] = 1,
     control: str | None = None,
     begun: Callable[[str | None], None] = lambda _: None,
     watch: Callable[[EmulatorReport], None] = lambda _: None,
@@ -203,6 +204,8 @@ def emulate(
         Address and port, as "127.0.0.1:5208".
     acts, seed, preset, tare_ms, array, sensor
         As in `play`.
+    wire : {1, 2}
+        The version of the wire that the board speaks.
     control : str, optional
         Address and port where the board takes commands by TCP; port 0 finds a free one.
     begun : function, optional
@@ -226,6 +229,7 @@ def emulate(
         whole("seed", seed, 0),
         _parts(acts, Array._of(array)),
         number("tare_ms", tare_ms),
+        whole("wire", wire, 1, 2),
         None if control is None else text("control", control),
         callback("begun", begun),
         lambda said: callback("watch", watch)(EmulatorReport._from_json(said)),

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use taxel_core::Events;
-use taxel_core::wire::Decoder;
+use taxel_core::wire::{Receiver, Took};
 
 use super::{LiveOptions, Shared, handover};
 use crate::Result;
@@ -29,10 +29,12 @@ const HAND_ON: usize = 1 << 14;
 /// The largest datagram of a board that closes frames with a shorter one: 280 events.
 const FULL: usize = 280 * taxel_core::wire::WORD_BYTES;
 
-pub(super) fn run(shared: &Shared, decoder: Decoder, options: &LiveOptions, listens: bool) {
+pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, listens: bool) {
     let mut work = Work {
         shared,
-        decoder,
+        sender,
+        repaired: vec![],
+        promise: Promise::default(),
         options,
         listens,
         clock: BoardClock::default(),
@@ -55,7 +57,10 @@ pub(super) fn run(shared: &Shared, decoder: Decoder, options: &LiveOptions, list
 
 struct Work<'a> {
     shared: &'a Shared,
-    decoder: Decoder,
+    sender: Receiver,
+    /// For each event that waits whether a state repaired it (version 2).
+    repaired: Vec<bool>,
+    promise: Promise,
     options: &'a LiveOptions,
     listens: bool,
     clock: BoardClock,
@@ -67,6 +72,36 @@ struct Work<'a> {
     counted: u64,
     pictured: Instant,
     told: Instant,
+}
+
+/// What a board of version 2 has promised: nothing before it comes any more.
+#[derive(Debug, Clone, Copy, Default)]
+struct Promise {
+    until: Option<i64>,
+    /// Numbers that had not come when a gap was last waited for, and until when (us, host) it is.
+    missing: u64,
+    waits: Option<i64>,
+}
+
+impl Promise {
+    /// A datagram came. At a gap what it promises waits for a frame: the missing ones may only be late.
+    fn note(&mut self, took: &Took, arrived_us: i64, frame_us: i64) {
+        if took.reset || took.missing < self.missing {
+            (self.missing, self.waits) = (took.missing, None);
+        } else if took.missing > self.missing {
+            (self.missing, self.waits) = (took.missing, Some(arrived_us + frame_us));
+        }
+        if self.waits.is_some_and(|until| arrived_us >= until) {
+            self.waits = None;
+        }
+        if self.waits.is_none() {
+            self.until = took.until.or(self.until);
+        }
+    }
+
+    fn take(&mut self) -> Option<i64> {
+        self.until.take()
+    }
 }
 
 impl Work<'_> {
@@ -85,7 +120,7 @@ impl Work<'_> {
             }
             self.look()?;
         }
-        self.decoder.finish_into(&mut self.events);
+        self.sender.finish_into(&mut self.events, &mut self.repaired);
         self.hand_on()?;
         self.silence();
         Ok(())
@@ -94,11 +129,16 @@ impl Work<'_> {
     fn decode(&mut self, batch: &Batch) -> Result<()> {
         for (datagram, bytes) in batch.iter() {
             let before = self.events.len();
-            self.decoder.push_into(bytes, Some(datagram.arrived_ns / 1000), &mut self.events);
-            self.decoder.end_of_datagram_into(&mut self.events);
+            let arrived_us = datagram.arrived_ns / 1000;
+            let took = self.sender.push(bytes, Some(arrived_us), &mut self.events, &mut self.repaired);
             let now = now_ns();
             self.decoded += 1;
-            if let Some(&t) = self.events.t[before..].last() {
+            if took.version == 2 {
+                self.promise.note(&took, arrived_us, self.frame_us());
+                if let Some(until) = took.until {
+                    self.clock.note(until, datagram.arrived_ns);
+                }
+            } else if let Some(&t) = self.events.t[before..].last() {
                 // What a frame saw leaves at its end, but for a full datagram, which leaves as soon as it is full.
                 if bytes.len() < FULL {
                     self.clock.note(t + self.frame_us(), datagram.arrived_ns);
@@ -136,7 +176,11 @@ impl Work<'_> {
             board.markers.extend_from_slice(&events.markers);
             let counters = &mut board.counters;
             counters.decoded = self.decoded;
-            counters.wire = *self.decoder.counts();
+            counters.wire = *self.sender.counts();
+            counters.wire_v2 = self.sender.two().counts();
+            counters.wire_version = self.sender.version();
+            counters.wire_refused = self.sender.refused();
+            counters.wire_changes = self.sender.changes();
             counters.events += events.len() as u64;
             counters.offset = self.clock.offset();
             counters.board_us = counters.board_us.max(events.t.iter().max().copied());
@@ -148,16 +192,21 @@ impl Work<'_> {
             self.shared.board().counters.events_dropped = dropped;
         }
         handover::clear(events);
+        self.repaired.clear();
+        if let Some(until) = self.promise.take().filter(|_| self.listens) {
+            self.shared.handover.quiet(until);
+        }
         if self.has_intensities {
             events.intensity.get_or_insert_default();
         }
         Ok(())
     }
 
-    /// Nothing waits: the readout's time may move on by the host's clock.
+    /// Nothing waits: of a board that makes no promises the readout's time may move on by the host's clock.
     #[allow(clippy::cast_possible_truncation)]
     fn silence(&self) {
         if self.listens
+            && self.sender.version() == 1
             && let Some(offset) = self.clock.offset()
         {
             let guard = (self.options.guard_frames * self.options.registers.frame_us()) as i64;

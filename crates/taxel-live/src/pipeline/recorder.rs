@@ -174,12 +174,16 @@ fn named(path: &Path) -> Result<&str> {
 /// What was lost, as recordings keep it.
 pub(super) fn losses(counters: &Counters) -> recording::Counts {
     let capture = &counters.capture;
+    let (second, missing) = recording::damage_of_version_2(&counters.wire_v2).unzip();
+    let mut decoder = recording::damage(&counters.wire);
+    decoder.extend(second.unwrap_or_default());
     recording::Counts {
         received: capture.datagrams,
         recorded: counters.decoded,
         dropped_by_kernel: capture.dropped_by_kernel,
         dropped_by_queue: capture.dropped_by_queue,
-        decoder: recording::damage(&counters.wire),
+        decoder,
+        missing,
         converted: None,
     }
 }

@@ -84,6 +84,10 @@ pub struct Decoded {
     pub events: Events,
     /// What the decoder saw and dropped.
     pub counts: wire::Counts,
+    /// What was heard and missed of version 2.
+    pub version_2: wire::v2::Counts,
+    /// For each event whether a state of version 2 repaired it.
+    pub repaired: Vec<bool>,
     /// When each datagram came, ns since 1970.
     pub arrived_ns: Vec<i64>,
     /// Our arrival number of each.
@@ -96,8 +100,8 @@ pub struct Decoded {
 
 impl Decoded {
     fn empty(events: Events) -> Self {
-        let counts = wire::Counts::default();
-        Self { events, counts, arrived_ns: vec![], number: vec![], first: vec![], bad_chunks: 0 }
+        let (counts, version_2, repaired) = (wire::Counts::default(), wire::v2::Counts::default(), vec![]);
+        Self { events, counts, version_2, repaired, arrived_ns: vec![], number: vec![], first: vec![], bad_chunks: 0 }
     }
 }
 
@@ -289,23 +293,25 @@ impl Reader {
     /// As [`Reader::messages`].
     pub fn decode(&self, pairing: Pairing, stop: Stop<'_>) -> Result<Decoded> {
         let array = self.header.array.clone();
-        let mut decoder = Decoder::new(array.clone()).pairing(pairing).differences(self.header.difference);
+        let decoder = Decoder::new(array.clone()).pairing(pairing).differences(self.header.difference);
+        let mut sender = wire::Receiver::new(decoder, 1);
         let mut decoded = Decoded::empty(Events::empty(array));
         let bad = self.messages(stop, |message| {
             if message.topic == Topic::Datagrams {
                 let before = decoded.events.len();
-                decoder.push_into(message.data, Some(message.at_ns / 1000), &mut decoded.events);
-                decoder.end_of_datagram_into(&mut decoded.events);
+                let arrived = Some(message.at_ns / 1000);
+                sender.push(message.data, arrived, &mut decoded.events, &mut decoded.repaired);
                 decoded.arrived_ns.push(message.at_ns);
                 decoded.number.push(message.number);
                 decoded.first.push(before as u64);
             }
             Ok(())
         })?;
-        decoder.finish_into(&mut decoded.events);
+        sender.finish_into(&mut decoded.events, &mut decoded.repaired);
         decoded.events.t.iter_mut().for_each(|t| *t += self.header.origin_us);
         decoded.events.markers.iter_mut().for_each(|m| m.t += self.header.origin_us);
-        decoded.counts = *decoder.counts();
+        decoded.counts = *sender.counts();
+        decoded.version_2 = sender.two().counts();
         decoded.bad_chunks = bad;
         Ok(decoded)
     }
