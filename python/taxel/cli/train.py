@@ -33,9 +33,9 @@ def train(
     recipe: Annotated[
         str | None,
         typer.Option(
-            help="A known recipe: gait_plate (counts), gait_insole (N), gait_channel (any other); or a TOML or JSON "
-            "file (its path holds a dot or a slash): [encoder], [learner], [neurons.LABEL], run_threshold. Without it "
-            "and --encoder: the one that fits the recording."
+            help="A known recipe: touch (events of a board), gait_plate (counts), gait_insole (N), gait_channel (any "
+            "other); or a TOML or JSON file (its path holds a dot or a slash): [encoder], [learner], [neurons.LABEL], "
+            "run_threshold. Without it and --encoder: the one that fits the recording."
         ),
     ] = None,
     encoder: Annotated[str | None, typer.Option(help="The encoder's name, short for --set encoder.name=NAME.")] = None,

@@ -96,8 +96,8 @@ class Recipe:
     def from_dict(cls, values: Mapping[str, Any]) -> Recipe:
         """Build a recipe from plain values with the keys ``encoder learner neurons run_threshold about source``.
 
-        The encoder is a table with its `name` and parameters. What a recipe's file says of the recordings that it
-        `fits` and of any `other` label is for `load`.
+        The encoder is a table with its `name` and parameters, where "none" stands for None: TOML has no word for it.
+        What a recipe's file says of the recordings that it `fits` and of any `other` label is for `load`.
 
         Raises
         ------
@@ -115,7 +115,8 @@ class Recipe:
                 "recipe: says no encoder: name one, as --encoder contact_area or [encoder] in the recipe"
             )
         own = {key: value for key, value in values.items() if key in known}
-        return cls(**{**own, "encoder": Encoder.from_json(parameters(encoder))})
+        stated = {name: None if value == "none" else value for name, value in encoder.items()}
+        return cls(**{**own, "encoder": Encoder.from_json(parameters(stated))})
 
     @classmethod
     def load(
