@@ -62,7 +62,7 @@ def test_the_recipe_is_chosen_for_events_and_has_a_neuron_for_every_label() -> N
     recipe = Recipe.load("touch", labels=["contact", "Lift", "ball"])
     assert isinstance(recipe.encoder, taxel.encode.Moments)
     assert recipe.encoder.displacement_mm is None
-    assert [recipe.learner_of(label)[1] for label in ("contact", "Lift", "ball")] == [3.0, 3.0, 6.0]
+    assert [recipe.learner_of(label)[1] for label in ("contact", "Lift", "ball")] == [2.0, 4.0, 6.0]
 
 
 @pytest.mark.slow
