@@ -1,0 +1,92 @@
+"""Grasps of an iCub hand, 60 taxels on five fingers, one object a file (icub_grasp_dataset).
+
+A file ``OBJECT.csv.gz`` (or ``.csv``) holds grasps, slice by slice: trial, slice, nine joint angles, the largest of
+each finger, and twelve taxels a finger, thumb to little finger. The source gives no times and no rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from taxel import _arguments as arguments
+from taxel._core import FormatError
+from taxel.array import Array
+from taxel.formats import text
+from taxel.formats.trial import Trial
+from taxel.frames import Frames
+
+__all__ = ["FINGERS", "files", "trials"]
+
+#: Rows of the array, twelve taxels each.
+FINGERS = ("thumb", "index", "middle", "ring", "little")
+_TAXELS = tuple(f"{finger}_{k}" for finger in FINGERS for k in range(1, 13))
+_JOINTS = tuple(f"joint{k}" for k in range(7, 16))
+
+
+def files(path: Path) -> list[Path]:
+    """Find the files of this format: tables whose first line names trial, slice and the thumb's taxels."""
+    found = sorted([*path.glob("*.csv.gz"), *path.glob("*.csv")]) if path.is_dir() else [path]
+    return [f for f in found if f.name.endswith((".csv", ".csv.gz")) and _begins_so(f)]
+
+
+def _begins_so(path: Path) -> bool:
+    try:
+        head = text.lines(path)[:1]
+    except (FormatError, OSError):
+        return False
+    return bool(head) and head[0].startswith("trial,slice,") and "thumb_1" in head[0]
+
+
+def trials(path: str | Path) -> Iterator[Trial]:
+    """Read the grasps of one object's file, or of all in a folder, one after the other.
+
+    Pictures are 5 x 12 (fingers by rows), 255 less the raw value, so that they rise with pressure. Their times count
+    slices: 0, 1, 2 ... us, for want of any.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Yields
+    ------
+    Trial
+        `about` names the object; `series` has the joints, degrees.
+
+    Raises
+    ------
+    FormatError : a file that does not hold what it should (names file and line)
+    """
+    place = Path(arguments.path("path", path))
+    found = files(place)
+    if not found:
+        raise FormatError(f"{place}: no table of grasps (OBJECT.csv.gz) in it")
+    for file in found:
+        name = file.name.removesuffix(".gz").removesuffix(".csv")
+        grasps: dict[str, list[dict[str, str]]] = {}
+        for row in text.table(file, ["trial", "slice", *_JOINTS, *_TAXELS]):
+            grasps.setdefault(row["trial"], []).append(row)
+        for number, rows in grasps.items():
+            for k, row in enumerate(rows):
+                if text.number(row["slice"], file, int(row["line"]), "slice") != k:
+                    raise FormatError(f"{file.name}, line {row['line']}: slice is {row['slice']}, must be {k}")
+
+            def column(names: tuple[str, ...], rows: list[dict[str, str]] = rows, file: Path = file) -> np.ndarray:
+                return np.array([[text.number(r[n], file, int(r["line"]), n) for n in names] for r in rows])
+
+            raw, joints = column(_TAXELS), column(_JOINTS)
+            yield Trial(
+                f"{name}/{number}",
+                "",
+                Frames(
+                    255.0 - raw.reshape(len(rows), len(FINGERS), -1),
+                    np.arange(len(rows)),
+                    array=Array(len(FINGERS), 12, name="iCub hand"),
+                ),
+                {},
+                "",
+                series=dict(zip(_JOINTS, joints.T, strict=True)),
+                about={"object": name},
+            )

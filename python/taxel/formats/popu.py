@@ -1,0 +1,83 @@
+"""Pictures of people lying on a mat of 64 x 27 taxels, no movement (PoPu).
+
+A file ``*.npz`` holds ``readings``, uint8, poses x snapshots x rows x columns, and ``pose``, their names: left, prone,
+right and supine, a number and a variant (``supine3_1``), and the empty mat.
+"""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from taxel import _arguments as arguments
+from taxel._core import FormatError
+from taxel.array import Array
+from taxel.formats.trial import Trial
+from taxel.frames import Frames
+
+__all__ = ["files", "trials"]
+
+_NAME = re.compile(r"([a-z]+)(\d*)(?:_(\d+))?")
+
+
+def files(path: Path) -> list[Path]:
+    """Find the files of this format: a .npz with ``readings`` and ``pose``."""
+    found = sorted(path.glob("*.npz")) if path.is_dir() else [path]
+    return [f for f in found if f.suffix == ".npz" and _holds_poses(f)]
+
+
+def _holds_poses(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as file:
+            return {"readings.npy", "pose.npy"} <= set(file.namelist())
+    except (OSError, zipfile.BadZipFile):
+        return False
+
+
+def trials(path: str | Path) -> Iterator[Trial]:
+    """Read the poses of a file, or of all in a folder, one after the other.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Yields
+    ------
+    Trial
+        Its pictures are snapshots of the same lying person; their times count them, 0, 1, 2 ... us, for want of any.
+        `about` has the posture, the pose (without its variant) and the variant.
+
+    Raises
+    ------
+    FormatError : a file that does not hold what it should
+    """
+    place = Path(arguments.path("path", path))
+    found = files(place)
+    if not found:
+        raise FormatError(f"{place}: no .npz with readings and pose in it")
+    for file in found:
+        try:
+            with np.load(file, allow_pickle=False) as held:
+                readings, names = held["readings"], held["pose"]
+        except (ValueError, OSError, EOFError, zipfile.BadZipFile, KeyError) as error:
+            said = str(error).split("\n", maxsplit=1)[0]
+            raise FormatError(f"{file.name}: cannot be unpacked ({said}); get it again") from None
+        if readings.ndim != 4 or readings.dtype.kind not in "ui" or names.shape != readings.shape[:1]:
+            raise FormatError(f"{file.name}: readings must be poses x snapshots x rows x columns, with a name a pose")
+        array = Array(readings.shape[2], readings.shape[3], name="bed mat")
+        for name, pictures in zip(names, readings, strict=True):
+            match = _NAME.fullmatch(str(name))
+            if match is None:
+                raise FormatError(f"{file.name}: pose {arguments.shown(str(name))}; must be named like supine3_1")
+            yield Trial(
+                str(name),
+                "",
+                Frames(pictures, np.arange(len(pictures)), array=array),
+                {},
+                "",
+                about={"posture": match[1], "pose": f"{match[1]}{match[2]}", "variant": match[3] or ""},
+            )
