@@ -88,7 +88,7 @@ STUDY = Study(
         "aligned on contact, the middle of the heel in one column, a picture of rest before each (the plate records "
         "none); change events with a floor of 25 counts, phases drawn. Hand: which object, by slice, as the source "
         "gives no times; changes since the first slice, as that one names the object by itself. Mat: which of four "
-        "postures, whole poses with all their variants left out; it has no time, so only the number of taxels is asked. "
+        "postures, whole poses with all their variants left out; it has no time, so only the number of taxels counts. "
         "What was tried beforehand is our own, with other code, and stands where else published values stand."
     ),
     parameters=PARAMETERS,
