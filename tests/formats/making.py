@@ -126,3 +126,31 @@ def write_pedar(folder: Path, change=lambda rows: rows) -> Path:
     file = folder / "walk.asc"
     file.write_bytes("\n".join(change(head + rows)).replace("date", "\u00e4date").encode("latin-1"))
     return file
+
+
+_ICUB = [
+    "trial",
+    "slice",
+    *(f"joint{k}" for k in range(7, 16)),
+    *(f"max_{f}" for f in ("thumb", "index", "middle", "ring", "little")),
+]
+_ICUB += [f"{f}_{k}" for f in ("thumb", "index", "middle", "ring", "little") for k in range(1, 13)]
+
+
+def write_icub(place, name, trials, packed=True):
+    """Write grasps of one object by number, each slices of 60 raw values."""
+    rows = [",".join(_ICUB)]
+    for number, slices in trials.items():
+        for k, values in enumerate(slices):
+            rows.append(",".join(map(str, [number, k, *([1.5] * 9), *([14] * 5), *values])))
+    text = ("\n".join(rows) + "\n").encode()
+    path = place / f"{name}.csv{'.gz' if packed else ''}"
+    path.write_bytes(gzip.compress(text) if packed else text)
+    return path
+
+
+def write_popu(place, readings, names):
+    """Write readings, poses x snapshots x rows x columns, with a name a pose."""
+    path = place / "poses.npz"
+    np.savez(path, readings=np.asarray(readings, np.uint8), pose=np.array(names))
+    return path

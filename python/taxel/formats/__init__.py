@@ -4,7 +4,7 @@ Examples
 --------
 >>> from taxel import formats
 >>> sorted(formats.FORMATS)
-['gaitndd', 'gaitpdb', 'moticon', 'pedar', 'plate']
+['gaitndd', 'gaitpdb', 'icub', 'moticon', 'pedar', 'plate', 'popu']
 """
 
 from __future__ import annotations
@@ -56,6 +56,8 @@ FORMATS = {
         "gaitndd",
         "moticon",
         "pedar",
+        "icub",
+        "popu",
     )
 }
 
