@@ -128,29 +128,27 @@ def write_pedar(folder: Path, change=lambda rows: rows) -> Path:
     return file
 
 
-_ICUB = [
-    "trial",
-    "slice",
-    *(f"joint{k}" for k in range(7, 16)),
-    *(f"max_{f}" for f in ("thumb", "index", "middle", "ring", "little")),
-]
-_ICUB += [f"{f}_{k}" for f in ("thumb", "index", "middle", "ring", "little") for k in range(1, 13)]
+#: The columns of a table of grasps.
+ICUB = ["trial", "slice", *(f"joint{k}" for k in range(7, 16))]
+ICUB += [f"max_{finger}" for finger in ("thumb", "index", "middle", "ring", "little")]
+ICUB += [f"{finger}_{k}" for finger in ("thumb", "index", "middle", "ring", "little") for k in range(1, 13)]
 
 
-def write_icub(place, name, trials, packed=True):
+def write_icub(folder: Path, name="ball", trials=None, packed=True) -> Path:
     """Write grasps of one object by number, each slices of 60 raw values."""
-    rows = [",".join(_ICUB)]
-    for number, slices in trials.items():
+    rows = [",".join(ICUB)]
+    for number, slices in ({1: 242 - np.arange(180).reshape(3, 60) // 9} if trials is None else trials).items():
         for k, values in enumerate(slices):
             rows.append(",".join(map(str, [number, k, *([1.5] * 9), *([14] * 5), *values])))
     text = ("\n".join(rows) + "\n").encode()
-    path = place / f"{name}.csv{'.gz' if packed else ''}"
-    path.write_bytes(gzip.compress(text) if packed else text)
-    return path
+    file = folder / f"{name}.csv{'.gz' if packed else ''}"
+    file.write_bytes(gzip.compress(text) if packed else text)
+    return file
 
 
-def write_popu(place, readings, names):
+def write_popu(folder: Path, readings=None, names=("left1_0", "supine2_1")) -> Path:
     """Write readings, poses x snapshots x rows x columns, with a name a pose."""
-    path = place / "poses.npz"
-    np.savez(path, readings=np.asarray(readings, np.uint8), pose=np.array(names))
-    return path
+    file = folder / "poses.npz"
+    given = np.arange(48).reshape(2, 2, 4, 3) if readings is None else readings
+    np.savez(file, readings=np.asarray(given, np.uint8), pose=np.array(names))
+    return file
