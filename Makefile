@@ -46,7 +46,7 @@ slow: build
 
 lint: build
 	cargo fmt --all --check
-	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs  # the registry's macro hides them from cargo
+	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
@@ -58,7 +58,7 @@ lint: build
 
 format:
 	cargo fmt --all
-	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs
+	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from _peer import missing
 from _rounds import measure, ratio, stamp
 
-from taxel import SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeR
 
 WEIGHTS = 184
@@ -136,13 +136,13 @@ def whole(cone, pattern, targets):
 def run(*, quick):
     """Measure; quick: a tenth of the footfalls, one round."""
     warnings.simplefilter("ignore")
-    cone = ConeR(tau=70.0, after_spike="reset", kappa=1.2)
+    cone = ConeR(neuron=Neuron(tau=70.0, after_spike="reset"), kappa=1.2)
     patterns, targets = walk(6 if quick else 60, WEIGHTS)
     absent = missing(PEERS)
     runs = dict(zip(PEERS, whole(cone, patterns[0], targets[0]), strict=True))
     peers = {name: run for name, run in runs.items() if name not in absent}
     rows = cone.prepare(patterns, targets)
-    start = rows.fit(ConeR(tau=70.0, after_spike="reset", kappa=1.25))
+    start = rows.fit(ConeR(neuron=Neuron(tau=70.0, after_spike="reset"), kappa=1.25))
     results = measure(
         {
             "ConeR": lambda: cone.fit(patterns, targets),
@@ -154,7 +154,7 @@ def run(*, quick):
     )
     mine = cone.objective_
     long, at = walk(60 if quick else 1150, 96, seed=1)
-    large = ConeR(tau=30.0, after_spike="reset", divide_b_by="targets")
+    large = ConeR(neuron=Neuron(tau=30.0, after_spike="reset"), divide_b_by="targets")
     begun = time.process_time()
     large.fit(long, at)
     return {

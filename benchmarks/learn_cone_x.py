@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from _peer import ask, missing
 from _rounds import WIDEST, measure, stamp
 
-from taxel import SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX, check_certificate
 
 TAU, THETA_0, THETA_PLUS, REFRACTORY, BOUND, END = 15.0, 0.3, 0.2, 3.0, 0.3, 200
@@ -229,7 +229,7 @@ def peer(name, n, p):
 def against(n, p, limit, rounds, peers):
     """Measure one case: ConeX in rounds, then each peer once."""
     patterns, targets = trains(*draw(n, p))
-    cone = ConeX(time="grid", horizon=float(END))
+    cone = ConeX(neuron=Neuron(time="grid"), horizon=float(END))
     results = measure({"ConeX": lambda: cone.fit(patterns, targets)}, rounds=rounds)
     ours = results["ConeX"]
     out = {"ConeX": {**ours, "verdict": cone.status_, "rounds": cone.rounds_, "held": len(cone.held_)}}
@@ -261,7 +261,7 @@ def growth(most):
             for n in (n for n in GROWTH if n <= most):
                 p = round(share * n / 3) * 3
                 patterns, targets = trains(*draw(n, p))
-                cone = ConeX(time=clock, horizon=float(END))
+                cone = ConeX(neuron=Neuron(time=clock), horizon=float(END))
                 begun = time.thread_time()
                 cone.fit(patterns, targets)
                 table.append(

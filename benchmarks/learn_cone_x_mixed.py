@@ -14,7 +14,7 @@ import numpy as np
 from _peer import ask, missing
 from _rounds import WIDEST, measure, stamp
 
-from taxel import SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX
 
 TAU, THETA_0, THETA_PLUS, REFRACTORY, BOUND, END = 15.0, 0.3, 0.2, 3.0, 0.3, 200.0
@@ -70,7 +70,7 @@ def case(trains, patterns, lambdas, rounds, limit):
     """One size and mix: ConeX, then the peer once (a limit of 0: not at all)."""
     spikes, targets = draw(trains, patterns)
     examples = [SpikeTrains.from_lists([[s] for s in one], stop=END) for one in spikes], [[t] for t in targets]
-    cone = ConeX(time="grid", horizon=END, lambdas=lambdas, kappa=KAPPA)
+    cone = ConeX(neuron=Neuron(time="grid"), horizon=END, lambdas=lambdas, kappa=KAPPA)
     ours = measure({"ConeX": lambda: cone.fit(*examples)}, rounds=rounds)["ConeX"]
     said = {
         "status": cone.status_,

@@ -13,7 +13,9 @@ import numpy as np
 from _rounds import stamp
 
 from taxel import SpikeTrains
+from taxel.detect.training import learner_from
 from taxel.learn import ConeR, OnlineConeR
+from taxel.neuron import Neuron
 from taxel.studies.gait.recipes import NOTES
 from taxel.studies.gait.sources import encoded
 
@@ -27,11 +29,11 @@ def recorded(event):
         return None
     point = NOTES["plate"][event]
     data = encoded(folder, "plate", point["encoder"])
-    learner = dict(point["learner"])
-    later = data.latency_ms + learner.pop("delay_ms")
+    cone, delay_ms = learner_from("point", point["learner"])
+    later = data.latency_ms + delay_ms
     pieces = [p for p in data.pieces.values() if len(p.spikes.times) and len(p.truth[event])]
     order = np.random.default_rng(0).permutation(len(pieces))
-    return learner, [(pieces[k].spikes, pieces[k].truth[event] + later) for k in order]
+    return cone.get_params(deep=False), [(pieces[k].spikes, pieces[k].truth[event] + later) for k in order]
 
 
 def drawn():
@@ -45,7 +47,7 @@ def drawn():
         off = np.minimum(t + (0.35 + 0.65 * place**0.7) * stance + random.normal(0, 8, 92), t + stance)
         spikes = [[x] for x in on] + [[max(x, y + 2)] for x, y in zip(off, on, strict=True)]
         footfalls.append((SpikeTrains.from_lists(spikes, stop=t + stance + 300), np.array([t + 24])))
-    return {"tau": 70.0, "after_spike": "reset", "divide_b_by": "targets"}, footfalls
+    return {"neuron": Neuron(tau=70.0, after_spike="reset"), "divide_b_by": "targets"}, footfalls
 
 
 def cpu(call):

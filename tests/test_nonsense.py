@@ -67,9 +67,25 @@ LEVELS = taxel.encode.LevelCrossing([0.5])
 READOUT = taxel.Readout(LEVELS, {"a": (taxel.Neuron(tau=2.0), [0.5] * 32)}, array=ARRAY)
 RECIPE = taxel.detect.Recipe(LEVELS, {"tau": 5.0}, {"a": {"ub": 1.0}})
 EXAMPLE = taxel.detect.Example(taxel.Frames(np.eye(4)[:, :, None] * np.ones(4), [0, 9000, 18000, 27000]), {"a": [9000]})
-CONE = taxel.learn.ConeR(tau=5.0, ub=1.0)
-CONE_X = taxel.learn.ConeX(tau=5.0, ub=1.0)
+CONE_OPTIONS: dict[str, Any] = {
+    "kappa": 1.2,
+    "delta_t_ms": 1.0,
+    "lambdas": [1.0, 1.0, 1.0, 1.0, 1.0],
+    "lb": -1.0,
+    "ub": 1.0,
+    "divide_b_by": "targets",
+    "norm": "square",
+    "margin": 0.01,
+    "horizon": 30.0,
+    "tolerance": 1e-6,
+    "engine": "native",
+    "max_seconds": 60.0,
+}
+CONE = taxel.learn.ConeR(neuron=taxel.Neuron(tau=5.0), ub=1.0)
+CONE_X = taxel.learn.ConeX(neuron=taxel.Neuron(tau=5.0), ub=1.0)
 PLAIN = TRAINS.split_by_sign()
+FITTED = taxel.learn.ConeR(neuron=taxel.Neuron(tau=5.0), ub=1.0).fit([PLAIN], [[5.0]])
+SOLVED = taxel.learn.ConeX(neuron=taxel.Neuron(tau=5.0), lb=-9.0, ub=9.0).fit([PLAIN], [[5.0]])
 REFUTED = taxel.learn.ConeX().fit([UNSIGNED], [[0.5]])
 SCENE = taxel.simulate.Scene.draw(1)
 REGISTERS = taxel.wire.Registers()
@@ -260,6 +276,7 @@ SOUND: dict[str, Sound] = {
     "taxel.Labels.of": lambda: (taxel.Labels("here_labels.csv").of, {"recording": taxel.open("here_events.npz")}),
     "taxel.encode.Encoder.encode": method(LEVELS, "encode", x=FRAMES),
     "taxel.encode.Encoder.from_json": plain(taxel.encode.Encoder.from_json, text=LEVELS.to_json()),
+    "taxel.encode.Encoder.transform": method(LEVELS, "transform", recordings=[FRAMES]),
     "taxel.encode.Encoder.stream": method(LEVELS, "stream", array=ARRAY),
     "taxel.encode.Encoder.trains": method(LEVELS, "trains", array=ARRAY),
     "taxel.encode.Encoder.with_tare": method(LEVELS, "with_tare", tare=TARE),
@@ -310,41 +327,22 @@ SOUND: dict[str, Sound] = {
     "taxel.learn.Tempotron.fit": method(
         TEMPOTRON, "fit", patterns=[PLAIN], labels=[True], start=[0.1] * 4, progress=lambda *_: None
     ),
+    "taxel.learn.Tempotron.score": method(TEMPOTRON, "score", patterns=[PLAIN], labels=[True]),
     "taxel.learn.Tempotron.predict": method(TEMPOTRON, "predict", patterns=[PLAIN]),
     "taxel.learn.Tempotron.peak": method(TEMPOTRON, "peak", weights=[0.1] * 4, pattern=PLAIN),
     "taxel.learn.Tempotron.change": method(TEMPOTRON, "change", weights=[0.1] * 4, pattern=PLAIN, label=True),
     "taxel.learn.ConeR": plain(
         taxel.learn.ConeR,
-        tau=5.0,
-        theta_0=0.3,
-        theta_plus=0.2,
-        tau_rec=10.0,
-        refractory=3.0,
-        after_spike="reset",
-        first_threshold="theta_0",
-        step_ms=1.0,
-        kernel="double_exponential",
-        tau_s=1.0,
-        kappa=1.2,
-        delta_t_ms=1.0,
-        lambdas=[1.0, 1.0, 1.0, 1.0, 1.0],
-        lb=-1.0,
-        ub=1.0,
-        divide_b_by="targets",
-        norm="square",
-        margin=0.01,
-        horizon=30.0,
-        tolerance=1e-6,
-        engine="native",
-        max_seconds=60.0,
+        neuron=taxel.Neuron(tau=5.0),
+        **CONE_OPTIONS,
     ),
-    "taxel.learn.OnlineConeR": plain(taxel.learn.OnlineConeR, window=3),
+    "taxel.learn.OnlineConeR": plain(taxel.learn.OnlineConeR, window=3, neuron=taxel.Neuron(tau=5.0), **CONE_OPTIONS),
     "taxel.learn.OnlineConeR.partial_fit": lambda: (
-        taxel.learn.OnlineConeR(window=3, tau=5.0, ub=1.0).partial_fit,
+        taxel.learn.OnlineConeR(neuron=taxel.Neuron(tau=5.0), window=3, ub=1.0).partial_fit,
         {"pattern": PLAIN, "targets": [5.0]},
     ),
     "taxel.learn.OnlineConeR.fit": method(
-        taxel.learn.OnlineConeR(window=3, tau=5.0, ub=1.0),
+        taxel.learn.OnlineConeR(neuron=taxel.Neuron(tau=5.0), window=3, ub=1.0),
         "fit",
         patterns=[PLAIN],
         targets=[[5.0]],
@@ -361,17 +359,7 @@ SOUND: dict[str, Sound] = {
     ),
     "taxel.learn.ConeX": plain(
         taxel.learn.ConeX,
-        kernel="alpha",
-        tau=5.0,
-        tau_s=1.0,
-        theta_0=0.3,
-        theta_plus=0.2,
-        tau_rec=10.0,
-        refractory=3.0,
-        after_spike="reset",
-        first_threshold="theta_0",
-        time="continuous",
-        step_ms=1.0,
+        neuron=taxel.Neuron(tau=5.0),
         kappa=1.2,
         delta_t_ms=1.0,
         lambdas=[1.0, 1.0, 1.0],
@@ -388,6 +376,8 @@ SOUND: dict[str, Sound] = {
     "taxel.learn.ConeX.fit": method(
         CONE_X, "fit", patterns=[PLAIN], targets=[[5.0]], start=REFUTED, progress=lambda *_: None
     ),
+    "taxel.learn.ConeX.predict": method(SOLVED, "predict", patterns=[PLAIN]),
+    "taxel.learn.ConeR.predict": method(FITTED, "predict", patterns=[PLAIN]),
     "taxel.learn.ConeXProblem": plain(taxel.learn.ConeXProblem, cone=CONE_X, patterns=[PLAIN], targets=[[5.0]]),
     "taxel.learn.ConeXProblem.row": method(REFUTED.problem_, "row", row=("silence", 0, 5.0), margin=True),
     "taxel.learn.ConeXProblem.target": method(REFUTED.problem_, "target", pattern=0, target=0),
@@ -397,6 +387,8 @@ SOUND: dict[str, Sound] = {
     "taxel.learn.check_certificate": plain(
         taxel.learn.check_certificate, problem=REFUTED.problem_, certificate=REFUTED.certificate_, margin=True
     ),
+    "taxel.metrics.matching": plain(taxel.metrics.matching, spikes=[[1.0, 2.0]], targets=[[1.5]], window_ms=5.0),
+    "taxel.metrics.f1": plain(taxel.metrics.f1, spikes=[[1.0, 2.0]], targets=[[1.5]], window_ms=5.0),
     "taxel.metrics.victor_purpura": plain(taxel.metrics.victor_purpura, a=[1.0, 2.0], b=[1.5], q=0.1),
     "taxel.metrics.victor_purpura_multi_unit": plain(
         taxel.metrics.victor_purpura_multi_unit, a=UNSIGNED, b=UNSIGNED, q=0.1, k=0.5
@@ -686,6 +678,9 @@ LEFT_OUT = {
     "taxel.detect.Learner": "a protocol",
     "taxel.formats.Format": "a result",
     "taxel.formats.Trial": "a result",
+    "taxel.NotFittedError": "raised, not called",
+    "taxel.encode.Encoder.fit": "does nothing",
+    "taxel.metrics.Matching": "a result",
     "taxel.learn.Certificate": "a result",
     "taxel.learn.Margin": "a result",
     "taxel.learn.Row": "a name, checked by ConeXProblem.row",

@@ -6,6 +6,7 @@ import inspect
 import json
 import math
 import pickle
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
@@ -28,14 +29,23 @@ def of(kind: type[Parameters]) -> Iterator[type[Parameters]]:
 #: Every class with parameters.
 KINDS = sorted(set(of(Parameters)), key=lambda kind: kind.__name__)
 #: What has no default, for those that ask for some.
-REQUIRED: dict[str, dict[str, Any]] = {
-    "LevelCrossing": {"levels": [1.0]},
-    "ThresholdIzhikevich": {"levels": [1.0]},
+REQUIRED: dict[str, Any] = {
+    "levels": [1.0],
+    "eta": 0.1,
+    "epochs": 5,
+    "updates": "batch",
+    "initial": (0.0, 1.0),
+    "tau": 10.0,
+    "tau_s": 5.0,
+    "theta_0": 1.0,
+    "rule": "E",
+    "tau_a": 5.0,
+    "window_ms": 1.0,
 }
 
 
 def make(kind: type[Parameters], **changes: Any) -> Any:
-    return kind(**{**REQUIRED.get(kind.__name__, {}), **changes})
+    return kind(**{**{name: REQUIRED[name] for name in described(kind._kind)["required"]}, **changes})
 
 
 def ranged() -> list[Any]:
@@ -60,7 +70,9 @@ def test_the_signature_shows_what_the_compiled_part_has(kind):
     """Names and defaults of the constructor, one by one; a group is None, which stands for its defaults."""
     known = described(kind._kind)
     shown = {name: entry.default for name, entry in inspect.signature(kind).parameters.items()}
-    assert [name for name, default in shown.items() if default is inspect.Parameter.empty] == known["required"]
+    assert [name for name, default in sorted(shown.items()) if default is inspect.Parameter.empty] == sorted(
+        known["required"]
+    )
     assert set(shown) - set(known["required"]) == set(known["defaults"])
     for name, default in known["defaults"].items():
         wanted = tuple(default) if isinstance(default, list) else None if isinstance(default, dict) else default
@@ -77,29 +89,38 @@ def test_a_value_outside_its_range_is_refused_in_the_table_s_words(kind, name):
     if "most" in rules:
         wrong.append(rules["most"] * 2 + 1 if rules["most_in"] else rules["most"])
     default = described(kind._kind)["defaults"].get(name)
+    whole = get_type_hints(kind)[name] in (int, int | None)
     for value in wrong:
-        given = int(value) if isinstance(default, int) and math.isfinite(value) else value
+        given = int(value) if whole and math.isfinite(value) else value
         with pytest.raises(taxel.ProblemError) as error:
             make(kind, **{name: [given] * len(default) if isinstance(default, list) else given})
         assert name in str(error.value)
         assert "\n" not in str(error.value)
-        if math.isfinite(value) and not (isinstance(default, int) and value < 0):
+        if math.isfinite(value) and not (whole and value < 0):
             assert f"must be {rules['must_be']}" in str(error.value)
+
+
+def documented(kind: Any, name: str) -> str:
+    """What the documentation says of a parameter, where need be that of the class that it refers to."""
+    lines = inspect.getdoc(kind).split("Attributes\n")[0].split("Returns\n")[0].splitlines()
+    (place,) = (k for k, line in enumerate(lines) if re.match(rf"(\w+, )*{name}\b(, \w+)*( : |$)", line))
+    there = re.search(r"[Aa]s (?:in|for) `(\w+)`", " ".join(lines[place + 1 : place + 3]))
+    if there and not re.search(r"\d", lines[place].partition(" : ")[2]):
+        return documented(getattr(taxel.learn, there[1]), name)
+    return lines[place]
 
 
 @pytest.mark.parametrize(("kind", "name"), ranged())
 def test_the_documentation_says_the_table_s_range_and_unit(kind, name):
     rules = described(kind._kind)["ranges"][name]
-    lines = inspect.getdoc(kind).splitlines()
-    said = [line for line in lines if " : " in line and name in line.split(" : ")[0].split(", ")]
-    assert len(said) == 1, f"{name}: must be documented once"
+    said = documented(kind, name)
     wanted = rules["must_be"].removesuffix(" and finite")
     if "number of us" in wanted:
         wanted = "whole us"
     if wanted != "finite":
-        assert wanted.replace(" and ", ", ") in said[0].replace(" and ", ", "), f"{said[0]}: {wanted}"
+        assert wanted.replace(" and ", ", ") in said.replace(" and ", ", "), f"{said}: {wanted}"
     if rules["unit"]:
-        assert f", {rules['unit']}" in said[0].replace("percent", "%"), said[0]
+        assert f", {rules['unit']}" in said.replace("percent", "%"), said
 
 
 @pytest.mark.parametrize("kind", KINDS)

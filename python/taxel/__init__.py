@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from taxel import detect, device, encode, formats, information, learn, live, metrics, simulate, wire, wire_v2
 from taxel._convert import convert
-from taxel._core import DeviceError, Error, FormatError, ProblemError, SceneError
+from taxel._core import DeviceError, Error, FormatError, NotFittedError, ProblemError, SceneError
 from taxel._health import Health, health
 from taxel.array import Array
 from taxel.detect import Readout
@@ -39,6 +39,7 @@ __all__ = [
     "Label",
     "Labels",
     "Neuron",
+    "NotFittedError",
     "Note",
     "ProblemError",
     "Readout",

@@ -42,7 +42,10 @@ T = TypeVar("T")
 
 def shown(value: object) -> str:
     """Return what a value looks like in an error: one line, not long."""
-    said = " ".join(repr(value).split())
+    try:
+        said = " ".join(repr(value).split())
+    except Exception:  # a class of the caller's may fail in any way, and a list may hold itself too deeply
+        return f"a {type(value).__name__} that cannot be shown"
     return said if len(said) <= 60 else f"{said[:57]}..."
 
 

@@ -12,10 +12,10 @@ from types import SimpleNamespace
 from typing import Any, ClassVar, Self
 
 from taxel import _core
-from taxel._arguments import flag, instance, parameters, shown
+from taxel._arguments import bare, flag, instance, parameters, shown
 from taxel._core import ProblemError
 
-__all__ = ["Parameters", "Value", "defaults", "described"]
+__all__ = ["Parameters", "Value", "defaults", "described", "ranges"]
 
 
 @cache
@@ -35,6 +35,14 @@ def defaults(kind: str) -> Any:
         return tuple(value) if isinstance(value, list) else None if isinstance(value, dict) else value
 
     return SimpleNamespace(**{name: plain(value) for name, value in described(kind)["defaults"].items()})
+
+
+def ranges(kind: str) -> dict[str, Any]:
+    """Return the ranges of a noun's parameters by name; none where it is not known."""
+    try:
+        return dict(described(kind)["ranges"])
+    except ProblemError:
+        return {}
 
 
 class Parameters:
@@ -81,11 +89,15 @@ class Parameters:
     def _plain(self) -> dict[str, Any]:
         """Return the parameters as the compiled part reads them; a group that is left out has its defaults there."""
         plain: dict[str, Any] = {}
+        units = ranges(self._kind)
         for name, value in self._values().items():
             if value is None and self._stands_for(name) is not None:
                 continue
             group = self._nested.get(name)
-            plain[name] = value if group is None or value is None else instance(name, value, group)._plain()
+            if group is not None and value is not None:
+                plain[name] = instance(name, value, group)._plain()
+            else:
+                plain[name] = bare(name, value, units.get(name, {}).get("unit") or None)
         return plain
 
     def _json(self) -> str:

@@ -11,22 +11,22 @@ def kernel(cone, x):
     """The kernel, x ms after an input (6.5; the Tempotron's); 0 up to the input itself."""
     x = np.asarray(x, float)
     late = np.maximum(x, 0)
-    if cone.kernel == "alpha":
-        return np.where(x > 0, late / cone.tau * np.exp(-late / cone.tau), 0.0)
-    if cone.kernel == "exponential":
-        return np.where(x > 0, np.exp(-late / cone.tau), 0.0)
-    tau_s = cone.tau / 4 if cone.tau_s is None else cone.tau_s
-    top = cone.tau * tau_s / (cone.tau - tau_s) * np.log(cone.tau / tau_s)
-    shape = lambda t: np.exp(-t / cone.tau) - np.exp(-t / tau_s)  # noqa: E731
+    if cone.neuron_.kernel == "alpha":
+        return np.where(x > 0, late / cone.neuron_.tau * np.exp(-late / cone.neuron_.tau), 0.0)
+    if cone.neuron_.kernel == "exponential":
+        return np.where(x > 0, np.exp(-late / cone.neuron_.tau), 0.0)
+    tau_s = cone.neuron_.tau / 4 if cone.neuron_.tau_s is None else cone.neuron_.tau_s
+    top = cone.neuron_.tau * tau_s / (cone.neuron_.tau - tau_s) * np.log(cone.neuron_.tau / tau_s)
+    shape = lambda t: np.exp(-t / cone.neuron_.tau) - np.exp(-t / tau_s)  # noqa: E731
     return np.where(x > 0, shape(late) / shape(top), 0.0)
 
 
 def counts(cone, s, fired):
     """Whether an input at s counts after these spikes; within 1e-6 ms of an edge it is at it."""
-    if cone.after_spike == "reset" and len(fired):
-        return s > fired[-1] + cone.refractory + 1e-6
-    if cone.after_spike == "ignore":
-        return not any(e + 1e-6 < s <= e + cone.refractory + 1e-6 for e in fired)
+    if cone.neuron_.after_spike == "reset" and len(fired):
+        return s > fired[-1] + cone.neuron_.refractory + 1e-6
+    if cone.neuron_.after_spike == "ignore":
+        return not any(e + 1e-6 < s <= e + cone.neuron_.refractory + 1e-6 for e in fired)
     return True
 
 
@@ -40,27 +40,27 @@ def row(cone, pattern, t, fired):
 
 
 def threshold(cone, t, fired, start):
-    spike = fired[-1] if len(fired) else (start if cone.first_threshold == "printed" else None)
-    since = -np.inf if spike is None else t - spike - cone.refractory
-    rec = 2 * cone.tau if cone.tau_rec is None else cone.tau_rec
-    return cone.theta_0 + (cone.theta_plus * np.exp(-since / rec) if since >= -1e-9 else 0.0)
+    spike = fired[-1] if len(fired) else (start if cone.neuron_.first_threshold == "printed" else None)
+    since = -np.inf if spike is None else t - spike - cone.neuron_.refractory
+    rec = 2 * cone.neuron_.tau if cone.neuron_.tau_rec is None else cone.neuron_.tau_rec
+    return cone.neuron_.theta_0 + (cone.neuron_.theta_plus * np.exp(-since / rec) if since >= -1e-9 else 0.0)
 
 
 def grid_rows(cone, patterns, targets):
     """Every row of 6.11: at the targets, behind them, at the silent points; and what each asks."""
-    delta = 0.1 * cone.tau if cone.delta_t_ms is None else cone.delta_t_ms
+    delta = 0.1 * cone.neuron_.tau if cone.delta_t_ms is None else cone.delta_t_ms
     at, behind, theta, silent, limit = [], [], [], [], []
     for p, (pattern, wanted) in enumerate(zip(patterns, targets, strict=True)):
         for k, t in enumerate(wanted):
             at.append(row(cone, pattern, t, wanted[:k]))
             behind.append(row(cone, pattern, t + delta, wanted[:k]))
             theta.append(threshold(cone, t, wanted[:k], pattern.start))
-        end = max([pattern.stop, *(wanted[-1:] + cone.tau)])
+        end = max([pattern.stop, *(wanted[-1:] + cone.neuron_.tau)])
         if cone.horizon is not None:
             end = np.broadcast_to(cone.horizon, len(patterns))[p]
-        for k in range(int((end - pattern.start) / cone.step_ms + 1e-9) + 1):
-            t = pattern.start + k * cone.step_ms
-            if any(e - 1e-9 <= t <= e + cone.refractory + 1e-9 for e in wanted):
+        for k in range(int((end - pattern.start) / cone.neuron_.step_ms + 1e-9) + 1):
+            t = pattern.start + k * cone.neuron_.step_ms
+            if any(e - 1e-9 <= t <= e + cone.neuron_.refractory + 1e-9 for e in wanted):
                 continue
             fired = [e for e in wanted if e < t]
             silent.append(row(cone, pattern, t, fired))

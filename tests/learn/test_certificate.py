@@ -6,16 +6,17 @@ import dataclasses
 
 import numpy as np
 import pytest
+from making import made
 from stated import examples
 
-from taxel import ProblemError, SpikeTrains
+from taxel import Neuron, ProblemError, SpikeTrains
 from taxel.learn import Certificate, ConeX, Row, check_certificate
 
 
 def refuted(seed=0, **options):
     """A problem beyond what its inputs can do."""
     patterns, targets = examples(seed, trains=12, patterns=8, targets=1)
-    cone = ConeX(lb=-1, ub=1, **options).fit(patterns, targets)
+    cone = made(ConeX, lb=-1, ub=1, **options).fit(patterns, targets)
     assert cone.status_ == "infeasible"
     return cone
 
@@ -92,7 +93,7 @@ def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spi
         (0.3, 30.0, "full weights come to"),
         (5.0, 10.0, "no input counts before it"),
     ):
-        cone = ConeX(time=time, after_spike=after_spike, lb=-ub, ub=ub).fit([trains], [[target]])
+        cone = ConeX(neuron=Neuron(time=time, after_spike=after_spike), lb=-ub, ub=ub).fit([trains], [[target]])
         assert cone.status_ == "infeasible"
         proof = cone.certificate_
         assert proof.rows == [Row("target", 0, 0)]
@@ -102,11 +103,11 @@ def test_a_target_out_of_reach_is_refuted_by_one_row_and_said_so(time, after_spi
         assert f"pattern 0 target 0 ({target:.0f} ms)" in str(proof)
         assert "Impossible at all" in proof.text
     # An input at the target itself adds nothing there.
-    cone = ConeX(time=time, lb=-9, ub=9).fit([trains], [[20.0]])
+    cone = ConeX(neuron=Neuron(time=time), lb=-9, ub=9).fit([trains], [[20.0]])
     assert cone.certificate_.rows == [Row("target", 0, 0)]
     # Least weights that are too much are refuted by one row as well.
     many = SpikeTrains.from_lists([[20.0]] * 9, stop=120.0)
-    cone = ConeX(time=time, lb=0.5, ub=0.6).fit([many], [[35.0]])
+    cone = ConeX(neuron=Neuron(time=time), lb=0.5, ub=0.6).fit([many], [[35.0]])
     assert "the least weights come to" in cone.certificate_.text
 
 

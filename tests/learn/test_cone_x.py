@@ -8,10 +8,11 @@ import time
 
 import numpy as np
 import pytest
+from making import made
 from stated import examples, grid_rows, row, shares, terms, threshold
 
 import taxel
-from taxel import ProblemError, SpikeTrains
+from taxel import Neuron, ProblemError, SpikeTrains
 from taxel.learn import ConeX, check_certificate
 
 clarabel = pytest.importorskip("clarabel")
@@ -95,7 +96,7 @@ OPTIONS = [
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_on_the_grid_verdict_and_objective_are_those_of_every_row_handed_whole_to_a_solver(options, seed):
     patterns, targets = examples(seed, whole_ms=seed % 2 == 0, patterns=2 if seed < 4 else 6)
-    cone = ConeX(**{"time": "grid", "tau": 12.0, "lb": -3.0, "ub": 3.0, **options}).fit(patterns, targets)
+    cone = made(ConeX, **{"time": "grid", "tau": 12.0, "lb": -3.0, "ub": 3.0, **options}).fit(patterns, targets)
     rows = grid_rows(cone, patterns, targets)
     assert (cone.status_ == "solved") == feasible(cone, rows)
     if cone.status_ == "infeasible":
@@ -121,7 +122,12 @@ def test_verdicts_over_the_edge_of_what_can_be_met_are_those_of_highs_and_each_n
         patterns, targets = examples(
             seed, trains=16, patterns=3 + seed % 4, targets=1 + seed % 2, whole_ms=seed % 3 == 0
         )
-        cone = ConeX(time="grid", after_spike=("keep", "ignore", "reset")[seed % 3], lb=-2.0, ub=2.0, lambdas=(0, 0, 0))
+        cone = ConeX(
+            neuron=Neuron(time="grid", after_spike=("keep", "ignore", "reset")[seed % 3]),
+            lb=-2.0,
+            ub=2.0,
+            lambdas=(0, 0, 0),
+        )
         cone.fit(patterns, targets)
         verdicts.append(cone.status_ == "solved")
         assert verdicts[-1] == feasible(cone, grid_rows(cone, patterns, targets)), seed
@@ -136,7 +142,7 @@ def test_verdicts_over_the_edge_of_what_can_be_met_are_those_of_highs_and_each_n
 def test_the_problem_states_the_rows_of_the_grid_by_pattern_and_time():
     patterns, targets = examples(3)
     for options in OPTIONS:
-        cone = ConeX(**{"time": "grid", "lb": -3.0, "ub": 3.0, **options}).fit(patterns, targets)
+        cone = made(ConeX, **{"time": "grid", "lb": -3.0, "ub": 3.0, **options}).fit(patterns, targets)
         problem, rows = cone.problem_, grid_rows(cone, patterns, targets)
         for k, (p, target) in enumerate([(0, 0), (0, 1), (1, 0), (1, 1)]):
             at, theta = problem.target(p, target)
@@ -147,7 +153,7 @@ def test_the_problem_states_the_rows_of_the_grid_by_pattern_and_time():
         end = np.broadcast_to(np.inf if cone.horizon is None else cone.horizon, 2)[1]
         for t in np.arange(0.0, min(end, 125.0), 7.0):
             fired = [e for e in targets[1] if e < t]
-            if any(e - 1e-9 <= t <= e + cone.refractory + 1e-9 for e in targets[1]):
+            if any(e - 1e-9 <= t <= e + cone.neuron_.refractory + 1e-9 for e in targets[1]):
                 with pytest.raises(ProblemError, match="lies at a target or in its refractory time"):
                     problem.silence(1, t)
                 continue
@@ -165,7 +171,11 @@ def test_the_problem_states_rows_at_any_instant_with_their_tapered_margin_and_sl
 ):
     patterns, targets = examples(5)
     cone = ConeX(
-        kernel=kernel, first_threshold=first_threshold, after_spike=after_spike, margin=0.02, slope=0.004, lb=-3, ub=3
+        neuron=Neuron(kernel=kernel, first_threshold=first_threshold, after_spike=after_spike),
+        margin=0.02,
+        slope=0.004,
+        lb=-3,
+        ub=3,
     )
     cone.fit(patterns, targets)
     wanted, near = targets[0], 1e-4
@@ -201,9 +211,9 @@ def test_a_start_from_an_earlier_fit_changes_the_way_but_not_the_result():
     patterns, targets = examples(6, trains=60, patterns=8, targets=2, duration=200.0)
     for options in ({}, {"lambdas": (2, 2, 200)}, {"time": "grid"}):
         common = {"lb": -1.0, "ub": 1.0, **options}
-        cold = ConeX(**common, kappa=1.1).fit(patterns, targets)
+        cold = made(ConeX, **common, kappa=1.1).fit(patterns, targets)
         assert cold.status_ == "solved"
-        again = ConeX(**common, kappa=1.1).fit(patterns, targets, start=cold)
+        again = made(ConeX, **common, kappa=1.1).fit(patterns, targets, start=cold)
         assert again.status_ == "solved"
         assert again.objective_ == pytest.approx(cold.objective_, rel=1e-7)
         assert again.rounds_ <= cold.rounds_
@@ -214,13 +224,16 @@ def test_a_start_from_an_earlier_fit_changes_the_way_but_not_the_result():
             (common, moved),
             ({**common, "refractory": 5.0}, targets),
         ):
-            fresh, warm = ConeX(**other).fit(patterns, times), ConeX(**other).fit(patterns, times, start=cold)
+            fresh, warm = (
+                made(ConeX, **other).fit(patterns, times),
+                made(ConeX, **other).fit(patterns, times, start=cold),
+            )
             assert warm.status_ == fresh.status_
             if fresh.status_ == "solved":
                 # In continuous time a little of the margin is left open.
                 near = 1e-7 if "time" in options else 1e-5 if "lambdas" not in options else 1e-3
                 assert warm.objective_ == pytest.approx(fresh.objective_, rel=near)
-    with pytest.raises(ProblemError, match="start: has not been fitted"):
+    with pytest.raises(ProblemError, match="start: not fitted yet, call fit first"):
         ConeX().fit(patterns, targets, start=ConeX())
 
 
@@ -261,15 +274,16 @@ def test_a_problem_in_another_unit_of_potential_has_the_same_answer_in_that_unit
     for seed in range(16):
         patterns, targets = examples(seed, trains=24, patterns=3 + seed % 6, targets=1)
         parameters = {"time": "grid", "lb": -2.0, "ub": 2.0, "margin": 2e-3, **options}
-        cone = ConeX(**parameters)
-        names = ("theta_0", "theta_plus", "lb", "ub", "margin")
-        potentials = {name: times * getattr(cone, name) for name in names}
-        if cone.time == "continuous":
+        cone = made(ConeX, **parameters)
+        of = cone.get_params()
+        names = ("neuron__theta_0", "neuron__theta_plus", "lb", "ub", "margin")
+        potentials = {name.removeprefix("neuron__"): times * of[name] for name in names}
+        if of["neuron__time"] == "continuous":
             potentials["slope"] = times * 1e-3  # the default
         if cone.divide_b_by == "targets":  # B is then a square of potentials, and no ratio
             potentials["lambdas"] = (1, 1, 1 / times**2)
         cone.fit(patterns, targets)
-        other = ConeX(**(parameters | potentials)).fit(patterns, targets)
+        other = made(ConeX, **parameters | potentials).fit(patterns, targets)
         said.add(cone.status_)
         assert other.status_ == cone.status_
         if cone.status_ == "infeasible":
@@ -279,7 +293,7 @@ def test_a_problem_in_another_unit_of_potential_has_the_same_answer_in_that_unit
         assert sum(other.lambdas) * other.objective_ == pytest.approx(sum(cone.lambdas) * cone.objective_, rel=1e-7)
         assert other.weights_ == pytest.approx(times * cone.weights_, rel=1e-3, abs=times * 1e-4)
         assert other.margin_.mv == pytest.approx(times * cone.margin_.mv, rel=1e-3, abs=times * 1e-9)
-        again = ConeX(**(parameters | potentials)).fit(patterns, targets, start=other)
+        again = made(ConeX, **parameters | potentials).fit(patterns, targets, start=other)
         assert again.weights_ == pytest.approx(other.weights_, rel=1e-4, abs=times * 1e-5)
     assert said == {"solved", "infeasible"}
 
@@ -356,7 +370,7 @@ def test_progress_is_told_round_by_round():
     [
         ({"tau": 0}, "tau is 0 ms: must be above 0"),
         ({"kernel": "exponential"}, 'kernel is "exponential" and time "continuous": its potential only jumps'),
-        ({"kernel": "box"}, "ConeX: kernel: unknown variant `box`, expected one of `alpha`"),
+        ({"kernel": "box"}, "neuron: kernel: unknown variant `box`, expected one of `alpha`"),
         ({"kappa": 0}, "kappa is 0"),
         ({"delta_t_ms": -1}, "delta_t_ms is -1"),
         ({"lambdas": (1, 2)}, "lambdas: invalid length 2, expected an array of length 3$"),
@@ -364,20 +378,20 @@ def test_progress_is_told_round_by_round():
         ({"lambdas": (1, 2, -3)}, r"lambdas\[2\] is -3"),
         ({"ub": float("inf")}, "ub is inf: must be finite"),
         ({"lb": [0.0, float("nan")]}, r"lb\[1\] is nan: must be finite"),
-        ({"lb": "low"}, "lb is 'low': must be a number"),
+        ({"lb": "low"}, "lb: a bound must be a number, or one a synapse, mV"),
         ({"margin": 0.0}, "margin is 0 mV: must be above 0 in continuous time"),
         ({"slope": -1.0}, "slope is -1 mV/ms"),
         ({"slope": 0.1, "time": "grid"}, 'slope is 0.1 mV/ms: belongs to time "continuous"'),
         ({"horizon": float("nan")}, "horizon is nan"),
-        ({"tolerance": 0}, "tolerance is 0: must lie between"),
-        ({"max_seconds": 0}, "max_seconds is 0: must be above 0"),
+        ({"tolerance": 0}, "tolerance is 0: must be from 1e-12 to 0.1"),
+        ({"max_seconds": 0}, "max_seconds is 0 s: must be above 0"),
         ({"norm": "max"}, "norm: unknown variant `max`"),
         ({"norm": 2}, "norm: invalid type: integer `2`, expected a name$"),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):
     with pytest.raises(ProblemError, match=said) as error:
-        ConeX(**options)
+        made(ConeX, **options)
     assert "\n" not in str(error.value)
 
 
@@ -410,14 +424,14 @@ def lists(*times):
 )
 def test_examples_that_make_no_sense_are_one_clear_error_each(options, patterns, targets, said):
     with pytest.raises(ProblemError, match=said) as error:
-        ConeX(**options).fit(patterns, targets)
+        made(ConeX, **options).fit(patterns, targets)
     assert "\n" not in str(error.value)
 
 
 def test_the_defaults_that_python_shows_are_those_of_the_core():
-    core = taxel._core.check_cone_x("{}")
-    assert taxel._core.check_cone_x(ConeX()._json()) == core
-    assert repr(ConeX(tau=3.0, lb=[0.0, 0.1])) == "ConeX(tau=3.0, lb=[0.0, 0.1])"
+    checked = taxel._core.check_parameters
+    assert checked("cone_x", ConeX()._json()) == checked("cone_x", "{}")
+    assert repr(ConeX(neuron=Neuron(tau=3.0), lb=[0.0, 0.1])) == "ConeX(neuron=Neuron(tau=3.0), lb=[0.0, 0.1])"
 
 
 def test_a_fitted_cone_can_be_read_out():

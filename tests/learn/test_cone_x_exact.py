@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from stated import counts, examples, threshold
 
-from taxel import SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX, check_certificate
 
 #: Further problems are tried by `pytest -m slow`.
@@ -32,14 +32,16 @@ def draw(seed):
     )
     kernel = str(random.choice(["alpha", "double_exponential"]))
     cone = ConeX(
-        kernel=kernel,
-        tau=float(random.choice([8.0, 15.0])),
-        tau_s=random.choice([None, 2.0, 5.0]),
-        tau_rec=random.choice([None, 5.0, 40.0]),
-        theta_plus=float(random.choice([0.0, 0.2, 0.5])),
-        refractory=float(random.choice([1.0, 3.0, 4.5])),
-        after_spike=str(random.choice(["keep", "ignore", "reset"])),
-        first_threshold=str(random.choice(["theta_0", "printed"])),
+        neuron=Neuron(
+            kernel=kernel,
+            tau=float(random.choice([8.0, 15.0])),
+            tau_s=random.choice([None, 2.0, 5.0]),
+            tau_rec=random.choice([None, 5.0, 40.0]),
+            theta_plus=float(random.choice([0.0, 0.2, 0.5])),
+            refractory=float(random.choice([1.0, 3.0, 4.5])),
+            after_spike=str(random.choice(["keep", "ignore", "reset"])),
+            first_threshold=str(random.choice(["theta_0", "printed"])),
+        ),
         lambdas=LAMBDAS[str(random.choice(list(LAMBDAS)))],
         norm=str(random.choice(["norm", "square"])),
         lb=-2.0,
@@ -70,7 +72,7 @@ def outcome(seed):
 
 def shares(seeds):
     """Every verdict and kind comes up; the shares are said."""
-    met = Counter((draw(seed)[0].after_spike, outcome(seed)) for seed in seeds)
+    met = Counter((draw(seed)[0].neuron.after_spike, outcome(seed)) for seed in seeds)
     solved = sum(n for (_, status), n in met.items() if status == "solved")
     print(f"{solved} of {len(seeds)} solved and exact, {len(seeds) - solved} infeasible and proven: {dict(met)}")
     assert 0.3 < solved / len(seeds) < 0.9
@@ -89,8 +91,8 @@ def test_a_thousand_random_problems_are_solved_and_exact_or_infeasible_and_prove
 def stepped(cone, pattern, times, k):
     """Where a neuron in steps of 1 us fires first after target k - 1, this and the ones before put at their targets."""
     fired, step = list(times[:k]), 1e-3
-    begin = fired[-1] + cone.refractory if k else pattern.start
-    end = times[k] + 2 * step if k < len(times) else max(pattern.stop, times[-1] + cone.tau)
+    begin = fired[-1] + cone.neuron_.refractory if k else pattern.start
+    end = times[k] + 2 * step if k < len(times) else max(pattern.stop, times[-1] + cone.neuron_.tau)
     # The grid has a point at the target (or anywhere, behind the last).
     anchor = times[k] if k < len(times) else begin
     first = np.ceil((begin - anchor) / step - 1e-9)
@@ -104,18 +106,20 @@ def stepped(cone, pattern, times, k):
         total = np.concatenate([[0.0], np.cumsum(values * np.exp((s - begin) / tau))])
         return total[before] * np.exp(-(t - begin) / tau)
 
-    if cone.kernel == "alpha":
-        u = (t - begin) / cone.tau * summed(w, cone.tau) - summed(w * (s - begin) / cone.tau, cone.tau)
+    if cone.neuron_.kernel == "alpha":
+        u = (t - begin) / cone.neuron_.tau * summed(w, cone.neuron_.tau) - summed(
+            w * (s - begin) / cone.neuron_.tau, cone.neuron_.tau
+        )
     else:
-        tau_s = cone.tau / 4 if cone.tau_s is None else cone.tau_s
-        top = cone.tau * tau_s / (cone.tau - tau_s) * np.log(cone.tau / tau_s)
-        u = (summed(w, cone.tau) - summed(w, tau_s)) / (np.exp(-top / cone.tau) - np.exp(-top / tau_s))
-    last = fired[-1] if fired else (pattern.start if cone.first_threshold == "printed" else None)
-    theta = np.full(len(t), cone.theta_0)
+        tau_s = cone.neuron_.tau / 4 if cone.neuron_.tau_s is None else cone.neuron_.tau_s
+        top = cone.neuron_.tau * tau_s / (cone.neuron_.tau - tau_s) * np.log(cone.neuron_.tau / tau_s)
+        u = (summed(w, cone.neuron_.tau) - summed(w, tau_s)) / (np.exp(-top / cone.neuron_.tau) - np.exp(-top / tau_s))
+    last = fired[-1] if fired else (pattern.start if cone.neuron_.first_threshold == "printed" else None)
+    theta = np.full(len(t), cone.neuron_.theta_0)
     if last is not None:
-        since = t - last - cone.refractory
-        rec = 2 * cone.tau if cone.tau_rec is None else cone.tau_rec
-        theta += np.where(since >= -1e-9, cone.theta_plus * np.exp(-since / rec), 0.0)
+        since = t - last - cone.neuron_.refractory
+        rec = 2 * cone.neuron_.tau if cone.neuron_.tau_rec is None else cone.neuron_.tau_rec
+        theta += np.where(since >= -1e-9, cone.neuron_.theta_plus * np.exp(-since / rec), 0.0)
     assert theta[-1] == pytest.approx(threshold(cone, t[-1], fired, pattern.start), rel=1e-12)
     above = np.flatnonzero(u >= theta - 1e-11)
     return t[above[0]] if len(above) else None
@@ -152,7 +156,7 @@ def test_small_margins_are_exact_too(margin, kernel):
     verdicts = set()
     for seed in range(6):
         patterns, wanted = examples(seed, trains=60, patterns=5, targets=1)
-        cone = ConeX(kernel=kernel, margin=margin, slope=margin, lb=-1, ub=1).fit(patterns, wanted)
+        cone = ConeX(neuron=Neuron(kernel=kernel), margin=margin, slope=margin, lb=-1, ub=1).fit(patterns, wanted)
         verdicts.add(cone.status_)
         if cone.status_ == "solved":
             for pattern, times in zip(patterns, wanted, strict=True):
@@ -166,7 +170,7 @@ def test_weights_of_the_grid_fire_early_between_its_points_and_those_of_continuo
     for seed in range(5):
         patterns, wanted = examples(seed, trains=80, patterns=8, targets=1)
         for time in ("grid", "continuous"):
-            cone = ConeX(time=time, lb=-1, ub=1).fit(patterns, wanted)
+            cone = ConeX(neuron=Neuron(time=time), lb=-1, ub=1).fit(patterns, wanted)
             assert cone.status_ == "solved"
             for pattern, (target,) in zip(patterns, wanted, strict=True):
                 spikes = ConeX().fit(patterns, wanted).neuron_.run(cone.weights_, pattern)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from making import made
 from rival_examples import kernel, patterns
 
 from taxel import Neuron, ProblemError
@@ -78,7 +79,7 @@ def cone_x(**options):
     """CONE-X with HTP's neuron: no refractory time, no threshold rise; bounds far out."""
     bare = {"theta_plus": 0.0, "refractory": 0.0, "after_spike": "reset", "lb": -50.0, "ub": 50.0}
     kernel = {"kernel": "double_exponential", "tau": 10.0, "tau_s": 5.0, "theta_0": 0.3}
-    return ConeX(**bare, **kernel, time="grid", step_ms=STEP, **options)
+    return made(ConeX, **bare, **kernel, time="grid", step_ms=STEP, **options)
 
 
 @pytest.mark.parametrize("seed", range(3))

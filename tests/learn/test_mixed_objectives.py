@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from making import made
 
-from taxel import SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX
 
 cp = pytest.importorskip("cvxpy")
@@ -90,7 +91,9 @@ LAMBDAS = [(1, 0, 0), (2, 2, 200), (1, 4, 0), (4, 1, 0), (0, 2, 100), (1, 0, 100
 def test_the_objective_is_the_least_and_the_bound_lies_below_it(lambdas, reset, options):
     spikes, trains, targets = draw(seed=3)
     after = "reset" if reset else "keep"
-    cone = ConeX(time="grid", tau=TAU, after_spike=after, lambdas=lambdas, lb=-2.0, ub=2.0, horizon=60.0, **options)
+    cone = made(
+        ConeX, time="grid", tau=TAU, after_spike=after, lambdas=lambdas, lb=-2.0, ub=2.0, horizon=60.0, **options
+    )
     cone.fit(trains, targets)
     rows = statement(spikes, targets, reset, 60)
     share, least = optimum(cone, rows)
@@ -116,7 +119,7 @@ def test_the_objective_is_the_least_and_the_bound_lies_below_it(lambdas, reset, 
 
 def test_a_bound_far_from_the_optimum_is_said_and_still_lies_below_it():
     spikes, trains, targets = draw(seed=4, trains=40)
-    cone = ConeX(time="grid", tau=TAU, lambdas=(2, 2, 200), lb=-2.0, ub=2.0, horizon=60.0, tolerance=0.1)
+    cone = ConeX(neuron=Neuron(time="grid", tau=TAU), lambdas=(2, 2, 200), lb=-2.0, ub=2.0, horizon=60.0, tolerance=0.1)
     cone.fit(trains, targets)
     _, least = optimum(cone, statement(spikes, targets, False, 60))
     assert cone.status_ == "solved"
@@ -128,7 +131,7 @@ def test_l1_uses_the_fewer_weights_the_larger_its_share():
     _, trains, targets = draw(seed=5, trains=60)
     used = []
     for ratio in [(0, 1, 0), (1, 4, 0), (1, 1, 0), (4, 1, 0), (1, 0, 0)]:
-        cone = ConeX(time="grid", tau=TAU, lambdas=ratio, lb=-2.0, ub=2.0).fit(trains, targets)
+        cone = ConeX(neuron=Neuron(time="grid", tau=TAU), lambdas=ratio, lb=-2.0, ub=2.0).fit(trains, targets)
         assert cone.status_ == "solved"
         used.append(np.count_nonzero(cone.weights_))
     assert used == sorted(used, reverse=True)
@@ -138,7 +141,7 @@ def test_l1_uses_the_fewer_weights_the_larger_its_share():
 @pytest.mark.parametrize("lambdas", [(1, 0, 0), (2, 2, 200), (0, 2, 100)], ids=str)
 def test_in_continuous_time_the_trained_neuron_fires_at_its_targets_only(lambdas):
     _, trains, targets = draw(seed=6, trains=50)
-    cone = ConeX(tau=TAU, after_spike="reset", lambdas=lambdas, lb=-2.0, ub=2.0).fit(trains, targets)
+    cone = ConeX(neuron=Neuron(tau=TAU, after_spike="reset"), lambdas=lambdas, lb=-2.0, ub=2.0).fit(trains, targets)
     assert cone.status_ == "solved"
     assert cone.gap_ <= 1e-8
     for pattern, times in zip(trains, targets, strict=True):
@@ -151,9 +154,7 @@ def test_wave_trains_that_must_fall_silent_again_are_solved_with_b_undivided():
         random = np.random.default_rng(7)
         pattern = SpikeTrains.from_lists([[t] for t in random.uniform(0, 40, 200)], stop=40.0)
         cone = ConeX(
-            time="grid",
-            tau=10.0,
-            theta_plus=0.0,
+            neuron=Neuron(time="grid", tau=10.0, theta_plus=0.0),
             lambdas=(0, 2, 100),
             divide_b_by="targets",
             delta_t_ms=1.5,

@@ -8,8 +8,9 @@ import warnings
 
 import numpy as np
 import pytest
+from making import made
 
-from taxel import ProblemError, SpikeTrains
+from taxel import Neuron, ProblemError, SpikeTrains
 from taxel.learn import ConeR, OnlineConeR
 
 
@@ -42,7 +43,7 @@ OPTIONS = [
 @pytest.mark.parametrize("options", OPTIONS)
 @pytest.mark.parametrize("window", [1, 4, 7])
 def test_at_each_step_the_objective_is_that_of_a_fit_to_the_window_from_nothing(options, window):
-    online = OnlineConeR(window=window, tau=12.0, tolerance=3e-7, **options)
+    online = made(OnlineConeR, window=window, tau=12.0, tolerance=3e-7, **options)
     kept = []
     for pattern, targets in stream(window, 12):
         online.partial_fit(pattern, targets)
@@ -50,7 +51,7 @@ def test_at_each_step_the_objective_is_that_of_a_fit_to_the_window_from_nothing(
         assert online.patterns_ == len(kept)
         assert online.status_ == "solved"
         if any(len(t) for _, t in kept):
-            cold = ConeR(tau=12.0, tolerance=3e-7, **options).fit([p for p, _ in kept], [t for _, t in kept])
+            cold = made(ConeR, tau=12.0, tolerance=3e-7, **options).fit([p for p, _ in kept], [t for _, t in kept])
             assert online.objective_ == pytest.approx(cold.objective_, rel=1e-6, abs=1e-12)
             assert online.silent_rows_ == cold.silent_rows_
             assert online.unreachable_ == cold.unreachable_
@@ -58,7 +59,7 @@ def test_at_each_step_the_objective_is_that_of_a_fit_to_the_window_from_nothing(
 
 def test_what_left_the_window_leaves_no_trace():
     patterns = list(stream(3, 9))
-    long, short = OnlineConeR(window=4, tau=12.0), OnlineConeR(window=4, tau=12.0)
+    long, short = OnlineConeR(neuron=Neuron(tau=12.0), window=4), OnlineConeR(neuron=Neuron(tau=12.0), window=4)
     for pattern, targets in patterns:
         long.partial_fit(pattern, targets)
     for pattern, targets in patterns[-4:]:
@@ -68,8 +69,10 @@ def test_what_left_the_window_leaves_no_trace():
 
 def test_a_fit_at_once_is_the_fit_of_the_last_patterns_and_the_stream_goes_on_from_it():
     patterns = list(stream(4, 8))
-    once = OnlineConeR(window=5, tau=12.0).fit([p for p, _ in patterns[:7]], [t for _, t in patterns[:7]])
-    steps = OnlineConeR(window=5, tau=12.0)
+    once = OnlineConeR(neuron=Neuron(tau=12.0), window=5).fit(
+        [p for p, _ in patterns[:7]], [t for _, t in patterns[:7]]
+    )
+    steps = OnlineConeR(neuron=Neuron(tau=12.0), window=5)
     for pattern, targets in patterns[:7]:
         steps.partial_fit(pattern, targets)
     assert once.objective_ == pytest.approx(steps.objective_, rel=2e-6)
@@ -79,7 +82,7 @@ def test_a_fit_at_once_is_the_fit_of_the_last_patterns_and_the_stream_goes_on_fr
 
 
 def test_a_pattern_that_makes_no_sense_is_named_and_leaves_the_window_as_it_was():
-    online, same = OnlineConeR(window=3, tau=12.0), OnlineConeR(window=3, tau=12.0)
+    online, same = OnlineConeR(neuron=Neuron(tau=12.0), window=3), OnlineConeR(neuron=Neuron(tau=12.0), window=3)
     patterns = list(stream(5, 6))
     for k, (pattern, targets) in enumerate(patterns):
         online.partial_fit(pattern, targets)
@@ -100,7 +103,7 @@ def test_an_empty_window_and_a_misspelt_parameter_are_one_clear_error_each():
     with pytest.raises(ProblemError, match="window is 0"):
         OnlineConeR(window=0)
     with pytest.raises(ProblemError, match="no parameter 'lambda'"):
-        OnlineConeR(**{"lambda": 1})
+        OnlineConeR().set_params(**{"lambda": 1})
     with pytest.raises(ProblemError, match="must be one a pattern"):
         OnlineConeR().fit([], [])
     with pytest.raises(ProblemError, match="start: a window starts from its own last fit"):
@@ -108,7 +111,7 @@ def test_an_empty_window_and_a_misspelt_parameter_are_one_clear_error_each():
 
 
 def test_control_c_keeps_the_best_so_far_and_the_pattern():
-    online = OnlineConeR(window=50, tau=40.0, tolerance=1e-10, lambdas=(4, 0, 100, 100, 80))
+    online = OnlineConeR(neuron=Neuron(tau=40.0), window=50, tolerance=1e-10, lambdas=(4, 0, 100, 100, 80))
     timer = threading.Timer(0.3, signal.raise_signal, [signal.SIGINT])
     timer.start()
 
@@ -121,4 +124,5 @@ def test_control_c_keeps_the_best_so_far_and_the_pattern():
         learn_for_ever()
     assert online.status_ in ("solved", "stopped")
     assert online.patterns_ >= 1
-    assert repr(online).startswith("OnlineConeR(window=50, tau=40.0")
+    assert repr(online).startswith("OnlineConeR(neuron=Neuron(tau=40.0), ")
+    assert "window=50" in repr(online)

@@ -158,10 +158,13 @@ def test_control_c_stops_it_promptly():
         ({"ridge": -1.0}, "ridge is -1: must be 0 or more"),
         ({"branches": 10}, "spread: none was published for a layer of branches, give one"),
         ({"branches": 10, "spread": 1.0}, "delay_ms: none was published"),
-        ({"branches": 0, "spread": 1.0, "delay_ms": 0.0}, "branches is 0: must lie between 1 and 100000"),
-        ({"branches": 9, "spread": 1.0, "delay_ms": 0.0, "nonlinearity": "relu"}, "nonlinearity is 'relu'"),
-        ({"thresholds": []}, "thresholds: must be finite, and at least one"),
-        ({"within_ms": 0.0}, "within_ms is 0.0 ms: must be above 0"),
+        ({"branches": 0, "spread": 1.0, "delay_ms": 0.0}, "branches is 0: must be from 1 to 100000"),
+        (
+            {"branches": 9, "spread": 1.0, "delay_ms": 0.0, "nonlinearity": "relu"},
+            "nonlinearity: unknown variant `relu`",
+        ),
+        ({"thresholds": []}, "thresholds: must hold at least one"),
+        ({"within_ms": 0.0}, "within_ms is 0 ms: must be above 0"),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):

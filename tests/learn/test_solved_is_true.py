@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bruteforce import looked_at
 
-from taxel import SpikeTrains
+from taxel import Neuron, SpikeTrains
 from taxel.learn import ConeX, check_certificate
 
 #: Further problems are tried by `pytest -m slow`.
@@ -40,7 +40,7 @@ def test_a_long_pause_behind_the_target_is_silent(tau, stop, theta_plus):
     trains = SpikeTrains.from_lists([[0.0], [3.0], [10.0]], stop=stop)
     # With .5 ms the kernel would have its top at 10.5 ms, where no potential comes up to a target from below.
     target = 10.5 if tau == 15.0 else 10.3
-    assert judged(ConeX(tau=tau, lb=-3, ub=3, theta_plus=theta_plus), [trains], [[target]]) == "solved"
+    assert judged(ConeX(neuron=Neuron(tau=tau, theta_plus=theta_plus), lb=-3, ub=3), [trains], [[target]]) == "solved"
 
 
 def paused(seed):
@@ -59,12 +59,14 @@ def paused(seed):
         lists.append(SpikeTrains.from_lists([sorted(t) for t in times], stop=at))
         wanted.append(own)
     cone = ConeX(
-        tau=tau,
-        kernel=str(random.choice(["alpha", "double_exponential"])),
-        theta_plus=float(random.choice([0.0, 0.05, 0.2])),
-        tau_rec=random.choice([None, 0.5, 200.0]),
-        after_spike=str(random.choice(["keep", "ignore", "reset"])),
-        first_threshold=str(random.choice(["theta_0", "printed"])),
+        neuron=Neuron(
+            tau=tau,
+            kernel=str(random.choice(["alpha", "double_exponential"])),
+            theta_plus=float(random.choice([0.0, 0.05, 0.2])),
+            tau_rec=random.choice([None, 0.5, 200.0]),
+            after_spike=str(random.choice(["keep", "ignore", "reset"])),
+            first_threshold=str(random.choice(["theta_0", "printed"])),
+        ),
         lambdas=[(0, 1, 0), (0, 1, 0), (1, 0, 0), (2, 2, 200)][random.integers(4)],
         lb=-3,
         ub=3,
@@ -85,9 +87,11 @@ def beside(seed):
         lists.append(SpikeTrains.from_lists([sorted(t) for t in times], stop=own[-1] + 20))
         wanted.append(own.tolist())
     cone = ConeX(
-        kernel=str(random.choice(["alpha", "double_exponential"])),
-        theta_plus=float(random.choice([0.0, 0.05, 0.2])),
-        after_spike=str(random.choice(["keep", "ignore", "reset"])),
+        neuron=Neuron(
+            kernel=str(random.choice(["alpha", "double_exponential"])),
+            theta_plus=float(random.choice([0.0, 0.05, 0.2])),
+            after_spike=str(random.choice(["keep", "ignore", "reset"])),
+        ),
         lambdas=[(0, 1, 0), (1, 0, 0), (2, 2, 200), (0, 0, 1)][random.integers(4)],
         lb=-2,
         ub=2,
@@ -105,7 +109,7 @@ def lifted(seed):
     ]
     wanted = [np.sort(random.choice([[30.0], [70.0], [55.5]]))[:1].tolist() for _ in range(patterns)]
     wide = float(random.choice([0.3, 1.0, 3.0, 30.0]))
-    cone = ConeX(lambdas=(0, 0, 1), after_spike=str(random.choice(["keep", "reset"])), lb=-wide, ub=wide)
+    cone = ConeX(neuron=Neuron(after_spike=str(random.choice(["keep", "reset"]))), lambdas=(0, 0, 1), lb=-wide, ub=wide)
     return cone, lists, wanted
 
 

@@ -89,7 +89,7 @@ def test_a_shift_in_time_moves_spikes_and_nothing_else():
         ({"epochs": -1}, "invalid value: integer `-1`"),
         ({"updates": "now"}, "unknown variant `now`, expected `batch` or `pattern`"),
         ({"within_ms": 0.0}, "within_ms is 0 ms"),
-        ({"max_seconds": 0.0}, "max_seconds is 0.0: must be above 0"),
+        ({"max_seconds": 0.0}, "max_seconds is 0 s: must be above 0"),
         ({"seed": -1}, "invalid value: integer `-1`"),
     ],
 )

@@ -201,10 +201,10 @@ def test_spikingjelly_agrees_by_its_kept_numbers():
         ({"tau_s": 15.0}, "tau_s is 15 ms: must lie below tau, 15 ms"),
         ({"theta_0": 0.0}, "theta_0 is 0"),
         ({"eta": -1.0}, "eta is -1"),
-        ({"momentum": 1.0}, "momentum is 1: must lie from 0 up to, but not at, 1"),
+        ({"momentum": 1.0}, "momentum is 1: must be 0 or more and below 1"),
         ({"initial_sd": -1.0}, "initial_sd is -1"),
         ({"epochs": 0.5}, "invalid type: floating point"),
-        ({"max_seconds": -1.0}, "max_seconds is -1.0: must be above 0"),
+        ({"max_seconds": -1.0}, "max_seconds is -1 s: must be above 0"),
     ],
 )
 def test_a_parameter_that_makes_no_sense_is_one_clear_error(options, said):

@@ -213,15 +213,6 @@ pub fn above_0(name: &'static str, value: f64, unit: &'static str) -> Result<()>
     Parameter { name, unit, range: Range::ABOVE_0 }.check(&value)
 }
 
-/// Refuses a value that is below 0 or not finite; `unit` may be empty.
-///
-/// # Errors
-///
-/// `Problem`, naming the parameter and its value.
-pub fn at_least_0(name: &'static str, value: f64, unit: &'static str) -> Result<()> {
-    Parameter { name, unit, range: Range::FROM_0 }.check(&value)
-}
-
 /// Refuses weights that are not one a train, each finite.
 ///
 /// # Errors

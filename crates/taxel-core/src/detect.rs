@@ -7,7 +7,7 @@ mod stream;
 
 pub use frame_clock::FrameClock;
 pub use readout::{Readout, TrainedNeuron};
-pub use score::{Spread, Tally, WIDEST_WINDOW_US, match_in_order, score};
+pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;
 
 use serde::{Deserialize, Serialize};

@@ -5,56 +5,105 @@
 //! `spatial` or `multi_unit` in their names know of the other trains themselves.
 
 mod edges;
-mod isi_distance;
+pub mod matching;
 mod merged;
 mod pairwise;
 mod patterns;
-mod spike_distance;
 mod stored;
-mod van_rossum;
-mod van_rossum_absolute;
-mod van_rossum_spatial;
-mod van_rossum_spatial_absolute;
-mod victor_purpura;
-mod victor_purpura_multi_unit;
 
 use serde::{Deserialize, Serialize};
 
-pub use isi_distance::IsiDistance;
 pub use pairwise::Work;
 pub use patterns::Patterns;
-pub use spike_distance::SpikeDistance;
-pub use van_rossum::{Normalisation, VanRossum};
-pub use van_rossum_absolute::VanRossumAbsolute;
-pub use van_rossum_spatial::{OwnTrain, Smoothing, VanRossumSpatial};
-pub use van_rossum_spatial_absolute::VanRossumSpatialAbsolute;
-pub use victor_purpura::VictorPurpura;
-pub use victor_purpura_multi_unit::VictorPurpuraMultiUnit;
+pub use van_rossum::Normalisation;
+pub use van_rossum_spatial::{OwnTrain, Smoothing};
 
-use crate::vectors::Instructions;
+use crate::parameters::Described;
 use crate::{Result, Stop, problem};
 use pairwise::Matrix;
 
-/// A distance with its parameters.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "name", rename_all = "snake_case")]
-pub enum Metric {
+/// What a metric's file says of it.
+trait Law {
+    /// Its parameters, with their defaults and ranges.
+    fn described() -> Described
+    where
+        Self: Sized;
+
+    /// Checks every parameter.
+    fn check(&self) -> Result<()>;
+
+    /// Works out what all pairs of these patterns share.
+    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>>;
+}
+
+/// A metric with what all pairs share.
+trait Ready: Sync {
+    /// The distance between two patterns.
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64>;
+
+    /// Fills a whole matrix, where there is a quicker way than pair by pair.
+    fn fill(
+        &self,
+        _matrix: &Matrix,
+        _a: &Patterns<'_>,
+        _b: Option<&Patterns<'_>>,
+        _work: &mut Work<'_>,
+    ) -> Option<Result<()>> {
+        None
+    }
+}
+
+/// The registry: a line a metric, `NAME: Kind`, whose file is `metrics/NAME.rs` and whose name in JSON is `NAME`.
+macro_rules! metrics {
+    ($($(#[$about:meta])* $name:ident: $Kind:ident,)*) => {
+        $(mod $name;)*
+        $(pub use $name::$Kind;)*
+
+        /// A distance with its parameters.
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "name", rename_all = "snake_case")]
+        pub enum Metric {
+            $($(#[$about])* $Kind($Kind),)*
+        }
+
+        /// The names of all metrics, as JSON has them.
+        pub const NAMES: &[&str] = &[$(stringify!($name)),*];
+
+        impl Metric {
+            fn law(&self) -> &dyn Law {
+                match self { $(Self::$Kind(metric) => metric,)* }
+            }
+
+            /// The parameters of a metric, by its name, with their defaults and ranges.
+            #[must_use]
+            pub fn described(name: &str) -> Option<Described> {
+                $(if name == stringify!($name) {
+                    return Some($Kind::described());
+                })*
+                None
+            }
+        }
+    };
+}
+
+// Rustfmt finds no modules in a macro: the Makefile names their files to it.
+metrics! {
     /// The cheapest way to turn one train into the other.
-    VictorPurpura(VictorPurpura),
+    victor_purpura: VictorPurpura,
     /// The same where a spike may also change its train.
-    VictorPurpuraMultiUnit(VictorPurpuraMultiUnit),
+    victor_purpura_multi_unit: VictorPurpuraMultiUnit,
     /// Euclidean distance of trains smoothed by an exponential.
-    VanRossum(VanRossum),
+    van_rossum: VanRossum,
     /// Time integral, or sum, of the absolute difference of trains smoothed by an exponential.
-    VanRossumAbsolute(VanRossumAbsolute),
+    van_rossum_absolute: VanRossumAbsolute,
     /// Euclidean distance of patterns smoothed in time and over the array.
-    VanRossumSpatial(VanRossumSpatial),
+    van_rossum_spatial: VanRossumSpatial,
     /// Sum over taxels and time of the absolute difference of patterns smoothed in time and over the array.
-    VanRossumSpatialAbsolute(VanRossumSpatialAbsolute),
+    van_rossum_spatial_absolute: VanRossumSpatialAbsolute,
     /// How much the intervals between spikes differ.
-    IsiDistance(IsiDistance),
+    isi_distance: IsiDistance,
     /// How far spikes are from their nearest ones, over the intervals between spikes.
-    SpikeDistance(SpikeDistance),
+    spike_distance: SpikeDistance,
 }
 
 impl Metric {
@@ -64,16 +113,7 @@ impl Metric {
     ///
     /// `Problem`, naming the parameter.
     pub fn check(&self) -> Result<()> {
-        match self {
-            Self::VictorPurpura(m) => m.check(),
-            Self::VictorPurpuraMultiUnit(m) => m.check(),
-            Self::VanRossum(m) => m.check(),
-            Self::VanRossumAbsolute(m) => m.check(),
-            Self::VanRossumSpatial(m) => m.check(),
-            Self::VanRossumSpatialAbsolute(m) => m.check(),
-            Self::IsiDistance(m) => m.check(),
-            Self::SpikeDistance(m) => m.check(),
-        }
+        self.law().check()
     }
 
     /// The distance between two patterns (the first of each side).
@@ -93,19 +133,15 @@ impl Metric {
     pub fn pairwise(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>, work: &mut Work<'_>) -> Result<Vec<f64>> {
         let ready = self.prepare(a, b)?;
         let matrix = Matrix::new(a.count, b.map(|b| b.count));
-        match &ready {
-            Ready::VictorPurpura(m) if m.has_reach() && work.instructions != Instructions::Plain => {
-                m.fill(&matrix, a, b, work)?
-            }
-            Ready::VanRossum(m) => m.fill(&matrix, a, b, work)?,
-            Ready::VanRossumSpatial(m, kernel) => m.fill(kernel, &matrix, a, b, work)?,
-            _ => matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?,
+        match ready.fill(&matrix, a, b, work) {
+            Some(filled) => filled?,
+            None => matrix.each_pair(work, |i, j, stop| ready.between((a, i), (b.unwrap_or(a), j), stop))?,
         }
         Ok(matrix.finish())
     }
 
     /// Checks parameters and patterns; works out what all pairs share.
-    fn prepare(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Ready<'_>> {
+    fn prepare(&self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + '_>> {
         self.check()?;
         a.check()?;
         if let Some(b) = b {
@@ -120,49 +156,12 @@ impl Metric {
                 ));
             }
         }
-        Ok(match self {
-            Self::VictorPurpura(m) => Ready::VictorPurpura(m),
-            Self::VictorPurpuraMultiUnit(m) => Ready::VictorPurpuraMultiUnit(m),
-            Self::VanRossum(m) => Ready::VanRossum(m),
-            Self::VanRossumAbsolute(m) => Ready::VanRossumAbsolute(m),
-            Self::VanRossumSpatial(m) => Ready::VanRossumSpatial(m, m.smoothing.laid_out(a, b)?),
-            Self::VanRossumSpatialAbsolute(m) => Ready::VanRossumSpatialAbsolute(m, m.smoothing.laid_out(a, b)?),
-            Self::IsiDistance(m) => Ready::IsiDistance(edges::window(m.window, a, b)?),
-            Self::SpikeDistance(m) => Ready::SpikeDistance(edges::window(m.window, a, b)?),
-        })
+        self.law().ready(a, b)
     }
-}
-
-/// A metric with what all pairs share.
-enum Ready<'m> {
-    VictorPurpura(&'m VictorPurpura),
-    VictorPurpuraMultiUnit(&'m VictorPurpuraMultiUnit),
-    VanRossum(&'m VanRossum),
-    VanRossumAbsolute(&'m VanRossumAbsolute),
-    VanRossumSpatial(&'m VanRossumSpatial, van_rossum_spatial::Kernel),
-    VanRossumSpatialAbsolute(&'m VanRossumSpatialAbsolute, van_rossum_spatial::Kernel),
-    IsiDistance(edges::Window),
-    SpikeDistance(edges::Window),
 }
 
 /// A pattern: which of several.
 type One<'p> = (&'p Patterns<'p>, usize);
-
-impl Ready<'_> {
-    /// The distance between two patterns.
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
-        match self {
-            Self::VictorPurpura(m) => summed(a, b, stop, |a, b| m.between(a, b, stop)),
-            Self::VictorPurpuraMultiUnit(m) => m.between(a, b, stop),
-            Self::VanRossum(m) => summed(a, b, stop, |a, b| Ok(m.between(a, b))),
-            Self::VanRossumAbsolute(m) => summed(a, b, stop, |a, b| Ok(m.between(a, b))),
-            Self::VanRossumSpatial(m, kernel) => m.between(kernel, a, b, stop),
-            Self::VanRossumSpatialAbsolute(m, kernel) => m.between(kernel, a, b, stop),
-            Self::IsiDistance(window) => summed(a, b, stop, |a, b| Ok(isi_distance::between(a, b, *window))),
-            Self::SpikeDistance(window) => summed(a, b, stop, |a, b| Ok(spike_distance::between(a, b, *window))),
-        }
-    }
-}
 
 /// The sum over trains of a distance between trains.
 fn summed(
@@ -177,11 +176,6 @@ fn summed(
         sum += between(a.train(p, n), b.train(q, n))?;
     }
     Ok(sum)
-}
-
-/// Refuses a cost below 0.
-fn cost(name: &str, value: f64, unit: &str) -> Result<()> {
-    if value >= 0.0 { Ok(()) } else { Err(problem!("{name} is {value}{unit}: must be 0 or more")) }
 }
 
 /// Reads a cost that may be infinite, which JSON has no number for: a number, or its name as text.

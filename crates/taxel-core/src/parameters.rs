@@ -38,8 +38,16 @@ impl Described {
         self
     }
 
+    /// The same with one more.
+    #[must_use]
+    pub fn with(mut self, parameter: Parameter, default: impl Into<Value>) -> Self {
+        self.defaults.insert(parameter.name.to_owned(), default.into());
+        self.ranges.push(parameter);
+        self
+    }
+
     /// The description as JSON: `{"defaults": {…}, "required": […], "ranges": {name: {"unit", "must_be", "least", …}}}`;
-    /// `least` and `most` are left out where there is none.
+    /// `least` and `most` are left out where there is none, `infinite` stands where infinity will do.
     #[must_use]
     pub fn to_json(&self) -> Value {
         let ranges: Map<String, Value> = self
@@ -47,6 +55,9 @@ impl Described {
             .iter()
             .map(|Parameter { name, unit, range }| {
                 let mut said = serde_json::json!({ "unit": unit, "must_be": range.to_string() });
+                if range.most_in && range.most.is_infinite() {
+                    said["infinite"] = true.into();
+                }
                 for (end, value, is_in) in [("least", range.least, range.least_in), ("most", range.most, range.most_in)]
                 {
                     if value.is_finite() {

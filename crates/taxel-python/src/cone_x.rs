@@ -18,12 +18,6 @@ fn to_cone_x(json: &str) -> PyResult<ConeX> {
     Ok(parameters)
 }
 
-/// Checks parameters; gives them back with every default filled in.
-#[pyfunction]
-fn check_cone_x(parameters: &str) -> PyResult<String> {
-    serde_json::to_string(&to_cone_x(parameters)?).map_err(|e| core(problem!("ConeX: {e}")))
-}
-
 /// A row by name: kind, pattern, and target or time (ms).
 type Name = (String, usize, f64);
 
@@ -76,7 +70,10 @@ type RowOut<'py> = (Bound<'py, PyArray1<f64>>, f64);
 
 /// A stated problem.
 #[pyclass(frozen)]
-struct ConeXProblem(Problem);
+struct ConeXProblem {
+    problem: Problem,
+    max_seconds: Option<f64>,
+}
 
 #[pymethods]
 impl ConeXProblem {
@@ -90,44 +87,44 @@ impl ConeXProblem {
         let parameters = to_cone_x(parameters)?;
         let patterns = patterns.into_iter().map(to_spikes).collect::<PyResult<Vec<_>>>()?;
         let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
-        enter(py, |stop| Problem::new(&parameters, &patterns, &targets, stop)).map(Self)
+        let problem = enter(py, |stop| Problem::new(&parameters, &patterns, &targets, stop))?;
+        Ok(Self { problem, max_seconds: parameters.max_seconds })
     }
 
     /// Least and largest weights.
     fn bounds<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
-        let bounds = self.0.bounds();
+        let bounds = self.problem.bounds();
         (array(py, bounds.lower), array(py, bounds.upper))
     }
 
     /// A row, with or without its margin.
     fn row<'py>(&self, py: Python<'py>, name: Name, margin: bool) -> PyResult<RowOut<'py>> {
-        let Stated { coefficients, limit } = self.0.row(to_row(&name)?, margin).map_err(core)?;
+        let Stated { coefficients, limit } = self.problem.row(to_row(&name)?, margin).map_err(core)?;
         Ok((array(py, coefficients), limit))
     }
 
     /// What B looks at behind a target, and what it shall reach.
     fn behind<'py>(&self, py: Python<'py>, pattern: usize, target: usize) -> PyResult<RowOut<'py>> {
-        let Stated { coefficients, limit } = self.0.behind(pattern, target).map_err(core)?;
+        let Stated { coefficients, limit } = self.problem.behind(pattern, target).map_err(core)?;
         Ok((array(py, coefficients), limit))
     }
 
-    #[pyo3(signature = (start, multipliers, progress, max_seconds))]
+    #[pyo3(signature = (start, multipliers, progress))]
     fn fit<'py>(
         &self,
         py: Python<'py>,
         start: Vec<Name>,
         multipliers: PyReadonlyArray1<'py, f64>,
         progress: Option<Py<PyAny>>,
-        max_seconds: Option<f64>,
     ) -> PyResult<FitOut<'py>> {
         let multipliers = slice("multipliers", &multipliers)?;
         let rows = start.iter().map(to_row).collect::<PyResult<Vec<_>>>()?;
         let start: Vec<(Row, f64)> = rows.into_iter().zip(multipliers.iter().copied()).collect();
-        let (fit, signal) = enter_keeping(py, max_seconds, |stop, teller| {
+        let (fit, signal) = enter_keeping(py, self.max_seconds, |stop, teller| {
             let mut report = |r: Round| {
                 teller.tell(progress.as_ref(), |py, told| told.call1(py, (r.round, r.rows, r.broken, r.objective)));
             };
-            self.0.fit(&start, &mut report, stop)
+            self.problem.fit(&start, &mut report, stop)
         })?;
         let Fit { status, weights, objective, parts, gap, violation, margin, engine, rounds, held, certificate } = fit;
         let status = match status {
@@ -150,6 +147,5 @@ impl ConeXProblem {
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(check_cone_x, module)?)?;
     module.add_class::<ConeXProblem>()
 }

@@ -13,6 +13,7 @@ pyo3::create_exception!(
     Error,
     "Arguments, spike trains or a learning problem that make no sense."
 );
+pyo3::create_exception!(taxel, NotFittedError, ProblemError, "A learner that was used before `fit`.");
 pyo3::create_exception!(taxel, DeviceError, Error, "The board, its registers or its commands.");
 pyo3::create_exception!(taxel, SceneError, Error, "A simulated scene that cannot be played.");
 
@@ -76,6 +77,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("Error", py.get_type::<Error>())?;
     module.add("FormatError", py.get_type::<FormatError>())?;
     module.add("ProblemError", py.get_type::<ProblemError>())?;
+    module.add("NotFittedError", py.get_type::<NotFittedError>())?;
     module.add("DeviceError", py.get_type::<DeviceError>())?;
     module.add("SceneError", py.get_type::<SceneError>())
 }

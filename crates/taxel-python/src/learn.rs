@@ -2,6 +2,7 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
+use serde_json::{Map, Value};
 use taxel_core::learn as core_learn;
 use taxel_core::learn::{ConeR, Engine, Fit, Problem, Round, Shares, Status};
 use taxel_core::problem;
@@ -11,16 +12,19 @@ use crate::enter::{Shared, enter, enter_keeping};
 use crate::errors::core;
 use crate::parameters::parsed;
 
-fn to_cone_r(json: &str) -> PyResult<ConeR> {
+pub(crate) fn to_cone_r(json: &str) -> PyResult<ConeR> {
     let parameters: ConeR = parsed("ConeR", json)?;
     parameters.check().map_err(core)?;
     Ok(parameters)
 }
 
-/// Checks parameters; gives them back with every default filled in.
-#[pyfunction]
-fn check_cone_r(parameters: &str) -> PyResult<String> {
-    serde_json::to_string(&to_cone_r(parameters)?).map_err(|e| core(problem!("ConeR: {e}")))
+/// The parameters of [`ConeR`], and how many patterns the window holds.
+pub(crate) fn to_online(json: &str) -> PyResult<(ConeR, usize)> {
+    let mut given: Map<String, Value> = parsed("OnlineConeR", json)?;
+    let window = given.remove("window").unwrap_or(Value::Null);
+    let window = window.as_u64().and_then(|window| usize::try_from(window).ok());
+    let window = window.ok_or_else(|| core(problem!("window: must be a whole number, 1 or more")))?;
+    Ok((to_cone_r(&Value::Object(given).to_string())?, window))
 }
 
 /// Multipliers as Python holds them: rows, and a share each.
@@ -101,8 +105,8 @@ struct OnlineConeR {
 #[pymethods]
 impl OnlineConeR {
     #[new]
-    fn new(parameters: &str, window: usize) -> PyResult<Self> {
-        let parameters = to_cone_r(parameters)?;
+    fn new(parameters: &str) -> PyResult<Self> {
+        let (parameters, window) = to_online(parameters)?;
         let window = core_learn::OnlineConeR::new(&parameters, window).map_err(core)?;
         Ok(Self { window: Shared::new(window), max_seconds: parameters.max_seconds })
     }
@@ -152,7 +156,6 @@ fn fit_out(py: Python<'_>, fit: Fit) -> FitOut<'_> {
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(check_cone_r, module)?)?;
     module.add_class::<ConeRProblem>()?;
     module.add_class::<OnlineConeR>()
 }

@@ -4,7 +4,10 @@ use std::num::NonZero;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::metrics::{Metric, Patterns, Work};
+use serde_json::{Map, Value};
+use taxel_core::metrics::matching::matched;
+use taxel_core::metrics::{Metric, NAMES, Patterns, Work};
+use taxel_core::parameters::Described;
 use taxel_core::problem;
 use taxel_core::vectors::Instructions;
 
@@ -44,7 +47,43 @@ impl<'py> Held<'py> {
 }
 
 fn to_metric(json: &str) -> PyResult<Metric> {
-    parsed("metric", json)
+    let given: Map<String, Value> = parsed("metric", json)?;
+    let name = given.get("name").and_then(Value::as_str).unwrap_or_default();
+    let Some(Described { defaults, required, .. }) = Metric::described(name) else {
+        let names: Vec<String> = NAMES.iter().map(|name| format!("'{name}'")).collect();
+        return Err(core(problem!("metric is '{name}': must be one of {}", names.join(", "))));
+    };
+    let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
+    if let Some(unknown) = given.keys().find(|key| *key != "name" && !known.contains(&key.as_str())) {
+        return Err(core(problem!("{unknown}: {name} takes {}", known.join(", "))));
+    }
+    parsed(name, json)
+}
+
+/// Which spikes and targets (ms) belong together, pattern by pattern: a pair of places each.
+#[pyfunction]
+fn match_spikes(
+    py: Python<'_>,
+    spikes: Vec<PyReadonlyArray1<'_, f64>>,
+    targets: Vec<PyReadonlyArray1<'_, f64>>,
+    window_ms: f64,
+) -> PyResult<Vec<Vec<(usize, usize)>>> {
+    let spikes = spikes.iter().map(|times| slice("spikes", times)).collect::<PyResult<Vec<_>>>()?;
+    let targets = targets.iter().map(|times| slice("targets", times)).collect::<PyResult<Vec<_>>>()?;
+    enter(py, |stop| {
+        let each = spikes.iter().zip(&targets).enumerate();
+        each.map(|(p, (spikes, targets))| {
+            let (what, wanted) = (format!("spikes[{p}]"), format!("targets[{p}]"));
+            matched((&what, spikes), (&wanted, targets), window_ms, stop)
+        })
+        .collect()
+    })
+}
+
+/// The names of all metrics.
+#[pyfunction]
+fn metric_names() -> Vec<&'static str> {
+    NAMES.to_vec()
 }
 
 /// The distance of two patterns.
@@ -97,6 +136,8 @@ fn pairwise<'py>(
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(metric_names, module)?)?;
     module.add_function(wrap_pyfunction!(distance, module)?)?;
+    module.add_function(wrap_pyfunction!(match_spikes, module)?)?;
     module.add_function(wrap_pyfunction!(pairwise, module)?)
 }

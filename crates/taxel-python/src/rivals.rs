@@ -2,7 +2,8 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::learn::rivals::{Ended, Rival, Skim, SteppedNeuron, Tempotron, Trained};
+use serde_json::{Map, Value};
+use taxel_core::learn::rivals::{Ended, Rival, Skim, Tempotron, Trained};
 use taxel_core::{Result as CoreResult, SpikeTrains, Stop, problem};
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
@@ -38,29 +39,41 @@ fn to_patterns(patterns: Vec<SpikesIn<'_>>) -> PyResult<Vec<SpikeTrains>> {
     patterns.into_iter().map(to_spikes).collect()
 }
 
-/// Checks a rule with its neuron and its training.
+/// A rule with its neuron and its training, from its name and all parameters in one list.
+pub(crate) fn to_rival(json: &str) -> PyResult<Rival> {
+    let mut given: Map<String, Value> = parsed("rule", json)?;
+    let name = match given.remove("name") {
+        Some(Value::String(name)) => name,
+        _ => return Err(core(problem!("rule without a name"))),
+    };
+    let parts = Rival::parts(&name, given).map_err(core)?;
+    let rival: Rival = parsed(&name, &parts.to_string())?;
+    rival.check().map_err(core)?;
+    Ok(rival)
+}
+
+/// The names of all rules by epochs.
 #[pyfunction]
-fn check_rival(parameters: &str) -> PyResult<()> {
-    parsed::<Rival>("rule", parameters)?.check().map_err(core)
+fn rule_names() -> Vec<&'static str> {
+    Rival::names().collect()
 }
 
 /// Trains a rule's neuron.
 #[pyfunction]
-#[pyo3(signature = (parameters, patterns, targets, start, max_seconds, progress))]
+#[pyo3(signature = (parameters, patterns, targets, start, progress))]
 fn fit_rival<'py>(
     py: Python<'py>,
     parameters: &str,
     patterns: Vec<SpikesIn<'py>>,
     targets: Vec<PyReadonlyArray1<'py, f64>>,
     start: Option<PyReadonlyArray1<'py, f64>>,
-    max_seconds: Option<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<TrainedOut<'py>> {
-    let rival: Rival = parsed("rule", parameters)?;
+    let rival = to_rival(parameters)?;
     let patterns = to_patterns(patterns)?;
     let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
     let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
-    train(py, max_seconds, progress, |report, stop| rival.fit(&patterns, &targets, start, report, stop))
+    train(py, rival.training.max_seconds, progress, |report, stop| rival.fit(&patterns, &targets, start, report, stop))
 }
 
 /// What one presentation changes, over the learning rate; output spikes.
@@ -72,52 +85,43 @@ fn change_rival<'py>(
     pattern: SpikesIn<'py>,
     targets: PyReadonlyArray1<'py, f64>,
 ) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
-    let rival: Rival = parsed("rule", parameters)?;
+    let rival = to_rival(parameters)?;
     let pattern = to_spikes(pattern)?;
     let (weights, targets) = (slice("weights", &weights)?, slice("targets", &targets)?);
     let (change, fired) = enter(py, |_| rival.change(weights, &pattern, targets))?;
     Ok([array(py, change), array(py, fired)])
 }
 
-/// Output spikes of a stepped neuron.
+/// Output spikes of a rule's neuron.
 #[pyfunction]
-fn run_stepped<'py>(
+fn run_rival<'py>(
     py: Python<'py>,
     parameters: &str,
     weights: PyReadonlyArray1<'py, f64>,
     pattern: SpikesIn<'py>,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let neuron: SteppedNeuron = parsed("neuron", parameters)?;
+    let rival = to_rival(parameters)?;
     let pattern = to_spikes(pattern)?;
     let weights = slice("weights", &weights)?;
-    let fired = enter(py, |_| neuron.run(weights, &pattern))?;
+    let fired = enter(py, |_| rival.neuron.run(weights, &pattern))?;
     Ok(array(py, fired))
-}
-
-/// Checks parameters; gives them back with every default filled in.
-#[pyfunction]
-fn check_tempotron(parameters: &str) -> PyResult<String> {
-    let tempotron: Tempotron = parsed("Tempotron", parameters)?;
-    tempotron.check().map_err(core)?;
-    serde_json::to_string(&tempotron).map_err(|e| core(problem!("{e}")))
 }
 
 /// Trains a Tempotron.
 #[pyfunction]
-#[pyo3(signature = (parameters, patterns, labels, start, max_seconds, progress))]
+#[pyo3(signature = (parameters, patterns, labels, start, progress))]
 fn fit_tempotron<'py>(
     py: Python<'py>,
     parameters: &str,
     patterns: Vec<SpikesIn<'py>>,
     labels: Vec<bool>,
     start: Option<PyReadonlyArray1<'py, f64>>,
-    max_seconds: Option<f64>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<TrainedOut<'py>> {
     let tempotron: Tempotron = parsed("Tempotron", parameters)?;
     let patterns = to_patterns(patterns)?;
     let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
-    train(py, max_seconds, progress, |report, stop| tempotron.fit(&patterns, &labels, start, report, stop))
+    train(py, tempotron.max_seconds, progress, |report, stop| tempotron.fit(&patterns, &labels, start, report, stop))
 }
 
 /// Highest potential, its time, time of the spike (infinite where there is none).
@@ -149,12 +153,6 @@ fn change_tempotron<'py>(
     let weights = slice("weights", &weights)?;
     let change = enter(py, |_| tempotron.change(weights, &pattern, label))?;
     Ok(array(py, change))
-}
-
-/// Checks parameters.
-#[pyfunction]
-fn check_skim(parameters: &str) -> PyResult<()> {
-    parsed::<Skim>("SKIM", parameters)?.check().map_err(core)
 }
 
 /// A least-squares problem as Python gets it: R row after row, z, the sum of squares out of reach, rows.
@@ -200,15 +198,13 @@ fn output_skim<'py>(
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(check_rival, module)?)?;
+    module.add_function(wrap_pyfunction!(rule_names, module)?)?;
     module.add_function(wrap_pyfunction!(fit_rival, module)?)?;
     module.add_function(wrap_pyfunction!(change_rival, module)?)?;
-    module.add_function(wrap_pyfunction!(run_stepped, module)?)?;
-    module.add_function(wrap_pyfunction!(check_tempotron, module)?)?;
+    module.add_function(wrap_pyfunction!(run_rival, module)?)?;
     module.add_function(wrap_pyfunction!(fit_tempotron, module)?)?;
     module.add_function(wrap_pyfunction!(peak_tempotron, module)?)?;
     module.add_function(wrap_pyfunction!(change_tempotron, module)?)?;
-    module.add_function(wrap_pyfunction!(check_skim, module)?)?;
     module.add_function(wrap_pyfunction!(reduce_skim, module)?)?;
     module.add_function(wrap_pyfunction!(rows_skim, module)?)?;
     module.add_function(wrap_pyfunction!(output_skim, module)?)

@@ -13,6 +13,7 @@ from taxel.demo.script import TRAINING_SEED, script
 from taxel.detect import Readout
 from taxel.encode import ContactArea
 from taxel.learn import ConeR
+from taxel.neuron import Neuron
 from taxel.simulate import Contact, play, truth
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
@@ -64,7 +65,8 @@ def train(
     cones = {}
     for label, tau, bound in (("contact", 0.5, 3.0), ("lift", 3.0, 1.0)):
         progress(f"learning {label}")
-        cone = ConeR(tau=tau, refractory=_REFRACTORY_MS, step_ms=_FRAME_MS, lb=0.0, ub=bound)
+        neuron = Neuron(tau=tau, refractory=_REFRACTORY_MS, step_ms=_FRAME_MS)
+        cone = ConeR(neuron=neuron, lb=0.0, ub=bound)
         with warnings.catch_warnings():
             # Of slow lifts the foam's base loses the ball long before: their targets are out of reach, and known to be.
             warnings.filterwarnings("ignore", "no weights within")

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._arguments import floats, instance, number, parameters, shown, text, whole
 from taxel._arguments import path as checked_path
-from taxel._core import FormatError, ProblemError
+from taxel._core import FormatError, NotFittedError, ProblemError
 from taxel._files import write_whole
 from taxel.array import Array
 from taxel.detect.exchange import read_nir, write_nir
@@ -459,7 +459,8 @@ def _trained(label: str, one: Any, delay_ms: float | Mapping[str, float]) -> Tra
     elif hasattr(one, "weights_") and hasattr(one, "neuron_"):
         neuron, weights, delay = one.neuron_, one.weights_, delay_ms
     else:
-        said = "is not fitted" if hasattr(one, "fit") else "must be a fitted learner, or (Neuron, weights)"
-        raise ProblemError(f"{label}: {shown(one)} {said}")
+        if hasattr(one, "fit"):
+            raise NotFittedError(f"{label}: {shown(one)} is not fitted")
+        raise ProblemError(f"{label}: {shown(one)} must be a fitted learner, or (Neuron, weights)")
     instance(f"{label}: neuron", neuron, Neuron)
     return TrainedNeuron(neuron, floats(f"{label}: weights", weights), number(f"{label}: delay_ms", delay, "ms"))

@@ -20,6 +20,7 @@ from taxel.encode import Encoder
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.learn import ConeR
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
@@ -64,7 +65,7 @@ class Recipe:
     >>> from taxel.encode import ContactArea
     >>> recipe = Recipe(ContactArea(), {"refractory": 15.0}, {"contact": {"tau": 0.5, "delay_ms": 0.2}})
     >>> recipe.learner_of("contact")
-    (ConeR(tau=0.5, refractory=15.0), 0.2)
+    (ConeR(neuron=Neuron(tau=0.5, refractory=15.0, time='grid')), 0.2)
     """
 
     encoder: Encoder
@@ -272,11 +273,17 @@ def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
         raise ProblemError(f"{name} is {shown(values)}: must be parameters by name")
     values = dict(values)
     delay_ms = number(f"{name}.delay_ms", values.pop("delay_ms", 0.0), "ms")
-    known = inspect.signature(ConeR).parameters
+    # In a recipe a neuron's parameters stand among the learner's, which is trained on a grid whatever its clock.
+    cone = ConeR()
+    own = [key for key in cone.get_params(deep=False) if key != "neuron"]
+    neuron = [key for key in Neuron().get_params() if key != "time"]
     for key in values:
-        if key not in known:
-            raise ProblemError(f"{name}: no parameter {shown(key)}: there are {', '.join(known)} and delay_ms")
-    return ConeR(**values), delay_ms
+        if key not in own + neuron:
+            raise ProblemError(f"{name}: no parameter {shown(key)}: there are {', '.join(neuron + own)} and delay_ms")
+    nested = {f"neuron__{key}" if key in neuron else key: value for key, value in values.items()} | {
+        "neuron__time": "grid"
+    }
+    return cone.set_params(**nested), delay_ms
 
 
 def _examples(examples: Sequence[Example]) -> list[Example]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from taxel import _core
-from taxel._arguments import instance, shown
+from taxel._arguments import instance, several, shown
 from taxel._core import ProblemError
 from taxel._parameters import Value
 from taxel._recorded import Recorded, recorded
@@ -109,6 +110,29 @@ class Encoder(Value):
         frames = _frames(x)
         parts = frames.array._parts(), frames.t, frames.values.reshape(-1)
         return SpikeTrains._from_parts(_core.encode_frames(self._json(), *parts))
+
+    def fit(self, recordings: object = None, targets: object = None) -> Self:  # noqa: ARG002  scikit-learn's call
+        """Do nothing: an encoder learns nothing; so that it stands in a pipeline of scikit-learn's."""
+        return self
+
+    def transform(self, recordings: Sequence[Events | Frames | Recorded]) -> list[SpikeTrains]:
+        """Return the spikes of several recordings as learners take them: signed trains split into ON and OFF.
+
+        Parameters
+        ----------
+        recordings : sequence of Events, Frames or Recording
+
+        Returns
+        -------
+        list of SpikeTrains
+            One a recording, in ms from where its time counts.
+
+        Raises
+        ------
+        ProblemError : as `encode`
+        """
+        encoded = [self.encode(one) for one in several("recordings", recordings)]
+        return [trains.split_by_sign() if trains.signed else trains for trains in encoded]
 
     def stream(self, array: Array | None = None) -> EncoderStream:
         """Begin to encode pieces: the same spikes as of the whole, wherever it is cut.

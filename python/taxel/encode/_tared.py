@@ -7,8 +7,15 @@ import json
 from collections.abc import Mapping
 from typing import Any, Self
 
-from taxel._arguments import instance, parameters
+import numpy as np
+
+from taxel._arguments import number, parameters, shown, whole
+from taxel._core import ProblemError
+from taxel._recorded import Recorded, recorded
 from taxel.encode._encoder import Encoder
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
 __all__ = ["Tared"]
@@ -17,18 +24,59 @@ __all__ = ["Tared"]
 class Tared(Encoder):
     """Turn what stands above the taxels' rest into spikes: an encoder with the parameter `tare`.
 
-    A rest belongs to a board and a day, so a saved readout has none and is given one.
+    A rest belongs to a board and a day, so a saved readout has none and is given one. In seconds it is taken from each
+    recording's own beginning, so that recordings of several boards can be encoded alike.
     """
 
-    tare: Tare | None
+    tare: Tare | float | None
 
     def _json(self) -> str:
-        if self.tare is None:
+        if not self._is_rest():
             return super()._json()
         # As it stands: a tare of thousands of taxels need not be read to be handed over.
-        rest = instance("tare", self.tare, Tare).to_json()
+        rest = self.tare.to_json()  # type: ignore[union-attr]
         others = {name: value for name, value in self._plain().items() if name != "tare"}
         return f'{parameters(others)[:-1]}, "tare": {rest}}}'
+
+    def _is_rest(self) -> bool:
+        """Tell whether the rest itself is held: not how long it lasts, which is checked."""
+        if self.tare is None or isinstance(self.tare, Tare):
+            return self.tare is not None
+        if isinstance(self.tare, bool) or not isinstance(self.tare, int | float | np.integer | np.floating):
+            raise ProblemError(f"tare is {shown(self.tare)}: must be a taxel.Tare, or seconds")
+        return False
+
+    def _plain(self) -> dict[str, Any]:
+        rest = {} if self._is_rest() else {"tare": None}
+        return {name: value for name, value in super()._plain().items() if name not in rest} | rest
+
+    def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
+        """Return the spikes of a whole recording, as `Encoder.encode`; a tare in seconds is that of its beginning.
+
+        Raises
+        ------
+        ProblemError : as `Encoder.encode`; no tare, another array's, or one that is more than half of the recording
+        """
+        if self.tare is None or self._is_rest():
+            return super().encode(x)
+        held = recorded(x)
+        if not isinstance(held, Events | Frames) or not len(held.t):
+            return super().encode(held)
+        first, last = int(held.t[0]), int(held.t[-1])
+        rest_us = whole("tare, us", round(1e6 * number("tare", self.tare)), 1, 2**53)
+        if 2 * rest_us > last - first:
+            lasts = f"the recording lasts {(last - first) / 1e6:g} s"
+            raise ProblemError(f"tare is {self.tare} s: more than half of it would be rest, {lasts}")
+        return self.with_tare(Tare.take(held, stop_us=first + rest_us)).encode(held)
+
+    def __eq__(self, other: object) -> bool:
+        same = super().__eq__(other)
+        return same if same is not True else self._seconds() == other._seconds()  # type: ignore[attr-defined]
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _seconds(self) -> object:
+        return None if self._is_rest() else self.tare
 
     def with_tare(self, tare: Tare) -> Self:
         """Return the same encoder with this tare."""

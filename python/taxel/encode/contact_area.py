@@ -32,8 +32,9 @@ class ContactArea(Tared):
         That of the board; 3 in its fast presets.
     levels : sequence of int, ascending
         Numbers of taxels.
-    tare : Tare, optional
-        The taxels' rest. It belongs to a board and a day, so a saved readout has none; without it nothing is encoded.
+    tare : Tare, or float, s, optional
+        The taxels' rest, or how long each recording begins with it. It belongs to a board and a day, so a saved readout
+        has none; without it nothing is encoded.
 
     Raises
     ------
@@ -53,4 +54,4 @@ class ContactArea(Tared):
 
     noise_floor: float = _DEFAULT.noise_floor
     levels: Sequence[int] = _DEFAULT.levels
-    tare: Tare | None = _DEFAULT.tare
+    tare: Tare | float | None = _DEFAULT.tare

@@ -44,8 +44,9 @@ class Moments(Tared):
         While beyond a level: a spike when it is reached, then one every `tonic_ms`. None for crossings alone.
     period_ms : float, ms, whole us
         How often events are sampled; the step of the wire's stamps loses nothing.
-    tare : Tare, optional
-        The taxels' rest. It belongs to a board and a day, so a saved readout has none; without it nothing is encoded.
+    tare : Tare, or float, s, optional
+        The taxels' rest, or how long each recording begins with it. It belongs to a board and a day, so a saved readout
+        has none; without it nothing is encoded.
 
     Raises
     ------
@@ -73,4 +74,4 @@ class Moments(Tared):
     displacement_mm: tuple[float, float] | None = _DEFAULT.displacement_mm
     tonic_ms: float | None = _DEFAULT.tonic_ms
     period_ms: float = _DEFAULT.period_ms
-    tare: Tare | None = _DEFAULT.tare
+    tare: Tare | float | None = _DEFAULT.tare

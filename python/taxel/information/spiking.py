@@ -13,6 +13,7 @@ from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.sampling import Spikes
 from taxel.learn import ConeR, Tempotron
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
 __all__ = ["ConeRReadout", "TempotronReadout", "patterns_of", "readout_responses"]
@@ -75,14 +76,8 @@ class ConeRReadout(Classifier):
         self.learners_ = []
         for k in range(len(self.classes_)):
             targets = [[one.stop] if mine == k else [] for one, mine in zip(trains, row, strict=True)]
-            learner = ConeR(
-                tau=self.tau,
-                lb=-self.bound,
-                ub=self.bound,
-                max_seconds=self.max_seconds,
-                after_spike="keep",
-                step_ms=1.0,
-            )
+            neuron = Neuron(tau=self.tau, after_spike="keep", step_ms=1.0)
+            learner = ConeR(neuron=neuron, lb=-self.bound, ub=self.bound, max_seconds=self.max_seconds)
             self.learners_.append(learner.fit(trains, targets))
         return self
 

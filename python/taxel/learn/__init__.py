@@ -1,38 +1,24 @@
 """Weights from examples, in scikit-learn's manners: parameters in the constructor, `fit`, results end in `_`."""
 
-from taxel.learn.certificate import check_certificate
-from taxel.learn.chronotron import Chronotron
-from taxel.learn.cone_r import ConeR, ConeRProblem
-from taxel.learn.cone_x import Certificate, ConeX, ConeXProblem, Margin, Row
-from taxel.learn.filt import FILT
-from taxel.learn.fp import FP
-from taxel.learn.htp import HTP
-from taxel.learn.inst import INST
-from taxel.learn.online_cone_r import OnlineConeR
-from taxel.learn.psd import PSD
-from taxel.learn.resume import ReSuMe
-from taxel.learn.skim import SKIM
-from taxel.learn.span import SPAN
-from taxel.learn.tempotron import Tempotron
+from taxel.learn.certificate import check_certificate as check_certificate
+from taxel.learn.chronotron import Chronotron as Chronotron
+from taxel.learn.cone_r import ConeR as ConeR
+from taxel.learn.cone_r import ConeRProblem as ConeRProblem
+from taxel.learn.cone_x import Certificate as Certificate
+from taxel.learn.cone_x import ConeX as ConeX
+from taxel.learn.cone_x import ConeXProblem as ConeXProblem
+from taxel.learn.cone_x import Margin as Margin
+from taxel.learn.cone_x import Row as Row
+from taxel.learn.filt import FILT as FILT
+from taxel.learn.fp import FP as FP
+from taxel.learn.htp import HTP as HTP
+from taxel.learn.inst import INST as INST
+from taxel.learn.online_cone_r import OnlineConeR as OnlineConeR
+from taxel.learn.psd import PSD as PSD
+from taxel.learn.resume import ReSuMe as ReSuMe
+from taxel.learn.skim import SKIM as SKIM
+from taxel.learn.span import SPAN as SPAN
+from taxel.learn.tempotron import Tempotron as Tempotron
 
-__all__ = [
-    "FILT",
-    "FP",
-    "HTP",
-    "INST",
-    "PSD",
-    "SKIM",
-    "SPAN",
-    "Certificate",
-    "Chronotron",
-    "ConeR",
-    "ConeRProblem",
-    "ConeX",
-    "ConeXProblem",
-    "Margin",
-    "OnlineConeR",
-    "ReSuMe",
-    "Row",
-    "Tempotron",
-    "check_certificate",
-]
+# The lines above are the registry: a learner is one of them.
+__all__ = [name for name, held in sorted(globals().items()) if callable(held)]

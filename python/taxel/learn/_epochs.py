@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, Self
@@ -11,22 +11,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, floats, instance, parameters, several
-from taxel.learn._examples import examples, seconds
+from taxel._arguments import callback, floats, instance, several
+from taxel._parameters import defaults
+from taxel.learn._examples import examples
+from taxel.learn._learner import SpikeLearner
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
-__all__ = ["AfterSpike", "EpochLearner", "Updates", "fitted", "keep"]
+__all__ = ["AfterSpike", "EpochLearner", "Updates", "keep"]
 
 AfterSpike = Literal["subtract", "membrane", "reset"]
 Updates = Literal["batch", "pattern"]
 
-#: Arguments that every rule hands to its training; the rest belong to its neuron or to itself.
-_TRAINING = ("eta", "epochs", "updates", "initial", "within_ms", "until_right", "seed")
+#: What all rules share.
+_DEFAULT = defaults("inst")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class EpochLearner(ABC):
+class EpochLearner(SpikeLearner):
     """Learn spike times by epochs: present each pattern, compare the output spikes with the targets, correct.
 
     What a rule's source gives is its default; `INST`, of which everything was published, says what each parameter is.
@@ -40,11 +42,11 @@ class EpochLearner(ABC):
     tau_s: float | None
     theta_0: float
     after_spike: AfterSpike | None
-    step_ms: float = 0.1
-    within_ms: float = 1.0
-    until_right: bool = True
-    seed: int = 0
-    max_seconds: float | None = None
+    step_ms: float = _DEFAULT.step_ms
+    within_ms: float = _DEFAULT.within_ms
+    until_right: bool = _DEFAULT.until_right
+    seed: int = _DEFAULT.seed
+    max_seconds: float | None = _DEFAULT.max_seconds
 
     weights_: NDArray[np.float64] = field(init=False)
     right_: NDArray[np.float64] = field(init=False)
@@ -56,28 +58,8 @@ class EpochLearner(ABC):
     #: Entries of `right_` before the first epoch.
     _LOOKS_BEFORE_THE_FIRST = 1
 
-    def __post_init__(self) -> None:
-        seconds(self.max_seconds)
-        _core.check_rival(self._json())
-
-    @abstractmethod
-    def _law(self) -> dict[str, Any]:
-        """Return the rule's own constants, by its name."""
-
-    def _neuron(self) -> dict[str, Any]:
-        """Return the stepped neuron."""
-        return {
-            "tau": self.tau,
-            "current": {"exponential": {"tau_s": self.tau_s}},
-            "theta_0": self.theta_0,
-            "after_spike": self.after_spike,
-            "refractory": 0.0,
-            "step_ms": self.step_ms,
-        }
-
-    def _json(self) -> str:
-        training = {name: getattr(self, name) for name in _TRAINING}
-        return parameters({"law": self._law(), "neuron": self._neuron(), "training": training})
+    def _plain(self) -> dict[str, Any]:
+        return {"name": self._kind} | super()._plain()
 
     def fit(
         self,
@@ -115,7 +97,7 @@ class EpochLearner(ABC):
         if progress is not None:
             callback("progress", progress)
         self.neuron_ = self._fitted_neuron()
-        keep(self, _core.fit_rival(self._json(), trains, times, first, seconds(self.max_seconds), progress))
+        keep(self, _core.fit_rival(self._json(), trains, times, first, progress))
         return self
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
@@ -123,11 +105,12 @@ class EpochLearner(ABC):
 
         Raises
         ------
-        ProblemError : patterns that make no sense, or a learner that was not fitted
+        ProblemError : patterns that make no sense
+        NotFittedError : before `fit`
         """
-        neuron, weights = parameters(self._neuron()), fitted(self)
+        rule, weights = self._json(), self._fitted()
         given = enumerate(several("patterns", patterns))
-        return [_core.run_stepped(neuron, weights, instance(f"pattern {p}", s, SpikeTrains)._parts()) for p, s in given]
+        return [_core.run_rival(rule, weights, instance(f"pattern {p}", s, SpikeTrains)._parts()) for p, s in given]
 
     def change(
         self, weights: ArrayLike, pattern: SpikeTrains, targets: ArrayLike
@@ -156,7 +139,7 @@ class EpochLearner(ABC):
         return change, spikes
 
     def _fitted_neuron(self) -> Neuron | None:
-        stepped = self._neuron()
+        stepped = json.loads(_core.check_parameters(self._kind, self._json()))["neuron"]
         if stepped["after_spike"] != "reset" or "exponential" not in stepped["current"]:
             return None
         return Neuron(
@@ -171,13 +154,6 @@ class EpochLearner(ABC):
             step_ms=stepped["step_ms"],
         )
 
-    def __repr__(self) -> str:
-        given = type(self).__init__.__kwdefaults__ or {}
-        names = type(self).__init__.__annotations__
-        values = ((name, getattr(self, name)) for name in names if name != "return")
-        shown = (f"{name}={value!r}" for name, value in values if name not in given or value != given[name])
-        return f"{type(self).__name__}({', '.join(shown)})"
-
 
 def keep(learner: Any, trained: tuple[Any, ...]) -> None:
     """Put what was learnt on the learner, then raise the Ctrl-C that may have come meanwhile."""
@@ -187,11 +163,3 @@ def keep(learner: Any, trained: tuple[Any, ...]) -> None:
     learner.epochs_ = max(len(right) - learner._LOOKS_BEFORE_THE_FIRST, 0)
     if interrupt is not None:
         raise interrupt
-
-
-def fitted(learner: Any) -> NDArray[np.float64]:
-    """Return the weights of a learner; refuse one that was not fitted."""
-    weights = getattr(learner, "weights_", None)
-    if weights is None:
-        raise _core.ProblemError(f"{type(learner).__name__}: not fitted yet, call fit first")
-    return floats("weights_", weights)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
-from taxel._arguments import number, text
+from taxel._parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner
 
 __all__ = ["Chronotron"]
+
+
+_DEFAULT = defaults("chronotron")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -19,7 +22,7 @@ class Chronotron(EpochLearner):
     ----------
     rule : {"E", "I"}
         E-learning or I-learning.
-    tau, tau_s : float, ms
+    tau, tau_s : float, ms, above 0
         Membrane and synapse, as in `INST`; 15 and `tau` / 4 where left out (‡).
     tau_q : float, ms, above 0, optional
         E-learning: a move over `dt` costs ``(dt / tau_q)**2 / 2``, to add or to remove a spike 1; `tau` where left
@@ -68,23 +71,11 @@ class Chronotron(EpochLearner):
     1
     """
 
+    _kind = "chronotron"
+
     rule: Literal["E", "I"]
-    tau: float = 15.0
-    tau_s: float | None = None
-    after_spike: AfterSpike | None = None
-    tau_q: float | None = None
-    gamma_r: float | None = None
-
-    def _law(self) -> dict[str, Any]:
-        if text("rule", self.rule, ("E", "I")) == "I":
-            return {"i_learning": {}}
-        tau_q = self.tau if self.tau_q is None else self.tau_q
-        return {"e_learning": {"tau_q": tau_q, "gamma_r": tau_q if self.gamma_r is None else self.gamma_r}}
-
-    def _neuron(self) -> dict[str, Any]:
-        neuron = super()._neuron()
-        if self.tau_s is None:
-            neuron["current"] = {"exponential": {"tau_s": number("tau", self.tau) / 4}}
-        if self.after_spike is None:
-            neuron["after_spike"] = "membrane" if self.rule == "I" else "subtract"
-        return neuron
+    tau: float = _DEFAULT.tau
+    tau_s: float | None = _DEFAULT.tau_s
+    after_spike: AfterSpike | None = _DEFAULT.after_spike
+    tau_q: float | None = _DEFAULT.tau_q
+    gamma_r: float | None = _DEFAULT.gamma_r

@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+import copy
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any, Literal, Self
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, floats, instance, parameters
-from taxel._core import ProblemError
+from taxel._arguments import callback, floats, instance
+from taxel._core import NotFittedError
+from taxel._parameters import defaults
 from taxel.learn._examples import examples
-from taxel.learn._neuron import split
+from taxel.learn._learner import SpikeLearner, predicted
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
 __all__ = ["ConeR", "ConeRProblem"]
 
 
-class ConeR:
+_DEFAULT = defaults("cone_r")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class ConeR(SpikeLearner):
     """Learn weights by CONE-R: minimise norms, missed lift behind targets, missed targets and broken silence.
 
     The defaults are those of Tables 6.1 and 6.2. The neuron runs on a grid, as 6.13 is a sum over grid points; targets
@@ -28,11 +35,12 @@ class ConeR:
 
     Parameters
     ----------
-    tau, theta_0, theta_plus, tau_rec, refractory, after_spike, first_threshold, step_ms, kernel, tau_s
-        The neuron, as in `taxel.Neuron`; `step_ms` is also the step of the silent rows.
+    neuron : Neuron, optional
+        The neuron to be trained; ``Neuron()`` where it is left out. Whatever its `time`, it is trained on the grid of
+        its `step_ms`, which is also the step of the silent rows.
     kappa : float, above 0
         What the potential shall reach behind a target, in thresholds.
-    delta_t_ms : float, ms, optional
+    delta_t_ms : float, ms, 0 or more, optional
         How far behind; ``0.1 * tau`` where left out.
     lambdas : five floats, 0 or more
         Shares of l1, l2, B, C, D in the objective; only their ratios matter.
@@ -47,12 +55,12 @@ class ConeR:
         How far below the threshold silence shall stay.
     horizon : float, ms, optional
         Where silent rows end; the later of the pattern's stop and its last target + `tau` where left out.
-    tolerance : float
+    tolerance : float, from 1e-10 to 0.1
         The proven relative gap at which a fit counts as solved.
     engine : {"native", "cone solver"}
         "native": Newton steps on the few rows near threshold; where their result cannot be proven, the cone solver goes
         on from it. "cone solver": row generation around Clarabel from the start, slower by far.
-    max_seconds : float, s, optional
+    max_seconds : float, s, above 0, optional
         After so long a fit ends with the best so far, and what is proven of it.
 
     Attributes
@@ -77,7 +85,7 @@ class ConeR:
     refires_ : int
         Output spikes on the training patterns within `tau` of another one, with no target between.
     neuron_ : Neuron
-        The neuron that the weights are for.
+        The neuron that the weights are for: a copy with ``time="grid"``.
 
     Raises
     ------
@@ -92,76 +100,43 @@ class ConeR:
     Examples
     --------
     >>> trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
-    >>> cone = ConeR(tau=10.0, lb=-1.0, ub=1.0, after_spike="reset").fit([trains], [[20.0]])
+    >>> cone = ConeR(neuron=Neuron(tau=10.0, after_spike="reset"), lb=-1.0, ub=1.0).fit([trains], [[20.0]])
     >>> cone.status_
     'solved'
     >>> cone.neuron_.run(cone.weights_, trains, threshold=0.999)  # a target is met to rounding, from below as well
     array([20.])
     """
 
-    weights_: NDArray[np.float64]
-    objective_: float
-    parts_: dict[str, float]
-    gap_: float
-    status_: Literal["solved", "stopped"]
-    engine_: Literal["native", "cone solver"]
-    rounds_: int
-    rows_: int
-    silent_rows_: int
-    unreachable_: list[tuple[int, int]]
-    refires_: int
-    neuron_: Neuron
-    _multipliers: tuple[int, tuple[NDArray[np.int64], NDArray[np.float64]]]
+    _kind = "cone_r"
+    _nested: ClassVar = {"neuron": Neuron}
 
-    def __init__(
-        self,
-        *,
-        tau: float = 15.0,
-        theta_0: float = 0.3,
-        theta_plus: float = 0.2,
-        tau_rec: float | None = None,
-        refractory: float = 3.0,
-        after_spike: Literal["keep", "ignore", "reset"] = "keep",
-        first_threshold: Literal["theta_0", "printed"] = "theta_0",
-        step_ms: float = 1.0,
-        kernel: Literal["alpha", "double_exponential", "exponential"] = "alpha",
-        tau_s: float | None = None,
-        kappa: float = 1.2,
-        delta_t_ms: float | None = None,
-        lambdas: Sequence[float] = (2.8, 1.2, 100.0, 100.0, 80.0),
-        lb: float | Sequence[float] = -0.3,
-        ub: float | Sequence[float] = 0.3,
-        divide_b_by: Literal["B_max", "targets"] = "B_max",
-        norm: Literal["norm", "square"] = "norm",
-        margin: float = 0.0,
-        horizon: float | None = None,
-        tolerance: float = 1e-6,
-        engine: Literal["native", "cone solver"] = "native",
-        max_seconds: float | None = None,
-    ) -> None:
-        self.tau = tau
-        self.theta_0 = theta_0
-        self.theta_plus = theta_plus
-        self.tau_rec = tau_rec
-        self.refractory = refractory
-        self.after_spike: Literal["keep", "ignore", "reset"] = after_spike
-        self.first_threshold: Literal["theta_0", "printed"] = first_threshold
-        self.step_ms = step_ms
-        self.kernel: Literal["alpha", "double_exponential", "exponential"] = kernel
-        self.tau_s = tau_s
-        self.kappa = kappa
-        self.delta_t_ms = delta_t_ms
-        self.lambdas = lambdas
-        self.lb = lb
-        self.ub = ub
-        self.divide_b_by = divide_b_by
-        self.norm = norm
-        self.margin = margin
-        self.horizon = horizon
-        self.tolerance = tolerance
-        self.engine: Literal["native", "cone solver"] = engine
-        self.max_seconds = max_seconds
-        _core.check_cone_r(self._json())
+    neuron: Neuron | None = _DEFAULT.neuron
+    kappa: float = _DEFAULT.kappa
+    delta_t_ms: float | None = _DEFAULT.delta_t_ms
+    lambdas: Sequence[float] = _DEFAULT.lambdas
+    lb: float | Sequence[float] = _DEFAULT.lb
+    ub: float | Sequence[float] = _DEFAULT.ub
+    divide_b_by: Literal["B_max", "targets"] = _DEFAULT.divide_b_by
+    norm: Literal["norm", "square"] = _DEFAULT.norm
+    margin: float = _DEFAULT.margin
+    horizon: float | None = _DEFAULT.horizon
+    tolerance: float = _DEFAULT.tolerance
+    engine: Literal["native", "cone solver"] = _DEFAULT.engine
+    max_seconds: float | None = _DEFAULT.max_seconds
+
+    weights_: NDArray[np.float64] = field(init=False)
+    objective_: float = field(init=False)
+    parts_: dict[str, float] = field(init=False)
+    gap_: float = field(init=False)
+    status_: Literal["solved", "stopped"] = field(init=False)
+    engine_: Literal["native", "cone solver"] = field(init=False)
+    rounds_: int = field(init=False)
+    rows_: int = field(init=False)
+    silent_rows_: int = field(init=False)
+    unreachable_: list[tuple[int, int]] = field(init=False)
+    refires_: int = field(init=False)
+    neuron_: Neuron = field(init=False)
+    _multipliers: tuple[int, tuple[NDArray[np.int64], NDArray[np.float64]]] = field(init=False)
 
     def fit(
         self,
@@ -220,17 +195,23 @@ class ConeR:
         """
         return ConeRProblem(self, patterns, targets)
 
-    def _values(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if not (name.endswith("_") or name.startswith("_"))}
+    def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
+        """Return the output spikes of the trained neuron, one array a pattern, ms.
 
-    def _json(self) -> str:
-        neuron, rest = split(self._values())
-        return parameters({"neuron": {"time": "grid", **neuron}, **rest})
+        Raises
+        ------
+        ProblemError : patterns that make no sense
+        NotFittedError : before `fit`
+        """
+        return predicted(self, patterns)
 
-    def __repr__(self) -> str:
-        default = ConeR.__init__.__kwdefaults__ or {}
-        values = ((name, getattr(self, name)) for name in default)
-        return f"ConeR({', '.join(f'{name}={value!r}' for name, value in values if value != default[name])})"
+    def _on_grid(self) -> Neuron:
+        """Return the neuron that is trained: the given one, on the grid of its step."""
+        neuron = Neuron() if self.neuron is None else instance("neuron", self.neuron, Neuron)
+        return copy.copy(neuron).set_params(time="grid")
+
+    def _plain(self) -> dict[str, Any]:
+        return super()._plain() | {"neuron": self._on_grid()._plain()}
 
 
 class ConeRProblem:
@@ -287,7 +268,7 @@ class ConeRProblem:
         if not isinstance(start, ConeR):
             return floats("start", start), None
         if not hasattr(start, "weights_"):
-            raise ProblemError("start: this ConeR is not fitted yet")
+            raise NotFittedError("start: not fitted yet, call fit first")
         rows, multipliers = start._multipliers
         return start.weights_, multipliers if rows == self._problem.rows else None
 
@@ -304,7 +285,7 @@ def _keep(cone: ConeR, found: Any, silent_rows: int, all_rows: int) -> None:
     cone.rounds_, cone.rows_, cone.silent_rows_ = rounds, rows, silent_rows
     cone.unreachable_ = unreachable
     cone.refires_ = refires
-    cone.neuron_ = Neuron(**{"time": "grid", **split(vars(cone))[0]})
+    cone.neuron_ = cone._on_grid()
     cone._multipliers = (all_rows, multipliers)
 
 
@@ -324,7 +305,8 @@ def _warn(cone: ConeR) -> None:
     if cone.refires_:
         warnings.warn(
             f"the trained neuron fires again {cone.refires_} times after its own spikes on its training patterns: "
-            f'after_spike is "{cone.after_spike}"; "reset", a longer refractory or a larger theta_plus would end that',
+            f'after_spike is "{cone.neuron_.after_spike}"; "reset", a longer refractory or a larger '
+            "theta_plus would end that",
             stacklevel=4,
         )
     if cone.status_ != "solved":

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Self
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, flag, floats, instance, number, parameters, shown, whole
-from taxel._core import ProblemError
-from taxel.learn._examples import examples, seconds
-from taxel.learn._neuron import split
+from taxel._arguments import callback, flag, instance, number, shown, whole
+from taxel._core import NotFittedError, ProblemError
+from taxel._parameters import defaults
+from taxel.learn._examples import examples
+from taxel.learn._learner import SpikeLearner, predicted
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
@@ -84,7 +86,11 @@ class Margin(NamedTuple):
     slope: float
 
 
-class ConeX:
+_DEFAULT = defaults("cone_x")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class ConeX(SpikeLearner):
     """Learn weights by CONE-X: every target met and every silence kept, with the least norms and missed lift.
 
     In continuous time (the default) silence holds at every instant. On the grid it is the thesis' problem 6.11, which
@@ -92,11 +98,12 @@ class ConeX:
 
     Parameters
     ----------
-    kernel, tau, tau_s, theta_0, theta_plus, tau_rec, refractory, after_spike, first_threshold, time, step_ms
-        The neuron, as in `taxel.Neuron`; with ``time="grid"`` `step_ms` is also the step of the silent rows.
+    neuron : Neuron, optional
+        The neuron to be trained; ``Neuron()`` where it is left out. With its ``time="grid"`` its `step_ms` is also the
+        step of the silent rows.
     kappa : float, above 0
         What the potential shall reach behind a target, in thresholds.
-    delta_t_ms : float, ms, optional
+    delta_t_ms : float, ms, 0 or more, optional
         How far behind; ``0.1 * tau`` where left out.
     lambdas : three floats, 0 or more
         Shares of l1, l2, B in the objective; only their ratios matter. All 0: any weights will do.
@@ -106,18 +113,18 @@ class ConeX:
         B over its largest value, as printed, or over the number of targets.
     norm : {"norm", "square"}
         The l2 term as printed, or squared.
-    margin : float, mV, optional
+    margin : float, mV, 0 or more, optional
         How far below the threshold silence shall stay; where left out 1e-3 in continuous time, 0 on the grid. There the
         best weights touch the threshold at many points, and a neuron that is run on the grid fires where it is touched:
         ask for 1e-9 or more.
-    slope : float, mV/ms, optional
+    slope : float, mV/ms, 0 or more, optional
         How steeply that margin falls to 0 at a target, and how much steeper than the threshold the potential comes up
         there; 1e-3 where left out. Continuous time only.
     horizon : float or float64 of shape (patterns,), ms, optional
         Where silence ends; the later of a pattern's stop and its last target + `tau` where left out.
-    tolerance : float
+    tolerance : float, from 1e-12 to 0.1
         The proven relative gap at which a fit counts as solved.
-    max_seconds : float, optional
+    max_seconds : float, s, above 0, optional
         After so long a fit ends with the best so far.
 
     Attributes
@@ -167,78 +174,43 @@ class ConeX:
     Examples
     --------
     >>> trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
-    >>> cone = ConeX(tau=10.0, lb=-1.0, ub=1.0).fit([trains], [[20.0]])
+    >>> cone = ConeX(neuron=Neuron(tau=10.0), lb=-1.0, ub=1.0).fit([trains], [[20.0]])
     >>> cone.status_
     'solved'
     >>> cone.neuron_.run(cone.weights_, trains).round(6)
     array([20.])
     """
 
-    status_: Literal["solved", "infeasible", "stopped"]
-    weights_: NDArray[np.float64]
-    objective_: float
-    parts_: dict[str, float]
-    gap_: float
-    margin_: Margin
-    violation_: float
-    engine_: Literal["native", "cone solver"]
-    certificate_: Certificate | None
-    problem_: ConeXProblem
-    rounds_: int
-    held_: list[tuple[Row, float]]
-    neuron_: Neuron
+    _kind = "cone_x"
+    _nested: ClassVar = {"neuron": Neuron}
 
-    def __init__(
-        self,
-        *,
-        kernel: Literal["alpha", "double_exponential", "exponential"] = "alpha",
-        tau: float = 15.0,
-        tau_s: float | None = None,
-        theta_0: float = 0.3,
-        theta_plus: float = 0.2,
-        tau_rec: float | None = None,
-        refractory: float = 3.0,
-        after_spike: Literal["keep", "ignore", "reset"] = "keep",
-        first_threshold: Literal["theta_0", "printed"] = "theta_0",
-        time: Literal["continuous", "grid"] = "continuous",
-        step_ms: float = 1.0,
-        kappa: float = 1.2,
-        delta_t_ms: float | None = None,
-        lambdas: Sequence[float] = (0.0, 1.0, 0.0),
-        lb: float | ArrayLike = -0.3,
-        ub: float | ArrayLike = 0.3,
-        divide_b_by: Literal["B_max", "targets"] = "B_max",
-        norm: Literal["norm", "square"] = "norm",
-        margin: float | None = None,
-        slope: float | None = None,
-        horizon: float | ArrayLike | None = None,
-        tolerance: float = 1e-8,
-        max_seconds: float | None = None,
-    ) -> None:
-        self.kernel: Literal["alpha", "double_exponential", "exponential"] = kernel
-        self.tau = tau
-        self.tau_s = tau_s
-        self.theta_0 = theta_0
-        self.theta_plus = theta_plus
-        self.tau_rec = tau_rec
-        self.refractory = refractory
-        self.after_spike: Literal["keep", "ignore", "reset"] = after_spike
-        self.first_threshold: Literal["theta_0", "printed"] = first_threshold
-        self.time: Literal["continuous", "grid"] = time
-        self.step_ms = step_ms
-        self.kappa = kappa
-        self.delta_t_ms = delta_t_ms
-        self.lambdas = lambdas
-        self.lb = lb
-        self.ub = ub
-        self.divide_b_by = divide_b_by
-        self.norm = norm
-        self.margin = margin
-        self.slope = slope
-        self.horizon = horizon
-        self.tolerance = tolerance
-        self.max_seconds = max_seconds
-        _core.check_cone_x(self._json())
+    neuron: Neuron | None = _DEFAULT.neuron
+    kappa: float = _DEFAULT.kappa
+    delta_t_ms: float | None = _DEFAULT.delta_t_ms
+    lambdas: Sequence[float] = _DEFAULT.lambdas
+    lb: float | ArrayLike = _DEFAULT.lb
+    ub: float | ArrayLike = _DEFAULT.ub
+    divide_b_by: Literal["B_max", "targets"] = _DEFAULT.divide_b_by
+    norm: Literal["norm", "square"] = _DEFAULT.norm
+    margin: float | None = _DEFAULT.margin
+    slope: float | None = _DEFAULT.slope
+    horizon: float | ArrayLike | None = _DEFAULT.horizon
+    tolerance: float = _DEFAULT.tolerance
+    max_seconds: float | None = _DEFAULT.max_seconds
+
+    status_: Literal["solved", "infeasible", "stopped"] = field(init=False)
+    weights_: NDArray[np.float64] = field(init=False)
+    objective_: float = field(init=False)
+    parts_: dict[str, float] = field(init=False)
+    gap_: float = field(init=False)
+    margin_: Margin = field(init=False)
+    violation_: float = field(init=False)
+    engine_: Literal["native", "cone solver"] = field(init=False)
+    certificate_: Certificate | None = field(init=False)
+    problem_: ConeXProblem = field(init=False)
+    rounds_: int = field(init=False)
+    held_: list[tuple[Row, float]] = field(init=False)
+    neuron_: Neuron = field(init=False)
 
     def fit(
         self,
@@ -275,10 +247,11 @@ class ConeX:
         if progress is not None:
             callback("progress", progress)
         held = [] if start is None else _held(instance("start", start, ConeX))
+        neuron = Neuron() if self.neuron is None else copy.copy(self.neuron)
         problem = ConeXProblem(self, patterns, targets)
         multipliers = np.array([multiplier for _, multiplier in held], dtype=np.float64)
         first = [tuple(row) for row, _ in held]
-        found = problem._problem.fit(first, multipliers, progress, seconds(self.max_seconds))
+        found = problem._problem.fit(first, multipliers, progress)
         (status, weights, objective, parts, gap, violation), rest, signal = found
         margin, engine, rounds, (rows, multipliers), certificate = rest
         self.status_ = status
@@ -296,24 +269,20 @@ class ConeX:
             (rows, multipliers), proven, at_all, text = certificate
             self.certificate_ = Certificate([_row(row) for row in rows], multipliers, proven, at_all, text)
         self.problem_ = problem
-        self.neuron_ = Neuron(**split(vars(self))[0])
+        self.neuron_ = neuron
         if signal is not None:
             raise signal
         return self
 
-    def _json(self) -> str:
-        neuron, values = split({name: value for name, value in vars(self).items() if not name.endswith("_")})
-        seconds(values.pop("max_seconds"))
-        for name in ("lb", "ub", "horizon"):
-            if not (values[name] is None and name == "horizon"):
-                values[name] = _one_or_each(name, values[name])
-        return parameters({"neuron": neuron, **values})
+    def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
+        """Return the output spikes of the trained neuron, one array a pattern, ms.
 
-    def __repr__(self) -> str:
-        default = ConeX.__init__.__kwdefaults__ or {}
-        values = ((name, getattr(self, name)) for name in default)
-        changed = (f"{name}={value!r}" for name, value in values if not np.array_equal(value, default[name]))
-        return f"ConeX({', '.join(changed)})"
+        Raises
+        ------
+        ProblemError : patterns that make no sense
+        NotFittedError : before `fit`
+        """
+        return predicted(self, patterns)
 
 
 class ConeXProblem:
@@ -328,8 +297,19 @@ class ConeXProblem:
 
     def __init__(self, cone: ConeX, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
         parts, self.targets = examples(patterns, targets)
-        self._problem = _core.ConeXProblem(instance("cone", cone, ConeX)._json(), parts, self.targets)
+        self._stated = instance("cone", cone, ConeX)._json(), parts
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        self._problem = _core.ConeXProblem(*self._stated, self.targets)
         self.lb, self.ub = self._problem.bounds()
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {"_stated": self._stated, "targets": self.targets}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._lay_out()
 
     def row(self, row: Row | tuple[str, int, float], *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
         """State a row by its name: ``coefficients @ w == limit`` at a target, ``<= limit`` else.
@@ -449,9 +429,5 @@ def _row(name: tuple[str, int, float]) -> Row:
 def _held(start: ConeX) -> list[tuple[Row, float]]:
     held: Any = getattr(start, "held_", None)
     if held is None:
-        raise ProblemError("start: has not been fitted")
+        raise NotFittedError("start: not fitted yet, call fit first")
     return list(held)
-
-
-def _one_or_each(name: str, value: Any) -> Any:
-    return number(name, value) if np.isscalar(value) else floats(name, value).tolist()

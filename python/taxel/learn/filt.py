@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from taxel._parameters import defaults
 from taxel.learn.inst import INST
 
 __all__ = ["FILT"]
+
+
+_DEFAULT = defaults("filt")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -48,7 +51,6 @@ class FILT(INST):
     1
     """
 
-    tau_q: float = 10.0
+    _kind = "filt"
 
-    def _law(self) -> dict[str, Any]:
-        return {"filt": {"tau_q": self.tau_q}}
+    tau_q: float = _DEFAULT.tau_q

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from taxel._parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner
 
 __all__ = ["FP"]
+
+
+_DEFAULT = defaults("fp")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -56,8 +59,7 @@ class FP(EpochLearner):
     1
     """
 
-    window_ms: float
-    after_spike: AfterSpike = "reset"
+    _kind = "fp"
 
-    def _law(self) -> dict[str, Any]:
-        return {"fp": {"window_ms": self.window_ms}}
+    window_ms: float
+    after_spike: AfterSpike = _DEFAULT.after_spike

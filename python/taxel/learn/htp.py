@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from taxel._parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner
 
 __all__ = ["HTP"]
+
+
+_DEFAULT = defaults("htp")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -57,8 +60,7 @@ class HTP(EpochLearner):
     1
     """
 
-    window_ms: float
-    after_spike: AfterSpike = "reset"
+    _kind = "htp"
 
-    def _law(self) -> dict[str, Any]:
-        return {"htp": {"window_ms": self.window_ms}}
+    window_ms: float
+    after_spike: AfterSpike = _DEFAULT.after_spike

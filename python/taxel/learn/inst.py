@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
+from taxel._parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner, Updates
 
 __all__ = ["INST"]
+
+
+_DEFAULT = defaults("inst")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -25,7 +28,7 @@ class INST(EpochLearner):
         Epochs at most (†).
     updates : {"batch", "pattern"}
         Whether weights change once an epoch (†), or after each pattern in an order drawn anew.
-    tau, tau_s : float, ms
+    tau, tau_s : float, ms, above 0
         Membrane and synapse: an input of weight 1 makes a potential ``V0 (exp(-s/tau) - exp(-s/tau_s))`` that peaks at
         1 mV. (†)
     theta_0 : float, mV, above 0
@@ -41,7 +44,7 @@ class INST(EpochLearner):
         Whether to end as soon as every pattern is right.
     seed : int, 0 or more
         Of the first weights and the order of patterns.
-    max_seconds : float, above 0, optional
+    max_seconds : float, s, above 0, optional
         Ends the training with the best weights so far.
 
     Attributes
@@ -79,14 +82,13 @@ class INST(EpochLearner):
     1
     """
 
-    eta: float | None = None
-    initial: Sequence[float] | None = None
-    epochs: int = 500
-    updates: Updates = "batch"
-    tau: float = 10.0
-    tau_s: float = 5.0
-    theta_0: float = 15.0
-    after_spike: AfterSpike = "subtract"
+    _kind = "inst"
 
-    def _law(self) -> dict[str, Any]:
-        return {"inst": {}}
+    eta: float | None = _DEFAULT.eta
+    initial: Sequence[float] | None = _DEFAULT.initial
+    epochs: int = _DEFAULT.epochs
+    updates: Updates = _DEFAULT.updates
+    tau: float = _DEFAULT.tau
+    tau_s: float = _DEFAULT.tau_s
+    theta_0: float = _DEFAULT.theta_0
+    after_spike: AfterSpike = _DEFAULT.after_spike

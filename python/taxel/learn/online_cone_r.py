@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Any, Self
 
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._arguments import callback, floats, instance, several, whole
+from taxel._arguments import callback, floats, instance, several
 from taxel._core import ProblemError
+from taxel._parameters import defaults
 from taxel.learn.cone_r import ConeR, _keep, _warn
 from taxel.spikes import SpikeTrains
 
 __all__ = ["OnlineConeR"]
 
 
+_DEFAULT = defaults("online_cone_r")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
 class OnlineConeR(ConeR):
     """Learn weights by CONE-R as patterns arrive: one comes into a sliding window, the oldest leaves it.
 
@@ -26,8 +33,8 @@ class OnlineConeR(ConeR):
     ----------
     window : int, 1 or more
         How many patterns it holds.
-    **parameters
-        Those of `taxel.learn.ConeR`.
+    neuron, kappa, delta_t_ms, lambdas, lb, ub, divide_b_by, norm, margin, horizon, tolerance, engine, max_seconds
+        As in `ConeR`.
 
     Attributes
     ----------
@@ -48,7 +55,8 @@ class OnlineConeR(ConeR):
 
     Examples
     --------
-    >>> cone = OnlineConeR(window=2, tau=10.0, lb=-1.0, ub=1.0, after_spike="reset")
+    >>> from taxel import Neuron
+    >>> cone = OnlineConeR(window=2, neuron=Neuron(tau=10.0, after_spike="reset"), lb=-1.0, ub=1.0)
     >>> for shift in (0.0, 1.0, 2.0):
     ...     trains = SpikeTrains.from_lists([[5.0 + shift], [12.0 + shift], [30.0]], stop=60.0)
     ...     cone = cone.partial_fit(trains, [20.0 + shift])
@@ -56,15 +64,16 @@ class OnlineConeR(ConeR):
     (2, 'solved')
     """
 
-    patterns_: int
+    _kind = "online_cone_r"
 
-    def __init__(self, *, window: int = 200, **parameters: Any) -> None:
-        for name in parameters:
-            if name not in (known := ConeR.__init__.__kwdefaults__ or {}):
-                raise ProblemError(f"OnlineConeR: no parameter {name!r}: there are window, {', '.join(known)}")
-        self.window = whole("window", window, 1)
-        super().__init__(**parameters)
-        self._stream = self._new_stream()
+    window: int = _DEFAULT.window
+
+    patterns_: int = field(init=False)
+
+    #: What the window was begun with and holds, for a copy or a pickle to lay out again.
+    _begun: str = field(init=False)
+    _held: deque[tuple[Any, Any]] = field(init=False)
+    _stream: _core.OnlineConeR = field(init=False)
 
     def partial_fit(self, pattern: SpikeTrains, targets: ArrayLike) -> Self:
         """Take one more pattern into the window, and fit the weights to what it holds then.
@@ -91,6 +100,8 @@ class OnlineConeR(ConeR):
         -----
         UserWarning : as `ConeR.fit`
         """
+        if not hasattr(self, "_stream"):
+            self._begin()
         self._add(pattern, targets, "pattern", "targets")
         return self._fit()
 
@@ -128,13 +139,30 @@ class OnlineConeR(ConeR):
         trains, times = several("patterns", patterns), several("targets", targets)
         if len(trains) != len(times) or not trains:
             raise ProblemError(f"targets: {len(times)} lists for {len(trains)} patterns, must be one a pattern")
-        self._stream = self._new_stream()
+        self._begin()
         for p, (pattern, wanted) in enumerate(zip(trains, times, strict=True)):
             self._add(pattern, wanted, f"pattern {p}", f"targets of pattern {p}")
         return self._fit()
 
     def _add(self, pattern: SpikeTrains, targets: ArrayLike, name: str, wanted: str) -> None:
-        self._stream.add(instance(name, pattern, SpikeTrains)._parts(), floats(wanted, targets, "ms"))
+        given = instance(name, pattern, SpikeTrains)._parts(), floats(wanted, targets, "ms")
+        self._stream.add(*given)
+        self._held.append(given)
+
+    def _begin(self) -> None:
+        self._begun = self._json()
+        self._stream = _core.OnlineConeR(self._begun)
+        self._held = deque(maxlen=self.window)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_stream"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        if "_begun" in state:
+            self._stream = _core.OnlineConeR(self._begun)
+            for given in self._held:
+                self._stream.add(*given)
 
     def _fit(self) -> Self:
         found, signal = self._stream.fit()
@@ -144,12 +172,3 @@ class OnlineConeR(ConeR):
             raise signal
         _warn(self)
         return self
-
-    def _new_stream(self) -> _core.OnlineConeR:
-        return _core.OnlineConeR(self._json(), self.window)
-
-    def _values(self) -> dict[str, Any]:
-        return {name: value for name, value in super()._values().items() if name != "window"}
-
-    def __repr__(self) -> str:
-        return f"Online{super().__repr__().replace('(', f'(window={self.window}, ', 1).replace(', )', ')')}"

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from taxel._parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner
 
 __all__ = ["PSD"]
+
+
+_DEFAULT = defaults("psd")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -16,7 +19,7 @@ class PSD(EpochLearner):
 
     Parameters
     ----------
-    tau, tau_1, tau_2 : float, ms
+    tau, tau_1, tau_2 : float, ms, above 0
         Membrane; slow and fast time constant of the current ``V0 (exp(-s/tau_1) - exp(-s/tau_2))``, peak 1, which the
         membrane filters once more, over 1 MOhm (‡).
     tau_s : float, ms, above 0 and below `tau`, optional
@@ -58,18 +61,11 @@ class PSD(EpochLearner):
     1
     """
 
-    tau: float = 10.0
-    tau_s: float | None = None
-    tau_1: float = 10.0
-    tau_2: float = 2.5
-    after_spike: AfterSpike = "membrane"
-    refractory: float = 0.0
+    _kind = "psd"
 
-    def _law(self) -> dict[str, Any]:
-        return {"psd": {"tau_1": self.tau_1, "tau_2": self.tau_2}}
-
-    def _neuron(self) -> dict[str, Any]:
-        neuron = super()._neuron() | {"refractory": self.refractory}
-        if self.tau_s is None:
-            neuron["current"] = {"double_exponential": {"tau_1": self.tau_1, "tau_2": self.tau_2}}
-        return neuron
+    tau: float = _DEFAULT.tau
+    tau_s: float | None = _DEFAULT.tau_s
+    tau_1: float = _DEFAULT.tau_1
+    tau_2: float = _DEFAULT.tau_2
+    after_spike: AfterSpike = _DEFAULT.after_spike
+    refractory: float = _DEFAULT.refractory

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from taxel._parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner
 
 __all__ = ["ReSuMe"]
+
+
+_DEFAULT = defaults("resume")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -57,10 +60,9 @@ class ReSuMe(EpochLearner):
     1
     """
 
-    after_spike: AfterSpike = "membrane"
-    a: float = 0.0
-    amplitude: float = 1.0
-    tau_w: float | None = None
+    _kind = "resume"
 
-    def _law(self) -> dict[str, Any]:
-        return {"resume": {"a": self.a, "amplitude": self.amplitude, "tau_w": self.tau_w}}
+    after_spike: AfterSpike = _DEFAULT.after_spike
+    a: float = _DEFAULT.a
+    amplitude: float = _DEFAULT.amplitude
+    tau_w: float | None = _DEFAULT.tau_w

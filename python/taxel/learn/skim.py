@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import floats, instance, number, parameters, several, text
-from taxel._core import ProblemError
-from taxel.learn._epochs import fitted
+from taxel._arguments import floats, instance, number, several
+from taxel._parameters import defaults
 from taxel.learn._examples import examples
+from taxel.learn._learner import SpikeLearner
+from taxel.metrics import matching
 from taxel.spikes import SpikeTrains
 
 __all__ = ["SKIM"]
 
 
-class SKIM:
+_DEFAULT = defaults("skim")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class SKIM(SpikeLearner):
     """Learn by SKIM: least squares from filtered inputs to a pulse at each target, then a threshold on the output.
 
     Parameters
@@ -35,13 +41,14 @@ class SKIM:
         How long the wanted output is 1 from a target on; 10 steps of 1 ms (†).
     ridge : float, 0 or more
         Added to the sum of squares, times the squares of the weights.
-    branches : int, 1 or more, optional
+    branches : int, from 1 to 100000, optional
         A wide layer of so many dendritic branches between inputs and output, each with fixed random weights of all
         trains and a fixed random delay. Without it every train is a branch of its own, as in 6.5.4, and its kernel is
         not compressed.
-    spread, delay_ms : float
+    spread : float, above 0, optional
+    delay_ms : float, ms, 0 or more, optional
         Fixed weights are drawn evenly from ``-spread`` to `spread`, delays from 0 to `delay_ms`; both belong to
-        `branches` and have no default.
+        `branches`, and none was published.
     nonlinearity : {"tanh", "none"}
         What compresses a branch's potential; belongs to `branches`.
     thresholds : sequence of float
@@ -88,68 +95,27 @@ class SKIM:
     np.True_
     """
 
-    weights_: NDArray[np.float64]
-    residual_: float
-    rows_: int
-    threshold_: float
-    scores_: list[tuple[float, int, int, int]]
+    _kind = "skim"
 
-    def __init__(
-        self,
-        *,
-        tau: float = 15.0,
-        kernel: Literal["alpha", "double_exponential", "exponential"] = "alpha",
-        tau_s: float | None = None,
-        step_ms: float = 1.0,
-        pulse_ms: float = 10.0,
-        ridge: float = 0.0,
-        branches: int | None = None,
-        spread: float | None = None,
-        delay_ms: float | None = None,
-        nonlinearity: Literal["tanh", "none"] = "tanh",
-        thresholds: Sequence[float] = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9),
-        within_ms: float = 50.0,
-        seed: int = 0,
-    ) -> None:
-        self.tau = tau
-        self.kernel = kernel
-        self.tau_s = tau_s
-        self.step_ms = step_ms
-        self.pulse_ms = pulse_ms
-        self.ridge = ridge
-        self.branches = branches
-        self.spread = spread
-        self.delay_ms = delay_ms
-        self.nonlinearity = nonlinearity
-        self.thresholds = thresholds
-        self.within_ms = within_ms
-        self.seed = seed
-        self._levels()
-        self._window()
-        _core.check_skim(self._json())
+    tau: float = _DEFAULT.tau
+    kernel: Literal["alpha", "double_exponential", "exponential"] = _DEFAULT.kernel
+    tau_s: float | None = _DEFAULT.tau_s
+    step_ms: float = _DEFAULT.step_ms
+    pulse_ms: float = _DEFAULT.pulse_ms
+    ridge: float = _DEFAULT.ridge
+    branches: int | None = _DEFAULT.branches
+    spread: float | None = _DEFAULT.spread
+    delay_ms: float | None = _DEFAULT.delay_ms
+    nonlinearity: Literal["tanh", "none"] = _DEFAULT.nonlinearity
+    thresholds: Sequence[float] = _DEFAULT.thresholds
+    within_ms: float = _DEFAULT.within_ms
+    seed: int = _DEFAULT.seed
 
-    def _json(self) -> str:
-        layer = None
-        if self.branches is not None:
-            for name, value in (("spread", self.spread), ("delay_ms", self.delay_ms)):
-                if value is None:
-                    raise ProblemError(f"{name}: none was published for a layer of branches, give one")
-            compressed = text("nonlinearity", self.nonlinearity, ("tanh", "none")) == "tanh"
-            layer = {"count": self.branches, "spread": self.spread, "delay_ms": self.delay_ms, "tanh": compressed}
-        names = ("kernel", "tau", "tau_s", "step_ms", "pulse_ms", "ridge", "seed")
-        return parameters({**{name: getattr(self, name) for name in names}, "branches": layer})
-
-    def _levels(self) -> NDArray[np.float64]:
-        levels = floats("thresholds", self.thresholds)
-        if not len(levels) or not np.all(np.isfinite(levels)):
-            raise ProblemError("thresholds: must be finite, and at least one")
-        return levels
-
-    def _window(self) -> float:
-        window = number("within_ms", self.within_ms, "ms")
-        if not window > 0:
-            raise ProblemError(f"within_ms is {window} ms: must be above 0")
-        return window
+    weights_: NDArray[np.float64] = field(init=False)
+    residual_: float = field(init=False)
+    rows_: int = field(init=False)
+    threshold_: float = field(init=False)
+    scores_: list[tuple[float, int, int, int]] = field(init=False)
 
     def fit(self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> Self:
         """Solve for the output weights, and choose the threshold.
@@ -178,11 +144,10 @@ class SKIM:
         self.residual_ = float(rest + np.sum((r @ self.weights_ - z) ** 2))
         outputs = [_core.output_skim(self._json(), self.weights_, parts) for parts in trains]
         self.scores_ = []
-        for level in self._levels():
-            counts = np.zeros(3, dtype=int)
-            for output, pattern, wanted in zip(outputs, patterns, times, strict=True):
-                counts += _matched(self._crossings(output, pattern.start, float(level)), wanted, self._window())
-            self.scores_.append((float(level), int(counts[0]), int(counts[1]), int(counts[2])))
+        for level in map(float, self.thresholds):
+            fired = [self._crossings(output, s.start, level) for output, s in zip(outputs, patterns, strict=True)]
+            counts = matching(fired, times, window_ms=self.within_ms)
+            self.scores_.append((level, counts.found, counts.missed, counts.false))
         self.threshold_ = min(self.scores_, key=lambda score: (score[2] + score[3], score[0]))[0]
         return self
 
@@ -202,9 +167,10 @@ class SKIM:
 
         Raises
         ------
-        ProblemError : a pattern that makes no sense, or a learner that was not fitted
+        ProblemError : a pattern that makes no sense
+        NotFittedError : before `fit`
         """
-        return _core.output_skim(self._json(), fitted(self), instance("pattern", pattern, SpikeTrains)._parts())
+        return _core.output_skim(self._json(), self._fitted(), instance("pattern", pattern, SpikeTrains)._parts())
 
     def predict(self, patterns: Sequence[SpikeTrains], *, threshold: float | None = None) -> list[NDArray[np.float64]]:
         """Return when the output comes up to the threshold, one array a pattern, ms.
@@ -217,9 +183,10 @@ class SKIM:
 
         Raises
         ------
-        ProblemError : patterns that make no sense, or a learner that was not fitted
+        ProblemError : patterns that make no sense
+        NotFittedError : before `fit`
         """
-        fitted(self)
+        self._fitted()
         level = self.threshold_ if threshold is None else number("threshold", threshold)
         return [
             self._crossings(self.output(s), s.start, level)
@@ -230,19 +197,3 @@ class SKIM:
         above = output >= level
         rows = np.flatnonzero(above & ~np.concatenate([[False], above[:-1]]))
         return floats("crossings", start + rows * float(self.step_ms))
-
-    def __repr__(self) -> str:
-        given = type(self).__init__.__kwdefaults__ or {}
-        shown = (f"{name}={getattr(self, name)!r}" for name in given if getattr(self, name) != given[name])
-        return f"SKIM({', '.join(shown)})"
-
-
-def _matched(spikes: NDArray[np.float64], targets: NDArray[np.float64], window: float) -> tuple[int, int, int]:
-    """Return how many targets are found, how many missed, how many spikes false: as many pairs, in order, as go."""
-    found, next_spike = 0, 0
-    for target in targets:
-        while next_spike < len(spikes) and spikes[next_spike] < target - window:
-            next_spike += 1
-        if next_spike < len(spikes) and spikes[next_spike] <= target + window:
-            found, next_spike = found + 1, next_spike + 1
-    return found, len(targets) - found, len(spikes) - found

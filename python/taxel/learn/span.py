@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
+from taxel._parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner
 
 __all__ = ["SPAN"]
+
+
+_DEFAULT = defaults("span")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -55,8 +58,7 @@ class SPAN(EpochLearner):
     1
     """
 
-    tau_a: float
-    after_spike: AfterSpike = "membrane"
+    _kind = "span"
 
-    def _law(self) -> dict[str, Any]:
-        return {"span": {"tau_a": self.tau_a}}
+    tau_a: float
+    after_spike: AfterSpike = _DEFAULT.after_spike

@@ -3,33 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from typing import Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, flag, floats, instance, parameters, several
-from taxel.learn._epochs import fitted, keep
-from taxel.learn._examples import seconds
+from taxel._arguments import callback, flag, floats, instance, several
+from taxel._core import ProblemError
+from taxel._parameters import defaults
+from taxel.learn._epochs import keep
+from taxel.learn._learner import Learner
 from taxel.spikes import SpikeTrains
 
 __all__ = ["Tempotron"]
 
 
-class Tempotron:
+_DEFAULT = defaults("tempotron")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Tempotron(Learner):
     """Learn to fire, at whatever time, on the patterns with a true label and on no other.
 
     Parameters
     ----------
-    tau, tau_s : float, ms
+    tau, tau_s : float, ms, above 0
         Membrane and synapse: an input of weight 1 makes a potential ``V0 (exp(-s/tau) - exp(-s/tau_s))`` that peaks
         at 1. 15, and a quarter of `tau` where `tau_s` is left out (†).
     theta_0 : float, above 0
         Threshold: weights are in its unit. At an output spike inputs are shunted: those at or after it are lost.
     eta : float, above 0, optional
         Learning rate; ``3e-3 * T / (tau * trains * V0)`` where left out (†), `T` being the patterns' mean length.
-    momentum : float, from 0 up to 1
+    momentum : float, 0 or more, below 1
         How much of the last change the next one carries on, from error to error (†).
     initial_sd : float, 0 or more
         First weights are drawn normally around 0, this wide (†).
@@ -37,7 +44,7 @@ class Tempotron:
         Epochs at most.
     seed : int, 0 or more
         Of the first weights and the order of patterns.
-    max_seconds : float, above 0, optional
+    max_seconds : float, s, above 0, optional
         Ends the training with the best weights so far.
 
     Attributes
@@ -72,42 +79,24 @@ class Tempotron:
     ('right', array([ True, False]))
     """
 
-    weights_: NDArray[np.float64]
-    right_: NDArray[np.float64]
-    epochs_: int
-    best_epoch_: int
-    status_: Literal["right", "epochs", "stopped"]
+    _kind = "tempotron"
 
+    tau: float = _DEFAULT.tau
+    tau_s: float | None = _DEFAULT.tau_s
+    theta_0: float = _DEFAULT.theta_0
+    eta: float | None = _DEFAULT.eta
+    momentum: float = _DEFAULT.momentum
+    initial_sd: float = _DEFAULT.initial_sd
+    epochs: int = _DEFAULT.epochs
+    seed: int = _DEFAULT.seed
+    max_seconds: float | None = _DEFAULT.max_seconds
+
+    weights_: NDArray[np.float64] = field(init=False)
+    right_: NDArray[np.float64] = field(init=False)
+    epochs_: int = field(init=False)
+    best_epoch_: int = field(init=False)
+    status_: Literal["right", "epochs", "stopped"] = field(init=False)
     _LOOKS_BEFORE_THE_FIRST = 0
-
-    def __init__(
-        self,
-        *,
-        tau: float = 15.0,
-        tau_s: float | None = None,
-        theta_0: float = 1.0,
-        eta: float | None = None,
-        momentum: float = 0.99,
-        initial_sd: float = 1e-3,
-        epochs: int = 2000,
-        seed: int = 0,
-        max_seconds: float | None = None,
-    ) -> None:
-        self.tau = tau
-        self.tau_s = tau_s
-        self.theta_0 = theta_0
-        self.eta = eta
-        self.momentum = momentum
-        self.initial_sd = initial_sd
-        self.epochs = epochs
-        self.seed = seed
-        self.max_seconds = max_seconds
-        seconds(max_seconds)
-        _core.check_tempotron(self._json())
-
-    def _json(self) -> str:
-        given = type(self).__init__.__kwdefaults__ or {}
-        return parameters({name: getattr(self, name) for name in given if name != "max_seconds"})
 
     def fit(
         self,
@@ -141,11 +130,11 @@ class Tempotron:
         """
         given = enumerate(several("patterns", patterns))
         trains = [instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in given]
-        wanted = [flag(f"labels[{p}]", label) for p, label in enumerate(several("labels", labels))]
+        wanted = _labels(labels)
         first = None if start is None else floats("start", start)
         if progress is not None:
             callback("progress", progress)
-        keep(self, _core.fit_tempotron(self._json(), trains, wanted, first, seconds(self.max_seconds), progress))
+        keep(self, _core.fit_tempotron(self._json(), trains, wanted, first, progress))
         return self
 
     def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.bool_]:
@@ -153,10 +142,24 @@ class Tempotron:
 
         Raises
         ------
-        ProblemError : patterns that make no sense, or a learner that was not fitted
+        ProblemError : patterns that make no sense
+        NotFittedError : before `fit`
         """
-        weights = fitted(self)
+        weights = self._fitted()
         return np.array([np.isfinite(self.peak(weights, s)[2]) for s in several("patterns", patterns)], dtype=bool)
+
+    def score(self, patterns: Sequence[SpikeTrains], labels: ArrayLike) -> float:
+        """Return the share of patterns on which the trained neuron does what the label says.
+
+        Raises
+        ------
+        ProblemError : patterns or labels that make no sense
+        NotFittedError : before `fit`
+        """
+        fired, wanted = self.predict(patterns), _labels(labels)
+        if len(wanted) != len(fired) or not wanted:
+            raise ProblemError(f"labels: {len(wanted)} for {len(fired)} patterns, must be one a pattern")
+        return float(np.mean(fired == np.array(wanted)))
 
     def peak(self, weights: ArrayLike, pattern: SpikeTrains) -> tuple[float, float, float]:
         """Return the largest potential, its time and the time of the output spike, infinite without one; ms.
@@ -195,7 +198,6 @@ class Tempotron:
         trains = instance("pattern", pattern, SpikeTrains)._parts()
         return _core.change_tempotron(self._json(), floats("weights", weights), trains, flag("label", label))
 
-    def __repr__(self) -> str:
-        given = type(self).__init__.__kwdefaults__ or {}
-        shown = (f"{name}={getattr(self, name)!r}" for name in given if getattr(self, name) != given[name])
-        return f"Tempotron({', '.join(shown)})"
+
+def _labels(labels: ArrayLike) -> list[bool]:
+    return [flag(f"labels[{p}]", label) for p, label in enumerate(several("labels", labels))]

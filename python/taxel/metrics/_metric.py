@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._arguments import floats, instance, number, parameters, several, shown, text
+from taxel._arguments import bare, floats, instance, number, parameters, several, shown, text
 from taxel._core import ProblemError
+from taxel._parameters import ranges
 from taxel.array import Array
 from taxel.spikes import SpikeTrains
 
@@ -19,49 +20,30 @@ __all__ = ["Pattern", "distance", "listed", "stated"]
 
 Pattern = ArrayLike | SpikeTrains
 
-_NUMBERS = ("tau", "sigma", "step_ms")
-_UNITS = {"q": "1/ms", "tau": "ms", "sigma": "mm", "step_ms": "ms"}
-_WORDS = {"normalisation": ("spike", "tau", "none"), "own_train": ("twice", "once")}
 
-#: What each metric takes, as the compiled part has it.
-TAKES = {
-    "victor_purpura": {"q"},
-    "victor_purpura_multi_unit": {"q", "k"},
-    "van_rossum": {"tau", "normalisation"},
-    "van_rossum_absolute": {"tau", "window", "step_ms"},
-    "van_rossum_spatial": {"tau", "sigma", "array", "own_train", "normalisation"},
-    "van_rossum_spatial_absolute": {"tau", "sigma", "array", "own_train", "window", "step_ms"},
-    "isi_distance": {"window"},
-    "spike_distance": {"window"},
-}
+def stated(metric: str, given: Mapping[str, Any]) -> str:
+    """Return a metric as JSON for the compiled part, which checks it."""
+    name = text("metric", metric)
+    return parameters({"name": name, **{key: _plain(name, key, value) for key, value in given.items()}})
 
 
-def stated(metric: str, given: dict[str, Any]) -> str:
-    """Return a metric as JSON; refuse what it does not take, and what is of another kind, by name."""
-    values: dict[str, Any] = {"name": text("metric", metric, TAKES)}
-    for name, value in given.items():
-        if name not in TAKES[metric]:
-            raise ProblemError(f"{name}: {metric} takes {', '.join(sorted(TAKES[metric]))}")
-        if name in ("q", "k"):
-            # JSON has no number for what is not finite.
-            cost = number(name, value, _UNITS.get(name))
-            values[name] = cost if math.isfinite(cost) else str(cost)
-        elif name in _WORDS:
-            values[name] = text(name, value, _WORDS[name])
-        elif name == "array":
-            values[name] = instance(name, value, Array)._geometry()
-        elif name in _NUMBERS:
-            if value is not None or name != "step_ms":
-                values[name] = number(name, value, _UNITS.get(name))
-        elif value is not None:
-            ends = floats(name, value, "ms")
-            if len(ends) != 2:
-                raise ProblemError(f"{name} has {len(ends)} entries: must be start and stop, ms")
-            values[name] = ends.tolist()
-    return parameters(values)
+def _plain(metric: str, name: str, value: Any) -> Any:
+    if name == "array":
+        return instance(name, value, Array)._geometry()
+    if name == "window" and value is not None:
+        ends = floats(name, value, "ms")
+        if len(ends) != 2:
+            raise ProblemError(f"{name} has {len(ends)} entries: must be start and stop, ms")
+        return ends.tolist()
+    known = ranges(metric).get(name, {})
+    if "infinite" in known:
+        # JSON has no number for what is not finite; where infinity makes sense, the compiled part reads its name.
+        cost = number(name, value, known["unit"])
+        return cost if math.isfinite(cost) else str(cost)
+    return bare(name, value, known.get("unit") or None)
 
 
-def distance(metric: str, a: Pattern, b: Pattern, given: dict[str, Any]) -> float:
+def distance(metric: str, a: Pattern, b: Pattern, given: Mapping[str, Any]) -> float:
     """Return the distance of two trains or two patterns."""
     if isinstance(a, SpikeTrains) != isinstance(b, SpikeTrains):
         name, value, other = ("b", b, "a") if isinstance(a, SpikeTrains) else ("a", a, "b")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from taxel._parameters import defaults
 from taxel.metrics._metric import Pattern, distance
 
 __all__ = ["isi_distance"]
 
 
-def isi_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None = None) -> float:
+_DEFAULT = defaults("isi_distance")
+
+
+def isi_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None = _DEFAULT.window) -> float:
     """Return how much the intervals between spikes differ, moment by moment.
 
     The mean over the window of ``|x - y| / max(x, y)``, where x and y are the two trains' intervals at that moment.

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from taxel._parameters import defaults
 from taxel.metrics._metric import Pattern, distance
 
 __all__ = ["spike_distance"]
 
 
-def spike_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None = None) -> float:
+_DEFAULT = defaults("spike_distance")
+
+
+def spike_distance(a: Pattern, b: Pattern, *, window: tuple[float, float] | None = _DEFAULT.window) -> float:
     """Return how far the spikes around each moment are from their nearest ones in the other train.
 
     Distances are taken relative to the intervals between spikes and averaged over the window.

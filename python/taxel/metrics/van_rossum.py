@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from taxel._parameters import defaults
 from taxel.metrics._metric import Pattern, distance
 
 __all__ = ["van_rossum"]
 
 
-def van_rossum(a: Pattern, b: Pattern, *, tau: float, normalisation: str = "spike") -> float:
+_DEFAULT = defaults("van_rossum")
+
+
+def van_rossum(a: Pattern, b: Pattern, *, tau: float, normalisation: str = _DEFAULT.normalisation) -> float:
     """Return the Euclidean distance of two spike trains smoothed by an exponential.
 
     Each spike becomes ``exp(-(t - t_i) / tau)`` from its time on; the squared difference is integrated over all time,

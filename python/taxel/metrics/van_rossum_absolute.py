@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from taxel._parameters import defaults
 from taxel.metrics._metric import Pattern, distance
 
 __all__ = ["van_rossum_absolute"]
 
 
+_DEFAULT = defaults("van_rossum_absolute")
+
+
 def van_rossum_absolute(
-    a: Pattern, b: Pattern, *, tau: float, window: tuple[float, float] | None = None, step_ms: float | None = None
+    a: Pattern,
+    b: Pattern,
+    *,
+    tau: float,
+    window: tuple[float, float] | None = _DEFAULT.window,
+    step_ms: float | None = _DEFAULT.step_ms,
 ) -> float:
     """Return the absolute difference of two smoothed spike trains, summed over time.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from taxel._arguments import instance
+from taxel._parameters import defaults
 from taxel.array import Array
 from taxel.metrics._metric import distance
 from taxel.spikes import SpikeTrains
@@ -10,15 +11,18 @@ from taxel.spikes import SpikeTrains
 __all__ = ["van_rossum_spatial"]
 
 
+_DEFAULT = defaults("van_rossum_spatial")
+
+
 def van_rossum_spatial(
     a: SpikeTrains,
     b: SpikeTrains,
     *,
     array: Array,
-    tau: float = 0.4,
-    sigma: float = 2.0,
-    own_train: str = "twice",
-    normalisation: str = "spike",
+    tau: float = _DEFAULT.tau,
+    sigma: float = _DEFAULT.sigma,
+    own_train: str = _DEFAULT.own_train,
+    normalisation: str = _DEFAULT.normalisation,
 ) -> float:
     """Return the Euclidean distance of two patterns smoothed in time and over the array.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from taxel._arguments import instance
+from taxel._parameters import defaults
 from taxel.array import Array
 from taxel.metrics._metric import distance
 from taxel.spikes import SpikeTrains
@@ -10,16 +11,19 @@ from taxel.spikes import SpikeTrains
 __all__ = ["van_rossum_spatial_absolute"]
 
 
+_DEFAULT = defaults("van_rossum_spatial_absolute")
+
+
 def van_rossum_spatial_absolute(
     a: SpikeTrains,
     b: SpikeTrains,
     *,
     array: Array,
-    tau: float = 0.4,
-    sigma: float = 2.0,
-    own_train: str = "twice",
-    window: tuple[float, float] | None = None,
-    step_ms: float | None = None,
+    tau: float = _DEFAULT.tau,
+    sigma: float = _DEFAULT.sigma,
+    own_train: str = _DEFAULT.own_train,
+    window: tuple[float, float] | None = _DEFAULT.window,
+    step_ms: float | None = _DEFAULT.step_ms,
 ) -> float:
     """Return the absolute differences of two patterns smoothed in time and over the array, over taxels and time.
 

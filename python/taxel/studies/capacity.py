@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from taxel.learn import ConeX
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel.studies.mapping import LEARN, TABLE
 
@@ -51,10 +52,9 @@ def feasible(params: dict[str, Any], count: int, seed: int) -> bool:
     """
     margins = {"margin": params["margin"], "slope": params["slope"]} if params["time"] == "continuous" else {}
     cone = ConeX(
-        **{**TABLE, **LEARN},
+        **LEARN,
+        neuron=Neuron(**TABLE, time=params["time"], after_spike=params["after_spike"]),
         lambdas=(0.0, 1.0, 0.0),
-        time=params["time"],
-        after_spike=params["after_spike"],
         horizon=DURATION_MS,
         **margins,
     )

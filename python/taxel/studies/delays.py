@@ -9,6 +9,7 @@ import numpy as np
 
 from taxel import learn
 from taxel.learn import ConeX
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel.studies import capacity, mapping
 from taxel.studies.capacity import DURATION_MS, met, patterns, weakest
@@ -72,7 +73,8 @@ def delayed(params: dict[str, Any], drawn: Sequence[SpikeTrains], seed: int) -> 
 def fit(params: dict[str, Any], count: int, seed: int, lambdas: tuple[float, float, float]) -> ConeX:
     """Learn so many patterns of a realisation as an arm hears them."""
     drawn, targets = patterns(seed, params["inputs"], count, params["classes"])
-    cone = ConeX(**TABLE, **LEARN, lambdas=lambdas, time=params["time"], horizon=DURATION_MS)
+    neuron = Neuron(**TABLE, time=params["time"])
+    cone = ConeX(neuron=neuron, **LEARN, lambdas=lambdas, horizon=DURATION_MS)
     return cone.fit(delayed(params, drawn, seed), targets)
 
 

@@ -79,9 +79,9 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     room = params["stop"] - APART_MS * (params["count"] + 1)
     targets = np.sort(rng.uniform(0.0, room, params["count"])) + APART_MS * (np.arange(params["count"]) + 1)
     options = {**TABLE, "theta_plus": params["theta_plus"], "after_spike": params["after_spike"]}
-    cone = ConeX(
-        **options, **LEARN, lambdas=(0.0, 1.0, 0.0), kappa=1.0, margin=params["margin"], slope=params["margin"]
-    ).fit([trains], [targets])
+    margins = dict.fromkeys(("margin", "slope"), params["margin"])
+    cone = ConeX(neuron=Neuron(**options), **LEARN, lambdas=(0.0, 1.0, 0.0), kappa=1.0, **margins)
+    cone.fit([trains], [targets])
     if cone.status_ != "solved":
         return {"status": cone.status_, "runs": []}
     exact = cone.neuron_.run(cone.weights_, trains)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from taxel import learn, neuron
 from taxel.learn import ConeX
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel.studies import mapping
 from taxel.studies.mapping import LEARN, TABLE, thresholds
@@ -40,7 +41,8 @@ def tasks(p: Parameters) -> list[Task]:
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     """Train one neuron and follow it."""
     trains = mapping.poisson(seed, params["inputs"], params["stop"], *params["rates_hz"])
-    cone = ConeX(**TABLE, **LEARN, after_spike=params["after_spike"], lambdas=(1.0, 0.0, 0.0), kappa=1.0)
+    neuron = Neuron(**TABLE, after_spike=params["after_spike"])
+    cone = ConeX(neuron=neuron, **LEARN, lambdas=(1.0, 0.0, 0.0), kappa=1.0)
     cone.fit([trains], [params["targets"]])
     times = np.arange(round(params["stop"] / params["step_ms"]) + 1) * params["step_ms"]
     potential = cone.neuron_.potential(cone.weights_, trains, times, spikes=params["targets"])

@@ -38,7 +38,7 @@ def tasks(p: Parameters) -> list[Task]:
     """List one fit a kappa and a seed."""
     first, last = p["drawn"]
     times = (first + p["step_ms"] * np.arange(round((last - first) / p["step_ms"]) + 1)).round(6).tolist()
-    learnt = {name: p[name] for name in ("lambdas", "divide_b_by", "after_spike")}
+    learnt = {"lambdas": p["lambdas"], "divide_b_by": p["divide_b_by"], "neuron__after_spike": p["after_spike"]}
     return [
         Task(
             {

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from taxel import learn
 from taxel.learn import ConeR, ConeX
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel.studies import mapping
 from taxel.studies.mapping import LEARN, TABLE
@@ -45,7 +46,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     hard = params["learner"] == "cone_x"
     trains = SpikeTrains.from_lists([[t] for t in params["inputs_at"]], 0.0, params["target"])
     options = {
-        **TABLE,
+        "neuron": Neuron(**TABLE, time="grid"),
         "kappa": params["kappa"],
         "delta_t_ms": DELTA_T,
         "lb": -params["bound"],
@@ -53,7 +54,7 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         "lambdas": params["lambdas_x"] if hard else params["lambdas_r"],
     }
     if hard:
-        exact = ConeX(**options, time="grid").fit([trains], [[params["target"]]])
+        exact = ConeX(**options).fit([trains], [[params["target"]]])
         status, weights = exact.status_, exact.weights_
     else:
         best = ConeR(**options).fit([trains], [[params["target"]]])

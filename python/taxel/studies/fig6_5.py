@@ -46,8 +46,8 @@ def tasks(p: Parameters) -> list[Task]:
                 "learn": {
                     "kappa": p["kappa"],
                     "lambdas": [*ratio, 0.0],
-                    "after_spike": p["after_spike"],
-                    "time": p["time"],
+                    "neuron__after_spike": p["after_spike"],
+                    "neuron__time": p["time"],
                 },
                 "times": np.arange(0.0, p["drawn_to"] + 0.5).tolist(),
             },

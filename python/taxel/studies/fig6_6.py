@@ -42,7 +42,12 @@ def tasks(p: Parameters) -> list[Task]:
                 "rates_hz": p["rates_hz"],
                 "stop": p["stop"],
                 "targets": p["targets"],
-                "learn": {"lambdas": lambdas, "after_spike": reading, "time": p["time"], "kappa": 1.0},
+                "learn": {
+                    "lambdas": lambdas,
+                    "neuron__after_spike": reading,
+                    "neuron__time": p["time"],
+                    "kappa": 1.0,
+                },
                 "times": np.arange(0.0, p["stop"] + 0.5).tolist(),
             },
             seed,
@@ -73,7 +78,7 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
             here = [
                 r.result
                 for r in rows
-                if r.params["learn"]["after_spike"] == reading and r.params["learn"]["lambdas"] == lambdas
+                if r.params["learn"]["neuron__after_spike"] == reading and r.params["learn"]["lambdas"] == lambdas
             ]
             solved = [r for r in here if r["status"] == "solved"]
             between = np.array([r["between"] for r in solved]).reshape(len(solved), len(times))

@@ -10,6 +10,7 @@ import numpy as np
 from taxel import learn, metrics, neuron
 from taxel.learn import ConeX
 from taxel.metrics import victor_purpura
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel.studies import waves
 from taxel.studies.runner import Task
@@ -48,7 +49,8 @@ def tasks(p: Parameters) -> list[Task]:
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     """Train a neuron on the clean pattern and let it hear each noise."""
     times = waves.pattern(seed)
-    cone = ConeX(**waves.NEURON, **waves.LEARN, kappa=params["kappa"], lambdas=params["lambdas"], divide_b_by="targets")
+    learnt = {name: params[name] for name in ("kappa", "lambdas")}
+    cone = ConeX(neuron=Neuron(**waves.NEURON), **waves.LEARN, **learnt, divide_b_by="targets")
     cone.fit([SpikeTrains.from_lists([[t] for t in times], 0.0, waves.DURATION_MS)], [[waves.DURATION_MS]])
     train = waves.waves(times, np.random.default_rng([seed, 3]), params["repetitions"])
     clean = train.trains

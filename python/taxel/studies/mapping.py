@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel.learn import ConeX
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 
 __all__ = ["LEARN", "TABLE", "poisson", "realise", "single_spikes", "thresholds", "timing", "told"]
@@ -74,8 +75,8 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
     Parameters
     ----------
     params : dict
-        ``pattern`` ("single" or "poisson"), ``inputs``, ``stop`` (ms), ``targets`` (ms), ``learn`` (options of
-        `ConeX`), ``times`` (ms: where the potential is told; without spiking, or between output spikes).
+        ``pattern`` ("single" or "poisson"), ``inputs``, ``stop`` (ms), ``targets`` (ms), ``learn`` (parameters
+        of `ConeX`), ``times`` (ms: where the potential is told; without spiking, or between output spikes).
     seed : int
         Of the pattern.
 
@@ -89,7 +90,8 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         trains = single_spikes(seed, params["inputs"], params["stop"], max(params["times"]))
     else:
         trains = poisson(seed, params["inputs"], params["stop"], *params["rates_hz"])
-    cone = ConeX(**{**TABLE, **LEARN, **params["learn"]}).fit([trains], [params["targets"]])
+    cone = ConeX(neuron=Neuron(**TABLE), **LEARN).set_params(**params["learn"])
+    cone.fit([trains], [params["targets"]])
     neuron, times, targets = cone.neuron_, params["times"], params["targets"]
     return {
         "status": cone.status_,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from taxel import learn
 from taxel.metrics import victor_purpura
+from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
 from taxel.studies.runner import Task
 from taxel.studies.study import Row
@@ -245,9 +246,9 @@ def _fitted(
     patterns: Sequence[SpikeTrains],
     targets: Sequence[NDArray[np.float64]],
 ) -> learn.ConeR | learn.ConeX:
-    options = {**NEURON, **LEARN, **setting, "divide_b_by": params["divide_b_by"]}
+    options = {**LEARN, **setting, "divide_b_by": params["divide_b_by"]}
     with warnings.catch_warnings():
         # Noise may well take a target out of reach; the distance shows it.
         warnings.simplefilter("ignore", UserWarning)
         learner = learn.ConeX if params["learner"] == "cone_x" else learn.ConeR
-        return learner(**options).fit(patterns, targets)
+        return learner(neuron=Neuron(**NEURON), **options).fit(patterns, targets)

@@ -6,13 +6,11 @@
 use std::collections::BTreeMap;
 
 use crate::detect::{Detection, Reference};
+use crate::metrics::matching::in_order;
 use crate::{Result, Stop, problem};
 
 /// The widest window that a score takes, us: one hour.
 pub const WIDEST_WINDOW_US: i64 = 3_600_000_000;
-
-/// The most pairs within the windows of one label: a byte each while they are matched.
-const MOST_PAIRS: usize = 200_000_000;
 
 /// How the detections of one label met the reference events of that label.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -88,6 +86,9 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
     if windows.len() != truth.len() {
         return Err(problem!("{} windows for {} reference events: must be one each", windows.len(), truth.len()));
     }
+    if let Some(window) = windows.iter().find(|w| !(0..=WIDEST_WINDOW_US).contains(*w)) {
+        return Err(problem!("window of {window} us: must lie between 0 and one hour, {WIDEST_WINDOW_US} us"));
+    }
     let mut labels: BTreeMap<&str, (Vec<usize>, Vec<usize>)> = BTreeMap::new();
     for (k, detection) in found.iter().enumerate() {
         labels.entry(&detection.label).or_default().0.push(k);
@@ -102,7 +103,7 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
         let said_t: Vec<i64> = said.iter().map(|&k| found[k].t).collect();
         let events_t: Vec<i64> = events.iter().map(|&k| truth[k].t).collect();
         let reach: Vec<i64> = events.iter().map(|&k| windows[k]).collect();
-        let pairs = match_in_order(&said_t, &events_t, &reach, stop).map_err(|error| {
+        let pairs = in_order(&said_t, &events_t, &reach, stop).map_err(|error| {
             if let crate::Error::Problem(text) = error { problem!("{label}: {text}") } else { error }
         })?;
 
@@ -122,94 +123,6 @@ pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: St
         tallies.push(tally);
     }
     Ok(tallies)
-}
-
-/// Pairs detections with reference events one to one and in the order of time: as many pairs as the windows allow, and
-/// of all ways to have so many the one with the least sum of distances. Gives `(detection, reference)`, ascending.
-///
-/// Times (us) must ascend; `windows` is one a reference event. With one width for all, no pairing at all, in order or
-/// not, has more pairs or a smaller sum: two pairs that cross can be uncrossed without growing the longer or the sum.
-///
-/// # Errors
-///
-/// As [`score`].
-pub fn match_in_order(found: &[i64], truth: &[i64], windows: &[i64], stop: Stop<'_>) -> Result<Vec<(usize, usize)>> {
-    if let Some(k) = windows.iter().position(|w| !(0..=WIDEST_WINDOW_US).contains(w)) {
-        return Err(problem!("window of {} us: must lie between 0 and one hour, {WIDEST_WINDOW_US} us", windows[k]));
-    }
-    // Row i of the table stands for the first i + 1 reference events, its column j for the first j detections. Only the
-    // band of columns that some window reaches is kept; both its edges ascend from row to row.
-    let rows = truth.len();
-    let mut low: Vec<usize> =
-        (0..rows).map(|i| found.partition_point(|&f| f < truth[i].saturating_sub(windows[i]))).collect();
-    let mut high: Vec<usize> =
-        (0..rows).map(|i| found.partition_point(|&f| f <= truth[i].saturating_add(windows[i]))).collect();
-    for i in 1..rows {
-        high[i] = high[i].max(high[i - 1]);
-        low[rows - 1 - i] = low[rows - 1 - i].min(low[rows - i]);
-    }
-    let cells: usize = low.iter().zip(&high).map(|(l, h)| h - l).fold(0, usize::saturating_add);
-    if cells > MOST_PAIRS {
-        return Err(problem!(
-            "{cells} pairs lie within the windows, at most {MOST_PAIRS} are matched: narrow the window"
-        ));
-    }
-
-    #[derive(Clone, Copy)]
-    enum Step {
-        PassDetection,
-        PassEvent,
-        Match,
-    }
-    // One number orders "more pairs, then less distance": distances sum to less than 2^64.
-    const PAIR: i128 = 1 << 64;
-    let mut steps: Vec<Vec<Step>> = Vec::with_capacity(rows);
-    let mut above: Vec<i128> = vec![0];
-    let (mut above_low, mut above_high) = (0, 0);
-    for i in 0..rows {
-        stop.check()?;
-        let from_above = |j: usize| above[j.min(above_high) - above_low];
-        let mut row = Vec::with_capacity(high[i] - low[i] + 1);
-        let mut way = Vec::with_capacity(high[i] - low[i]);
-        row.push(from_above(low[i]));
-        for j in low[i]..high[i] {
-            let apart = found[j].abs_diff(truth[i]);
-            let (mut best, mut step) = (from_above(j + 1), Step::PassEvent);
-            let left = row[j - low[i]];
-            if left > best {
-                (best, step) = (left, Step::PassDetection);
-            }
-            if apart <= windows[i].unsigned_abs() {
-                let pair = from_above(j) + PAIR - i128::from(apart);
-                if pair > best {
-                    (best, step) = (pair, Step::Match);
-                }
-            }
-            row.push(best);
-            way.push(step);
-        }
-        steps.push(way);
-        (above, above_low, above_high) = (row, low[i], high[i]);
-    }
-
-    let mut pairs = Vec::new();
-    let mut j = found.len();
-    for i in (0..rows).rev() {
-        j = j.min(high[i]);
-        while j > low[i] {
-            match steps[i][j - 1 - low[i]] {
-                Step::PassDetection => j -= 1,
-                Step::PassEvent => break,
-                Step::Match => {
-                    j -= 1;
-                    pairs.push((j, i));
-                    break;
-                }
-            }
-        }
-    }
-    pairs.reverse();
-    Ok(pairs)
 }
 
 /// Whether each detection lies within the window of any reference event; times ascend.
@@ -236,73 +149,7 @@ fn ms_between(from: i64, to: i64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use rand::rngs::StdRng;
-    use rand::{Rng, SeedableRng};
-
     use super::*;
-
-    fn matched(found: &[i64], truth: &[i64], window: i64) -> Vec<(usize, usize)> {
-        match_in_order(found, truth, &vec![window; truth.len()], Stop::never()).unwrap()
-    }
-
-    /// The best of all pairings, crossing ones too: pairs, then the negative sum of distances.
-    fn best_of_all(found: &[i64], truth: &[i64], windows: &[i64], taken: u32, ordered: bool) -> (usize, i64) {
-        let Some((&t, rest)) = truth.split_first() else { return (0, 0) };
-        let mut best = best_of_all(found, rest, &windows[1..], taken, ordered);
-        for (j, &f) in found.iter().enumerate() {
-            if taken & (1 << j) == 0 && (f - t).abs() <= windows[0] {
-                let blocked = if ordered { (1 << (j + 1)) - 1 } else { 1 << j };
-                let (pairs, cost) = best_of_all(found, rest, &windows[1..], taken | blocked, ordered);
-                best = best.max((pairs + 1, cost - (f - t).abs()));
-            }
-        }
-        best
-    }
-
-    #[test]
-    fn no_pairing_whatever_has_more_pairs_or_a_smaller_sum_of_distances() {
-        let mut random = StdRng::seed_from_u64(3);
-        for _ in 0..3000 {
-            let mut times = |most| {
-                let mut t: Vec<i64> = (0..random.random_range(0..=most)).map(|_| random.random_range(0..40)).collect();
-                t.sort_unstable();
-                t
-            };
-            let (found, truth) = (times(8), times(6));
-            let window = random.random_range(0..12);
-            let windows = vec![window; truth.len()];
-            let pairs = matched(&found, &truth, window);
-            let cost: i64 = pairs.iter().map(|&(j, i)| -(found[j] - truth[i]).abs()).sum();
-            assert!(pairs.windows(2).all(|w| w[0].0 < w[1].0 && w[0].1 < w[1].1), "in order, one to one");
-            assert_eq!((pairs.len(), cost), best_of_all(&found, &truth, &windows, 0, false), "{found:?} {truth:?}");
-        }
-    }
-
-    #[test]
-    fn windows_of_different_widths_give_the_best_pairing_in_order() {
-        let mut random = StdRng::seed_from_u64(4);
-        for _ in 0..3000 {
-            let mut times = |most| {
-                let mut t: Vec<i64> = (0..random.random_range(0..=most)).map(|_| random.random_range(0..40)).collect();
-                t.sort_unstable();
-                t
-            };
-            let (found, truth) = (times(8), times(6));
-            let windows: Vec<i64> = truth.iter().map(|_| random.random_range(0..15)).collect();
-            let pairs = match_in_order(&found, &truth, &windows, Stop::never()).unwrap();
-            let cost: i64 = pairs.iter().map(|&(j, i)| -(found[j] - truth[i]).abs()).sum();
-            assert!(pairs.iter().all(|&(j, i)| (found[j] - truth[i]).abs() <= windows[i]));
-            assert_eq!((pairs.len(), cost), best_of_all(&found, &truth, &windows, 0, true), "{found:?} {truth:?}");
-        }
-    }
-
-    #[test]
-    fn a_pair_is_never_given_up_for_a_nearer_one() {
-        // The nearest pairing (second with second) would leave the first event without its only partner.
-        assert_eq!(matched(&[40, 60], &[0, 50], 50), [(0, 0), (1, 1)]);
-        assert_eq!(matched(&[-50, 50], &[0], 50), [(0, 0)]);
-        assert_eq!(matched(&[-51, 51], &[0], 50), []);
-    }
 
     #[test]
     fn every_further_spike_is_false_inside_the_window_too() {
@@ -331,13 +178,11 @@ mod tests {
     }
 
     #[test]
-    fn windows_that_make_no_sense_and_too_many_pairs_are_refused() {
+    fn windows_that_make_no_sense_are_refused() {
         let never = Stop::never();
-        assert!(match_in_order(&[0], &[0], &[-1], never).unwrap_err().to_string().contains("window of -1 us"));
-        assert!(match_in_order(&[0], &[0], &[i64::MAX], never).is_err());
+        let one = [Reference { label: "a".into(), t: 0 }];
+        assert!(score(&[], &one, &[-1], never).unwrap_err().to_string().contains("window of -1 us"));
+        assert!(score(&[], &one, &[i64::MAX], never).is_err());
         assert!(score(&[], &[Reference { label: "a".into(), t: 0 }], &[], never).is_err());
-        let many = vec![0; 20_000];
-        assert!(matches!(match_in_order(&many, &many, &vec![1; 20_000], never), Err(crate::Error::Problem(_))));
-        assert_eq!(matched(&[i64::MIN, i64::MAX], &[i64::MIN, i64::MAX], 5), [(0, 0), (1, 1)]);
     }
 }

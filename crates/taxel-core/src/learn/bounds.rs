@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::allowed::Numbers;
 use crate::{Result, problem};
 
 /// A least or a largest weight, mV.
@@ -12,6 +13,15 @@ pub enum Bound {
     All(f64),
     /// One a synapse.
     Each(Vec<f64>),
+}
+
+impl Numbers for Bound {
+    fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
+        match self {
+            Self::All(value) => value.each(look),
+            Self::Each(values) => values.each(look),
+        }
+    }
 }
 
 impl Bound {

@@ -9,7 +9,9 @@ use super::bounds::{Bound, bounds_of, check_bounds};
 use super::rounds::START_NEAR_MS;
 use super::rows::{Layout, SilentRows, TargetRow, target_rows};
 use super::{check_examples, check_trains};
+use crate::allowed::{Range, ranges};
 use crate::neuron::{Neuron, Time};
+use crate::parameters::Described;
 use crate::vectors::{add, dot};
 use crate::{Result, SpikeTrains, Stop, problem};
 
@@ -104,6 +106,24 @@ impl Default for ConeR {
 }
 
 impl ConeR {
+    ranges! {
+        kappa: "", Range::ABOVE_0;
+        delta_t_ms(delta_t): "ms", Range::FROM_0;
+        lambdas: "", Range::FROM_0;
+        lb: "mV", Range::FINITE;
+        ub: "mV", Range::FINITE;
+        margin: "mV", Range::FROM_0;
+        horizon: "ms", Range::FINITE;
+        tolerance: "", Range::within(1e-10, 0.1);
+        max_seconds: "s", Range::ABOVE_0;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors
@@ -114,33 +134,11 @@ impl ConeR {
         if self.neuron.time != Time::Grid {
             return Err(problem!("time is \"continuous\": 6.13 is a sum over grid points, must be \"grid\""));
         }
-        if !(self.kappa.is_finite() && self.kappa > 0.0) {
-            return Err(problem!("kappa is {}: must be above 0 and finite", self.kappa));
-        }
-        for (name, value) in [("delta_t_ms", self.delta_t()), ("margin", self.margin)] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(problem!("{name} is {value}: must be 0 or more and finite"));
-            }
-        }
-        if let Some(k) = self.lambdas.iter().position(|l| !(l.is_finite() && *l >= 0.0)) {
-            return Err(problem!("lambdas[{k}] is {}: must be 0 or more and finite", self.lambdas[k]));
-        }
+        self.check_ranges()?;
         if self.lambdas.iter().sum::<f64>() == 0.0 {
             return Err(problem!("lambdas are all 0: at least one must be above 0"));
         }
-        check_bounds(&self.lb, &self.ub)?;
-        if let Some(horizon) = self.horizon
-            && !horizon.is_finite()
-        {
-            return Err(problem!("horizon is {horizon} ms: must be finite"));
-        }
-        if !(1e-10..=0.1).contains(&self.tolerance) {
-            return Err(problem!("tolerance is {}: must lie between 1e-10 and 0.1", self.tolerance));
-        }
-        if let Some(most) = self.max_seconds.filter(|most| !(most.is_finite() && *most > 0.0)) {
-            return Err(problem!("max_seconds is {most}: must be above 0 and finite"));
-        }
-        Ok(())
+        check_bounds(&self.lb, &self.ub)
     }
 
     /// How far behind a target B looks, ms.

@@ -16,7 +16,9 @@ use super::check_examples;
 use super::cone_r::{Divisor, Norm};
 use super::silence::{Peak, Silence};
 use super::statement::{Margin, Row, Stated, Statement};
+use crate::allowed::{Numbers, Range, ranges};
 use crate::neuron::{Neuron, Time};
+use crate::parameters::Described;
 use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
 use shortest::{End, Shortest};
@@ -64,6 +66,8 @@ pub struct ConeX {
     pub horizon: Option<Horizon>,
     /// The relative gap between objective and proven bound at which a fit counts as solved.
     pub tolerance: f64,
+    /// After how long the caller asks for the best so far, s; this crate looks at no clock.
+    pub max_seconds: Option<f64>,
 }
 
 /// Where silence ends, ms.
@@ -76,14 +80,16 @@ pub enum Horizon {
     Each(Vec<f64>),
 }
 
-impl Horizon {
-    fn values(&self) -> &[f64] {
+impl Numbers for Horizon {
+    fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {
         match self {
-            Self::All(value) => std::slice::from_ref(value),
-            Self::Each(values) => values,
+            Self::All(value) => value.each(look),
+            Self::Each(values) => values.each(look),
         }
     }
+}
 
+impl Horizon {
     fn each(&self, patterns: usize) -> Result<Vec<f64>> {
         match self {
             Self::All(value) => Ok(vec![*value; patterns]),
@@ -110,11 +116,31 @@ impl Default for ConeX {
             slope: None,
             horizon: None,
             tolerance: 1e-8,
+            max_seconds: None,
         }
     }
 }
 
 impl ConeX {
+    ranges! {
+        kappa: "", Range::ABOVE_0;
+        delta_t_ms(delta_t): "ms", Range::FROM_0;
+        lambdas: "", Range::FROM_0;
+        lb: "mV", Range::FINITE;
+        ub: "mV", Range::FINITE;
+        margin: "mV", Range::FROM_0;
+        slope: "mV/ms", Range::FROM_0;
+        horizon: "ms", Range::FINITE;
+        tolerance: "", Range::within(1e-12, 0.1);
+        max_seconds: "s", Range::ABOVE_0;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors
@@ -122,33 +148,16 @@ impl ConeX {
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
-        if !(self.kappa.is_finite() && self.kappa > 0.0) {
-            return Err(problem!("kappa is {}: must be above 0 and finite", self.kappa));
-        }
-        if !(self.delta_t().is_finite() && self.delta_t() >= 0.0) {
-            return Err(problem!("delta_t_ms is {}: must be 0 or more and finite", self.delta_t()));
-        }
-        if let Some(k) = self.lambdas.iter().position(|l| !(l.is_finite() && *l >= 0.0)) {
-            return Err(problem!("lambdas[{k}] is {}: must be 0 or more and finite", self.lambdas[k]));
-        }
+        self.check_ranges()?;
         check_bounds(&self.lb, &self.ub)?;
         let Margin { height, slope } = self.margin();
         for (name, value, unit) in [("margin", height, "mV"), ("slope", slope, "mV/ms")] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(problem!("{name} is {value} {unit}: must be 0 or more and finite"));
-            }
             if value == 0.0 && self.neuron.time == Time::Continuous {
                 return Err(problem!("{name} is 0 {unit}: must be above 0 in continuous time (1e-6 will do)"));
             }
         }
         if slope > 0.0 && self.neuron.time == Time::Grid {
             return Err(problem!("slope is {slope} mV/ms: belongs to time \"continuous\", on the grid nothing tapers"));
-        }
-        if let Some(horizon) = self.horizon.iter().flat_map(Horizon::values).find(|h| !h.is_finite()) {
-            return Err(problem!("horizon is {horizon} ms: must be finite"));
-        }
-        if !(1e-12..=0.1).contains(&self.tolerance) {
-            return Err(problem!("tolerance is {}: must lie between 1e-12 and 0.1", self.tolerance));
         }
         Ok(())
     }

@@ -5,6 +5,8 @@
 
 use super::check_example;
 use super::cone_r::{ConeR, Fit, Problem, Round, Shares};
+use crate::allowed::{Parameter, Range};
+use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// The window, its rows, and the last fit.
@@ -19,6 +21,15 @@ pub struct OnlineConeR {
 }
 
 impl OnlineConeR {
+    /// How many patterns the window holds.
+    const WINDOW: Parameter = Parameter { name: "window", unit: "", range: Range::FROM_1 };
+
+    /// The parameters of [`ConeR`] and `window`, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        ConeR::described().with(Self::WINDOW, 200)
+    }
+
     /// An empty window of so many patterns.
     ///
     /// # Errors
@@ -26,9 +37,7 @@ impl OnlineConeR {
     /// `Problem` for parameters that make no sense, or a window of none.
     pub fn new(parameters: &ConeR, window: usize) -> Result<Self> {
         parameters.check()?;
-        if window == 0 {
-            return Err(problem!("window is 0: must be 1 pattern or more"));
-        }
+        Self::WINDOW.check(&window)?;
         Ok(Self { parameters: parameters.clone(), window, problem: None, seen: 0, last: None })
     }
 

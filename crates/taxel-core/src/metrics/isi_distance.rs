@@ -4,7 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::edges::{Window, begun, distinct, interval};
 use super::van_rossum_absolute::Exposure;
-use crate::Result;
+use super::{Law, One, Patterns, Ready, summed};
+use crate::parameters::Described;
+use crate::{Result, Stop};
 
 /// The mean over the window of `|x - y| / max(x, y)`, where x and y are the two trains' intervals at that moment.
 ///
@@ -18,14 +20,25 @@ pub struct IsiDistance {
     pub window: Option<(f64, f64)>,
 }
 
-impl IsiDistance {
-    /// Checks the window.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` where it is not finite, or ends before it starts.
-    pub fn check(&self) -> Result<()> {
-        Exposure::check(self.window, None)
+impl Law for IsiDistance {
+    fn described() -> Described {
+        Described::by(&Self { window: None }, &[], &[])
+    }
+
+    fn check(&self) -> Result<()> {
+        Exposure::check(self.window)
+    }
+
+    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
+        Ok(Box::new(Within(super::edges::window(self.window, a, b)?)))
+    }
+}
+
+struct Within(Window);
+
+impl Ready for Within {
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        summed(a, b, stop, |a, b| Ok(between(a, b, self.0)))
     }
 }
 

@@ -5,8 +5,11 @@ mod matrix;
 use serde::{Deserialize, Serialize};
 
 use super::merged::merged;
-use crate::Result;
-use crate::allowed::above_0;
+use super::pairwise::Matrix;
+use super::{Law, One, Patterns, Ready, Work, summed};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
+use crate::{Result, Stop};
 
 /// The Euclidean distance of two trains, each spike of which becomes `exp(-(t - t_i) / tau)` from its time on.
 ///
@@ -48,14 +51,40 @@ impl Normalisation {
     }
 }
 
+impl Law for VanRossum {
+    fn described() -> Described {
+        Described::by(&Self { tau: 1.0, normalisation: Normalisation::default() }, &["tau"], Self::RANGES)
+    }
+
+    fn check(&self) -> Result<()> {
+        self.check_ranges()
+    }
+
+    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
+        let _ = (a, b);
+        Ok(Box::new(self))
+    }
+}
+
+impl Ready for &VanRossum {
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        summed(a, b, stop, |a, b| Ok(VanRossum::between(self, a, b)))
+    }
+
+    fn fill(
+        &self,
+        matrix: &Matrix,
+        a: &Patterns<'_>,
+        b: Option<&Patterns<'_>>,
+        work: &mut Work<'_>,
+    ) -> Option<Result<()>> {
+        Some(VanRossum::fill(self, matrix, a, b, work))
+    }
+}
+
 impl VanRossum {
-    /// Checks `tau`.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` where it is not above 0 and finite.
-    pub fn check(&self) -> Result<()> {
-        above_0("tau", self.tau, "ms")
+    ranges! {
+        tau: "ms", Range::ABOVE_0;
     }
 
     /// The distance of two ascending trains.

@@ -3,8 +3,10 @@
 use serde::{Deserialize, Serialize};
 
 use super::merged::merged;
-use crate::allowed::above_0;
-use crate::{Result, problem};
+use super::{Law, One, Patterns, Ready, summed};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
+use crate::{Result, Stop, problem};
 
 /// The absolute difference of two trains, smoothed as in 5.8, integrated over time, or summed over the points of a grid.
 ///
@@ -23,15 +25,32 @@ pub struct VanRossumAbsolute {
     pub step_ms: Option<f64>,
 }
 
+impl Law for VanRossumAbsolute {
+    fn described() -> Described {
+        Described::by(&Self { tau: 1.0, window: None, step_ms: None }, &["tau"], Self::RANGES)
+    }
+
+    fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        Exposure::check(self.window)
+    }
+
+    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
+        let _ = (a, b);
+        Ok(Box::new(self))
+    }
+}
+
+impl Ready for &VanRossumAbsolute {
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        summed(a, b, stop, |a, b| Ok(VanRossumAbsolute::between(self, a, b)))
+    }
+}
+
 impl VanRossumAbsolute {
-    /// Checks every parameter.
-    ///
-    /// # Errors
-    ///
-    /// `Problem`, naming the parameter.
-    pub fn check(&self) -> Result<()> {
-        above_0("tau", self.tau, "ms")?;
-        Exposure::check(self.window, self.step_ms)
+    ranges! {
+        tau: "ms", Range::ABOVE_0;
+        step_ms: "ms", Range::ABOVE_0;
     }
 
     /// The distance of two ascending trains.
@@ -62,13 +81,13 @@ pub(super) struct Exposure {
 }
 
 impl Exposure {
-    pub(super) fn check(window: Option<(f64, f64)>, step_ms: Option<f64>) -> Result<()> {
+    pub(super) fn check(window: Option<(f64, f64)>) -> Result<()> {
         if let Some((start, stop)) = window
             && !(start.is_finite() && stop.is_finite() && start <= stop)
         {
             return Err(problem!("window is {start} to {stop} ms: must be finite, and its start not after its stop"));
         }
-        step_ms.map_or(Ok(()), |step| above_0("step_ms", step, "ms"))
+        Ok(())
     }
 
     pub(super) fn new(tau: f64, window: Option<(f64, f64)>, step: Option<f64>) -> Self {

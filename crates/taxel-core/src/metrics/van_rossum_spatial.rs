@@ -4,9 +4,11 @@ mod matrix;
 
 use serde::{Deserialize, Serialize};
 
+use super::pairwise::Matrix;
 use super::van_rossum::Normalisation;
-use super::{One, Patterns};
-use crate::allowed::above_0;
+use super::{Law, One, Patterns, Ready, Work};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
 use crate::{Array, Result, Stop, problem};
 
 /// Smoothing in time and over the array (5.8, 5.11).
@@ -48,9 +50,22 @@ pub enum OwnTrain {
 }
 
 impl Smoothing {
+    ranges! {
+        tau: "ms", Range::ABOVE_0;
+        sigma: "mm", Range::ABOVE_0;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        let defaults = serde_json::json!({
+            "tau": thesis_tau(), "sigma": thesis_sigma(), "own_train": OwnTrain::default()
+        });
+        Described { required: vec!["array"], ..Described::by(&defaults, &[], Self::RANGES) }
+    }
+
     pub(super) fn check(&self) -> Result<()> {
-        above_0("tau", self.tau, "ms")?;
-        above_0("sigma", self.sigma, "mm")?;
+        self.check_ranges()?;
         Array::new(self.array.rows, self.array.columns, self.array.pitch_mm, &self.array.name)?;
         match &self.array.exists {
             Some(exists) if exists.len() != self.array.len() => {
@@ -96,16 +111,41 @@ pub struct VanRossumSpatial {
     pub normalisation: Normalisation,
 }
 
-impl VanRossumSpatial {
-    /// Checks every parameter.
-    ///
-    /// # Errors
-    ///
-    /// `Problem`, naming the parameter.
-    pub fn check(&self) -> Result<()> {
+impl Law for VanRossumSpatial {
+    fn described() -> Described {
+        let mut described = Smoothing::described();
+        described.defaults.insert("normalisation".into(), serde_json::json!(Normalisation::default()));
+        described
+    }
+
+    fn check(&self) -> Result<()> {
         self.smoothing.check()
     }
 
+    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
+        Ok(Box::new(Smoothed(self, self.smoothing.laid_out(a, b)?)))
+    }
+}
+
+struct Smoothed<'m>(&'m VanRossumSpatial, Kernel);
+
+impl Ready for Smoothed<'_> {
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        self.0.between(&self.1, a, b, stop)
+    }
+
+    fn fill(
+        &self,
+        matrix: &Matrix,
+        a: &Patterns<'_>,
+        b: Option<&Patterns<'_>>,
+        work: &mut Work<'_>,
+    ) -> Option<Result<()>> {
+        Some(self.0.fill(&self.1, matrix, a, b, work))
+    }
+}
+
+impl VanRossumSpatial {
     /// The distance of two patterns.
     pub(super) fn between(&self, kernel: &Kernel, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
         Ok(self.normalisation.root(self.square(kernel, a, b, stop)?, self.smoothing.tau))

@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::One;
 use super::van_rossum_absolute::Exposure;
 use super::van_rossum_spatial::{Gauge, Kernel, Smoothing};
+use super::{Law, One, Patterns, Ready};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
 use crate::{Result, Stop};
 
 /// The sum over taxels of `|g_m(a) - g_m(b)|` (5.11), integrated over time or summed over the points of a grid.
@@ -24,15 +26,35 @@ pub struct VanRossumSpatialAbsolute {
     pub step_ms: Option<f64>,
 }
 
-impl VanRossumSpatialAbsolute {
-    /// Checks every parameter.
-    ///
-    /// # Errors
-    ///
-    /// `Problem`, naming the parameter.
-    pub fn check(&self) -> Result<()> {
+impl Law for VanRossumSpatialAbsolute {
+    fn described() -> Described {
+        Described { ranges: [Smoothing::RANGES, Self::RANGES].concat(), ..Smoothing::described() }
+            .or_nothing("window")
+            .or_nothing("step_ms")
+    }
+
+    fn check(&self) -> Result<()> {
         self.smoothing.check()?;
-        Exposure::check(self.window, self.step_ms)
+        self.check_ranges()?;
+        Exposure::check(self.window)
+    }
+
+    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
+        Ok(Box::new(Smoothed(self, self.smoothing.laid_out(a, b)?)))
+    }
+}
+
+struct Smoothed<'m>(&'m VanRossumSpatialAbsolute, Kernel);
+
+impl Ready for Smoothed<'_> {
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        self.0.between(&self.1, a, b, stop)
+    }
+}
+
+impl VanRossumSpatialAbsolute {
+    ranges! {
+        step_ms: "ms", Range::ABOVE_0;
     }
 
     /// The distance of two patterns.

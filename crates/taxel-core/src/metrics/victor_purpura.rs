@@ -5,7 +5,10 @@ mod lanes;
 use serde::{Deserialize, Serialize};
 
 use super::pairwise::Matrix;
-use super::{Patterns, Work, cost, number_or_name};
+use super::{Law, One, Patterns, Ready, Work, number_or_name, summed};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
+use crate::vectors::Instructions;
 use crate::{Result, Stop};
 use lanes::{Block, lanes};
 
@@ -21,14 +24,41 @@ pub struct VictorPurpura {
     pub q: f64,
 }
 
+impl Law for VictorPurpura {
+    fn described() -> Described {
+        Described::by(&Self { q: 0.0 }, &["q"], Self::RANGES)
+    }
+
+    fn check(&self) -> Result<()> {
+        self.check_ranges()
+    }
+
+    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
+        let _ = (a, b);
+        Ok(Box::new(self))
+    }
+}
+
+impl Ready for &VictorPurpura {
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        summed(a, b, stop, |a, b| VictorPurpura::between(self, a, b, stop))
+    }
+
+    fn fill(
+        &self,
+        matrix: &Matrix,
+        a: &Patterns<'_>,
+        b: Option<&Patterns<'_>>,
+        work: &mut Work<'_>,
+    ) -> Option<Result<()>> {
+        let quicker = self.has_reach() && work.instructions != Instructions::Plain;
+        quicker.then(|| VictorPurpura::fill(self, matrix, a, b, work))
+    }
+}
+
 impl VictorPurpura {
-    /// Checks `q`.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` where `q` is below 0.
-    pub fn check(&self) -> Result<()> {
-        cost("q", self.q, "/ms")
+    ranges! {
+        q: "1/ms", Range::COST;
     }
 
     /// Whether moving costs something, and not without end: otherwise spikes are only counted.

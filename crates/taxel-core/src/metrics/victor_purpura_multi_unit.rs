@@ -5,7 +5,9 @@ use std::collections::BinaryHeap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{One, cost, number_or_name};
+use super::{Law, One, Patterns, Ready, number_or_name};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
 use crate::{Result, Stop};
 
 /// The least cost of turning one pattern into the other: 1 for each spike removed or added, `q |dt|` for each one moved,
@@ -34,15 +36,31 @@ struct Labelled {
     unit: usize,
 }
 
+impl Law for VictorPurpuraMultiUnit {
+    fn described() -> Described {
+        Described::by(&Self { q: 0.0, k: 0.0 }, &["q", "k"], Self::RANGES)
+    }
+
+    fn check(&self) -> Result<()> {
+        self.check_ranges()
+    }
+
+    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>> {
+        let _ = (a, b);
+        Ok(Box::new(self))
+    }
+}
+
+impl Ready for &VictorPurpuraMultiUnit {
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64> {
+        VictorPurpuraMultiUnit::between(self, a, b, stop)
+    }
+}
+
 impl VictorPurpuraMultiUnit {
-    /// Checks `q` and `k`.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` where one is below 0.
-    pub fn check(&self) -> Result<()> {
-        cost("q", self.q, "/ms")?;
-        cost("k", self.k, "")
+    ranges! {
+        q: "1/ms", Range::COST;
+        k: "", Range::COST;
     }
 
     /// The distance of two patterns.

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from taxel.learn import FILT, FP, HTP, INST, PSD, SPAN, Chronotron, ConeX, ReSuMe
+from taxel.neuron import Neuron
 
 __all__ = ["CHOSEN_ON", "PUBLISHED", "RULES", "Rule", "learner"]
 
@@ -78,17 +79,19 @@ RULES = {
 #: potentials and weights are in fiftieths: targets are met to 1e-12 mV, which is below the rounding of 15 mV.
 _CONE: dict[str, dict[str, Any]] = {
     "a": {
-        "kernel": "double_exponential",
-        "tau": 10.0,
-        "tau_s": 5.0,
-        "theta_0": 0.3,
-        "theta_plus": 0.0,
-        "refractory": 0.0,
-        "after_spike": "reset",
+        "neuron": Neuron(
+            kernel="double_exponential",
+            tau=10.0,
+            tau_s=5.0,
+            theta_0=0.3,
+            theta_plus=0.0,
+            refractory=0.0,
+            after_spike="reset",
+        ),
         "lb": -20.0,
         "ub": 20.0,
     },
-    "b": {"after_spike": "keep", "lb": -20.0, "ub": 20.0},
+    "b": {"neuron": Neuron(after_spike="keep"), "lb": -20.0, "ub": 20.0},
 }
 
 

@@ -1,11 +1,13 @@
 //! The Chronotron's two rules (Florian 2012, PLoS ONE 7(8) e40233).
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
 use super::epochs::{Correction, Presented, Rule};
+use super::rival::Source;
 use super::stepped::{Shape, SteppedNeuron};
-use crate::Result;
-use crate::allowed::above_0;
+use crate::allowed::{Range, ranges};
+use crate::{Result, problem};
 
 /// E-learning: down the gradient of a Victor-Purpura distance whose moves cost `(dt / tau_q)^2 / 2`.
 ///
@@ -25,6 +27,38 @@ pub struct ELearning {
 #[serde(deny_unknown_fields)]
 pub struct ILearning {}
 
+/// What its source says, and public code where that could not be read.
+pub(super) const SOURCE: Source = Source {
+    name: "chronotron",
+    own: &["rule", "tau_q", "gamma_r"],
+    ranges: &[ELearning::RANGES],
+    defaults: || json!({ "tau": 15.0, "tau_s": null, "after_spike": null, "tau_q": null, "gamma_r": null }),
+    arrange: |given| {
+        let i_learning = match given["rule"].as_str() {
+            Some("E") => false,
+            Some("I") => true,
+            Some(other) => return Err(problem!("rule: unknown variant `{other}`, expected `E` or `I`")),
+            None => return Err(problem!("rule is {}: must be \"E\" or \"I\"", given["rule"])),
+        };
+        let Some(tau) = given["tau"].as_f64() else {
+            return Err(problem!("tau is {}: must be a number", given["tau"]));
+        };
+        let mut fill = |name: &str, value: Value| {
+            if given[name].is_null() {
+                given.insert(name.to_owned(), value);
+            }
+        };
+        fill("tau_s", json!(tau / 4.0));
+        fill("after_spike", json!(if i_learning { "membrane" } else { "subtract" }));
+        fill("tau_q", json!(tau));
+        let (tau_q, gamma_r) = (given["tau_q"].clone(), given["gamma_r"].clone());
+        let gamma_r = if gamma_r.is_null() { tau_q.clone() } else { gamma_r };
+        let e_learning = json!({ "e_learning": { "tau_q": tau_q, "gamma_r": gamma_r } });
+        given.insert("law".into(), if i_learning { json!({ "i_learning": {} }) } else { e_learning });
+        Ok(())
+    },
+};
+
 pub(super) struct ERule {
     shape: Shape,
     tau_q: f64,
@@ -34,9 +68,13 @@ pub(super) struct ERule {
 pub(super) struct IRule(Shape);
 
 impl ELearning {
+    ranges! {
+        tau_q: "ms", Range::ABOVE_0;
+        gamma_r: "ms", Range::ABOVE_0;
+    }
+
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<ERule> {
-        above_0("tau_q", self.tau_q, "ms")?;
-        above_0("gamma_r", self.gamma_r, "ms")?;
+        self.check_ranges()?;
         Ok(ERule { shape: neuron.shape(), tau_q: self.tau_q, gamma_r: self.gamma_r })
     }
 }

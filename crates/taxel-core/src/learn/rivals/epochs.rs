@@ -6,7 +6,7 @@ use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
 use super::stepped::{Laid, SteppedNeuron};
-use crate::allowed::{above_0, one_weight_a_train};
+use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// When weights change.
@@ -37,6 +37,8 @@ pub struct Training {
     pub until_right: bool,
     /// Of the first weights and the order of patterns.
     pub seed: u64,
+    /// After how long the caller asks for the best so far, s; this crate looks at no clock.
+    pub max_seconds: Option<f64>,
 }
 
 /// How training ended.
@@ -200,23 +202,25 @@ fn step(weights: &mut [f64], eta: f64, change: &[f64]) {
 }
 
 impl Training {
+    ranges! {
+        eta: "", Range::ABOVE_0;
+        initial: "mV", Range::FINITE;
+        within_ms: "ms", Range::ABOVE_0;
+        max_seconds: "s", Range::ABOVE_0;
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        if let Some(eta) = self.eta
-            && !(eta.is_finite() && eta > 0.0)
-        {
-            return Err(problem!("eta is {eta}: must be above 0 and finite"));
-        }
+        self.check_ranges()?;
         if let Some([low, high]) = self.initial
-            && !(low.is_finite() && high.is_finite() && low <= high)
+            && low > high
         {
             return Err(problem!("initial is {low} to {high} mV: must be two finite weights, the lower first"));
         }
-        above_0("within_ms", self.within_ms, "ms")?;
         Ok(())
     }
 

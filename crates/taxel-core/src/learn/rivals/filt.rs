@@ -1,11 +1,13 @@
 //! FILT: filtered differences of spikes (Gardner and Grüning 2016, PLoS ONE 11(8) e0161335).
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::epochs::Rule;
 use super::inst::{published_eta, published_initial};
+use super::rival::Source;
 use super::stepped::{Current, SteppedNeuron, peak_factor};
-use crate::allowed::above_0;
+use crate::allowed::{Range, ranges};
 use crate::{Result, problem};
 
 /// INST with both spike trains filtered by `e^{-s/tau_q}`: an input counts by
@@ -18,6 +20,20 @@ pub struct Filt {
     pub tau_q: f64,
 }
 
+/// What its source says.
+pub(super) const SOURCE: Source = Source {
+    name: "filt",
+    own: &["tau_q"],
+    ranges: &[Filt::RANGES],
+    defaults: || {
+        json!({
+            "eta": null, "initial": null, "epochs": 500, "updates": "batch",
+            "tau": 10.0, "tau_s": 5.0, "theta_0": 15.0, "after_spike": "subtract", "tau_q": 10.0
+        })
+    },
+    arrange: |_| Ok(()),
+};
+
 pub(super) struct FiltRule {
     eps_0: f64,
     tau: f64,
@@ -28,8 +44,12 @@ pub(super) struct FiltRule {
 }
 
 impl Filt {
+    ranges! {
+        tau_q: "ms", Range::ABOVE_0;
+    }
+
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<FiltRule> {
-        above_0("tau_q", self.tau_q, "ms")?;
+        self.check_ranges()?;
         let (tau, tau_q) = (neuron.tau, self.tau_q);
         let Current::Exponential { tau_s } = neuron.current else {
             return Err(problem!("current is a double exponential: FILT is stated for an exponential one"));

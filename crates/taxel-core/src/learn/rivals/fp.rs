@@ -1,11 +1,13 @@
 //! FP-learning: finite precision (Memmesheimer, Rubin, Ölveczky and Sompolinsky 2014, Neuron 82:925).
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::epochs::{Correction, Presented, Rule};
+use super::rival::Source;
 use super::stepped::{Reset, Shape, SteppedNeuron};
 use crate::Result;
-use crate::allowed::above_0;
+use crate::allowed::{Range, ranges};
 
 /// Only the *first* error of a trial changes weights, by the potential that each input makes there; the trial then ends.
 ///
@@ -18,6 +20,15 @@ pub struct Fp {
     pub window_ms: f64,
 }
 
+/// What its source says.
+pub(super) const SOURCE: Source = Source {
+    name: "fp",
+    own: &["window_ms"],
+    ranges: &[Fp::RANGES],
+    defaults: || json!({ "after_spike": "reset" }),
+    arrange: |_| Ok(()),
+};
+
 pub(super) struct FpRule {
     shape: Shape,
     window: f64,
@@ -25,8 +36,12 @@ pub(super) struct FpRule {
 }
 
 impl Fp {
+    ranges! {
+        window_ms: "ms", Range::ABOVE_0;
+    }
+
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<FpRule> {
-        above_0("window_ms", self.window_ms, "ms")?;
+        self.check_ranges()?;
         neuron.check_linear("FP")?;
         Ok(FpRule { shape: neuron.shape(), window: self.window_ms, forgets: neuron.after_spike == Reset::Reset })
     }

@@ -1,11 +1,13 @@
 //! HTP, high threshold projection (Memmesheimer, Rubin, Ölveczky and Sompolinsky 2014, Neuron 82:925).
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::epochs::{Correction, Presented, Rule};
+use super::rival::Source;
 use super::stepped::{Reset, Shape, SteppedNeuron};
 use crate::Result;
-use crate::allowed::at_least_0;
+use crate::allowed::{Range, ranges};
 
 /// Output spikes are forced at the targets, so resets are known and each demand is linear in the weights: the potential
 /// reaches the threshold at every target, and stays below it at every other grid point, but for the last `window_ms`
@@ -20,6 +22,15 @@ pub struct Htp {
     pub window_ms: f64,
 }
 
+/// What its source says.
+pub(super) const SOURCE: Source = Source {
+    name: "htp",
+    own: &["window_ms"],
+    ranges: &[Htp::RANGES],
+    defaults: || json!({ "after_spike": "reset" }),
+    arrange: |_| Ok(()),
+};
+
 pub(super) struct HtpRule {
     shape: Shape,
     window: f64,
@@ -29,8 +40,12 @@ pub(super) struct HtpRule {
 }
 
 impl Htp {
+    ranges! {
+        window_ms: "ms", Range::FROM_0;
+    }
+
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<HtpRule> {
-        at_least_0("window_ms", self.window_ms, "ms")?;
+        self.check_ranges()?;
         neuron.check_linear("HTP")?;
         Ok(HtpRule {
             shape: neuron.shape(),

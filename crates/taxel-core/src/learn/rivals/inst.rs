@@ -1,8 +1,10 @@
 //! INST: instantaneous differences of spikes (Gardner and Grüning 2016, PLoS ONE 11(8) e0161335).
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::epochs::Rule;
+use super::rival::Source;
 use super::stepped::{Shape, SteppedNeuron};
 use crate::Result;
 
@@ -10,6 +12,20 @@ use crate::Result;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Inst {}
+
+/// What its source says.
+pub(super) const SOURCE: Source = Source {
+    name: "inst",
+    own: &[],
+    ranges: &[],
+    defaults: || {
+        json!({
+            "eta": null, "initial": null, "epochs": 500, "updates": "batch",
+            "tau": 10.0, "tau_s": 5.0, "theta_0": 15.0, "after_spike": "subtract"
+        })
+    },
+    arrange: |_| Ok(()),
+};
 
 pub(super) struct InstRule(Shape);
 

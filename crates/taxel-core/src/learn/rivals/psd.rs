@@ -1,10 +1,12 @@
 //! PSD, precise-spike-driven plasticity (Yu, Tang, Tan and Li 2013, PLoS ONE 8(11) e78318).
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::epochs::Rule;
+use super::rival::Source;
 use super::stepped::{SteppedNeuron, peak_factor};
-use crate::allowed::above_0;
+use crate::allowed::{Range, ranges};
 use crate::{Result, problem};
 
 /// `eta [sum over targets of PSC - sum over output spikes of PSC]`, PSC being the *current*
@@ -18,6 +20,26 @@ pub struct Psd {
     pub tau_2: f64,
 }
 
+/// What its source says.
+pub(super) const SOURCE: Source = Source {
+    name: "psd",
+    own: &["tau_1", "tau_2"],
+    ranges: &[Psd::RANGES],
+    defaults: || {
+        json!({
+            "tau": 10.0, "tau_s": null, "tau_1": 10.0, "tau_2": 2.5, "after_spike": "membrane", "refractory": 0.0
+        })
+    },
+    // Without a synapse of its own the neuron is driven by the rule's current.
+    arrange: |given| {
+        if given["tau_s"].is_null() {
+            let current = json!({ "tau_1": given["tau_1"], "tau_2": given["tau_2"] });
+            given.insert("current".into(), json!({ "double_exponential": current }));
+        }
+        Ok(())
+    },
+};
+
 pub(super) struct PsdRule {
     peak: f64,
     tau_1: f64,
@@ -25,10 +47,14 @@ pub(super) struct PsdRule {
 }
 
 impl Psd {
+    ranges! {
+        tau_1: "ms", Range::ABOVE_0;
+        tau_2: "ms", Range::ABOVE_0;
+    }
+
     pub(super) fn rule(&self, _: &SteppedNeuron) -> Result<PsdRule> {
         let (tau_1, tau_2) = (self.tau_1, self.tau_2);
-        above_0("tau_1", tau_1, "ms")?;
-        above_0("tau_2", tau_2, "ms")?;
+        self.check_ranges()?;
         if tau_2 >= tau_1 {
             return Err(problem!("tau_2 is {tau_2} ms: must lie below tau_1, {tau_1} ms"));
         }

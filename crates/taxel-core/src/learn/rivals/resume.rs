@@ -1,10 +1,12 @@
 //! ReSuMe, the remote supervised method (Ponulak and Kasiński 2010, Neural Computation 22:467).
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::epochs::Rule;
+use super::rival::Source;
 use super::stepped::SteppedNeuron;
-use crate::allowed::above_0;
+use crate::allowed::{Range, ranges};
 use crate::{Result, problem};
 
 /// `eta [S_d - S_o] [a + sum over earlier inputs of amplitude e^{-s/tau_w}]` (equation 2.10, summed over whole spikes).
@@ -19,6 +21,15 @@ pub struct Resume {
     pub tau_w: Option<f64>,
 }
 
+/// What its source says.
+pub(super) const SOURCE: Source = Source {
+    name: "resume",
+    own: &["a", "amplitude", "tau_w"],
+    ranges: &[Resume::RANGES],
+    defaults: || json!({ "after_spike": "membrane", "a": 0.0, "amplitude": 1.0, "tau_w": null }),
+    arrange: |_| Ok(()),
+};
+
 pub(super) struct ResumeRule {
     a: f64,
     amplitude: f64,
@@ -26,10 +37,15 @@ pub(super) struct ResumeRule {
 }
 
 impl Resume {
+    ranges! {
+        a: "", Range::FINITE;
+        amplitude: "", Range::ABOVE_0;
+        tau_w: "ms", Range::ABOVE_0;
+    }
+
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<ResumeRule> {
         let tau_w = self.tau_w.unwrap_or(neuron.tau);
-        above_0("tau_w", tau_w, "ms")?;
-        above_0("amplitude", self.amplitude, "")?;
+        self.check_ranges()?;
         if !self.a.is_finite() {
             return Err(problem!("a is {}: must be finite", self.a));
         }

@@ -1,44 +1,15 @@
 //! The rules that learn spike times by epochs, under one roof: a neuron, a way of training, a rule.
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value, json};
 
-use super::chronotron::{ELearning, ILearning};
-use super::epochs::{Examples, Trained, Training, change_of};
-use super::filt::Filt;
-use super::fp::Fp;
-use super::htp::Htp;
-use super::inst::Inst;
-use super::psd::Psd;
-use super::resume::Resume;
-use super::span::Span;
+use super::epochs::{Examples, Trained, Training};
 use super::stepped::SteppedNeuron;
-use crate::allowed::one_weight_a_train;
+use super::{Law, SOURCES};
+use crate::allowed::{Parameter, one_weight_a_train};
 use crate::neuron::Neuron;
-use crate::{Result, SpikeTrains, Stop};
-
-/// Which rule, with its own constants.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Law {
-    /// INST, Gardner and Grüning 2016.
-    Inst(Inst),
-    /// FILT, Gardner and Grüning 2016.
-    Filt(Filt),
-    /// E-learning, Florian 2012.
-    ELearning(ELearning),
-    /// I-learning, Florian 2012.
-    ILearning(ILearning),
-    /// ReSuMe, Ponulak and Kasiński 2010.
-    Resume(Resume),
-    /// SPAN, Mohemmed et al. 2012.
-    Span(Span),
-    /// PSD, Yu et al. 2013.
-    Psd(Psd),
-    /// FP-learning, Memmesheimer et al. 2014.
-    Fp(Fp),
-    /// HTP, Memmesheimer et al. 2014.
-    Htp(Htp),
-}
+use crate::parameters::Described;
+use crate::{Result, SpikeTrains, Stop, problem};
 
 /// A rule, the neuron that it trains, and how.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -52,22 +23,98 @@ pub struct Rival {
     pub training: Training,
 }
 
-/// Does `$work` with the rule in `$law`, whichever it is.
-macro_rules! with_rule {
-    ($rival:expr, |$rule:pat_param| $work:expr) => {
-        with_rule!(@ $rival, $rule, $work, Inst Filt ELearning ILearning Resume Span Psd Fp Htp)
-    };
-    (@ $rival:expr, $rule:pat_param, $work:expr, $($law:ident)*) => {
-        match &$rival.law {
-            $(Law::$law(law) => {
-                let $rule = law.rule(&$rival.neuron)?;
-                $work
-            })*
+/// What the source of a rule says of its parameters, and how they are put together.
+pub struct Source {
+    /// By which the rule is called.
+    pub(super) name: &'static str,
+    /// The parameters that are the rule's own.
+    pub(super) own: &'static [&'static str],
+    /// Their ranges.
+    pub(super) ranges: &'static [&'static [Parameter]],
+    /// What the source gives; what stands neither here nor among what all rules share, the caller must give.
+    pub(super) defaults: fn() -> Value,
+    /// Works out what is left out; may name `law` and `current` itself.
+    pub(super) arrange: fn(&mut Map<String, Value>) -> Result<()>,
+}
+
+/// Parameters of the neuron that each rule has, and of its training.
+const NEURON: [&str; 5] = ["tau", "tau_s", "theta_0", "after_spike", "step_ms"];
+const TRAINING: [&str; 8] = ["eta", "epochs", "updates", "initial", "within_ms", "until_right", "seed", "max_seconds"];
+
+/// What holds for all rules.
+fn shared() -> Value {
+    json!({ "step_ms": 0.1, "within_ms": 1.0, "until_right": true, "seed": 0, "max_seconds": null })
+}
+
+impl Source {
+    fn named(name: &str) -> Option<&'static Self> {
+        SOURCES.iter().find(|source| source.name == name)
+    }
+
+    /// Names with what the source gives, and names that the caller must give.
+    fn split(&self) -> (Map<String, Value>, Vec<&'static str>) {
+        let mut given = Map::new();
+        for defaults in [shared(), (self.defaults)()] {
+            if let Value::Object(defaults) = defaults {
+                given.extend(defaults);
+            }
         }
-    };
+        let names = NEURON.iter().chain(&TRAINING).chain(self.own);
+        let required = names.copied().filter(|name| !given.contains_key(*name)).collect();
+        (given, required)
+    }
 }
 
 impl Rival {
+    /// The parameters of a rule, by its name, with those of its neuron and its training, in one list.
+    #[must_use]
+    pub fn described(name: &str) -> Option<Described> {
+        let source = Source::named(name)?;
+        let (defaults, required) = source.split();
+        let mut ranges = [SteppedNeuron::RANGES, Training::RANGES].concat();
+        ranges.push(SteppedNeuron::TIME_CONSTANT);
+        ranges.retain(|range| defaults.contains_key(range.name) || required.contains(&range.name));
+        ranges.extend(source.ranges.iter().copied().flatten());
+        Some(Described { defaults, required, ranges })
+    }
+
+    /// The names of all rules.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        SOURCES.iter().map(|source| source.name)
+    }
+
+    /// The parts of a rule, as this crate reads them from JSON, of all its parameters in one list.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for a name that is not known, or a parameter that is not known or missing.
+    pub fn parts(name: &str, given: Map<String, Value>) -> Result<Value> {
+        let Some(source) = Source::named(name) else {
+            let known: Vec<&str> = Self::names().collect();
+            return Err(problem!("rule {name}: must be one of {}", known.join(", ")));
+        };
+        let (mut all, required) = source.split();
+        for key in given.keys() {
+            if !all.contains_key(key) && !required.contains(&key.as_str()) {
+                return Err(problem!("{name}: no parameter {key}"));
+            }
+        }
+        all.extend(given);
+        if let Some(missing) = required.iter().find(|name| !all.contains_key(**name)) {
+            return Err(problem!("{missing}: its source does not give it, so it must be given"));
+        }
+        (source.arrange)(&mut all)?;
+        let take = |all: &Map<String, Value>, names: &[&str]| -> Value {
+            names.iter().filter_map(|name| all.get(*name).map(|value| ((*name).to_owned(), value.clone()))).collect()
+        };
+        let law = all.remove("law").unwrap_or_else(|| json!({ name: take(&all, source.own) }));
+        let current = all.remove("current").unwrap_or_else(|| json!({ "exponential": take(&all, &["tau_s"]) }));
+        let mut neuron = take(&all, &["tau", "theta_0", "after_spike", "step_ms"]);
+        neuron["refractory"] = all.remove("refractory").unwrap_or(json!(0.0));
+        neuron["current"] = current;
+        Ok(json!({ "law": law, "neuron": neuron, "training": take(&all, &TRAINING) }))
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors
@@ -76,7 +123,7 @@ impl Rival {
     pub fn check(&self) -> Result<()> {
         self.neuron.check()?;
         self.training.check()?;
-        with_rule!(self, |_| Ok(()))
+        self.law.check(&self.neuron)
     }
 
     /// Trains on patterns of the same trains, with one list of targets (ms, ascending) a pattern.
@@ -101,8 +148,7 @@ impl Rival {
             patterns,
             targets,
         )?;
-        let Self { neuron, training, .. } = self;
-        with_rule!(self, |rule| training.train(&rule, neuron, Examples { patterns, targets, start }, report, stop))
+        self.law.train(self, Examples { patterns, targets, start }, report, stop)
     }
 
     /// What one presentation of a pattern changes, over the learning rate, and the output spikes in it (ms).
@@ -119,7 +165,7 @@ impl Rival {
             crate::learn::check_examples(&neuron, std::slice::from_ref(pattern), &[targets.to_vec()])?;
         }
         one_weight_a_train(weights, pattern.len())?;
-        with_rule!(self, |rule| Ok(change_of(&rule, &self.neuron, weights, pattern, targets)))
+        self.law.change(&self.neuron, weights, pattern, targets)
     }
 }
 

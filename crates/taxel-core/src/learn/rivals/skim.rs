@@ -5,48 +5,83 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{above_0, at_least_0, one_weight_a_train};
+use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::neuron::{Kernel, Neuron, Shape, State};
+use crate::parameters::Described;
 use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// Rows that are laid out at once: few enough for the cache, many enough to be worth a reflection each.
 const BLOCK: usize = 512;
 
+/// What compresses what comes out of a branch's kernel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Nonlinearity {
+    /// tanh.
+    #[default]
+    Tanh,
+    /// Nothing.
+    None,
+}
+
 /// A wide layer of dendritic branches between inputs and output.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Branches {
-    /// How many.
-    pub count: usize,
-    /// Their fixed weights are drawn evenly from minus this to this.
-    pub spread: f64,
-    /// Their fixed delays are drawn evenly from 0 to this, ms.
-    pub delay_ms: f64,
-    /// Whether `tanh` compresses what comes out of their kernels.
-    pub tanh: bool,
+struct Layer {
+    count: usize,
+    spread: f64,
+    delay_ms: f64,
 }
 
 /// Parameters of SKIM.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Skim {
     /// What an input does.
     pub kernel: Kernel,
-    /// Its time constant, ms.
+    /// Its time constant, ms; that of Table 6.1.
     pub tau: f64,
     /// Its second one, ms, where it has one; `tau / 4` where left out.
     pub tau_s: Option<f64>,
-    /// Time between rows, ms.
+    /// Time between rows, ms; 1 as the thesis samples.
     pub step_ms: f64,
-    /// The layer between; without one every train is a branch of its own, its kernel not compressed.
-    pub branches: Option<Branches>,
-    /// How long the wanted output is 1 from a target on, ms.
+    /// How long the wanted output is 1 from a target on, ms; ten steps of 1 ms.
     pub pulse_ms: f64,
     /// Added to the sum of squares, times the squares of the weights.
     pub ridge: f64,
+    /// How many branches the layer between has; without one every train is a branch of its own, its kernel not compressed.
+    pub branches: Option<usize>,
+    /// The layer's fixed weights are drawn evenly from minus this to this; none was published.
+    pub spread: Option<f64>,
+    /// Its fixed delays are drawn evenly from 0 to this, ms; none was published.
+    pub delay_ms: Option<f64>,
+    /// What compresses what comes out of its kernels.
+    pub nonlinearity: Nonlinearity,
+    /// The thresholds to choose from; those of 6.5.4.
+    pub thresholds: Vec<f64>,
+    /// How far from a target an output spike may lie, ms; 50 as in 6.5.2.
+    pub within_ms: f64,
     /// Of weights and delays of the layer.
     pub seed: u64,
+}
+
+impl Default for Skim {
+    fn default() -> Self {
+        Self {
+            kernel: Kernel::Alpha,
+            tau: 15.0,
+            tau_s: None,
+            step_ms: 1.0,
+            pulse_ms: 10.0,
+            ridge: 0.0,
+            branches: None,
+            spread: None,
+            delay_ms: None,
+            nonlinearity: Nonlinearity::Tanh,
+            thresholds: vec![0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9],
+            within_ms: 50.0,
+            seed: 0,
+        }
+    }
 }
 
 /// A least-squares problem, brought to triangular form: of all rows `A w ~ y` it keeps `R w ~ z`, with the same solutions.
@@ -124,28 +159,51 @@ struct Branch {
 }
 
 impl Skim {
+    ranges! {
+        tau: "ms", Range::ABOVE_0;
+        tau_s(tau_s): "ms", Range::ABOVE_0;
+        step_ms: "ms", Range::ABOVE_0;
+        pulse_ms: "ms", Range::ABOVE_0;
+        ridge: "", Range::FROM_0;
+        branches: "", Range::within(1.0, 100_000.0);
+        spread: "", Range::ABOVE_0;
+        delay_ms: "ms", Range::FROM_0;
+        thresholds: "", Range::FINITE;
+        within_ms: "ms", Range::ABOVE_0;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        above_0("tau", self.tau, "ms")?;
-        above_0("tau_s", self.tau_s(), "ms")?;
+        self.check_ranges()?;
         if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
             return Err(problem!("tau_s is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
         }
-        above_0("step_ms", self.step_ms, "ms")?;
-        above_0("pulse_ms", self.pulse_ms, "ms")?;
-        at_least_0("ridge", self.ridge, "")?;
-        if let Some(branches) = &self.branches {
-            if !(1..=100_000).contains(&branches.count) {
-                return Err(problem!("branches is {}: must lie between 1 and 100000", branches.count));
+        if self.thresholds.is_empty() {
+            return Err(problem!("thresholds: must hold at least one"));
+        }
+        for (name, value) in [("spread", self.spread), ("delay_ms", self.delay_ms)] {
+            if self.branches.is_some() && value.is_none() {
+                return Err(problem!("{name}: none was published for a layer of branches, give one"));
             }
-            above_0("spread", branches.spread, "")?;
-            at_least_0("delay_ms", branches.delay_ms, "ms")?;
         }
         Ok(())
+    }
+
+    fn layer(&self) -> Option<Layer> {
+        let (Some(count), Some(spread), Some(delay_ms)) = (self.branches, self.spread, self.delay_ms) else {
+            return None;
+        };
+        Some(Layer { count, spread, delay_ms })
     }
 
     fn tau_s(&self) -> f64 {
@@ -155,13 +213,13 @@ impl Skim {
     /// How many output weights there are, for so many trains.
     #[must_use]
     pub fn columns(&self, trains: usize) -> usize {
-        self.branches.as_ref().map_or(trains, |b| b.count)
+        self.branches.unwrap_or(trains)
     }
 
     /// The branches of a pattern, each with its own inputs; weights and delays come from the seed alone.
     fn branches(&self, pattern: &SpikeTrains) -> Vec<Branch> {
         let branch = |inputs| Branch { inputs, next: 0, state: State::default() };
-        let Some(layer) = &self.branches else {
+        let Some(layer) = self.layer() else {
             return (0..pattern.len()).map(|n| branch(pattern.train(n).iter().map(|&t| (t, 1.0)).collect())).collect();
         };
         let mut random = StdRng::seed_from_u64(self.seed);
@@ -185,7 +243,7 @@ impl Skim {
     ) -> Result<()> {
         let shape = Shape::new(self.kernel, self.tau, self.tau_s());
         let step = shape.step(self.step_ms);
-        let compress = self.branches.as_ref().is_some_and(|b| b.tanh);
+        let compress = self.branches.is_some() && self.nonlinearity == Nonlinearity::Tanh;
         let mut branches = self.branches(pattern);
         let rows = ((pattern.stop - pattern.start) / self.step_ms + 1e-9).floor() as usize + 1;
         let mut block: Vec<Vec<f64>> = vec![Vec::with_capacity(BLOCK); branches.len()];

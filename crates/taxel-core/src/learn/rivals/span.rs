@@ -1,11 +1,13 @@
 //! SPAN, the spike pattern association neuron (Mohemmed et al. 2012, Int J Neural Syst 22:1250012).
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::epochs::Rule;
+use super::rival::Source;
 use super::stepped::SteppedNeuron;
 use crate::Result;
-use crate::allowed::above_0;
+use crate::allowed::{Range, ranges};
 
 /// Widrow-Hoff on inputs, targets and outputs that are all filtered by `(e / tau_a) s e^{-s/tau_a}`:
 /// `eta` times the integral of `x_i (y_d - y_o)`, in closed form
@@ -17,11 +19,24 @@ pub struct Span {
     pub tau_a: f64,
 }
 
+/// What its source says.
+pub(super) const SOURCE: Source = Source {
+    name: "span",
+    own: &["tau_a"],
+    ranges: &[Span::RANGES],
+    defaults: || json!({ "after_spike": "membrane" }),
+    arrange: |_| Ok(()),
+};
+
 pub(super) struct SpanRule(f64);
 
 impl Span {
+    ranges! {
+        tau_a: "ms", Range::ABOVE_0;
+    }
+
     pub(super) fn rule(&self, _: &SteppedNeuron) -> Result<SpanRule> {
-        above_0("tau_a", self.tau_a, "ms")?;
+        self.check_ranges()?;
         Ok(SpanRule(self.tau_a))
     }
 }

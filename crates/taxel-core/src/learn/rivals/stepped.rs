@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{above_0, at_least_0};
+use crate::allowed::{Parameter, Range, ranges};
 use crate::{Result, SpikeTrains, problem};
 
 /// What drives the membrane after an input.
@@ -143,30 +143,33 @@ impl Shape {
 }
 
 impl SteppedNeuron {
+    ranges! {
+        tau: "ms", Range::ABOVE_0;
+        theta_0: "mV", Range::ABOVE_0;
+        refractory: "ms", Range::FROM_0;
+        step_ms: "ms", Range::ABOVE_0;
+    }
+
+    /// A time constant of its current.
+    pub(super) const TIME_CONSTANT: Parameter = Parameter { name: "tau_s", unit: "ms", range: Range::ABOVE_0 };
+
     /// Checks every parameter.
     ///
     /// # Errors
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
+        self.check_ranges()?;
         let (names, values) = match self.current {
             Current::Exponential { tau_s } => (["tau", "tau_s"], [self.tau, tau_s]),
             Current::DoubleExponential { tau_1, tau_2 } => (["tau_1", "tau_2"], [tau_1, tau_2]),
         };
-        let all = [
-            ("tau", self.tau, "ms"),
-            (names[0], values[0], "ms"),
-            (names[1], values[1], "ms"),
-            ("theta_0", self.theta_0, "mV"),
-            ("step_ms", self.step_ms, "ms"),
-        ];
-        for (name, value, unit) in all {
-            above_0(name, value, unit)?;
+        for (name, value) in names.into_iter().zip(values) {
+            Parameter { name, ..Self::TIME_CONSTANT }.check(&value)?;
         }
         if values[1] >= values[0] {
             return Err(problem!("{} is {} ms: must lie below {}, {} ms", names[1], values[1], names[0], values[0]));
         }
-        at_least_0("refractory", self.refractory, "ms")?;
         if self.refractory > 0.0 && self.after_spike != Reset::Membrane {
             return Err(problem!("refractory is {} ms: must be 0 unless after_spike is \"membrane\"", self.refractory));
         }

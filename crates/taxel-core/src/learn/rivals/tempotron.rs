@@ -7,8 +7,9 @@ use rand_distr::StandardNormal;
 use serde::{Deserialize, Serialize};
 
 use super::epochs::{Ended, Trained};
-use crate::allowed::{above_0, at_least_0, one_weight_a_train};
+use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::neuron::{Kernel, Shape, State, Step};
+use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
 /// Parameters of the Tempotron.
@@ -31,6 +32,8 @@ pub struct Tempotron {
     pub epochs: usize,
     /// Of the first weights and the order of patterns.
     pub seed: u64,
+    /// After how long the caller asks for the best so far, s; this crate looks at no clock.
+    pub max_seconds: Option<f64>,
 }
 
 impl Default for Tempotron {
@@ -44,6 +47,7 @@ impl Default for Tempotron {
             initial_sd: 1e-3,
             epochs: 2000,
             seed: 0,
+            max_seconds: None,
         }
     }
 }
@@ -75,25 +79,32 @@ struct Reached {
 }
 
 impl Tempotron {
+    ranges! {
+        tau: "ms", Range::ABOVE_0;
+        tau_s(tau_s): "ms", Range::ABOVE_0;
+        theta_0: "", Range::ABOVE_0;
+        eta: "", Range::ABOVE_0;
+        momentum: "", Range::FROM_0.below(1.0);
+        initial_sd: "", Range::FROM_0;
+        max_seconds: "s", Range::ABOVE_0;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors
     ///
     /// `Problem`, naming the parameter, its value and what would be right.
     pub fn check(&self) -> Result<()> {
-        above_0("tau", self.tau, "ms")?;
-        above_0("tau_s", self.tau_s(), "ms")?;
-        above_0("theta_0", self.theta_0, "")?;
+        self.check_ranges()?;
         if self.tau_s() >= self.tau {
             return Err(problem!("tau_s is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
         }
-        if let Some(eta) = self.eta {
-            above_0("eta", eta, "")?;
-        }
-        if !(0.0..1.0).contains(&self.momentum) {
-            return Err(problem!("momentum is {}: must lie from 0 up to, but not at, 1", self.momentum));
-        }
-        at_least_0("initial_sd", self.initial_sd, "")?;
         Ok(())
     }
 

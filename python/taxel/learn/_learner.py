@@ -1,0 +1,74 @@
+"""What all learners share: parameters, what is asked of one that was not fitted, how well it does."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any
+
+from numpy import float64
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._arguments import floats, instance, several
+from taxel._core import NotFittedError
+from taxel._parameters import Parameters, defaults
+from taxel.learn._examples import examples
+from taxel.metrics import f1
+from taxel.spikes import SpikeTrains
+
+__all__ = ["Learner", "SpikeLearner", "predicted"]
+
+
+_DEFAULT = defaults("matching")
+
+
+class Learner(Parameters):
+    """Learn weights; what is learnt ends in ``_``."""
+
+    def _fitted(self) -> NDArray[float64]:
+        """Return the weights; refuse where there are none yet."""
+        weights = getattr(self, "weights_", None)
+        if weights is None:
+            raise NotFittedError(f"{type(self).__name__}: not fitted yet, call fit first")
+        return floats("weights_", weights)
+
+
+class SpikeLearner(Learner, ABC):
+    """Learn when to fire."""
+
+    @abstractmethod
+    def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[float64]]:
+        """Return the output spikes of the trained neuron, one array a pattern, ms."""
+
+    def score(
+        self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike], window_ms: float = _DEFAULT.window_ms
+    ) -> float:
+        """Return how well the output spikes meet the targets.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+        targets : sequence of float sequences, ms
+            When the neuron shall fire, one list a pattern.
+        window_ms : float, ms, 0 or more
+            How far a spike may lie from its target.
+
+        Returns
+        -------
+        float, 0 to 1
+            F1 over all patterns, as `taxel.metrics.f1` has it.
+
+        Raises
+        ------
+        ProblemError : patterns or targets that make no sense
+        NotFittedError : before `fit`
+        """
+        _, wanted = examples(patterns, targets)
+        return f1(self.predict(patterns), wanted, window_ms=window_ms)
+
+
+def predicted(learner: Any, patterns: Sequence[SpikeTrains]) -> list[NDArray[float64]]:
+    """Return the output spikes of a learner's `neuron_` with its weights."""
+    weights = learner._fitted()
+    given = enumerate(several("patterns", patterns))
+    return [learner.neuron_.run(weights, instance(f"pattern {p}", one, SpikeTrains)) for p, one in given]

@@ -1,0 +1,20 @@
+"""Learners from options in one list, those of the neuron among them."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from taxel import Neuron
+from taxel.learn import ConeR, ConeX
+
+Cone = TypeVar("Cone", ConeX, ConeR)
+
+
+def made(kind: type[Cone], **options: Any) -> Cone:
+    """A learner; what is a neuron's goes to its neuron, which is left out where it would be all default."""
+    names = Neuron().get_params()
+    own = {name: value for name, value in options.items() if name in names}
+    if issubclass(kind, ConeR):
+        own.setdefault("time", "grid")
+    rest = {name: value for name, value in options.items() if name not in names}
+    return kind(neuron=Neuron(**own) if own else None, **rest)

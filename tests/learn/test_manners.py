@@ -1,0 +1,225 @@
+"""Learners keep scikit-learn's manners, tried against scikit-learn itself; laws run over the registry of learners."""
+
+import copy
+import pickle
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import Events, Neuron, NotFittedError, SpikeTrains, _core, learn
+from taxel._parameters import Parameters, described
+from taxel.encode import ContactArea, LevelCrossing
+from taxel.learn import ConeR, ConeX, OnlineConeR, Tempotron
+
+sklearn = pytest.importorskip("sklearn")
+
+#: What learners without defaults are given.
+GIVEN = {"eta": 0.05, "initial": (0.0, 0.5), "epochs": 50, "updates": "pattern", "tau": 10.0, "tau_s": 5.0}
+GIVEN |= {"theta_0": 1.0, "rule": "E", "tau_a": 5.0, "window_ms": 1.0}
+LEARNERS = {
+    name: kind
+    for name, kind in vars(learn).items()
+    if isinstance(kind, type) and issubclass(kind, Parameters) and not name.startswith("_")
+}
+each_learner = pytest.mark.parametrize("name", sorted(LEARNERS))
+
+
+def make(name):
+    from inspect import Parameter, signature
+
+    asked = signature(LEARNERS[name]).parameters.values()
+    return LEARNERS[name](**{p.name: GIVEN[p.name] for p in asked if p.default is Parameter.empty})
+
+
+def examples(shift=0.0):
+    """Two patterns of forty trains, and targets; of the Tempotron, labels."""
+    random = np.random.default_rng(3)
+    patterns = [
+        SpikeTrains.from_lists(np.sort(random.uniform(0, 80, (40, 3))) + shift, start=shift, stop=100.0 + shift)
+        for _ in range(2)
+    ]
+    return patterns, [[50.0 + shift], [60.0 + shift]]
+
+
+def fitted(name, shift=0.0):
+    patterns, targets = examples(shift)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        return make(name).fit(patterns, [True, False] if name == "Tempotron" else targets), patterns
+
+
+def test_a_learner_has_a_file_in_each_place_and_nothing_is_left_out():
+    root = Path(__file__).parents[2]
+    files = {f.stem for f in (root / "python/taxel/learn").glob("*.py") if not f.stem.startswith("_")}
+    kinds = {kind._kind for kind in LEARNERS.values()}
+    assert kinds == files - {"certificate"}, "python/taxel/learn/NAME.py with _kind NAME, a line in learn/__init__.py"
+    rules = set(_core.rule_names())
+    ours = {"cone_x", "cone_r", "online_cone_r", "tempotron", "skim"}
+    assert kinds - ours == rules, "a line in the registry of crates/taxel-core/src/learn/rivals.rs"
+    for name in kinds:
+        assert (root / f"tests/learn/test_{name}.py").exists(), f"tests/learn/test_{name}.py"
+        assert described(name)["defaults"]
+
+
+@each_learner
+def test_a_clone_has_the_same_parameters_and_nothing_learnt(name):
+    one, _ = fitted(name)
+    other = sklearn.base.clone(one)
+    assert repr(other) == repr(one)
+    assert not hasattr(other, "weights_")
+    with pytest.raises(NotFittedError, match=f"{name}: not fitted yet, call fit first"):
+        other.predict([])
+
+
+@each_learner
+def test_what_was_learnt_survives_a_copy_and_a_pickle(name):
+    one, patterns = fitted(name)
+    for other in (copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+        assert np.array_equal(other.weights_, one.weights_)
+        for here, there in zip(other.predict(patterns), one.predict(patterns), strict=True):
+            assert np.array_equal(here, there)
+
+
+@each_learner
+def test_scores_lie_between_0_and_1_and_predictions_are_spikes(name):
+    one, patterns = fitted(name)
+    if name == "Tempotron":
+        assert one.score(patterns, one.predict(patterns)) == 1.0
+        return
+    spikes = one.predict(patterns)
+    assert [type(times) for times in spikes] == [np.ndarray] * 2
+    assert 0.0 <= one.score(patterns, examples()[1]) <= 1.0
+    # What it says is what it is judged by.
+    assert one.score(patterns, spikes, window_ms=0.0) == 1.0
+    assert one.score(patterns, [[1.0], [1.0]], window_ms=0.0) == 0.0
+
+
+@each_learner
+def test_moved_in_time_it_learns_the_same(name):
+    here, _ = fitted(name)
+    there, _ = fitted(name, 1000.0)
+    assert there.weights_ == pytest.approx(here.weights_, abs=2e-4 * np.abs(here.weights_).max())
+
+
+@pytest.mark.parametrize("kind", [ConeX, ConeR, OnlineConeR])
+def test_a_neuron_that_two_share_is_never_changed(kind):
+    shared = Neuron(tau=10.0)
+    one, two = kind(neuron=shared), kind(neuron=shared)
+    one.set_params(neuron__tau=12.0, neuron__after_spike="reset")
+    assert (one.neuron, two.neuron, shared) == (Neuron(tau=12.0, after_spike="reset"), Neuron(tau=10.0), shared)
+    assert two.neuron is shared
+    assert kind().neuron is None
+    assert kind().get_params()["neuron__tau"] == Neuron().tau
+    assert kind().set_params(neuron__tau=12.0).neuron == Neuron(tau=12.0)
+    assert kind(neuron=shared).set_params(neuron=None, neuron__tau=3.0).neuron == Neuron(tau=3.0)
+
+
+@pytest.mark.parametrize("kind", [ConeX, ConeR, OnlineConeR])
+def test_all_is_checked_again_in_fit(kind):
+    patterns, targets = examples()
+    learner = kind(neuron=Neuron(tau=10.0))
+    learner.neuron.tau = -1.0
+    with pytest.raises(taxel.ProblemError, match="tau is -1 ms: must be above 0"):
+        learner.fit(patterns, targets)
+    with pytest.raises(taxel.ProblemError, match=r"neuron is 5: must be a taxel\.Neuron"):
+        kind(neuron=5)
+
+
+def test_cone_r_is_trained_on_its_neuron_s_step_whatever_its_clock():
+    patterns, targets = examples()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        cone, on_grid = (
+            ConeR(neuron=Neuron(tau=10.0, step_ms=0.5, time=time)).fit(patterns, targets)
+            for time in ("continuous", "grid")
+        )
+    assert cone.neuron == Neuron(tau=10.0, step_ms=0.5)
+    assert cone.neuron_ == Neuron(tau=10.0, step_ms=0.5, time="grid") == on_grid.neuron_
+    assert np.array_equal(cone.weights_, on_grid.weights_)
+
+
+def test_a_fit_goes_on_in_a_window_that_was_pickled():
+    patterns, targets = examples()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        one = OnlineConeR(window=2, tolerance=1e-8).fit(patterns, targets)
+        other = pickle.loads(pickle.dumps(one))
+        moved = SpikeTrains(patterns[0].times, patterns[0].offsets, 0.0, 100.0)
+        for learner in (one, other):
+            learner.partial_fit(moved, [40.0])
+    assert other.patterns_ == one.patterns_ == 2
+    assert other.objective_ == pytest.approx(one.objective_, rel=2e-8)
+
+
+def touches(seed, rate=3):
+    """A board at rest, then a touch that spreads over some taxels; when it begins, ms."""
+    random = np.random.default_rng(seed)
+    array = taxel.Array(4, 4)
+    begin = 300_000 + 1000 * int(random.integers(0, 300))
+    t, x, y, value = [], [], [], []
+    for moment, level in ((0, 50), (50_000, 50), *((begin + 2000 * k, 55 + 5 * k) for k in range(rate))):
+        for n in range(16 if level == 50 else 10):
+            t.append(moment)
+            x.append(n % 4)
+            y.append(n // 4)
+            value.append(level)
+    t.append(1_000_000)
+    x.append(0)
+    y.append(0)
+    value.append(50)
+    return Events(t, x, y, [True] * len(t), array=array, intensity=value), begin / 1000.0
+
+
+def test_a_search_over_a_pipeline_finds_touches_in_recordings():
+    """Recordings in, targets in their own ms, the rest taken from each: scikit-learn's own search, folds and all."""
+    from sklearn.model_selection import GridSearchCV
+    from sklearn.pipeline import Pipeline
+
+    recordings, begins = map(list, zip(*(touches(seed) for seed in range(9)), strict=True))
+    targets = [[begin + 5.0] for begin in begins]
+    pipe = Pipeline([("encode", ContactArea(tare=0.2)), ("cone", ConeR(neuron=Neuron(refractory=20.0), lb=0.0))])
+    grid = {"cone__neuron__tau": [1.0, 5.0], "cone__ub": [0.01, 3.0], "encode__levels": [(2, 4, 8)]}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)
+        search = GridSearchCV(pipe, grid, cv=3, error_score="raise").fit(recordings, targets)
+    assert search.best_score_ == 1.0
+    assert search.best_params_["cone__ub"] == 3.0
+    assert min(search.cv_results_["mean_test_score"]) < 0.5
+    (spikes,) = search.predict(recordings[:1])
+    assert np.abs(spikes - targets[0]).min() < 50.0
+    assert search.score(recordings, targets) == 1.0
+
+
+def test_a_tare_in_seconds_is_each_recording_s_own():
+    recording, _ = touches(1)
+    given = ContactArea(tare=taxel.Tare.take(recording, stop_us=200_000)).encode(recording)
+    taken = ContactArea(tare=0.2).encode(recording)
+    assert np.array_equal(given.times, taken.times)
+    assert ContactArea(tare=0.2) == ContactArea(tare=0.2) != ContactArea(tare=0.3)
+    assert ContactArea(tare=0.2).to_json() == ContactArea().to_json()
+    for tare, said in ((0.9, "more than half"), (0, "must be a whole number from 1"), ("soon", "tare is 'soon'")):
+        with pytest.raises(taxel.ProblemError, match=said):
+            ContactArea(tare=tare).encode(recording)
+
+
+def test_an_encoder_transforms_a_list_and_splits_signed_trains():
+    recording, _ = touches(2)
+    encoder = LevelCrossing([52.0])
+    assert encoder.fit([recording], None) is encoder
+    (trains,) = encoder.transform([recording])
+    assert not trains.signed
+    assert len(trains) == 2 * len(encoder.encode(recording))
+
+
+def test_tags_are_asked_by_scikit_learn_alone():
+    tags = sklearn.utils.get_tags(ConeX())
+    assert tags.requires_fit
+    assert tags.estimator_type is None
+    assert not sklearn.base.is_classifier(Tempotron())
+    code = "import sys, taxel; taxel.learn.ConeX(); assert not any(name.startswith('sklearn') for name in sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
