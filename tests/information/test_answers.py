@@ -164,9 +164,23 @@ def test_what_a_setting_costs_on_the_wire():
         np.array([0.0, np.inf]),
         np.array([np.inf, np.inf]),
     )
-    # 301 events; two datagrams for the 300 at once, one for the last; two trials of 10 ms.
-    assert kilobits_per_second(spikes, 10_000.0, values=False) == pytest.approx((301 * 40 + 3 * 224) / 20.0)
-    assert kilobits_per_second(spikes, 10_000.0, values=True) == pytest.approx((301 * 80 + 4 * 224) / 20.0)
+    first, end = np.array([0.0]), np.array([np.inf])
+    # 301 events; a datagram for the 300 at once, one for the last; two trials of 10 ms.
+    assert kilobits_per_second(spikes, 10_000.0, values=False) == pytest.approx((301 * 16 + 2 * 192) / 20.0)
+    assert kilobits_per_second(spikes, 10_000.0, values=True) == pytest.approx((301 * 32 + 2 * 192) / 20.0)
+    many = Spikes(
+        1000, 900, np.zeros(900, int), np.arange(900), np.zeros(900, int), np.ones(900, np.float32), first, end
+    )
+    assert kilobits_per_second(many, 10_000.0, values=False) == pytest.approx((900 * 16 + 2 * 192) / 10.0)
+
+
+def test_a_datagram_of_the_board_has_the_bytes_that_are_reckoned():
+    """24 bytes of its own, a word of two bytes an event; the board sends kind 1, whose words are as long as kind 0's."""
+    board = taxel.device.Board(taxel.wire.Registers(wire_version=2))
+    ticks = np.zeros(4096, np.uint16)
+    ticks[:100] = 40
+    sent = [datagram for datagram in board.frame(ticks) if datagram[1] & 15 == 1]
+    assert sum(map(len, sent)) == 24 * len(sent) + 2 * 100 > 0
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -107,7 +108,17 @@ def _curves(found: Answer) -> Figure:
         ax.set_ylabel("bits")
         ax.set_ylim(0, most * 1.03)
         ax.axhline(most, color="0.8", lw=1)
+    axes[0, 0].set_ylim(0, 1.03 * max(most, *(points[0].found.most for points in found.parameters.values()), 0.0))
+    _ticks(axes[0, 0], [p.period_ms for p in found.by_period])
+    _ticks(axes[0, 1], sorted({p.window_ms for p in found.points}))
+    _ticks(axes[1, 0], sorted({p.taxels for p in (*found.by_period, *found.taxels)}))
     return figure
+
+
+def _ticks(ax: Axes, values: Sequence[float]) -> None:
+    """Name on a logarithmic axis what was asked, and nothing else."""
+    ax.set_xticks(values, [f"{value:g}" for value in values])
+    ax.set_xticks([], minor=True)
 
 
 def _by_period(ax: Axes, found: Answer) -> None:
