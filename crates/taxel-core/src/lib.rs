@@ -3,6 +3,9 @@
 //! The modules stand in the order that data takes them. Nothing here opens a socket or a file, looks at a clock or
 //! knows of Python, so the same bytes give the same result on a machine, however often and in however many threads.
 //!
+//! Of the nouns only `Frames` is not here: pictures are pushed one by one from where they lie (a file, NumPy), so nothing
+//! here ever holds many.
+//!
 //! On another machine, decoding, the board and whatever adds and multiplies by [`vectors`]' plain loops give the same
 //! bits too. What takes an exponential from the platform's library (neurons, smoothed metrics, scenes), and learners,
 //! whose sums are fused and ordered as the machine's vectors are, can differ there in the last places of an `f64`; each
@@ -15,7 +18,6 @@ pub mod vectors;
 
 pub mod array;
 pub mod events;
-pub mod frames;
 pub mod spikes;
 
 pub mod board;
@@ -32,5 +34,4 @@ pub mod metrics;
 pub use array::Array;
 pub use error::{Error, Result, Stop};
 pub use events::{Events, Intensities, Marker};
-pub use frames::Frames;
 pub use spikes::{Spike, SpikeTrains};

@@ -1,0 +1,282 @@
+//! The house: modules import only from floors below theirs, and no new circle of modules comes in.
+//!
+//! A module is a file. It depends on what its `use` declarations and its paths name, seen through re-exports: so a parent
+//! that only declares and re-exports is on nobody's way. Tests do not count.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Floors from the ground up; those of one line do not know of each other.
+const FLOORS: [(&str, &[&[&str]]); 3] = [
+    (
+        "taxel-core",
+        &[
+            &["error", "vectors"],
+            &["allowed"],
+            &["parameters", "array"],
+            &["events", "spikes"],
+            &["wire", "contact", "neuron"],
+            &["board"],
+            &["encode"],
+            &["learn", "metrics"],
+            &["detect"],
+        ],
+    ),
+    ("taxel-live", &[&["error", "clock", "latency"], &["recording"], &["capture"], &["emulate", "pipeline"]]),
+    (
+        "taxel-python",
+        &[
+            &["errors"],
+            &["enter", "convert", "parameters"],
+            &[
+                "cone_x",
+                "detect",
+                "encode",
+                "knock",
+                "learn",
+                "live",
+                "metrics",
+                "neuron",
+                "nouns",
+                "recording",
+                "rivals",
+                "simulate",
+                "wire",
+                "wire_v2",
+            ],
+        ],
+    ),
+];
+
+/// Circles that still stand, each by its modules. Take one off when it is broken; none may be added.
+const STILL: &[&[&str]] = &[
+    &["board", "board::outbox"],
+    &["detect::readout", "detect::stream"],
+    &["encode", "encode::sampled"],
+    &["learn::augmented", "learn::cone_program", "learn::cone_r", "learn::point", "learn::rounds"],
+    &["learn::cone_x", "learn::cone_x::shortest"],
+    &["learn::rivals", "learn::rivals::rival"],
+    &["neuron", "neuron::srm0"],
+    &["neuron::grid", "neuron::streaming"],
+    &["neuron::population", "neuron::population::continuous", "neuron::population::grid"],
+    &[
+        "wire::decoder",
+        "wire::decoder::blocks",
+        "wire::decoder::blocks::avx2",
+        "wire::decoder::blocks::avx512",
+        "wire::decoder::blocks::scalar",
+        "wire::v1",
+    ],
+    &["wire::registers", "wire::registers::table"],
+    &["capture", "capture::queue", "capture::socket"],
+    &["emulate", "emulate::control"],
+    &["pipeline", "pipeline::decode", "pipeline::read", "pipeline::recorder"],
+    &["learn", "parameters", "rivals"],
+];
+
+type Name = Vec<String>;
+
+/// What a file declares of others: where names that it re-exports come from, and what it uses.
+#[derive(Default)]
+struct Module {
+    exports: BTreeMap<String, Name>,
+    uses: Vec<Name>,
+}
+
+/// A crate's modules by name; the root has none.
+struct House(BTreeMap<Name, Module>);
+
+impl House {
+    fn of(package: &str) -> Self {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap().join(package).join("src");
+        let mut texts = BTreeMap::new();
+        for file in files(&root) {
+            let inside = file.strip_prefix(&root).unwrap().with_extension("");
+            let name: Name = inside.iter().map(|part| part.to_str().unwrap().to_owned()).collect();
+            let name = if name == ["lib"] { vec![] } else { name };
+            if name.last().is_none_or(|last| last != "tests") {
+                texts.insert(name, code(&fs::read_to_string(&file).unwrap()));
+            }
+        }
+        let names: BTreeSet<Name> = texts.keys().cloned().collect();
+        Self(texts.iter().map(|(name, text)| (name.clone(), read(name, text, &names))).collect())
+    }
+
+    /// The module that a path leads to.
+    fn home(&self, path: &[String], depth: usize) -> Name {
+        let inside = (0..=path.len()).rev().find(|&k| self.0.contains_key(&path[..k])).unwrap_or(0);
+        let (module, rest) = path.split_at(inside);
+        match rest.first().and_then(|name| self.0[module].exports.get(name)) {
+            Some(from) if depth < 8 => self.home(&[from, &rest[1..]].concat(), depth + 1),
+            _ => module.to_vec(),
+        }
+    }
+
+    /// Whom each module depends on.
+    fn edges(&self) -> BTreeMap<Name, BTreeSet<Name>> {
+        let mut edges = BTreeMap::new();
+        for (name, module) in &self.0 {
+            let homes = module.uses.iter().map(|path| self.home(path, 0));
+            edges.insert(name.clone(), homes.filter(|home| home != name && !home.is_empty()).collect());
+        }
+        edges
+    }
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = vec![];
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else if path.extension().is_some_and(|ending| ending == "rs") {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// A file's text without comments and tests.
+fn code(text: &str) -> String {
+    let text = text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default();
+    text.lines().map(|line| line.split("//").next().unwrap_or_default()).collect::<Vec<_>>().join("\n")
+}
+
+fn read(name: &Name, text: &str, names: &BTreeSet<Name>) -> Module {
+    let (mut module, mut rest, mut other) = (Module::default(), text, String::new());
+    while let Some(at) = next_use(rest) {
+        let (before, after) = rest.split_at(at);
+        other.push_str(before);
+        let (declared, left) = after.split_once(';').unwrap_or((after, ""));
+        rest = left;
+        let public = before.trim_end().ends_with("pub")
+            || before.trim_end().ends_with(')') && {
+                before.rfind('\n').is_none_or(|line| before[line..].trim_start().starts_with("pub("))
+            };
+        for path in spread(declared.trim_start_matches("use").trim()) {
+            let Some(path) = absolute(name, &path, names) else { continue };
+            let own = path.len() > name.len() && path.starts_with(name);
+            match path.last() {
+                Some(last) if public && own => drop(module.exports.insert(last.clone(), path.clone())),
+                _ => module.uses.push(path),
+            }
+        }
+    }
+    other.push_str(rest);
+    let path_like = |c: char| c.is_alphanumeric() || c == '_' || c == ':' || c == '$';
+    for word in other.split(|c| !path_like(c)).filter(|word| word.contains("::")) {
+        module.uses.extend(absolute(name, word.trim_matches(':'), names));
+    }
+    module
+}
+
+/// Where the next `use` declaration begins.
+fn next_use(text: &str) -> Option<usize> {
+    text.match_indices("use ").map(|(at, _)| at).find(|&at| {
+        let line = text[..at].rfind('\n').map_or(0, |line| line + 1);
+        let before = text[line..at].trim();
+        before.is_empty() || before == "pub" || before.starts_with("pub(") && before.ends_with(')')
+    })
+}
+
+/// The single paths of a declaration with braces.
+fn spread(tree: &str) -> Vec<String> {
+    let Some((before, inside)) = tree.split_once('{') else {
+        return vec![tree.split(" as ").next().unwrap_or_default().trim().to_owned()];
+    };
+    let inside = inside.trim_end().strip_suffix('}').unwrap_or(inside);
+    let (mut depth, mut parts, mut part) = (0, vec![], String::new());
+    for c in inside.chars() {
+        depth += i32::from(c == '{') - i32::from(c == '}');
+        if c == ',' && depth == 0 {
+            parts.push(std::mem::take(&mut part));
+        } else {
+            part.push(c);
+        }
+    }
+    parts.push(part);
+    let parts = parts.iter().filter(|part| !part.trim().is_empty());
+    parts.flat_map(|part| spread(part.trim())).map(|part| format!("{}{part}", before.trim())).collect()
+}
+
+/// A path from the crate's root, where it is one of this crate.
+fn absolute(name: &Name, path: &str, names: &BTreeSet<Name>) -> Option<Name> {
+    let mut steps: Vec<String> = path.split("::").map(str::to_owned).collect();
+    match steps[0].as_str() {
+        "crate" | "$crate" => Some(steps.split_off(1)),
+        "self" => Some([name.clone(), steps.split_off(1)].concat()),
+        "super" => {
+            let up = steps.iter().take_while(|step| *step == "super").count();
+            Some([&name[..name.len().saturating_sub(up)], &steps[up..]].concat())
+        }
+        _ => {
+            let child = [name.as_slice(), &steps[..1]].concat();
+            names.contains(&child).then(|| [name.clone(), steps].concat())
+        }
+    }
+}
+
+/// Modules that reach each other, in order of their names.
+fn circles(edges: &BTreeMap<Name, BTreeSet<Name>>) -> BTreeSet<Vec<String>> {
+    let reach = |from: &Name| {
+        let (mut seen, mut next) = (BTreeSet::new(), vec![from.clone()]);
+        while let Some(module) = next.pop() {
+            for to in edges.get(&module).into_iter().flatten() {
+                if seen.insert(to.clone()) {
+                    next.push(to.clone());
+                }
+            }
+        }
+        seen
+    };
+    let reached: BTreeMap<&Name, BTreeSet<Name>> = edges.keys().map(|name| (name, reach(name))).collect();
+    let ring = |name: &Name| {
+        let others = reached[name].iter().filter(|other| reached.get(other).is_some_and(|r| r.contains(name)));
+        others.map(|other| other.join("::")).collect::<Vec<_>>()
+    };
+    edges.keys().map(ring).filter(|ring| !ring.is_empty()).collect()
+}
+
+#[test]
+fn a_module_imports_only_from_floors_below() {
+    for (package, floors) in FLOORS {
+        let floor = |name: &str| floors.iter().position(|floor| floor.contains(&name));
+        for (module, used) in House::of(package).edges() {
+            let Some(from) = module.first() else { continue };
+            let own = floor(from).unwrap_or_else(|| panic!("{package}: {from} stands on no floor of FLOORS"));
+            for to in used.iter().filter(|to| to[0] != *from) {
+                let ring = |ring: &&&[&str]| ring.contains(&from.as_str()) && ring.contains(&to[0].as_str());
+                let below = floor(&to[0]).is_some_and(|other| other < own) || STILL.iter().any(|known| ring(&known));
+                assert!(below, "{package}: {} imports {}, which is not below it", module.join("::"), to.join("::"));
+            }
+        }
+    }
+}
+
+#[test]
+fn no_circle_of_modules_comes_in() {
+    let found: BTreeSet<Vec<String>> =
+        FLOORS.iter().flat_map(|(package, _)| circles(&House::of(package).edges())).collect();
+    let known: BTreeSet<Vec<String>> =
+        STILL.iter().map(|ring| ring.iter().map(|name| (*name).to_owned()).collect()).collect();
+    let new: Vec<_> = found.difference(&known).collect();
+    assert!(new.is_empty(), "modules import each other in a circle: {new:?}");
+    let broken: Vec<_> = known.difference(&found).collect();
+    assert!(broken.is_empty(), "these circles are gone, take them off the list: {broken:?}");
+}
+
+#[test]
+fn a_circle_and_a_wrong_floor_are_seen() {
+    let names: BTreeSet<Name> = [vec![], vec!["a".into()], vec!["a".into(), "b".into()]].into();
+    let module = read(&vec!["a".into(), "b".into()], "use super::{Thing, self as a};\nfn f() { super::g() }", &names);
+    assert!(
+        module.uses.contains(&vec!["a".into(), "Thing".into()]) && module.uses.contains(&vec!["a".into(), "g".into()])
+    );
+    let parent = read(&vec!["a".into()], "mod b;\npub use b::Made;\nfn f() { b::made() }", &names);
+    assert_eq!(parent.exports["Made"], ["a", "b", "Made"]);
+    assert!(parent.uses.contains(&vec!["a".into(), "b".into(), "made".into()]));
+    let house =
+        House([(vec![], Module::default()), (vec!["a".into()], parent), (vec!["a".into(), "b".into()], module)].into());
+    assert_eq!(circles(&house.edges()), [vec!["a".to_owned(), "a::b".to_owned()]].into());
+}
