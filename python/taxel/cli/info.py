@@ -95,7 +95,7 @@ def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[st
         "file": str(recording.path),
         "kind": recording.kind,
         "source": recording.source,
-        "array": {"rows": array.rows, "columns": array.columns, "pitch_mm": array.pitch_mm, "name": array.name},
+        "array": {name: value for name, value in array._geometry().items() if name != "exists"},
         "from_us": span[0] if span else None,
         "to_us": span[1] if span else None,
         "seconds": seconds,

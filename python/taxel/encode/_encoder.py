@@ -65,7 +65,7 @@ class Encoder(Value):
 
     def trains(self, array: Array) -> int:
         """Return on how many trains the encoder speaks for an array; signed ones count once."""
-        return _core.encoder_about(self._json(), _array(array)._parts())[0]
+        return _core.encoder_about(self._json(), instance("array", array, Array)._parts())[0]
 
     @property
     def signed(self) -> bool:
@@ -79,8 +79,7 @@ class Encoder(Value):
 
     def with_tare(self, tare: Tare) -> Self:
         """Return the same encoder with this tare; one that reads none stays as it is."""
-        if not isinstance(tare, Tare):
-            raise ProblemError(f"tare is {shown(tare)}: must be a taxel.Tare")
+        instance("tare", tare, Tare)
         return self
 
     def encode(self, x: Events | Frames | Recorded) -> SpikeTrains:
@@ -168,7 +167,7 @@ class EncoderStream:
 
     def _begin(self, array: Array) -> _core.EncoderStream:
         if self._core is None:
-            self._core = _core.EncoderStream(self._parameters, _array(array)._parts())
+            self._core = _core.EncoderStream(self._parameters, instance("array", array, Array)._parts())
         return self._core
 
     @property
@@ -203,12 +202,6 @@ class EncoderStream:
 
     def _told(self, parts: tuple[Any, ...] | None) -> SpikeTrains:
         return SpikeTrains.from_lists([]) if parts is None else SpikeTrains._from_parts(parts)
-
-
-def _array(array: Array) -> Array:
-    if not isinstance(array, Array):
-        raise ProblemError(f"array is {shown(array)}: must be a taxel.Array")
-    return array
 
 
 def _frames(x: object) -> Frames:
