@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import json
 import os
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +31,8 @@ KINDS = (".mcap", ".lsa", ".npz", ".csv")
 #: Events a datagram at most, as the board sends them: 1400 bytes.
 _DATAGRAM_BYTES = 1400
 
-#: Pictures a second that a converted file shows to viewers.
-_PICTURES_HZ = 10
+#: Between the pictures that a converted file shows to viewers, us.
+_PICTURE_US = 100_000
 
 #: The board's stamps: their unit and how far they count.
 _STAMP_US, _TURN_US = 100, 6_553_600
@@ -204,7 +206,7 @@ def _write_mcap(
     }
     writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
     writer.datagrams(arrived, datagrams.number, datagrams.offsets, datagrams.payload)
-    _add_remarks(writer, events, recording, registers)
+    _add_remarks(writer, events, recording)
     writer.finish(json.dumps(_counts(recording, len(datagrams))))
     again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)
     if (len(again), again.intensity is None) != (len(events), events.intensity is None):
@@ -214,7 +216,23 @@ def _write_mcap(
     return lost
 
 
-def _add_remarks(writer: Any, events: Events, recording: Recording | None, registers: dict[str, Any] | None) -> None:
+def _pictures(events: Events) -> Iterator[tuple[int, NDArray[np.uint16]]]:
+    """Give what the taxels hold, ten times a second where something came, as a board that is recorded does."""
+    if events.intensity is None or events.present is None:
+        return
+    there = np.flatnonzero(events.present)
+    order = there[np.argsort(events.t[there], kind="stable")]
+    place, ticks = events.array.index(events.x[order], events.y[order]), events.intensity[order]
+    # Each event is in the first picture from it on.
+    number = -(-events.t[order] // _PICTURE_US)
+    begins = np.flatnonzero(np.diff(number, prepend=number[:1] - 1))
+    held = np.zeros(events.array.rows * events.array.columns, np.uint16)
+    for a, b in pairwise([*begins.tolist(), len(order)]):
+        held[place[a:b]] = ticks[a:b]
+        yield int(number[a]) * _PICTURE_US, held
+
+
+def _add_remarks(writer: Any, events: Events, recording: Recording | None) -> None:
     clock = None if recording is None else recording.clock
 
     def at_ns(t: int) -> int:
@@ -222,12 +240,8 @@ def _add_remarks(writer: Any, events: Events, recording: Recording | None, regis
 
     for t, start in events.markers:
         writer.marker(max(0, at_ns(t)), t, start)
-    if events.intensity is not None and len(events):
-        ramp = int(registers["ramp"]) if registers else int(events.intensity.max()) or 1
-        pictures = Frames.from_events(events, 1_000_000 // _PICTURES_HZ)
-        for t, picture in zip(pictures.t.tolist(), pictures.values, strict=True):
-            ticks = picture.astype(np.uint16).ravel()
-            writer.picture(max(0, at_ns(t)), t, events.array.columns, ticks, ramp)
+    for t, ticks in _pictures(events):
+        writer.picture(max(0, at_ns(t)), t, events.array.columns, ticks)
     if recording is None:
         return
     for note in recording.notes:

@@ -44,13 +44,15 @@ def test_the_picture_is_a_standard_raw_image_and_a_note_a_standard_log(tmp_path:
     record(path, some_events())
     with path.open("rb") as file:
         messages = {channel.topic: (schema, m) for schema, channel, m in make_reader(file).iter_messages()}
+    # The last one: two taxels pressed by 60 and 30 ticks above what all read before.
     schema, message = messages["/pressure"]
     assert (schema.name, schema.encoding) == ("foxglove.RawImage", "jsonschema")
     assert set(json.loads(schema.data)["properties"]) >= RAW_IMAGE
     picture = json.loads(message.data)
     assert set(picture) >= RAW_IMAGE
     assert (picture["width"], picture["height"], picture["encoding"], picture["step"]) == (64, 64, "mono8", 64)
-    assert base64.b64decode(picture["data"]) == bytes([75 * 255 // 150]) * 4096
+    assert base64.b64decode(picture["data"]) == bytes([255, 128]) + bytes(4094)
+    assert (picture["rest"], picture["full_ticks"]) == ("lowest so far", 60.0)
     schema, message = messages["/notes"]
     assert schema.name == "foxglove.Log"
     assert set(json.loads(message.data)) >= LOG
@@ -65,3 +67,23 @@ def test_every_schema_is_json_and_names_what_its_messages_hold(tmp_path: Path) -
                 assert channel.topic == "/datagrams"
                 continue
             assert set(json.loads(message.data)) <= set(json.loads(schema.data)["properties"]), channel.topic
+
+
+def test_a_converted_file_shows_what_was_held_where_something_came(tmp_path: Path) -> None:
+    # Two presses with an hour between: no pictures of the hour.
+    t = [0, 50_000, 3_600_000_000, 3_600_150_000]
+    events = taxel.Events(t, [1, 1, 1, 2], [0] * 4, [True] * 4, array=taxel.Array(1, 4), intensity=[10, 40, 30, 50])
+    taxel.convert(events, tmp_path / "a.mcap")
+    with (tmp_path / "a.mcap").open("rb") as file:
+        said = [
+            json.loads(m.data) for _, channel, m in make_reader(file).iter_messages() if channel.topic == "/pressure"
+        ]
+    assert [p["t_us"] for p in said] == [0, 100_000, 3_600_000_000, 3_600_200_000]
+    # Above the lowest so far, 10 at (1, 0) and 50 at (2, 0); white is the largest of 10 s.
+    assert [list(base64.b64decode(p["data"])) for p in said] == [
+        [0] * 4,
+        [0, 255, 0, 0],
+        [0, 255, 0, 0],
+        [0, 255, 0, 0],
+    ]
+    assert [p["full_ticks"] for p in said] == [1.0, 30.0, 20.0, 20.0]

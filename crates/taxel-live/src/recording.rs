@@ -11,6 +11,7 @@ mod limits;
 mod lsa;
 mod mcap_reader;
 mod mcap_writer;
+mod picture;
 mod topic;
 
 use std::collections::BTreeMap;

@@ -50,7 +50,7 @@ fn record(path: &Path, datagrams: u64, compression: Compression) {
     let said = Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5 };
     writer.detection(1_000_000_000_700, &said).unwrap();
     writer.registers(1_000_000_000_800, &header().registers.unwrap()).unwrap();
-    writer.picture(1_000_000_000_900, 192, 64, &vec![75; 4096], 150).unwrap();
+    writer.picture(1_000_000_000_900, 192, 64, &vec![75; 4096]).unwrap();
     let counts = Counts { received: datagrams, ..Counts::default() };
     writer.finish(counts).unwrap();
 }

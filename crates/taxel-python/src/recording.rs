@@ -196,10 +196,9 @@ impl RecordingWriter {
         t_us: i64,
         columns: u16,
         ticks: PyReadonlyArray1<'_, u16>,
-        full: u16,
     ) -> PyResult<()> {
         let ticks = slice("ticks", &ticks)?;
-        self.with(py, |writer| writer.picture(at_ns, t_us, columns, ticks, full))
+        self.with(py, |writer| writer.picture(at_ns, t_us, columns, ticks))
     }
 
     /// Ends the recording; counts in and out as JSON.

@@ -43,6 +43,7 @@ pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, list
         has_intensities: false,
         decoded: 0,
         counted: 0,
+        tared: false,
         pictured: Instant::now(),
         told: Instant::now(),
     };
@@ -70,6 +71,8 @@ struct Work<'a> {
     has_intensities: bool,
     decoded: u64,
     counted: u64,
+    /// Whether the recorder knows the tare.
+    tared: bool,
     pictured: Instant,
     told: Instant,
 }
@@ -223,15 +226,20 @@ impl Work<'_> {
         self.pictured = Instant::now();
         let new = self.decoded != self.counted;
         self.counted = self.decoded;
-        let counters = {
+        let (counters, tare) = {
             let mut board = self.shared.board();
             board.picture.copy_from_slice(&self.held);
-            board.counters.clone()
+            let tare = if self.tared { None } else { board.tare.clone() };
+            (board.counters.clone(), tare)
         };
         let Some(recorder) = &self.shared.recorder else { return Ok(()) };
+        if let Some(tare) = tare {
+            recorder.tare(&tare)?;
+            self.tared = true;
+        }
         recorder.flush()?;
         if new && let Some(board_us) = counters.board_us {
-            recorder.picture(board_us, self.options.array.columns, &self.held, self.options.registers.ramp)?;
+            recorder.picture(board_us, self.options.array.columns, &self.held)?;
         }
         if self.told.elapsed() >= COUNTS_EVERY {
             self.told = Instant::now();

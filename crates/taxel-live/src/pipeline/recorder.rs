@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
+use taxel_core::encode::Tare;
 use taxel_core::{Marker, problem};
 
 use super::{Counters, LiveOptions, Record, Said};
@@ -107,9 +108,17 @@ impl Recorder {
         }
     }
 
-    pub(super) fn picture(&self, board_us: i64, columns: u16, held: &[u16], ramp: u16) -> Result<()> {
+    /// What is taken off the pictures from here on.
+    pub(super) fn tare(&self, tare: &Tare) -> Result<()> {
+        if let Kind::Mcap(writer) = self.kind()? {
+            writer.tare(tare);
+        }
+        Ok(())
+    }
+
+    pub(super) fn picture(&self, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
         match self.kind()? {
-            Kind::Mcap(writer) => writer.picture(now_ns(), board_us, columns, held, ramp),
+            Kind::Mcap(writer) => writer.picture(now_ns(), board_us, columns, held),
             Kind::Lsa(_) => Ok(()),
         }
     }

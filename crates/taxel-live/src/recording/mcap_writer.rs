@@ -22,9 +22,11 @@ use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions};
 use serde_json::json;
 use taxel_core::detect::Detection;
+use taxel_core::encode::Tare;
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
+use super::picture::Pictures;
 use super::{Compression, Counts, FLUSH_EVERY, Header, LATE, Topic, WriterOptions, create};
 use crate::{Error, Result};
 
@@ -48,6 +50,7 @@ pub(super) const END: &str = "taxel.end";
 pub struct Writer {
     path: PathBuf,
     shared: Arc<Shared>,
+    pictures: Mutex<Pictures>,
     thread: Option<JoinHandle<Result<()>>>,
 }
 
@@ -132,7 +135,7 @@ impl Writer {
         let pen = Pen::begin(file, header, options.compression, &at_disk).map_err(|e| Broken::of(e).named(path))?;
         let (pen, state) = (Mutex::new(Some(pen)), Mutex::new(Pending::default()));
         let shared = Shared { pen, at_disk, state, work: Condvar::new(), room: Condvar::new() };
-        Ok(Self { path: path.to_owned(), shared: Arc::new(shared), thread: None })
+        Ok(Self { path: path.to_owned(), shared: Arc::new(shared), pictures: Mutex::default(), thread: None })
     }
 
     /// Keeps a datagram as it came: arrival by the host's clock (ns since 1970), our arrival number, bytes.
@@ -198,26 +201,32 @@ impl Writer {
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
 
-    /// Keeps a picture of held values for viewers: 8 bits, `full` ticks (the ramp) being white.
+    /// Takes a tare's rest off the pictures from here on; before, the lowest value that each taxel held so far.
+    pub fn tare(&self, tare: &Tare) {
+        self.pictures().tare(tare);
+    }
+
+    fn pictures(&self) -> MutexGuard<'_, Pictures> {
+        self.pictures.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Keeps a picture of held values for viewers: 8 bits above rest, the largest of the last 10 s being white. The
+    /// message says what was taken off and how many ticks are white.
     ///
     /// # Errors
     ///
-    /// As [`Writer::datagram`]; `Core` where `ticks` are not rows of `columns`, or `full` is 0.
-    pub fn picture(&self, at_ns: i64, t_us: i64, columns: u16, ticks: &[u16], full: u16) -> Result<()> {
+    /// As [`Writer::datagram`]; `Core` where `ticks` are not rows of `columns`.
+    pub fn picture(&self, at_ns: i64, t_us: i64, columns: u16, ticks: &[u16]) -> Result<()> {
         let columns = usize::from(columns);
-        if columns == 0 || ticks.is_empty() || !ticks.len().is_multiple_of(columns) || full == 0 {
+        if columns == 0 || ticks.is_empty() || !ticks.len().is_multiple_of(columns) {
             let n = ticks.len();
-            return Err(
-                problem!("picture of {n} taxels, {columns} a row, {full} ticks full: must be whole rows").into()
-            );
+            return Err(problem!("picture of {n} taxels, {columns} a row: must be whole rows").into());
         }
-        let grey: Vec<u8> = ticks
-            .iter()
-            .map(|&v| u8::try_from(u32::from(v.min(full)) * 255 / u32::from(full)).unwrap_or(u8::MAX))
-            .collect();
+        let grey = self.pictures().take(t_us, ticks);
         let picture = json!({
             "timestamp": time(at_ns), "frame_id": "taxel", "width": columns, "height": ticks.len() / columns,
-            "encoding": "mono8", "step": columns, "data": base64(&grey), "t_us": t_us,
+            "encoding": "mono8", "step": columns, "data": base64(&grey.bytes), "t_us": t_us,
+            "rest": grey.rest, "full_ticks": grey.full,
         });
         self.push_json(Topic::Pressure, at_ns, &picture)
     }

@@ -1,0 +1,105 @@
+//! The low-rate picture: held values as grey, so that a viewer shows a touch and not the rest of the sensor.
+
+use std::collections::VecDeque;
+
+use taxel_core::encode::Tare;
+
+/// White is the largest value of so long, us.
+const SCALE_US: i64 = 10_000_000;
+
+/// What pictures are made of: what each taxel reads at rest, and how strongly it was pressed lately.
+#[derive(Debug, Default)]
+pub(super) struct Pictures {
+    tare: Option<Vec<f64>>,
+    /// The lowest that each taxel held so far; `None` before it was heard of.
+    lowest: Vec<Option<u16>>,
+    /// Largest values above rest with their times, us: falling values, so that the first is the largest of all.
+    peaks: VecDeque<(i64, f64)>,
+}
+
+/// A picture, and what its grey means.
+#[derive(Debug, PartialEq)]
+pub(super) struct Grey {
+    /// 0 at rest, 255 at `full`, row by row.
+    pub(super) bytes: Vec<u8>,
+    /// What was taken off.
+    pub(super) rest: &'static str,
+    /// What is white, ticks above rest.
+    pub(super) full: f64,
+}
+
+impl Pictures {
+    /// Takes a tare's rest off from here on.
+    pub(super) fn tare(&mut self, tare: &Tare) {
+        // A taxel that was never heard of reads 0 and rests there.
+        self.tare = Some(tare.rest.iter().map(|rest| rest.unwrap_or(0.0)).collect());
+        self.peaks.clear();
+    }
+
+    /// The grey picture of what the taxels hold at `t_us`; a taxel that holds 0 was not heard of yet.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub(super) fn take(&mut self, t_us: i64, held: &[u16]) -> Grey {
+        self.lowest.resize(held.len(), None);
+        for (lowest, &value) in self.lowest.iter_mut().zip(held) {
+            if value > 0 {
+                *lowest = Some(lowest.map_or(value, |low| low.min(value)));
+            }
+        }
+        let tare = self.tare.as_ref().filter(|rest| rest.len() == held.len());
+        let above: Vec<f64> = held
+            .iter()
+            .enumerate()
+            .map(|(k, &value)| {
+                let rest = tare.map_or_else(|| f64::from(self.lowest[k].unwrap_or(0)), |rest| rest[k]);
+                if value > 0 { (f64::from(value) - rest).max(0.0) } else { 0.0 }
+            })
+            .collect();
+        let rest = if tare.is_some() { "tare" } else { "lowest so far" };
+        let peak = above.iter().copied().fold(0.0, f64::max);
+        // Time that steps back begins the scale anew.
+        while self.peaks.front().is_some_and(|&(t, _)| t <= t_us.saturating_sub(SCALE_US) || t > t_us) {
+            self.peaks.pop_front();
+        }
+        while self.peaks.back().is_some_and(|&(_, earlier)| earlier <= peak) {
+            self.peaks.pop_back();
+        }
+        self.peaks.push_back((t_us, peak));
+        // One tick is the least that can be seen: a sensor at rest stays black.
+        let full = self.peaks.front().map_or(1.0, |&(_, largest)| largest.max(1.0));
+        let bytes = above.iter().map(|&value| (value / full * 255.0).round().min(255.0) as u8).collect();
+        Grey { bytes, rest, full }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taxel_core::Array;
+
+    #[test]
+    fn rest_is_black_and_the_largest_of_the_last_ten_seconds_white() {
+        let mut pictures = Pictures::default();
+        let first = pictures.take(0, &[100, 50, 0]);
+        assert_eq!(first, Grey { bytes: vec![0, 0, 0], rest: "lowest so far", full: 1.0 });
+        let pressed = pictures.take(100_000, &[160, 80, 0]);
+        assert_eq!((pressed.bytes, pressed.full), (vec![255, 128, 0], 60.0));
+        // A weaker press beside the stronger one, then alone: ten seconds later it is white.
+        assert_eq!(pictures.take(5_000_000, &[130, 50, 7]).bytes, [128, 0, 0]);
+        assert_eq!(pictures.take(10_100_000, &[130, 50, 7]).bytes, [255, 0, 0]);
+        // A lower value than ever moves the rest.
+        assert_eq!(pictures.take(10_200_000, &[90, 50, 7]).bytes, [0, 0, 0]);
+        assert_eq!(pictures.take(30_000_000, &[100, 50, 7]).full, 10.0);
+    }
+
+    #[test]
+    fn a_tare_is_what_is_taken_off_once_there_is_one() {
+        let array = Array { rows: 1, columns: 3, ..Array::thesis() };
+        let rest = vec![Some(90.5), None, Some(20.0)];
+        let tare = Tare { array, rest, start_us: 0, stop_us: 1, note: String::new() };
+        let mut pictures = Pictures::default();
+        pictures.take(0, &[100, 50, 20]);
+        pictures.tare(&tare);
+        let grey = pictures.take(100_000, &[110, 39, 20]);
+        assert_eq!(grey, Grey { bytes: vec![128, 255, 0], rest: "tare", full: 39.0 });
+    }
+}
