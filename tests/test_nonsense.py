@@ -433,6 +433,27 @@ SOUND: dict[str, Sound] = {
     "taxel.open": plain(taxel.open, path="here_events.npz", array=ARRAY, pairing="direct", differences=False),
     "taxel.Recording.between": lambda: (taxel.open("here_events.npz").between, {"start": 0, "stop": 300}),
     "taxel.Recording.frames": lambda: (taxel.open("here_events.npz").frames, {"rate_hz": 1000.0}),
+    "taxel.cut": lambda: (
+        taxel.cut,
+        {
+            "recording": taxel.open("here_events.npz"),
+            "start_us": 0,
+            "stop_us": 300,
+            "columns": slice(0, 2),
+            "rows": slice(0, 2),
+            "label": None,
+            "before_us": 10.0,
+            "after_us": 10.0,
+        },
+    ),
+    "taxel.merge": lambda: (
+        taxel.merge,
+        {"recordings": [taxel.open("here_events.npz")] * 2, "gap_us": 1000.0, "beside": True},
+    ),
+    "taxel.Recording.with_notes": lambda: (
+        taxel.open("here_events.npz").with_notes,
+        {"notes": [taxel.Note("heel", 100, 0)]},
+    ),
     "taxel.convert": plain(
         taxel.convert, source=EVENTS, target="there.npz", frames_hz=1000.0, compression="none", overwrite=True
     ),

@@ -8,6 +8,8 @@ from taxel import detect, device, encode, formats, information, learn, live, met
 from taxel._convert import convert
 from taxel._core import DeviceError, Error, FormatError, NotFittedError, ProblemError, SceneError
 from taxel._health import Health, health
+from taxel._opening import open_any as open  # noqa: A004  taxel.open is a recording's
+from taxel._parts import cut, merge
 from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
@@ -16,7 +18,6 @@ from taxel.frames import Frames
 from taxel.labels import Label, Labels
 from taxel.neuron import Neuron
 from taxel.recording import Clock, Datagrams, Note, Recording
-from taxel.recording import open_recording as open  # noqa: A004  taxel.open is a recording's
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
@@ -48,6 +49,7 @@ __all__ = [
     "SpikeTrains",
     "Tare",
     "convert",
+    "cut",
     "detect",
     "device",
     "encode",
@@ -56,6 +58,7 @@ __all__ = [
     "information",
     "learn",
     "live",
+    "merge",
     "metrics",
     "open",
     "plot",

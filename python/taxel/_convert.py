@@ -17,6 +17,7 @@ from taxel import _core, wire
 from taxel._arguments import flag, path, shown, text
 from taxel._core import ProblemError
 from taxel._files import whole_file, write_whole
+from taxel._h5 import write_h5
 from taxel._remarks import Remarks
 from taxel._tables import write_csv, write_npz
 from taxel.events import Events
@@ -26,7 +27,7 @@ from taxel.recording import Datagrams, Recording, _Source, open_recording, perio
 __all__ = ["KINDS", "convert"]
 
 #: What can be written.
-KINDS = (".mcap", ".lsa", ".npz", ".csv")
+KINDS = (".mcap", ".lsa", ".npz", ".csv", ".h5")
 
 #: Events a datagram at most, as the board sends them: 1400 bytes.
 _DATAGRAM_BYTES = 1400
@@ -51,9 +52,9 @@ def convert(
     Parameters
     ----------
     source : Recording, Events, Frames or path
-    target : path ending in .mcap, .lsa, .npz or .csv
+    target : path ending in .mcap, .lsa, .npz, .csv or .h5
     frames_hz : float, optional
-        Write pictures at this rate (.npz, .csv) instead of events.
+        Write pictures at this rate (.npz, .csv, .h5) instead of events.
     compression : {"none", "lz4", "zstd"}
         Of a .mcap.
     overwrite : bool
@@ -95,15 +96,19 @@ def convert(
         raise ProblemError(f"source is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
     recording = source if isinstance(source, Recording) else None
     table = _table(source, frames_hz)
-    if kind in (".npz", ".csv"):
+    if kind in (".npz", ".csv", ".h5"):
         remarks, lost = _remarks_of(recording)
+        if kind == ".h5":
+            with whole_file(place, overwrite=overwrite) as part:
+                write_h5(part, table, remarks)
+            return lost
         if kind == ".npz":
             write_whole(place, lambda file: write_npz(file, table, remarks), overwrite=overwrite)
             return lost
         write_whole(place, lambda file: write_csv(file, table), overwrite=overwrite)
         return lost + _not_in_csv(table, remarks)
     if isinstance(table, Frames):
-        raise ProblemError(f"{place}: a {kind} holds events and no pictures; write pictures to .npz or .csv")
+        raise ProblemError(f"{place}: a {kind} holds events and no pictures; write pictures to .npz, .csv or .h5")
     # Of a slice the bytes are not known: they are made of its events.
     origin = None if recording is None or recording.is_slice else recording._source
     if kind == ".lsa":
@@ -131,7 +136,7 @@ def _remarks_of(recording: Recording | None) -> tuple[Remarks, list[str]]:
     if recording is None:
         return Remarks(), []
     remarks = Remarks(
-        source=recording.source or recording.path.name,
+        source=recording.source or recording.name,
         registers=recording._source.registers,
         notes=recording.notes,
         detections=recording.detections,
@@ -201,7 +206,7 @@ def _write_mcap(
         "registers": registers,
         "difference": origin is not None and origin.differences,
         "origin_us": first_us,
-        "source": "events" if recording is None else recording.source or recording.path.name,
+        "source": "events" if recording is None else recording.source or recording.name,
         "started_ns": int(arrived[0]) if len(arrived) else 0,
     }
     writer = _core.RecordingWriter(part, json.dumps(header), compression, True)

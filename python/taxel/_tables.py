@@ -14,7 +14,7 @@ import zipfile
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any, BinaryIO
+from typing import IO, Any, BinaryIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,23 +28,27 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 
-__all__ = ["read_csv", "read_npz", "table_of", "write_csv", "write_npz"]
+__all__ = ["columns_of", "read_csv", "read_npz", "table_of", "write_csv", "write_npz"]
 
 _EVENTS = ("t_us", "x", "y", "p")
 _COLUMNS = ("t", "x", "y", "p", "intensity", "present", "markers", "values", "unit", "about")
 _TAXEL = re.compile(r"x(\d{1,5})y(\d{1,5})")
 
 
+def columns_of(table: Events | Frames) -> dict[str, NDArray[Any]]:
+    """Return a table as columns by name, as .npz and .h5 hold it."""
+    if isinstance(table, Frames):
+        return {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
+    columns: dict[str, Any] = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
+    if table.intensity is not None:
+        columns |= {"intensity": table.intensity, "present": table.present}
+    return {**columns, "markers": np.array(table.markers, np.int64).reshape(-1, 2)}
+
+
 def write_npz(file: BinaryIO, table: Events | Frames, remarks: Remarks) -> None:
     """Write a .npz."""
-    if isinstance(table, Events):
-        columns: dict[str, Any] = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
-        if table.intensity is not None:
-            columns |= {"intensity": table.intensity, "present": table.present}
-        columns["markers"] = np.array(table.markers, np.int64).reshape(-1, 2)
-    else:
-        columns = {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
-    np.savez_compressed(file, about=np.array(replace(remarks, array=table.array).to_json()), **columns)
+    about = np.array(replace(remarks, array=table.array).to_json())
+    np.savez_compressed(file, about=about, **cast(dict[str, Any], columns_of(table)))
 
 
 def read_npz(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:

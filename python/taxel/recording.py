@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,8 +15,9 @@ from numpy.typing import NDArray
 
 from taxel import _arguments as arguments
 from taxel import _core
-from taxel._arguments import flag, instance, number, shown, text, window
+from taxel._arguments import flag, instance, number, several, shown, text, window
 from taxel._core import FormatError, ProblemError
+from taxel._h5 import read_h5
 from taxel._remarks import Note, Remarks, array_of, detections_of, notes_of
 from taxel._tables import read_csv, read_npz
 from taxel.array import Array
@@ -27,7 +29,7 @@ from taxel.wire import Registers
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Clock", "Datagrams", "Note", "Recording", "open_recording"]
+__all__ = ["ENDINGS", "Clock", "Datagrams", "Note", "Recording", "in_memory", "open_recording"]
 
 #: Pictures a second where a recording of events is asked for frames without a rate.
 FRAMES_HZ = 100.0
@@ -37,6 +39,7 @@ _MAGIC = {
     b"\x89MCAP0\r\n": "mcap",
     b"PK\x03\x04": "npz",
     b"PK\x05\x06": "npz",
+    b"\x89HDF\r\n\x1a\n": "h5",
 }
 _STRANGERS = {
     b"\x1f\x8b": "gzip; unpack it first",
@@ -44,14 +47,13 @@ _STRANGERS = {
     b"\x04\x22\x4d\x18": "lz4; unpack it first",
     b"BZh": "bzip2; unpack it first",
     b"\xfd7zXZ": "xz; unpack it first",
-    b"\x89HDF": "HDF5; see taxel.formats for other people's recordings",
     b"\x89PNG": "a PNG picture, no recording",
     b"%PDF": "a PDF document, no recording",
     b"SQLite": "SQLite (a ROS 2 bag?); convert it to MCAP first",
     b"#ROSBAG": "a ROS 1 bag; convert it to MCAP first",
     b"\x93NUMPY": "a single NumPy array; save its columns t, x, y, p with numpy.savez",
 }
-_ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv"}
+ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": "h5"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,8 +154,10 @@ class Recording:
     Attributes
     ----------
     path : Path
+    name : str
+        The file's name; of a trial in other people's file what that calls it.
     kind : str
-        "mcap", "lsa", "npz" or "csv".
+        "mcap", "lsa", "npz", "csv" or "h5"; "trial" of other people's, "merged" of `taxel.merge`.
     array : Array
         The sensor.
     source : str
@@ -175,12 +179,16 @@ class Recording:
     'nothing lost after arrival (version 1 of the wire cannot show what was lost before it)'
     """
 
-    def __init__(self, source: _Source, window: tuple[float, float] | None = None) -> None:
+    def __init__(
+        self, source: _Source, window: tuple[float, float] | None = None, noted: tuple[Note, ...] = ()
+    ) -> None:
         if not isinstance(source, _Source):
             raise ProblemError(f"source is {shown(source)}: a recording is opened by taxel.open(path), not built")
         self._source = source
         self._window = window
+        self._noted = noted
         self.path, self.kind, self.array, self.source = source.path, source.kind, source.array, source.origin
+        self.name = source.name
 
     @cached_property
     def events(self) -> Events:
@@ -242,8 +250,8 @@ class Recording:
 
     @cached_property
     def notes(self) -> tuple[Note, ...]:
-        """What people wrote down, in the order of the file."""
-        notes = self._source.notes
+        """What people wrote down, in the order of the file; then the labels of its folder."""
+        notes = self._source.notes + self._noted
         if self._window is None:
             return notes
         start, stop = self._window
@@ -313,7 +321,12 @@ class Recording:
         start, stop = window("us", start, stop)
         if self._window is not None:
             start, stop = max(start, self._window[0]), min(stop, self._window[1])
-        return Recording(self._source, (start, max(start, stop)))
+        return Recording(self._source, (start, max(start, stop)), self._noted)
+
+    def with_notes(self, notes: Iterable[Note]) -> Recording:
+        """Return the same recording with further notes."""
+        more = tuple(instance("notes", note, Note) for note in several("notes", notes))
+        return Recording(self._source, self._window, self._noted + more)
 
     def plot(self) -> Figure:
         """Draw what is in it: events (or the sum of pressure) over time, and where on the array."""
@@ -334,15 +347,13 @@ class Recording:
         more += [f"{len(self.detections)} detections"] * bool(len(self.detections))
         more += ["truncated"] * self.truncated
         size = f"{self.array.rows} x {self.array.columns} taxels"
-        return f"Recording({self.path.name}: {', '.join([f'{len(what)} {noun}', time, size, *more])})"
+        return f"Recording({self.name}: {', '.join([f'{len(what)} {noun}', time, size, *more])})"
 
 
 def open_recording(
     path: str | os.PathLike[str], *, array: Array | None = None, pairing: str = "direct", differences: bool = False
 ) -> Recording:
-    """Open a recording: .mcap, .lsa, .npz or .csv, finished or not, whole or damaged.
-
-    `taxel.open` is this function.
+    """Open one file of ours: .mcap, .lsa, .npz, .csv or .h5, finished or not, whole or damaged.
 
     Parameters
     ----------
@@ -381,10 +392,15 @@ def open_recording(
             return Recording(_Mcap(place, pairing))
         if kind == "lsa":
             return Recording(_Lsa(place, array or Array.thesis(), pairing, differences))
-        table = read_npz(place, array) if kind == "npz" else read_csv(place, array)
-        return Recording(_Table(place, kind, *table))
+        table = {"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array)
+        return in_memory(place, kind, *table)
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
+
+
+def in_memory(path: Path, kind: str, table: Events | Frames, remarks: Remarks, *, name: str | None = None) -> Recording:
+    """Return a recording of a table that is in memory."""
+    return Recording(_Table(path, kind, table, remarks, path.name if name is None else name))
 
 
 def period_us(name: str, rate_hz: float) -> int:
@@ -397,7 +413,7 @@ def period_us(name: str, rate_hz: float) -> int:
 
 def _kind(path: Path, head: bytes) -> str:
     """Return the kind of a file by its first bytes and its ending, which must not contradict each other."""
-    ending = _ENDINGS.get(path.suffix.lower())
+    ending = ENDINGS.get(path.suffix.lower())
     found = next((kind for magic, kind in _MAGIC.items() if head.startswith(magic)), None)
     begins = " ".join(f"{byte:02X}" for byte in head[:4]) or "nothing"
     if found is not None and ending in (None, found):
@@ -407,6 +423,7 @@ def _kind(path: Path, head: bytes) -> str:
         return ending
     stranger = next((what for magic, what in _STRANGERS.items() if head.startswith(magic)), None)
     wanted = {"mcap": "the MCAP magic", "npz": "the magic of a .npz", "csv": "the names of columns"}
+    wanted["h5"] = "the magic of HDF5"
     if found is not None:
         stranger = f"a .{found} file; rename it"
     if stranger is not None:
@@ -416,9 +433,10 @@ def _kind(path: Path, head: bytes) -> str:
             f"{path}, byte 0: starts with {begins} ({what}), not with {right}" + f"; {advice}" * bool(advice)
         )
     if ending is None:
-        raise FormatError(f"{path}, byte 0: starts with {begins}: no recording; there are .mcap, .lsa, .npz and .csv")
-    if ending == "npz":
-        raise FormatError(f"{path}, byte 0: starts with {begins}, not with {wanted[ending]} (50 4B 03 04)")
+        raise FormatError(f"{path}, byte 0: starts with {begins}: no recording; there are {', '.join(ENDINGS)}")
+    if ending in {"npz", "h5"}:
+        magic = {"npz": "50 4B 03 04", "h5": "89 48 44 46"}[ending]
+        raise FormatError(f"{path}, byte 0: starts with {begins}, not with {wanted[ending]} ({magic})")
     # The compiled reader says what is wrong with a .mcap, the table's reader with a .csv.
     return ending
 
@@ -433,6 +451,7 @@ class _Source:
 
     def __init__(self, path: Path, kind: str, array: Array, origin: str = "") -> None:
         self.path, self.kind, self.array, self.origin = path, kind, array, origin
+        self.name = path.name
 
     @property
     def events(self) -> Events | None:
@@ -501,8 +520,9 @@ class _Source:
 class _Table(_Source):
     """A table of events or pictures, all in memory."""
 
-    def __init__(self, path: Path, kind: str, table: Events | Frames, remarks: Remarks) -> None:
+    def __init__(self, path: Path, kind: str, table: Events | Frames, remarks: Remarks, name: str) -> None:
         super().__init__(path, kind, table.array, remarks.source)
+        self.name = name
         self._table, self._remarks = table, remarks
 
     @property

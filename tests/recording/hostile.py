@@ -86,6 +86,13 @@ def _csv_frames(folder: Path) -> Path:
     return folder / "press.csv"
 
 
+@kind("h5")
+def _h5(folder: Path) -> Path:
+    record(folder / "walk.mcap", some_events())
+    taxel.convert(folder / "walk.mcap", folder / "walk.h5")
+    return folder / "walk.h5"
+
+
 for _name in formats.FORMATS:
     KINDS[_name] = getattr(other, f"write_{_name}")
 

@@ -96,7 +96,7 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
     [
         (("info",), "Missing argument"),
         (("info", "nothing.mcap"), "nothing.mcap: no such file or directory"),
-        (("info", "."), "is a directory"),
+        (("info", "."), ".: holds no recording; there are .mcap"),
         (("convert", "WALK", "walk.xyz"), "must be .mcap, .lsa, .npz, .csv"),
         (("convert", "WALK", "WALK"), "exists already"),
         (("convert", "WALK", "nowhere/a.csv"), "nowhere: no such folder"),

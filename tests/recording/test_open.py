@@ -61,8 +61,9 @@ def npz(**columns: object) -> bytes:
         ("a.csv", b"t_us,x0y0\n0.5,1\n", "t[0] is 0.5"),
         ("a.csv", b"t_us,x0y0\n0,1\n1,2,3\n", "line 3"),
         ("a.csv", b"t_us,x9999y9999\n0,1\n", "most are missing"),
-        ("a.txt", b"hello", "no recording; there are .mcap, .lsa, .npz and .csv"),
-        ("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5"),
+        ("a.txt", b"hello", "no recording; there are .mcap, .lsa, .npz, .csv, .h5"),
+        ("a.h5", b"\x89HDF\r\n\x1a\n", "not a whole HDF5 file"),
+        ("a.h5", b"hello", "not with the magic of HDF5 (89 48 44 46)"),
         ("a.bag", b"#ROSBAG V2.0", "ROS 1 bag"),
     ],
 )
@@ -88,7 +89,7 @@ def test_missing_files_and_folders_are_oserrors(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError):
         taxel.open(tmp_path / "nothing.mcap")
     with pytest.raises(IsADirectoryError):
-        taxel.open(tmp_path)
+        taxel.recording.open_recording(tmp_path)
 
 
 @pytest.mark.parametrize("path", [3, None, b"a.mcap", 1.5, ["a.mcap"], "", "a\0b"])

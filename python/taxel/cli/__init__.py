@@ -58,6 +58,7 @@ def _said(error: OSError) -> str:
 for _command in (
     "bench",
     "convert",
+    "cut",
     "demo",
     "detect",
     "emulate",
@@ -66,6 +67,7 @@ for _command in (
     "info",
     "information",
     "live",
+    "merge",
     "record",
     "study",
     "train",

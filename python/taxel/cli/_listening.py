@@ -181,7 +181,7 @@ def told(quiet: bool) -> Iterator[Callable[[str], None]]:
 
 
 def open_recording(path: Path) -> Recording:
-    """Open a recording; `taxel.open`, imported late."""
-    import taxel  # noqa: PLC0415  the command line starts quickly
+    """Open a file of ours; imported late."""
+    from taxel import recording  # noqa: PLC0415  the command line starts quickly
 
-    return taxel.open(path)
+    return recording.open_recording(path)

@@ -16,10 +16,11 @@ __all__ = ["convert"]
 
 @app.command()
 def convert(
-    source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
+    source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
     target: Annotated[Path, typer.Argument(help="The new file; its ending says the kind.")],
     frames: Annotated[
-        float | None, typer.Option(metavar="HZ", help="Write pictures at this rate (.npz, .csv) instead of events.")
+        float | None,
+        typer.Option(metavar="HZ", help="Write pictures at this rate (.npz, .csv, .h5), not events."),
     ] = None,
     compression: Annotated[str, typer.Option(help="Of a .mcap: none, lz4 or zstd.")] = "none",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target where it exists.")] = False,

@@ -28,7 +28,10 @@ _PICTURES = (".png", ".svg", ".pdf")
 
 @app.command()
 def info(
-    file: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
+    file: Annotated[
+        Path,
+        typer.Argument(help="A recording, other people's file, or a folder."),
+    ],
     picture: Annotated[
         Path | None,
         typer.Option(help="Write rates, a map of the taxels and the pressure over time to this .png, .svg or .pdf."),
@@ -52,7 +55,14 @@ def info(
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
     # Shown on a terminal only, and gone when done.
     with Console(stderr=True).status(f"reading {file}"):
-        recording = taxel.open(file)
+        opened = taxel.open(file)
+        if isinstance(opened, list):
+            if picture is not None or table is not None:
+                raise ProblemError(f"{file}: holds {len(opened)} recordings; a picture or a table is of one")
+            every = [about(recording, above_rest(recording)) for recording in opened]
+            typer.echo(json.dumps(every) if as_json else "\n".join(_page(said) for said in every))
+            return
+        recording = opened
         pressed = above_rest(recording)
         said = about(recording, pressed)
     if table is not None and table.suffix.lower() != ".csv":
@@ -92,7 +102,7 @@ def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[st
     span = (int(table.t.min()), int(table.t.max())) if len(table) else None
     seconds = (span[1] - span[0]) / 1e6 if span else 0.0
     said: dict[str, Any] = {
-        "file": str(recording.path),
+        "file": str(recording.path.with_name(recording.name)),
         "kind": recording.kind,
         "source": recording.source,
         "array": {name: value for name, value in array._geometry().items() if name != "exists"},

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import time
+from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -18,6 +19,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import OUTSIDE, WRONG_INPUT, app
 from taxel.cli._board import ArrayOption, HostOption, PortOption, PresetOption, counters_table, geometry, outside
+from taxel.cli._noting import noting
 from taxel.live import Live, Summary
 
 __all__ = ["record"]
@@ -51,7 +53,9 @@ def record(
     """Record what a board sends by UDP, and say what was lost.
 
     Ends with Ctrl-C, after --seconds, or with the board's stop marker (--markers). With --length it records one trial
-    after the other, the index appended to the name, a countdown with beeps before each. Exit code 3 where nothing came
+    after the other, the index appended to the name, a countdown with beeps before each. While it records, a key on the
+    terminal, or a line on any other standard input, writes a note with that label and the board's time into the .mcap
+    (give it < /dev/null where its input is meant for others). Exit code 3 where nothing came
     or something was lost after it had arrived, 2 where the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap
@@ -132,8 +136,13 @@ def _one(
     """Record one file until its time is over, the board marks a stop, or Ctrl-C; return whether it was that."""
     with Live(record=file, **options) as live:
         try:
-            console.print(f"listening on UDP {live.address[0]}:{live.address[1]}, recording to {file}; Ctrl-C ends")
-            _watch(live, seconds, markers, console)
+            # A .lsa holds no notes.
+            takes = noting(live.note, console.print) if file.suffix == ".mcap" else nullcontext("")
+            with takes as how:
+                console.print(f"listening on UDP {live.address[0]}:{live.address[1]}, recording to {file}; Ctrl-C ends")
+                if how:
+                    console.print(how)
+                _watch(live, seconds, markers, console)
             stopped = False
         except KeyboardInterrupt:
             stopped = True

@@ -1,0 +1,161 @@
+"""What `taxel.open` opens: a file of ours, a file of other people's, a folder of trials."""
+
+from __future__ import annotations
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from taxel import _arguments as arguments
+from taxel import formats
+from taxel._core import FormatError
+from taxel._h5 import is_ours
+from taxel._remarks import Note, Remarks
+from taxel.array import Array
+from taxel.formats import Trial
+from taxel.labels import Labels
+from taxel.recording import ENDINGS, Clock, Recording, in_memory, open_recording
+
+__all__ = ["open_any"]
+
+#: What a folder's reference events are called.
+LABELS = "labels.csv"
+
+
+def open_any(
+    path: str | os.PathLike[str], *, array: Array | None = None, pairing: str = "direct", differences: bool = False
+) -> Any:
+    r"""Open a recording, or a folder of trials.
+
+    `taxel.open` is this function.
+
+    Parameters
+    ----------
+    path : path
+        A .mcap, .lsa, .npz, .csv or .h5 of ours, finished or not, whole or damaged; a file of other people's that
+        `taxel.formats` reads; or a folder of either kind.
+    array : Array, optional
+        The sensor, for files that do not hold it (.lsa, .csv, plain .npz); the thesis' 64 x 64 where it is left out,
+        a larger one where events lie outside it.
+    pairing : {"direct", "taxel"}
+        Which change an intensity belongs to: the one directly before it, or the latest of that taxel.
+    differences : bool
+        Whether the intensities of a .lsa are differences (the board's option); a .mcap says so itself.
+
+    Returns
+    -------
+    Recording, or list of Recording
+        A file of ours is one. A folder is a list, in the order of the names (2 before 10), and so is a file of other
+        people's, which holds a trial or several: what is known of them (contact, foot-off ...) appears as notes.
+
+    Raises
+    ------
+    FormatError : no recording, or damaged where nothing can be read (names the place)
+    OSError : the file is not there, or cannot be read
+
+    Notes
+    -----
+    A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
+    stands in `taxel._h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) appear as notes of the
+    recordings that it names; where a folder holds files of ours, other files in it are not looked at.
+
+    Examples
+    --------
+    >>> import pathlib, tempfile, taxel
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    >>> for name in ("step10.npz", "step2.npz"):
+    ...     _ = taxel.convert(events, folder / name)
+    >>> _ = (folder / "labels.csv").write_text("recording,label,t_us\nstep2,contact,200\n")
+    >>> taxel.open(folder)
+    [Recording(step2.npz: 2 events, 0 to 200 us, 8 x 8 taxels, 1 notes),
+     Recording(step10.npz: 2 events, 0 to 200 us, 8 x 8 taxels)]
+    """
+    place = Path(arguments.path("path", path))
+    how: dict[str, Any] = {"array": array, "pairing": pairing, "differences": differences}
+    if place.is_dir():
+        return _folder(place, how)
+    if not _is_own(place) and place.exists() and (names := _formats(place)):
+        return [_of(trial, place) for trial in formats.trials(place, names[0])]
+    return open_recording(place, **how)
+
+
+def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
+    """Open all recordings of a folder, with the labels that lie beside them."""
+    own = sorted((f for f in folder.iterdir() if f.is_file() and f.name != LABELS and _is_own(f)), key=_order)
+    if own:
+        found = [open_recording(file, **how) for file in own]
+        named = [(recording.path.relative_to(folder), recording) for recording in found]
+    else:
+        names = _formats(folder)
+        if len(names) != 1:
+            said = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
+            raise FormatError(f"{folder}: holds {said}; there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}")
+        trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
+        named = [(Path(trial.name), _of(trial, folder)) for trial in trials]
+    return _labelled(folder / LABELS, named)
+
+
+def _labelled(table: Path, named: list[tuple[Path, Recording]]) -> list[Recording]:
+    """Put the reference events of a folder among the notes of its recordings."""
+    if not table.exists():
+        return [recording for _, recording in named]
+    labels = Labels(table)
+    known = {labels.named(name) for name, _ in named}
+    unknown = [name for name in labels.recordings if name not in known]
+    if unknown:
+        there = ", ".join(str(name) for name, _ in named[:8])
+        raise FormatError(f"{table}: {unknown[0]} is no recording of this folder; there are {there}")
+    if None in known and any(not row.recording for row in labels.rows) and len(named) > 1:
+        raise FormatError(f"{table}: without a column recording, but the folder holds {len(named)}")
+    return [recording.with_notes(_notes(labels, name, recording)) for name, recording in named]
+
+
+def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
+    clock = recording.clock if recording.clock is not None and len(recording.clock.board_us) else None
+    times = labels.of(_Named(name, clock))
+    return sorted(
+        (
+            Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
+            for label, every in times.items()
+            for t in every
+        ),
+        key=lambda note: note.t or 0,
+    )
+
+
+@dataclass(frozen=True)
+class _Named:
+    """What labels look at: a recording under the name that its folder gives it."""
+
+    path: Path
+    clock: Clock | None
+
+
+def _of(trial: Trial, place: Path) -> Recording:
+    """Return a trial of other people's as a recording; what is known of it are notes."""
+    notes = sorted(
+        (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
+    )
+    path = place if place.is_file() else place / trial.name
+    return in_memory(path, "trial", trial.recorded, Remarks(source=trial.source, notes=tuple(notes)), name=trial.name)
+
+
+def _formats(place: Path) -> list[str]:
+    return [name for name, kind in formats.FORMATS.items() if kind.files(place)]
+
+
+def _is_own(file: Path) -> bool:
+    """Tell whether a file is of a kind of ours, by its ending and, where others use that too, by its content."""
+    ending = file.suffix.lower()
+    if ending == ".csv":
+        with file.open("rb") as table:
+            return table.read(16).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"t_us")
+    return is_ours(file) if ending == ".h5" else ending in ENDINGS
+
+
+def _order(path: Path) -> list[tuple[bool, int, str]]:
+    """Return what puts names in the order that people expect: 2 before 10."""
+    return [(part.isdigit(), int(part) if part.isdigit() else 0, part) for part in re.split(r"(\d+)", str(path))]

@@ -1,0 +1,107 @@
+"""Notes while recording: a key on a terminal, a line on any other standard input."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import sys
+import threading
+from collections.abc import Callable, Iterator
+
+from taxel._core import Error
+
+__all__ = ["noting"]
+
+#: How often it looks whether the recording has ended, s.
+_LOOK_S = 0.1
+
+
+@contextlib.contextmanager
+def noting(write: Callable[[str], None], tell: Callable[[str], None]) -> Iterator[str]:
+    """Hand what is typed to `write` until the block ends: a key at once on a terminal, else a line when it is whole.
+
+    Parameters
+    ----------
+    write : function
+        Takes the label.
+    tell : function
+        Takes one line for the user: what was noted, or why it was not.
+
+    Yields
+    ------
+    str
+        How to write a note, for the user; "" where nobody can type.
+    """
+    try:
+        source = sys.stdin.fileno()
+        keys = os.isatty(source)
+        # Reading a terminal from the background would stop the whole program.
+        if keys and os.tcgetpgrp(source) != os.getpgrp():
+            source = -1
+    except (OSError, ValueError, AttributeError):
+        source, keys = -1, False
+    if source < 0:
+        yield ""
+        return
+    over = threading.Event()
+    with _by_key(source) if keys else contextlib.nullcontext():
+        thread = threading.Thread(target=_listen, args=(source, keys, over, write, tell), daemon=True)
+        thread.start()
+        try:
+            yield "a key writes a note" if keys else "a line on standard input writes a note"
+        finally:
+            over.set()
+            thread.join()
+
+
+def _listen(
+    source: int, keys: bool, over: threading.Event, write: Callable[[str], None], tell: Callable[[str], None]
+) -> None:
+    waiting = b""
+    while not over.is_set():
+        if not select.select([source], [], [], _LOOK_S)[0]:
+            continue
+        try:
+            said = os.read(source, 4096)
+        except OSError:
+            return
+        waiting += said
+        if keys:
+            labels, waiting = _keys(waiting.decode("utf-8", "replace")), b""
+        else:
+            *lines, waiting = waiting.split(b"\n") if said else (waiting, b"")
+            labels = [label for line in lines if (label := line.decode("utf-8", "replace").strip())]
+        for label in labels:
+            try:
+                write(label)
+                tell(f"noted: {label}")
+            except (Error, OSError) as error:
+                tell(f"not noted: {error}")
+        if not said:
+            return
+
+
+def _keys(typed: str) -> list[str]:
+    """Return a label a key; the keys without a letter of their own are marks, arrows and the like are nothing."""
+    if typed.startswith("\x1b"):
+        return []
+    return [
+        key if key.isprintable() and not key.isspace() else "mark"
+        for key in typed
+        if key in " \n\r" or key.isprintable()
+    ]
+
+
+@contextlib.contextmanager
+def _by_key(source: int) -> Iterator[None]:
+    """Have a terminal give each key at once, without showing it; Ctrl-C stays what it is."""
+    import termios  # noqa: PLC0415  Unix only
+    import tty  # noqa: PLC0415
+
+    before = termios.tcgetattr(source)
+    tty.setcbreak(source)
+    try:
+        yield
+    finally:
+        termios.tcsetattr(source, termios.TCSADRAIN, before)

@@ -1,0 +1,71 @@
+"""``taxel cut``: a part of a recording."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from taxel import _core
+from taxel._core import ProblemError
+from taxel.cli._app import app
+
+__all__ = ["cut"]
+
+
+@app.command()
+def cut(
+    recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
+    out: Annotated[Path, typer.Argument(help="The new file; its ending says the kind. With --label out1 ...")],
+    start: Annotated[float | None, typer.Option("--from", metavar="S", help="From this time of the board, s.")] = None,
+    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="To this time of the board, s.")] = None,
+    columns: Annotated[str | None, typer.Option(metavar="A:B", help="These columns, the last not: 0:32.")] = None,
+    rows: Annotated[str | None, typer.Option(metavar="A:B", help="These rows, the last not: 10:20.")] = None,
+    label: Annotated[str | None, typer.Option(help="Cut around each note of this text.")] = None,
+    before: Annotated[float, typer.Option(min=0.0, metavar="S", help="With --label: so long before it, s.")] = 0.5,
+    after: Annotated[float, typer.Option(min=0.0, metavar="S", help="With --label: so long after it, s.")] = 0.5,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Cut a recording by time, by region or by label.
+
+    Example: taxel cut walk.mcap heel.mcap --from 1.5 --to 3 --rows 0:20
+    """
+    import taxel  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording import open_recording  # noqa: PLC0415
+
+    parts = taxel.cut(
+        open_recording(recording),
+        start_us=float("-inf") if start is None else start * 1e6,
+        stop_us=float("inf") if stop is None else stop * 1e6,
+        columns=_range("--columns", columns),
+        rows=_range("--rows", rows),
+        label=label,
+        before_us=before * 1e6,
+        after_us=after * 1e6,
+    )
+    if not parts:
+        raise ProblemError(f"{recording}: no note {label!r} with a time in it; taxel info says which there are")
+    written = []
+    for k, part in enumerate(parts, start=1):
+        place = out if label is None else Path(_core.numbered_path(out, k))
+        lost = taxel.convert(part, place, overwrite=overwrite)
+        written.append({"file": str(place), "lost": lost})
+        if not as_json:
+            typer.echo(f"written to {place}: {part!r}")
+            for what in lost:
+                typer.echo(f"  a {place.suffix} cannot hold: {what}")
+    if as_json:
+        typer.echo(json.dumps({"recording": str(recording), "written": written}))
+
+
+def _range(option: str, said: str | None) -> slice | None:
+    if said is None:
+        return None
+    match = re.fullmatch(r"(\d{0,5}):(\d{0,5})", said)
+    if match is None:
+        raise ProblemError(f"{option} is {said!r}: must be first:last, the last not taken, as 0:32")
+    return slice(*(int(n) if n else None for n in match.groups()))

@@ -1,0 +1,47 @@
+"""``taxel merge``: several recordings as one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from taxel.cli._app import app
+
+__all__ = ["merge"]
+
+
+@app.command()
+def merge(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz, .csv or .h5.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The new file; its ending says the kind.")],
+    gap: Annotated[
+        float | None,
+        typer.Option(min=0.0, metavar="S", help="Put each after the one before, with this pause, s; else times stay."),
+    ] = None,
+    beside: Annotated[bool, typer.Option("--beside", help="Put the sensors side by side, left to right.")] = False,
+    label: Annotated[str | None, typer.Option(help="Only what lies half a second around notes of this text.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Merge recordings: by time, beside one another, or what lies around a label in each.
+
+    A note with its name stands where each begins.
+
+    Example: taxel merge left.mcap right.mcap -o both.mcap --beside
+    """
+    import taxel  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording import open_recording  # noqa: PLC0415
+
+    opened = [open_recording(path) for path in recordings]
+    parts = opened if label is None else [part for each in opened for part in taxel.cut(each, label=label)]
+    merged = taxel.merge(parts, gap_us=None if gap is None else gap * 1e6, beside=beside)
+    lost = taxel.convert(merged, out, overwrite=overwrite)
+    if as_json:
+        typer.echo(json.dumps({"recordings": [str(path) for path in recordings], "file": str(out), "lost": lost}))
+        return
+    typer.echo(f"written to {out}: {merged!r}")
+    for what in lost:
+        typer.echo(f"  a {out.suffix} cannot hold: {what}")

@@ -1,0 +1,250 @@
+"""Folders of trials, .h5, and recordings cut and merged again: nothing is lost or made up on the way."""
+
+from __future__ import annotations
+
+import itertools
+import os
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from formats import making
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel._core import FormatError, ProblemError
+
+from .making import record, some_events, some_frames
+
+QUIET = settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def run(*arguments: object, **how: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "taxel", *map(str, arguments)], check=False, capture_output=True, text=True, **how
+    )
+
+
+# .h5
+
+
+@pytest.mark.parametrize("source", [some_events(), some_events(50, intensity=False), some_events()[:0], some_frames()])
+def test_a_h5_gives_back_what_was_written(tmp_path: Path, source: taxel.Events | taxel.Frames) -> None:
+    taxel.convert(source, tmp_path / "a.h5")
+    rec = taxel.open(tmp_path / "a.h5")
+    assert (rec.kind, rec.array) == ("h5", source.array)
+    assert (rec.events if rec.has_events else rec.frames()) == source
+
+
+def test_a_h5_keeps_what_a_npz_keeps(tmp_path: Path) -> None:
+    record(tmp_path / "a.mcap", some_events())
+    taxel.convert(tmp_path / "a.mcap", tmp_path / "a.h5")
+    taxel.convert(tmp_path / "a.mcap", tmp_path / "a.npz")
+    a, b = taxel.open(tmp_path / "a.h5"), taxel.open(tmp_path / "a.npz")
+    for name in ("events", "notes", "detections", "registers", "verdict", "counts", "source", "array"):
+        assert getattr(a, name) == getattr(b, name), name
+
+
+def test_another_program_reads_a_h5_as_the_layout_says(tmp_path: Path) -> None:
+    events = some_events(30)
+    taxel.convert(events, tmp_path / "a.h5")
+    with h5py.File(tmp_path / "a.h5") as h5:
+        assert h5.attrs["taxel"] == 1
+        assert {name: h5[name].dtype for name in "txyp"} == {
+            "t": np.int64,
+            "x": np.uint16,
+            "y": np.uint16,
+            "p": np.bool_,
+        }
+        assert np.array_equal(h5["t"][...], events.t)
+        assert h5["markers"].shape == (2, 2)
+
+
+def test_other_peoples_h5_is_a_list_of_trials_whose_truth_is_notes(tmp_path: Path) -> None:
+    opened = taxel.open(making.write_plate(tmp_path))
+    trials = list(taxel.formats.trials(tmp_path))
+    assert [rec.name for rec in opened] == [trial.name for trial in trials]
+    for rec, trial in zip(opened, trials, strict=True):
+        assert rec.frames() == trial.frames
+        assert {n.text: n.t for n in rec.notes} == {e: int(t[0]) for e, t in trial.truth.items()}
+    with h5py.File(tmp_path / "other.h5", "w") as h5:
+        h5["t"] = [1]
+    with pytest.raises(FormatError, match="without the attribute taxel"):
+        taxel.open(tmp_path / "other.h5")
+
+
+# folders
+
+
+def test_a_folder_is_a_list_in_the_order_of_the_names_with_its_labels_as_notes(tmp_path: Path) -> None:
+    names = ["walk10.npz", "walk2.mcap", "walk1.csv", "a.h5"]
+    for k, name in enumerate(names):
+        taxel.convert(some_events(40, seed=k), tmp_path / name)
+    (tmp_path / "people.csv").write_text("person,age\n1,40\n")
+    (tmp_path / "labels.csv").write_text("recording,label,t_us\nwalk2,heel,700\nwalk2,heel,300\na,toe,100\n")
+    opened = taxel.open(tmp_path)
+    assert [rec.name for rec in opened] == ["a.h5", "walk1.csv", "walk2.mcap", "walk10.npz"]
+    assert [[(n.text, n.t) for n in rec.notes] for rec in opened] == [
+        [("toe", 100)],
+        [],
+        [("heel", 300), ("heel", 700)],
+        [],
+    ]
+    (tmp_path / "labels.csv").write_text("recording,label,t_us\nrun,heel,700\n")
+    with pytest.raises(FormatError, match=r"run is no recording of this folder; there are a\.h5, walk1\.csv"):
+        taxel.open(tmp_path)
+
+
+@pytest.mark.parametrize("name", taxel.formats.FORMATS)
+def test_a_folder_of_other_peoples_files_is_its_trials(tmp_path: Path, name: str) -> None:
+    getattr(making, f"write_{name}")(tmp_path)
+    opened = taxel.open(tmp_path)
+    assert {rec.name for rec in opened} == {trial.name for trial in taxel.formats.trials(tmp_path)}
+
+
+def test_a_folder_without_a_recording_says_what_there_is_to_read(tmp_path: Path) -> None:
+    with pytest.raises(FormatError, match=r"holds no recording; there are .mcap, .lsa"):
+        taxel.open(tmp_path)
+
+
+def test_info_of_a_folder_says_all_of_them(tmp_path: Path) -> None:
+    for k in range(2):
+        taxel.convert(some_events(40, seed=k), tmp_path / f"walk{k}.npz")
+    said = run("info", tmp_path)
+    assert said.returncode == 0, said.stderr
+    assert "walk0.npz: " in said.stdout
+    assert "walk1.npz: " in said.stdout
+
+
+# cut and merge
+
+
+def opened(table: taxel.Events | taxel.Frames, folder: Path, name: str = "a.npz") -> taxel.Recording:
+    taxel.convert(table, folder / name, overwrite=True)
+    return taxel.open(folder / name)
+
+
+@QUIET
+@given(at=st.lists(st.integers(-1000, 80_000), max_size=4), seed=st.integers(0, 50))
+def test_what_is_cut_anywhere_and_merged_is_whole_again(tmp_path: Path, at: list[int], seed: int) -> None:
+    rec = opened(some_events(200, seed=seed).sorted(), tmp_path)
+    ends = [-np.inf, *sorted(at), np.inf]
+    parts = [taxel.cut(rec, start_us=a, stop_us=b)[0] for a, b in itertools.pairwise(ends)]
+    assert taxel.merge(parts).events == rec.events
+
+
+@QUIET
+@given(column=st.integers(1, 63), seed=st.integers(0, 50))
+def test_what_is_cut_along_a_column_and_put_beside_is_whole_again(tmp_path: Path, column: int, seed: int) -> None:
+    events = some_events(200, seed=seed).sorted()
+    rec = opened(events, tmp_path)
+    left, right = (taxel.cut(rec, columns=c)[0] for c in (slice(column), slice(column, None)))
+    assert (left.array.columns, right.array.columns) == (column, 64 - column)
+    both = taxel.merge([left, right], beside=True).events
+    for mine, theirs in ((both, events),):
+        order = [np.lexsort((e.p, e.y, e.x, e.t)) for e in (mine, theirs)]
+        for name in ("t", "x", "y", "p"):
+            assert np.array_equal(getattr(mine, name)[order[0]], getattr(theirs, name)[order[1]])
+
+
+def test_pictures_are_cut_and_put_beside_to_the_last_bit(tmp_path: Path) -> None:
+    frames = some_frames(9)
+    rec = opened(frames, tmp_path)
+    halves = [taxel.cut(rec, columns=c)[0] for c in (slice(2), slice(2, None))]
+    assert np.array_equal(taxel.merge(halves, beside=True).frames().values, frames.values)
+    t = int(frames.t[4])
+    parts = [taxel.cut(rec, stop_us=t)[0], taxel.cut(rec, start_us=t)[0]]
+    assert taxel.merge(parts).frames() == frames
+    with pytest.raises(ProblemError, match="not after"):
+        taxel.merge([rec, rec])
+    again = taxel.merge([rec, rec], gap_us=500).frames()
+    assert len(again) == 18
+    assert again.t[9] - again.t[8] == 500
+    assert {n.text for n in taxel.merge([rec, rec], gap_us=500).notes} == {"a.npz"}
+
+
+def test_a_label_is_cut_out_with_what_lies_around_it(tmp_path: Path) -> None:
+    record(tmp_path / "a.mcap", some_events())
+    rec = taxel.open(tmp_path / "a.mcap")
+    (part,) = taxel.cut(rec, label="left heel", before_us=1000, after_us=2000)
+    assert part.events == rec.events.between(4000, 7000)
+    assert taxel.cut(rec, label="nothing") == []
+    said = run("cut", tmp_path / "a.mcap", tmp_path / "heel.npz", "--label", "left heel", "--before", ".001")
+    assert said.returncode == 0, said.stderr
+    assert taxel.open(tmp_path / "heel1.npz").events == rec.events.between(4000, 505_000)
+    none = run("cut", tmp_path / "a.mcap", tmp_path / "b.npz", "--label", "x")
+    assert (none.returncode, none.stderr.count("\n")) == (2, 1)
+
+
+def test_merge_refuses_what_does_not_go_together(tmp_path: Path) -> None:
+    events, frames = opened(some_events(20), tmp_path), opened(some_frames(), tmp_path, "f.npz")
+    small = opened(taxel.Events([0], [0], [0], [True], array=taxel.Array(2, 2)), tmp_path, "s.npz")
+    for parts, said in (
+        ([events, frames], "events among pictures"),
+        ([], "one or more"),
+        ([events, small], "different"),
+    ):
+        with pytest.raises(ProblemError, match=said):
+            taxel.merge(parts)
+
+
+def test_cut_and_merge_as_a_shell_sees_them(tmp_path: Path) -> None:
+    record(tmp_path / "a.mcap", some_events())
+    events = taxel.open(tmp_path / "a.mcap").events
+    for name, ends in (("one", ("--to", ".02")), ("two", ("--from", ".02"))):
+        said = run("cut", tmp_path / "a.mcap", tmp_path / f"{name}.mcap", *ends, "--json")
+        assert said.returncode == 0, said.stderr
+    said = run("merge", tmp_path / "one.mcap", tmp_path / "two.mcap", "-o", tmp_path / "both.npz")
+    assert said.returncode == 0, said.stderr
+    assert np.array_equal(taxel.open(tmp_path / "both.npz").events.t, events.t)
+    for command, options in (("cut", ("x.npz", "--rows", "1-2")), ("cut", ("x.npz", "--from", "3", "--to", "1"))):
+        said = run(command, tmp_path / "a.mcap", tmp_path / options[0], *options[1:])
+        assert (said.returncode, said.stderr.count("\n")) == (2, 1), said.stderr
+
+
+# notes while recording
+
+#: Makes its standard input the terminal that it belongs to, and becomes taxel.
+AT_A_TERMINAL = """
+import fcntl, os, sys, termios
+fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+os.execv(sys.executable, [sys.executable, "-m", "taxel", *sys.argv[1:]])
+"""
+
+
+def test_a_line_on_standard_input_is_a_note_of_the_recording(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    said = run("record", path, "--port", "0", "--host", "127.0.0.1", "--seconds", "2", input="heel\n\ntoe off\nlast")
+    assert "a line on standard input writes a note" in said.stderr
+    assert [n.text for n in taxel.open(path).notes] == ["heel", "toe off", "last"]
+
+
+def test_a_key_on_a_terminal_is_a_note_of_the_recording(tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    master, slave = os.openpty()
+
+    arguments = ["record", path, "--port", "0", "--host", "127.0.0.1", "--seconds", "4"]
+    with subprocess.Popen(
+        [sys.executable, "-c", AT_A_TERMINAL, *map(str, arguments)],
+        stdin=slave,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+    ) as process:
+        assert process.stderr is not None
+        while b"a key writes a note" not in (said := process.stderr.readline()):
+            assert said, "it never said so"
+        threading.Thread(target=process.stderr.read, daemon=True).start()
+        # Another key's sequence is no note; two keys at once are two.
+        for keys in (b"h", b"\x1b[A", b"t "):
+            os.write(master, keys)
+            time.sleep(0.5)
+        process.wait()
+    os.close(master)
+    os.close(slave)
+    assert [n.text for n in taxel.open(path).notes] == ["h", "t", "mark"]
