@@ -153,6 +153,8 @@ def _is_own(file: Path) -> bool:
     if ending == ".csv":
         with file.open("rb") as table:
             return table.read(16).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"t_us")
+    if ending == ".npz":
+        return not _formats(file)
     return is_ours(file) if ending == ".h5" else ending in ENDINGS
 
 
