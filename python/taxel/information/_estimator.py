@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._core import ProblemError
+from taxel._core import NotFittedError, ProblemError
 from taxel._parameters import Parameters
 from taxel.information._labels import words
 
@@ -44,7 +44,7 @@ class Classifier(Parameters):
 
     def _fitted(self, name: str) -> Any:
         if not hasattr(self, name):
-            raise ProblemError(f"{type(self).__name__} was not fitted yet; call fit first")
+            raise NotFittedError(f"{type(self).__name__} was not fitted yet; call fit first")
         return getattr(self, name)
 
 
