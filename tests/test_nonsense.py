@@ -690,6 +690,7 @@ LEFT_OUT = {
     "taxel.Clock.board_us_at": "of a recording",
     "taxel.Datagrams": "of a recording",
     "taxel.Health": "a result",
+    "taxel.Label": "a row of Labels",
     "taxel.Note": "of a recording",
     "taxel.Recording": "made by taxel.open",
     "taxel.detect.Score": "a result",
