@@ -4,13 +4,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml)
 
-.PHONY: help check setup build demo test slow lint format registers bench docs clean
+.PHONY: help check setup build demo test slow lint format registers bench docs dist clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
 	@echo "make test   all tests but the slow ones     make slow   the slow ones"
 	@echo "make lint   format, lint, types, floors     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
+	@echo "make dist   a wheel for machines without cargo, and the source package, to dist/"
 
 check:
 	@command -v $(PYTHON) >/dev/null || { echo "taxel needs Python 3.11 or later: install it, or say make PYTHON=/path/to/python3"; exit 1; }
@@ -40,7 +41,7 @@ test: build
 	cargo test --release --workspace --quiet
 	$(BIN)/python -m pytest -q -m "not slow"
 
-slow: build
+slow: build dist
 	cargo test --release --workspace --quiet -- --ignored
 	$(BIN)/python -m pytest -q -m slow
 
@@ -78,5 +79,18 @@ bench: build $(VENV)/.peers
 docs: build
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
+# Zig links against the glibc of 2018 (2.28), whatever this machine has; auditwheel looks whether that is so.
+$(VENV)/.dist: $(VENV)/.installed
+	$(BIN)/python -c 'import tomllib; print("\n".join(tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["dist"]))' > $(VENV)/dist.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/dist.txt
+	@touch $@
+
+dist: $(VENV)/.dist
+	rm -rf dist
+	$(BIN)/maturin sdist --out dist
+	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/maturin build --release --zig --compatibility manylinux_2_28 --out dist
+	$(BIN)/auditwheel show dist/*.whl
+	@ls -l dist
+
 clean:
-	rm -rf target $(VENV) docs/_build
+	rm -rf target $(VENV) docs/_build dist

@@ -13,7 +13,7 @@ from typing import BinaryIO
 from taxel._arguments import flag
 from taxel._arguments import path as checked_path
 
-__all__ = ["whole_file", "write_whole"]
+__all__ = ["try_whole", "whole_file", "write_whole"]
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[BinaryIO], object], *, overwrite: bool = False) -> Path:
@@ -81,6 +81,24 @@ def whole_file(path: str | os.PathLike[str], *, overwrite: bool = False) -> Iter
         if isinstance(error, OSError):
             error.filename, error.filename2 = str(place), None
         raise
+
+
+class _Enough(Exception):  # noqa: N818  no error
+    """What a try ends with."""
+
+
+def try_whole(path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+    """Try whether a file could be written, before the work whose result it is to hold; leave nothing behind.
+
+    Raises
+    ------
+    As `whole_file`.
+    """
+    try:
+        with whole_file(path, overwrite=overwrite):
+            raise _Enough
+    except _Enough:
+        return
 
 
 def _umask() -> int:

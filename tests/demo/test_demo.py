@@ -13,11 +13,12 @@ import pytest
 from typer.testing import CliRunner
 
 from taxel.cli import app
-from taxel.demo.hearing import FRAME_US, hear
+from taxel.demo.hearing import hear
 from taxel.demo.judging import GOALS, LABELS
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.demo.shipped import shipped
 from taxel.simulate import Scene, Silence
+from taxel.wire import FRAME_US
 
 
 def run(*arguments):

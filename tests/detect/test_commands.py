@@ -232,7 +232,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
         (("detect", "9.npz", "--readout", "touch.json"), "tare"),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "-1"), "--tare -1: must be seconds above 0"),
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "none.json"), "none.json: no such file"),
-        (("detect", "9.npz", "--readout", "touch.json", "--tare", "tare.json", "--frame-us", "0"), "frame_us is 0"),
+        (("detect", "9.npz", "--readout", "touch.json", "--tare", "tare.json", "--frame-us", "0"), "--frame-us is 0"),
         (("detect", "9.npz", "--readout", "touch.json", "--truth", "recipe.toml"), "recipe.toml, line 1"),
         (("encode", "1.npz", "out.txt", "--encoder", "fa1"), "out.txt: spikes are written to a .npz"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa2"), "encoder fa2: must be one of"),

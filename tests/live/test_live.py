@@ -293,7 +293,8 @@ def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path
     np.testing.assert_array_equal(taxel.open(file).events.to_numpy(), events.to_numpy())
     again = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert again.returncode == 2
-    assert again.stderr.strip().splitlines() == [f"taxel: {file}: file exists"]
+    said = f"taxel: {file}: exists already; say --overwrite, or name another"
+    assert again.stderr.strip().splitlines() == [said]
 
 
 def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:
@@ -328,7 +329,10 @@ def test_taxel_record_goes_on_by_itself_in_automatic_mode(tmp_path: Path) -> Non
     assert sorted(path.name for path in tmp_path.iterdir()) == ["step7.lsa", "step7.lss", "step8.lsa", "step8.lss"]
     assert said.count("nothing lost after arrival") == 2
     again = subprocess.run(arguments, capture_output=True, text=True, check=False)
-    assert (again.returncode, again.stderr.strip()) == (2, f"taxel: {tmp_path / 'step7.lsa'}: file exists")
+    assert (again.returncode, again.stderr.strip()) == (
+        2,
+        f"taxel: {tmp_path / 'step7.lsa'}: exists already; say --overwrite, or name another",
+    )
 
 
 def test_a_port_that_is_taken_is_one_line(tmp_path: Path) -> None:
@@ -373,8 +377,13 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         lines += [json.loads(line) for line in process.stdout]
     assert process.returncode == 0
-    assert [set(line) for line in lines] == [{"label", "t", "known", "slope", "said", "said_ns"}] * 5
-    np.testing.assert_array_equal([line["t"] for line in lines], taxel.open(tmp_path / "live.mcap").detections.t)
+    keys = {"label", "t_us", "known_us", "slope_mv_per_ms"}
+    assert [set(line) for line in lines] == [keys | {"said_us", "said_ns"}] * 5
+    heard_again = ("detect", tmp_path / "live.mcap", "--readout", tmp_path / "touch.json", "--json")
+    again = subprocess.run(command(*heard_again), capture_output=True, text=True, check=True)
+    detected = json.loads(again.stdout)["detections"]
+    assert detected == [{key: line[key] for key in keys} for line in lines], "one schema"
+    np.testing.assert_array_equal([line["t_us"] for line in lines], taxel.open(tmp_path / "live.mcap").detections.t)
 
 
 def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:
@@ -382,7 +391,7 @@ def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:
     arguments = command("live", "--readout", tmp_path / "touch.json", "--save-tare", tmp_path / "tare.json")
     done = subprocess.run(arguments, capture_output=True, text=True, check=False)
     assert done.returncode == 2
-    assert done.stderr == "taxel: save_tare without a fresh tare: give --tare SECONDS\n"
+    assert done.stderr == "taxel: --save-tare without a fresh tare: give --tare SECONDS\n"
 
 
 @pytest.mark.parametrize("kind", ["mcap", "lsa"])

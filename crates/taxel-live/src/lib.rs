@@ -1,5 +1,6 @@
 //! Where the world comes in: sockets, files and threads around `taxel-core`.
 
+pub mod address;
 pub mod clock;
 pub mod error;
 pub mod latency;

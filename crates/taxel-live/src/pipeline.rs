@@ -84,10 +84,9 @@ pub struct Record {
 }
 
 /// A detection, and when it was said.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Said {
     /// What was said.
-    #[serde(flatten)]
     pub detection: Detection,
     /// When it was said by the host's clock, ns since 1970.
     pub said_ns: i64,
@@ -111,13 +110,21 @@ impl<F: FnMut(&Said) -> std::io::Result<()> + Send> Sink for F {
     }
 }
 
-/// Writes each detection as a line of JSON.
+/// Writes each detection as a line of JSON, with the keys of `taxel detect --json` and when it was said.
 #[derive(Debug)]
 pub struct Lines<W>(pub W);
 
 impl<W: std::io::Write + Send> Sink for Lines<W> {
     fn take(&mut self, said: &Said) -> std::io::Result<()> {
-        let mut line = serde_json::to_vec(said)?;
+        let Said { detection, said_ns, said } = said;
+        let mut line = serde_json::to_vec(&serde_json::json!({
+            "label": detection.label,
+            "t_us": detection.t,
+            "known_us": detection.known,
+            "slope_mv_per_ms": detection.slope,
+            "said_us": said,
+            "said_ns": said_ns,
+        }))?;
         line.push(b'\n');
         self.0.write_all(&line)?;
         self.0.flush()

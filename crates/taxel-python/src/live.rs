@@ -1,6 +1,5 @@
 //! The pipeline from datagrams to detections, and the sender of the benchmarks.
 
-use std::net::{SocketAddr, ToSocketAddrs};
 use std::path::PathBuf;
 use std::sync::{PoisonError, RwLock};
 use std::time::{Duration, Instant};
@@ -13,6 +12,7 @@ use taxel_core::detect::Readout;
 use taxel_core::encode::Tare;
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
+use taxel_live::address::of_host;
 use taxel_live::capture::{self, SendCounts, Sender};
 use taxel_live::pipeline::{Ear, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink};
 
@@ -50,12 +50,6 @@ impl Chosen {
             held => Registers::deserialize(held).map_err(|e| ProblemError::new_err(format!("registers: {e}"))),
         }
     }
-}
-
-/// The address that `host` and `port` name.
-fn address(host: &str, port: u16) -> PyResult<SocketAddr> {
-    let found = (host, port).to_socket_addrs().ok().and_then(|mut all| all.next());
-    found.ok_or_else(|| ProblemError::new_err(format!("host is {host:?}: must be an address or a name of a host")))
 }
 
 /// Label, t, known, slope, said (us of the board's clock), said (ns of the host's clock).
@@ -147,8 +141,7 @@ impl Live {
                 Ear::Reading(Box::new(readout.stream(&options.array, frame_us, tare.as_ref()).map_err(core)?))
             }
         };
-        let address = address(host, port)?;
-        let pipeline = enter(py, |_| Pipeline::start(address, options, ear, sinks))?;
+        let pipeline = enter(py, |_| Pipeline::start(of_host(host, port)?, options, ear, sinks))?;
         Ok(Self { pipeline: RwLock::new(Some(pipeline)) })
     }
 
@@ -249,9 +242,8 @@ fn send(
             return Err(ProblemError::new_err(format!("{name} is {value}: must lie between 0 and 1e9")));
         }
     }
-    let to = address(host, port)?;
     let counts: SendCounts = enter(py, |stop| {
-        let mut sender = Sender::open(to, segment)?;
+        let mut sender = Sender::open(of_host(host, port)?, segment)?;
         let begun = Instant::now();
         let mut next = datagrams.iter().cycle();
         for period in 0_u32.. {

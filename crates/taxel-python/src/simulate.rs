@@ -1,13 +1,13 @@
 //! Simulated touch, and the board that feels it, as fast as it goes.
 
-use std::net::SocketAddr;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::board::{Board, session};
 use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor, Stage, Taxels};
 use taxel_core::wire::{Decoder, Registers};
-use taxel_core::{Array, Error, Events, Result, problem};
+use taxel_core::{Array, Error, Events, Result};
+use taxel_live::address::of_text;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Report};
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
@@ -157,7 +157,7 @@ fn emulate(
 ) -> PyResult<String> {
     let (array, acts) = (to_array(parts)?, to_acts(acts)?);
     let registers = Registers { wire_version: wire, ..Registers::preset(preset).map_err(core)? };
-    let (to, control) = (address(to)?, control.map(address).transpose()?);
+    let (to, control) = enter(py, |_| Ok::<_, taxel_live::Error>((of_text(to)?, control.map(of_text).transpose()?)))?;
     enter_telling(py, |stop, teller| {
         let mut stage = ready(&array, registers, sensor, seed, &acts)?;
         let commands = session(&registers, tare_ms, stage.frames() as u64)?;
@@ -181,10 +181,6 @@ fn emulate(
         failed?;
         Ok::<_, taxel_live::Error>(json(&report))
     })
-}
-
-fn address(text: &str) -> PyResult<SocketAddr> {
-    text.parse().map_err(|_| core(problem!("address {text:?}: must be an IP address and a port, as 127.0.0.1:5208")))
 }
 
 fn json(report: &Report) -> String {

@@ -5,16 +5,20 @@ Exit codes, for scripts: 0 done, 2 the user's input is wrong, 3 board, socket or
 
 from __future__ import annotations
 
+import re
 import sys
 from importlib import import_module
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import typer
 
 from taxel._core import DeviceError, Error
-from taxel.cli._app import OUTSIDE, WRONG_INPUT, app
+from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, app
 
 __all__ = ["app", "main"]
+
+#: What typer makes of words that cannot be a command line: the class is of its own copy of click.
+_UsageError: Any = typer.BadParameter.__base__
 
 
 @app.callback(invoke_without_command=True)
@@ -29,7 +33,15 @@ def _root(version: bool = typer.Option(False, "--version", help="Print the versi
 def main(arguments: list[str] | None = None) -> NoReturn:
     """Run the command line; what the user got wrong ends in one line on stderr and an exit code."""
     try:
-        app(arguments)
+        code = app(arguments, prog_name="taxel", standalone_mode=False)
+    except _UsageError as error:
+        if not str(error.format_message()).startswith("Usage:"):
+            _end(f"{_plain(error.format_message())}; see {_typed(error.ctx)} --help", WRONG_INPUT)
+        # No command at all: its help is what is wanted.
+        typer.echo(error.format_message(), err=True)
+        sys.exit(WRONG_INPUT)
+    except KeyboardInterrupt:
+        sys.exit(STOPPED)
     except DeviceError as error:
         _end(str(error), OUTSIDE)
     except Error as error:
@@ -40,7 +52,23 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         _end(_said(error), OUTSIDE)
     except MemoryError as error:
         _end(f"this needs more memory than there is ({error})", OUTSIDE)
-    sys.exit(0)
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _plain(said: str) -> str:
+    """Return what is wrong with a word, without what the parser says of itself."""
+    said = re.sub(r"^Invalid value for '?(.+?)'?: ", r"\1: ", said)
+    said = re.sub(r"^Missing (?:argument|option|parameter) '(.+?)'.*", lambda m: f"{_upper(m[1])} is missing", said)
+    return said.replace("Input should be", "must be").rstrip(".")
+
+
+def _upper(word: str) -> str:
+    return word if word.startswith("-") else word.upper()
+
+
+def _typed(context: Any) -> str:
+    """Return the command that was being read, as it is typed."""
+    return "taxel" if context is None else str(context.command_path)
 
 
 def _end(text: str, code: int) -> NoReturn:

@@ -2,14 +2,100 @@
 
 from __future__ import annotations
 
+import errno
+import re
+from collections.abc import Callable
+from typing import Any
+
 import typer
+from typer.core import TyperCommand
 
-__all__ = ["OUTSIDE", "WRONG_INPUT", "app"]
+from taxel._core import Error
 
-#: Exit codes: the user's input is wrong; board, socket or disk.
-WRONG_INPUT, OUTSIDE = 2, 3
+__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "app"]
 
-app = typer.Typer(
+#: Exit codes: the user's input is wrong; board, socket or disk; stopped by Ctrl-C.
+WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
+
+
+def _wanted(said: str) -> str:
+    """Return what a parser expects, in words."""
+    said = said.strip().replace("`", "")
+    for kind, words in _KINDS.items():
+        if re.fullmatch(kind, said):
+            return words
+    return f"one of {said.removeprefix('one of ').replace(' or ', ', ')}"
+
+
+#: What parsers of parameters expect, and the same in words.
+_KINDS = {
+    r"f32|f64|a number": "a number",
+    r"[ui]\d+|usize|a whole number": "a whole number",
+    r"(a )?sequence": "a list",
+    r"an array of length \d+|a tuple of size \d+": "a list of so many",
+    r"(a )?map|struct .*": "values by name",
+    r"(a )?boolean": "true or false",
+    r"(a )?string|a name|string or map": "a name",
+}
+_IN_WORDS: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
+    (
+        r": invalid (?:type|value): (?:\w+ ){1,2}[`\"](.+?)[`\"], expected (.+)$",
+        lambda m: f" is {m[1]}: must be {_wanted(m[2])}",
+    ),
+    (r": invalid (?:type|value): (.+?), expected (.+)$", lambda m: f" is a {m[1]}: must be {_wanted(m[2])}"),
+    (r": invalid length (\d+), expected (.+)$", lambda m: f" has {m[1]} values: must be {_wanted(m[2])}"),
+    (r": unknown variant `(.*?)`, expected (.+)$", lambda m: f" is {m[1]}: must be {_wanted(m[2])}"),
+    (r"unknown field `(.*?)`, expected (.+)$", lambda m: f"no parameter {m[1]}: must be {_wanted(m[2])}"),
+    (r"missing field `(.*?)`", lambda m: f"{m[1]} is missing"),
+)
+
+
+class _Command(TyperCommand):
+    """A command whose errors speak of what was typed, not of Python's arguments."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run it."""
+        try:
+            return super().invoke(ctx)
+        except Error as error:
+            raise type(error)(self._named(str(error))) from error
+        except FileExistsError as error:
+            if error.filename is None:
+                raise
+            replace = "say --overwrite, or name another" if "overwrite" in self._options() else "name another"
+            raise FileExistsError(errno.EEXIST, f"exists already; {replace}", error.filename) from error
+
+    def _options(self) -> dict[str, str]:
+        """Return what is typed for each parameter: --readout-events for readout_events, FILE for file."""
+        return {
+            p.name: max(p.opts, key=len) if p.param_type_name == "option" else p.name.upper()
+            for p in self.params
+            if p.name is not None
+        }
+
+    def _named(self, text: str) -> str:
+        options = self._options()
+        # Of the board's registers only a preset can be typed.
+        options |= {"registers": options["preset"]} if "preset" in options else {}
+        first = re.match(r"(\w+)(?=: | is )", text)
+        if first and first[1] in options:
+            text = options[first[1]] + text[first.end() :]
+        if "tare" in options:
+            text = re.sub(r"without a tare: .*", "without the taxels' rest: give --tare SECONDS or --tare FILE", text)
+        for theirs, ours in _IN_WORDS:
+            text = re.sub(theirs, ours, text)
+        return text
+
+
+class App(typer.Typer):
+    """A group of such commands."""
+
+    def command(self, *names: Any, **options: Any) -> Callable[[Any], Any]:
+        """Register a command."""
+        return super().command(*names, **{"cls": _Command, **options})
+
+
+app = App(
     name="taxel",
     help="Touch as events: from the bytes of a tactile array to decisions that say when.",
     no_args_is_help=True,

@@ -22,7 +22,7 @@ __all__ = [
     "outside",
 ]
 
-PortOption = Annotated[int, typer.Option(help="The UDP port that the board sends to.")]
+PortOption = Annotated[int, typer.Option(min=0, max=65_535, help="The UDP port that the board sends to.")]
 HostOption = Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: every one.")]
 ArrayOption = Annotated[str, typer.Option(help="Rows x columns of the sensor, as 64x64.")]
 PresetOption = Annotated[str, typer.Option(help='The board\'s registers: "5.2 kHz", "2 kHz", "20.8 kHz".')]
@@ -32,7 +32,7 @@ def geometry(said: str) -> Array:
     """Return the array of `said` rows x columns, at the thesis' pitch."""
     match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", said)
     if match is None:
-        raise ProblemError(f"array is {said!r}: must be rows x columns, as 64x64")
+        raise ProblemError(f"--array {said}: must be rows x columns, as 64x64")
     thesis = Array.thesis()
     rows, columns = int(match[1]), int(match[2])
     return thesis if thesis.shape == (rows, columns) else Array(rows, columns, pitch_mm=thesis.pitch_mm, name=said)

@@ -31,7 +31,9 @@ def convert(
     Example: taxel convert walk.mcap walk.csv
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
+    from taxel._files import try_whole  # noqa: PLC0415
 
+    try_whole(target, overwrite=overwrite)
     # Shown on a terminal only, and gone when done.
     with Console(stderr=True).status(f"{source} to {target}"):
         lost = taxel.convert(source, target, frames_hz=frames, compression=compression, overwrite=overwrite)

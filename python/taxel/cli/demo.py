@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from taxel._files import try_whole
 from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED
 
@@ -39,6 +40,9 @@ def demo(
     Examples: taxel demo --seed 1; taxel demo --scenes 100 --no-clock -o benchmarks/results/demo.json
     """
     console = Console(quiet=as_json)
+    for place, replaced in ((train_to, False), (result, True)):
+        if place is not None:
+            try_whole(place, overwrite=replaced)
     if train_to is not None:
         _train(console, train_to)
         typer.echo(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")

@@ -38,8 +38,11 @@ def detect(
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """
+    from taxel._files import try_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.detect import Readout, run, score  # noqa: PLC0415  the command line starts quickly
 
+    if csv is not None:
+        try_whole(csv, overwrite=overwrite)
     loaded = Readout.load(readout)
     opened = open_recording(recording)
     with told(as_json) as tell:

@@ -14,7 +14,6 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.simulate import Contact, EmulatorReport, truth
@@ -25,8 +24,8 @@ __all__ = ["emulate"]
 
 @app.command()
 def emulate(
-    port: Annotated[int, typer.Option(help="Where the datagrams go.")] = 5208,
-    host: Annotated[str, typer.Option(help="To which machine, as an IP address.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=1, max=65_535, help="Where the datagrams go.")] = 5208,
+    host: Annotated[str, typer.Option(help="To which machine, by name or address.")] = "127.0.0.1",
     scenes: Annotated[int, typer.Option(min=0, help="How many scenes.")] = 10,
     seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Draws scenes, taxels, noise.")] = None,
     tare: Annotated[
@@ -53,8 +52,6 @@ def emulate(
 
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
-    if not 1 <= port <= 65_535:
-        raise ProblemError(f"port is {port}: must be 1 to 65535")
     seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
     tare_ms = 1e3 * tare
     acts = script(seed, scenes, tare_ms=tare_ms, left_to_rest=rest)

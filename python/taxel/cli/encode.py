@@ -10,6 +10,7 @@ import numpy as np
 import typer
 
 from taxel._core import ProblemError, encoder_names
+from taxel._files import try_whole
 from taxel.cli._app import app
 from taxel.cli._listening import SET_HELP, TARE_HELP, encoder_of, open_recording, tare_of, told
 
@@ -32,6 +33,7 @@ def encode(
     """
     if out.suffix != ".npz":
         raise ProblemError(f"{out}: spikes are written to a .npz")
+    try_whole(out, overwrite=overwrite)
     chosen = encoder_of(encoder, values or [])
     opened = open_recording(recording)
     with told(as_json) as tell:

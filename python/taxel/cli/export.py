@@ -8,11 +8,11 @@ from typing import Annotated
 
 import typer
 
-from taxel.cli._app import app
+from taxel.cli._app import App, app
 
 __all__ = ["nir"]
 
-_export = typer.Typer(no_args_is_help=True, help="Write a readout for other simulators and for chips.")
+_export = App(no_args_is_help=True, help="Write a readout for other simulators and for chips.")
 app.add_typer(_export, name="export")
 
 

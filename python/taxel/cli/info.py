@@ -48,11 +48,16 @@ def info(
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
-    from taxel._files import write_whole  # noqa: PLC0415
+    from taxel._files import try_whole, write_whole  # noqa: PLC0415
     from taxel._pressure import above_rest  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
+    if table is not None and table.suffix.lower() != ".csv":
+        raise ProblemError(f"{table}: a table ends in .csv")
+    for place in (picture, table):
+        if place is not None:
+            try_whole(place, overwrite=overwrite)
     # Shown on a terminal only, and gone when done.
     with Console(stderr=True).status(f"reading {file}"):
         opened = taxel.open(file)
@@ -65,8 +70,6 @@ def info(
         recording = opened
         pressed = above_rest(recording)
         said = about(recording, pressed)
-    if table is not None and table.suffix.lower() != ".csv":
-        raise ProblemError(f"{table}: a table ends in .csv")
     if table is not None:
         if pressed is None:
             raise ProblemError(f"{file}: holds events without intensities, so there is no pressure to write")

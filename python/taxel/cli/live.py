@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import errno
 from collections import deque
 from pathlib import Path
 from typing import Annotated
@@ -14,6 +13,7 @@ from rich.live import Live as Display
 from rich.text import Text
 
 from taxel._core import ProblemError
+from taxel._files import try_whole
 from taxel.cable import Cable
 from taxel.cli._app import OUTSIDE, WRONG_INPUT, app
 from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, geometry, outside
@@ -55,19 +55,19 @@ def live(
     """Listen to a board and say what a readout detects, while it happens.
 
     Shows rates, losses and latency. With --json each detection is one line, written by the thread that made it: label;
-    t, known and said in us of the board's clock; slope in mV/ms; said_ns by the host's. Exit code 3 where nothing
-    came or something was lost after it had arrived, 2 where the board has more taxels than the array.
+    t_us, known_us and said_us of the board's clock; slope_mv_per_ms; said_ns by this computer's. Exit code 3 where
+    nothing came or something was lost after it had arrived, 2 where the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     """
     heard = Readout.load(readout)
     rest = _tare(tare)
     if save_tare is not None and not isinstance(rest, float):
-        raise ProblemError("save_tare without a fresh tare: give --tare SECONDS")
-    if save_tare is not None and save_tare.exists():
-        raise FileExistsError(errno.EEXIST, "File exists", str(save_tare))
+        raise ProblemError("--save-tare without a fresh tare: give --tare SECONDS")
+    if save_tare is not None:
+        try_whole(save_tare)
     if control is not None and not isinstance(rest, float):
-        raise ProblemError("control without a fresh tare: give --tare SECONDS")
+        raise ProblemError("--control without a fresh tare: give --tare SECONDS")
     console = Console(stderr=True, quiet=as_json)
     with contextlib.ExitStack() as at_rest:
         if control is not None:
@@ -96,7 +96,9 @@ def live(
     elif summary.nothing_came or summary.lost:
         typer.echo(f"taxel: {summary.verdict}", err=True)
     if save_tare is not None and taken is None and not summary.nothing_came:
-        raise ProblemError(f"tare: not complete after {summary.counters['seconds']:.1f} s; {save_tare} was not written")
+        raise ProblemError(
+            f"--tare {tare}: not complete after {summary.counters['seconds']:.1f} s; {save_tare} was not written"
+        )
     if summary.nothing_came or summary.lost or summary.counters["events_dropped"]:
         raise typer.Exit(OUTSIDE)
     if outside(summary.counters, pipeline.array):
@@ -145,9 +147,12 @@ def _tare(said: str | None) -> Tare | float | None:
     if said is None:
         return None
     try:
-        return float(said)
+        seconds = float(said)
     except ValueError:
         return Tare.load(said)
+    if not 1e-6 <= seconds <= 3600:
+        raise ProblemError(f"--tare {said}: must be seconds from 1e-6 to 3600, or a file")
+    return seconds
 
 
 def _state(now: dict[str, object], shown: deque[Said]) -> Text:

@@ -61,9 +61,9 @@ def record(
     Example: taxel record --port 5208 walk.mcap
     """
     if length is None and trials is not None:
-        raise ProblemError("trials without a length: automatic mode needs --length, how long each trial is")
+        raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
     if length is not None and seconds is not None:
-        raise ProblemError("seconds and length: give --length for automatic mode, --seconds for one recording")
+        raise ProblemError("--seconds and --length: give --length for automatic mode, --seconds for one recording")
     live: dict[str, Any] = {
         "port": port,
         "host": host,
@@ -107,7 +107,7 @@ def _automatic(
     while trials is None or done < trials:
         name = Path(_core.numbered_path(file, index + done))
         if name.exists() and not live["overwrite"]:
-            raise FileExistsError(errno.EEXIST, "File exists", str(name))
+            raise FileExistsError(errno.EEXIST, "exists already", str(name))
         try:
             _count_down(name, countdown, console)
         except KeyboardInterrupt:

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from taxel.cli._app import app
+from taxel.cli._app import App, app
 from taxel.cli._listening import SET_HELP, assignments
 from taxel.studies import STUDIES, load
 
 if TYPE_CHECKING:
     from taxel.studies.runner import Workers
 
-studies = typer.Typer(help="Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.")
+studies = App(help="Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.")
 app.add_typer(studies, name="study", no_args_is_help=True)
 
 Jobs = Annotated[int, typer.Option(help="Processes.")]

@@ -55,12 +55,12 @@ def train(
     Example: taxel train a.mcap b.mcap --labels events.csv --encoder contact_area --tare 0.05
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
+    from taxel._files import try_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.detect import Example, Recipe, recipes, run, score  # noqa: PLC0415  the command line starts quickly
     from taxel.detect import train as train_readout  # noqa: PLC0415
     from taxel.detect.training import changed  # noqa: PLC0415
 
-    if out.exists() and not overwrite:
-        raise FileExistsError(17, "exists already; say --overwrite or another --out", str(out))
+    try_whole(out, overwrite=overwrite)
     changes = assignments(values or [])
     if encoder is not None:
         changes["encoder.name"] = encoder

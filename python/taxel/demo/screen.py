@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.columns import Columns
 from rich.console import Group
 from rich.live import Live as Drawing
-from rich.padding import Padding
 from rich.panel import Panel
 from rich.progress_bar import ProgressBar
 from rich.style import Style
@@ -23,10 +21,12 @@ from taxel.simulate import Contact
 __all__ = ["Screen"]
 
 
+#: The picture's panel, and what else must find room beside and below it, characters.
+_PICTURE_WIDTH, _PICTURE_HEIGHT, _LEAST_WIDTH, _LEAST_HEIGHT = 36, 18, 40, 5
+
+
 class Screen:
     """What is drawn while it runs: the picture, the counters, what was said."""
-
-    _LINES = 9
 
     def __init__(self, drawing: Drawing, contacts: list[Contact], seconds: float) -> None:
         self._drawing = drawing
@@ -61,13 +61,32 @@ class Screen:
         ):
             rows.add_row(Text(name, style="dim"), value)
         state = "taring" if counters["taring"] else f"{min(now, self._seconds):5.1f} of {self._seconds:.1f} s"
+        width, height = self._drawing.console.size
+        if width < _PICTURE_WIDTH + _LEAST_WIDTH or height < _PICTURE_HEIGHT + _LEAST_HEIGHT:
+            # No room for the picture: the counters alone, and what was said.
+            pictured, taken = [], len(rows.rows) + 2
+        else:
+            pictured, taken = [Panel(_blocks(picture), title="pressure", width=_PICTURE_WIDTH)], _PICTURE_HEIGHT
+        above = Table.grid()
+        above.add_row(*pictured, Panel(rows, title=state, height=taken))
         self._drawing.update(
             Group(
-                Columns([Panel(_blocks(picture), title="pressure", width=36), Panel(rows, title=state, height=18)]),
-                Padding(ProgressBar(total=self._seconds, completed=min(now, self._seconds), width=80), (0, 0)),
-                *[self._line(one) for one in said[-self._LINES :]],
+                above,
+                ProgressBar(total=self._seconds, completed=min(now, self._seconds), width=min(80, width)),
+                *self._newest(said, width, height - taken - 2),
             )
         )
+
+    def _newest(self, said: list[Said], width: int, rows: int) -> list[Text]:
+        """Return the last lines that find room, the newest last; a long one takes more than one row."""
+        lines: list[Text] = []
+        for one in reversed(said):
+            line = self._line(one)
+            rows -= -(-line.cell_len // width)
+            if rows < 0 and lines:
+                break
+            lines.insert(0, line)
+        return lines
 
     def _line(self, said: Said) -> Text:
         true = self._true[said.label]
@@ -76,7 +95,7 @@ class Screen:
         if len(true):
             nearest = int(np.abs(true - said.t).argmin())
             line.append(f"{self._kinds[nearest]:<7} known {(said.known - true[nearest]) / 1e3:+6.2f} ms, ")
-            line.append(f"said {(said.said - true[nearest]) / 1e3:+6.2f} ms after the true moment", style="dim")
+            line.append(f"said {(said.said - true[nearest]) / 1e3:+6.2f} ms after the truth", style="dim")
         return line
 
 

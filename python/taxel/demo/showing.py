@@ -100,7 +100,7 @@ def show(
             "agrees": playing.agrees,
         }
         for verdict in playing.verdicts:
-            console.print(f"[dim]{verdict}[/dim]", soft_wrap=True)
+            console.print(f"[dim]{verdict}[/dim]", soft_wrap=not console.is_terminal)
     seconds = (60.0 if live else 120.0) if noise_s is None else noise_s
     quiet = _hear(console, f"hearing {seconds:g} s of noise without the clock", _noise(seconds), heard_by, seed)
     # In real time there is a minute for all of it: a few scenes show what the dashpot does.

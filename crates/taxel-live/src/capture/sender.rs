@@ -12,8 +12,8 @@ use socket2::SockAddr;
 
 use crate::{Error, Result};
 
-/// A train must fit one UDP message of IPv4 with its headers, bytes.
-const TRAIN_BYTES: usize = 65_507;
+/// A datagram, and so a train, must fit one IPv4 packet with its headers, bytes.
+const LARGEST: usize = 65_507;
 
 /// The kernel takes no longer train (`UDP_MAX_SEGMENTS` of linux/udp.h before 6.9; later kernels take twice that).
 const TRAIN_DATAGRAMS: usize = 64;
@@ -46,6 +46,14 @@ pub struct Sender {
     counts: SendCounts,
 }
 
+/// Any address of this machine, of the kind of another.
+fn unspecified(to: SocketAddr) -> SocketAddr {
+    match to {
+        SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+        SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+    }
+}
+
 #[repr(C, align(8))]
 struct Control([u8; 64]);
 
@@ -56,16 +64,12 @@ impl Sender {
     ///
     /// `Socket` where no socket can be had.
     pub fn open(to: SocketAddr, segment: bool) -> Result<Self> {
-        let any: SocketAddr = match to {
-            SocketAddr::V4(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
-            SocketAddr::V6(_) => (Ipv6Addr::UNSPECIFIED, 0).into(),
-        };
-        let socket = UdpSocket::bind(any).map_err(Error::socket(format!("UDP to {to}")))?;
+        let socket = UdpSocket::bind(unspecified(to)).map_err(Error::socket(format!("UDP to {to}")))?;
         // Not connected: a connected socket would fail where nobody listens yet, and a board does not care.
         let segmenting =
             segment && super::socket::set(socket.as_raw_fd(), libc::SOL_UDP, libc::UDP_SEGMENT, &0).is_ok();
         let counts = SendCounts { segmenting, ..SendCounts::default() };
-        Ok(Self { socket, to, train: Vec::with_capacity(TRAIN_BYTES), segment: 0, datagrams: 0, counts })
+        Ok(Self { socket, to, train: Vec::with_capacity(LARGEST), segment: 0, datagrams: 0, counts })
     }
 
     /// What was sent.
@@ -86,7 +90,7 @@ impl Sender {
             && !datagram.is_empty()
             && datagram.len() <= self.segment
             && self.train.len() == self.datagrams * self.segment
-            && self.train.len() + datagram.len() <= TRAIN_BYTES;
+            && self.train.len() + datagram.len() <= LARGEST;
         if !joins {
             self.flush()?;
             self.segment = datagram.len();
@@ -105,13 +109,44 @@ impl Sender {
         if self.datagrams == 0 {
             return Ok(());
         }
-        self.send().map_err(Error::socket(format!("UDP to {}", self.to)))?;
+        self.send().map_err(|error| Error::socket(format!("UDP to {}", self.to))(self.explained(error)))?;
         self.counts.messages += 1;
         self.counts.datagrams += self.datagrams as u64;
         self.counts.bytes += self.train.len() as u64;
         self.train.clear();
         self.datagrams = 0;
         Ok(())
+    }
+
+    /// Says of an error of the system when it is about a datagram that is too long: "message too long", or of a train
+    /// "invalid argument" by older kernels.
+    fn explained(&self, error: io::Error) -> io::Error {
+        let too_long = match error.raw_os_error() {
+            Some(libc::EMSGSIZE) => true,
+            Some(libc::EINVAL) => self.datagrams > 1,
+            _ => false,
+        };
+        if !too_long {
+            return error;
+        }
+        let (bytes, headers) = (self.segment, if self.to.is_ipv4() { 28 } else { 48 });
+        let text = match self.path_mtu() {
+            _ if bytes > LARGEST => format!("a datagram of {bytes} bytes: UDP carries at most {LARGEST}"),
+            Some(mtu) if bytes + headers > mtu => {
+                format!("a datagram of {bytes} bytes, and {headers} of headers, is larger than the path's MTU, {mtu}")
+            }
+            _ => return error,
+        };
+        io::Error::new(io::ErrorKind::InvalidInput, text)
+    }
+
+    /// What the kernel knows of the largest packet on the way, bytes: it says so of a connected socket.
+    fn path_mtu(&self) -> Option<usize> {
+        let ask = UdpSocket::bind(unspecified(self.to)).ok()?;
+        ask.connect(self.to).ok()?;
+        let (level, name) =
+            if self.to.is_ipv4() { (libc::IPPROTO_IP, libc::IP_MTU) } else { (libc::IPPROTO_IPV6, libc::IPV6_MTU) };
+        usize::try_from(super::socket::number(ask.as_raw_fd(), level, name).ok()?).ok()
     }
 
     fn send(&mut self) -> io::Result<()> {

@@ -1,0 +1,57 @@
+//! Names of hosts to addresses, the same for who sends and who listens.
+
+use std::net::{SocketAddr, ToSocketAddrs};
+
+use taxel_core::problem;
+
+use crate::Result;
+
+/// The address of a host, given by name or number, and a port. Of several it is the first of IPv4, so that "localhost" is
+/// the same place to a board that sends and to a host that listens.
+///
+/// # Errors
+///
+/// `Core(Problem)` where there is no such host.
+pub fn of_host(host: &str, port: u16) -> Result<SocketAddr> {
+    let found: Vec<SocketAddr> = (host, port).to_socket_addrs().map_or_else(|_| vec![], Iterator::collect);
+    let Some(first) = found.iter().find(|address| address.is_ipv4()).or(found.first()) else {
+        return Err(problem!("host is {host:?}: must be an address or a name of a host").into());
+    };
+    Ok(*first)
+}
+
+/// The address that a text such as "127.0.0.1:5208", "localhost:5208" or "[::1]:5208" names.
+///
+/// # Errors
+///
+/// `Core(Problem)` where it names none.
+pub fn of_text(text: &str) -> Result<SocketAddr> {
+    let (host, port) = text.rsplit_once(':').unwrap_or_default();
+    let host = host.strip_prefix('[').and_then(|inner| inner.strip_suffix(']')).unwrap_or(host);
+    match port.parse() {
+        Ok(port) if !host.is_empty() => of_host(host, port),
+        _ => Err(problem!("address {text:?}: must be a host and a port, as 127.0.0.1:5208").into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn localhost_is_one_place() {
+        assert_eq!(of_host("localhost", 5208).unwrap(), "127.0.0.1:5208".parse().unwrap());
+        assert_eq!(of_text("localhost:5208").unwrap(), "127.0.0.1:5208".parse().unwrap());
+    }
+
+    #[test]
+    fn addresses_are_read_as_they_are_written() {
+        for text in ["127.0.0.1:5208", "[::1]:5208", "0.0.0.0:0", "[fe80::1]:9"] {
+            assert_eq!(of_text(text).unwrap(), text.parse().unwrap());
+        }
+        assert_eq!(of_host("::1", 7).unwrap(), "[::1]:7".parse().unwrap());
+        for text in ["nowhere", "", ":5208", "127.0.0.1", "127.0.0.1:99999", "127.0.0.1:", "no such host:1"] {
+            assert!(of_text(text).is_err(), "{text}");
+        }
+    }
+}

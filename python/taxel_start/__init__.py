@@ -1,0 +1,24 @@
+"""The program `taxel` while the package `taxel` loads: that takes a while, in which Ctrl-C is to be quiet too."""
+
+import os
+import signal
+import sys
+from typing import NoReturn
+
+__all__ = ["main"]
+
+#: Exit code of what Ctrl-C stopped, as `taxel.cli` has it.
+_STOPPED = 130
+
+
+def main() -> NoReturn:
+    """Load the command line, then run it."""
+    # Nothing is open yet that would have to be closed.
+    signal.signal(signal.SIGINT, lambda *_: os._exit(_STOPPED))
+    from taxel.cli import main as run  # noqa: PLC0415  this is what takes a while
+
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        run()
+    except KeyboardInterrupt:
+        sys.exit(_STOPPED)

@@ -1,0 +1,173 @@
+"""The command line speaks of what was typed, in one line, and its exit codes are those of the docs."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel.cli import main
+from taxel.live import send
+
+DOCS = Path(__file__).parent.parent / "docs"
+
+#: Words of parsers and of Python that no user should have to know.
+FOREIGN = r"invalid type|invalid value|expected|`|Traceback|_core|overwrite=|NoneType|Input should be|taxel\.[A-Z]"
+
+
+def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    with pytest.raises(SystemExit) as ended:
+        main([str(a) for a in arguments])
+    said = capsys.readouterr()
+    return int(ended.value.code or 0), said.out, said.err
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a recording, labels and a readout that wants a tare."""
+    monkeypatch.chdir(tmp_path)
+    array = taxel.Array(4, 4, name="small")
+    t = np.arange(0, 2_000_000, 1000)
+    events = taxel.Events(t, t // 1000 % 4, t // 4000 % 4, t % 2000 == 0, array=array, intensity=40 + t // 1000 % 2)
+    taxel.convert(events, "walk.npz")
+    Path("labels.csv").write_text("label,t_us\ncontact,500000\n")
+    readout = taxel.Readout(taxel.encode.ContactArea(), {"contact": (taxel.Neuron(tau=0.5), np.ones(10))})
+    readout.save("touch.json")
+    Path("there.json").write_text("{}")
+    Path("there.mcap").write_bytes(b"")
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("record", "--array", "8", "a.mcap"), "--array 8: must be rows x columns, as 64x64"),
+        (
+            ("record", "--port", "70000", "a.mcap"),
+            "--port: must be less than or equal to 65535; see taxel record --help",
+        ),
+        (("record", "--port", "x", "a.mcap"), "--port: "),
+        (("record", "--compression", "x", "a.mcap"), '--compression is "x": must be none, lz4 or zstd'),
+        (("record", "--host", "no such host", "a.mcap"), '--host is "no such host": must be an address or a name'),
+        (("record", "--preset", "9 kHz", "a.mcap"), 'preset "9 kHz": there are "5.2 kHz"'),
+        (("record", "there.mcap"), "there.mcap: exists already; say --overwrite, or name another"),
+        (("record", "--trials", "3", "a.mcap"), "--trials without --length"),
+        (("record",), "FILE is missing; see taxel record --help"),
+        (("record", "a.mcap", "--bogus"), "No such option: --bogus"),
+        (("bogus",), "No such command 'bogus'; see taxel --help"),
+        (
+            ("encode", "walk.npz", "s.npz", "--encoder", "level_crossing", "--set", "levels=40"),
+            "levels is 40: must be a list",
+        ),
+        (("encode", "walk.npz", "s.npz", "--encoder", "level_crossing"), "levels is missing"),
+        (("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "alpha=soon"), "alpha is soon: must be a number"),
+        (
+            ("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "alpha=[1]"),
+            "alpha is a sequence: must be a number",
+        ),
+        (("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "wings=2"), "no parameter wings: must be one of"),
+        (("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "decay=s"), "decay is s: must be one of"),
+        (("encode", "walk.npz", "s.npz", "--encoder", "contact_area"), "give --tare SECONDS or --tare FILE"),
+        (("encode", "walk.npz", "nowhere/s.npz", "--encoder", "fa1"), "nowhere: no such folder"),
+        (("detect", "walk.npz", "--readout", "touch.json"), "give --tare SECONDS or --tare FILE"),
+        (("detect", "walk.npz", "--readout", "touch.json", "--tare", "0.1", "--frame-us", "-5"), "--frame-us is -5"),
+        (
+            ("live", "--readout", "touch.json", "--tare", "5000"),
+            "--tare 5000: must be seconds from 1e-6 to 3600, or a file",
+        ),
+        (("live", "--readout", "touch.json", "--save-tare", "a.json"), "--save-tare without a fresh tare"),
+        (("train", "walk.npz", "--labels", "labels.csv", "-o", "nowhere/x.json"), "nowhere: no such folder"),
+        (
+            ("train", "walk.npz", "--labels", "labels.csv", "-o", "there.json"),
+            "there.json: exists already; say --overwrite",
+        ),
+        (("demo", "--noise", "0.1"), "--noise is 0.1 s: must be 0.5 to 86400"),
+        (("study", "fig6.1", "--set", "kappa"), "--set kappa: must be KEY=VALUE"),
+    ],
+)
+def test_an_error_names_what_was_typed(here: Path, capsys, arguments: tuple[str, ...], said: str) -> None:
+    before = sorted(here.iterdir())
+    code, out, error = call(capsys, *arguments)
+    assert (code, out) == (2, "")
+    assert said in error
+    assert error.count("\n") == 1
+    assert not re.search(FOREIGN, error), error
+    assert sorted(here.iterdir()) == before, "nothing is left behind"
+
+
+@pytest.mark.usefixtures("here")
+def test_an_existing_file_stays_where_a_result_would_go(capsys) -> None:
+    call(capsys, "train", "walk.npz", "--labels", "labels.csv", "-o", "there.json")
+    assert Path("there.json").read_text() == "{}"
+
+
+def test_exit_codes_are_those_of_the_docs() -> None:
+    table = (DOCS / "command-line.md").read_text()
+    assert set(re.findall(r"^\| (\d+) \|", table, re.MULTILINE)) == {"0", "2", "3", "130"}
+
+
+def test_localhost_is_one_place_to_who_sends_and_who_listens() -> None:
+    with taxel.live.Live(0, host="localhost") as live:
+        assert live.address[0] == "127.0.0.1"
+        sent = send([b"12345"], "localhost", live.address[1], seconds=0.01)
+    assert live.stop().counters["capture"]["datagrams"] == sent["datagrams"]
+
+
+def test_a_datagram_that_udp_cannot_carry_is_said_as_such() -> None:
+    with pytest.raises(OSError, match="a datagram of 70000 bytes: UDP carries at most 65507"):
+        send([bytes(70_000)], port=9, seconds=0.01)
+
+
+@pytest.mark.parametrize("segment", [True, False])
+def test_a_datagram_larger_than_the_paths_mtu_is_said_as_such(segment: bool) -> None:
+    """In a network of its own, whose loopback takes 1000 bytes."""
+    script = (
+        "import socket, taxel.live as live\n"
+        "with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:\n"
+        f"    live.send([bytes(1400)] * 8, port=9, each=8, seconds=0.01, segment={segment})\n"
+    )
+    inside = ["sh", "-c", 'ip link set lo mtu 1000 up && exec "$0" -c "$1"', sys.executable, script]
+    try:
+        done = subprocess.run(["unshare", "-rn", *inside], capture_output=True, text=True, check=False, timeout=60)
+    except FileNotFoundError:
+        pytest.skip("needs unshare")
+    if "unshare" in done.stderr or "ip:" in done.stderr or "RTNETLINK" in done.stderr:
+        pytest.skip(f"needs a network of its own: {done.stderr.strip()}")
+    if not segment:
+        # The kernel cuts a single one into packets: it arrives.
+        assert done.returncode == 0, done.stderr
+    else:
+        assert "a datagram of 1400 bytes, and 28 of headers, is larger than the path's MTU, 1000" in done.stderr
+
+
+@pytest.mark.parametrize("after_s", [0.0, 0.1, 0.3, 1.0])
+def test_ctrl_c_while_it_starts_ends_quietly(after_s: float) -> None:
+    program = Path(sys.executable).with_name("taxel")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        link.bind(("127.0.0.1", 0))
+        port = str(link.getsockname()[1])
+    arguments = [program, "emulate", "--port", port, "--scenes", "3", "--json"]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        # Not before Python itself has begun: taxel is loading now.
+        until = time.monotonic() + 60
+        while "numpy" not in _maps(process.pid):
+            assert time.monotonic() < until
+            time.sleep(0.005)
+        time.sleep(after_s)
+        os.kill(process.pid, signal.SIGINT)
+        out, error = process.communicate(timeout=60)
+    assert (process.returncode, out, error) == (130, "", "")
+
+
+def _maps(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/maps").read_text()
+    except OSError:
+        return ""
