@@ -16,7 +16,10 @@ def main() -> NoReturn:
     # Nothing is open yet that would have to be closed.
     signal.signal(signal.SIGINT, lambda *_: os._exit(_STOPPED))
     from taxel.cli import main as run  # noqa: PLC0415  this is what takes a while
+    from taxel.wire import decode  # noqa: PLC0415
 
+    # With its first array the compiled part asks NumPy for its interface: an interrupt there would be a panic.
+    decode(b"")
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         run()

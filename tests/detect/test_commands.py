@@ -190,7 +190,7 @@ def test_without_a_recipe_it_starts_from_the_recipe_of_the_unit(tmp_path: Path, 
     arguments = ("train", tmp_path / "walk.npz", "--labels", labels, "--out", out, "--overwrite")
     code, said, _ = call(capsys, *arguments, "--json")
     assert (code, json.loads(said)["recipe"]) == (0, "gait_insole")
-    assert json.loads(said)["recordings"][0]["score_on_itself"]["missed"] == 0
+    assert json.loads(said)["recordings"][0]["score"]["missed"] == 0
     readout = taxel.Readout.load(out)
     assert readout.encoder == taxel.encode.LevelCrossing([5, 10, 20, 30, 40, 50], release_share=0.7)
     assert {n.delay_ms for n in readout.neurons.values()} == {8.0}
@@ -220,7 +220,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
     assert (code, "names no event" in error) == (2, True), "a .npz has no notes"
     code, out, _ = call(capsys, *arguments, "--labels", labels, "--json")
     assert code == 0
-    assert json.loads(out)["recordings"][0]["score_on_itself"]["found"] == 4
+    assert json.loads(out)["recordings"][0]["score"]["found"] == 4
 
 
 @pytest.mark.parametrize(
@@ -326,3 +326,68 @@ def test_a_line_of_labels_that_makes_no_sense_is_named(tmp_path: Path) -> None:
         table.write_text(text)
         with pytest.raises(taxel.FormatError, match=said.replace("^", r"\^")):
             taxel.Labels(table)
+
+
+def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, capsys, tmp_path: Path) -> None:
+    plan = ("--recipe", folder / "recipe.toml", "--set", "neurons.lift.tau=3.0", "--tare", folder / "tare.json")
+    arguments = (
+        "train",
+        folder / "1.npz",
+        folder / "2.npz",
+        folder / "9.npz",
+        "--labels",
+        folder / "labels.csv",
+        *plan,
+    )
+    code, out, _ = call(capsys, *arguments, "--folds", 3, "--window-ms", 10, "--json", "-o", tmp_path / "a.json")
+    result = json.loads(out)
+    assert (code, result["judged_on"]) == (0, "whole recordings, 3 folds")
+    assert result["score"]["missed"] == sum(one["score"]["missed"] for one in result["recordings"]) == 0
+    code, _, error = call(capsys, *arguments, "--search", "-o", tmp_path / "b.json")
+    assert (code, "lists no other points" in error) == (2, True)
+    point = ("--set", "neurons.contact.search=[{ub = 1e-6}]")
+    code, out, _ = call(capsys, *arguments, *point, "--search", "--folds", 3, "-o", tmp_path / "c.json")
+    assert code == 0
+    assert "on what was held out: whole recordings, 3 folds" in out
+    assert "contact, chosen: tau 1.5" in out
+    code, out, _ = call(capsys, *arguments, "-o", tmp_path / "d.json")
+    assert "on its own training data" in out
+
+
+def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: Path, capsys, tmp_path: Path) -> None:
+    arguments = ("detect", folder / "9.npz", "--readout", trained, "--tare", folder / "tare.json", "--report")
+    code, out, _ = call(capsys, *arguments, tmp_path / "with", "--truth", folder / "truth.csv")
+    page = (tmp_path / "with" / "report.html").read_text()
+    assert (code, f"report: {tmp_path / 'with' / 'report.html'}" in out) == (0, True)
+    assert page.count("<svg") == 2 * 3, "potential, errors, weights of each label"
+    assert "<h2>contact</h2>" in page
+    assert "The worst" in page
+    assert call(capsys, *arguments, tmp_path / "without")[0] == 0
+    page = (tmp_path / "without" / "report.html").read_text()
+    assert page.count("<svg") == 2 * 2
+    assert "The worst" not in page
+    code, _, error = call(capsys, *arguments, tmp_path / "without")
+    assert (code, "exists already" in error) == (2, True)
+
+
+def test_weights_are_drawn_by_taxel_where_trains_are_taxels() -> None:
+    from taxel.report.listening import _planes
+
+    array = taxel.Array(3, 4)
+    for encoder, count in (
+        (taxel.encode.LevelCrossing([10.0, 20.0]), 2 * 12 * 2),
+        (taxel.encode.LevelCrossing([10.0, 20.0], tonic_ms=5.0), 2 * 12 * 3),
+        (taxel.encode.ChangeEvents(), 2 * 12),
+    ):
+        weights = np.arange(count, dtype=float)
+        readout = taxel.Readout(encoder, {"a": (taxel.Neuron(), weights)}, array=array)
+        planes = dict(_planes(weights, readout, 12))
+        assert sorted(np.concatenate(list(planes.values()))) == weights.tolist(), "each weight once"
+        on = [plane for name, plane in planes.items() if name.startswith("ON") and "tonic" not in name]
+        frames = taxel.Frames(np.stack([np.zeros((3, 4)), np.eye(3, 4) * 15.0]), [0, 1000], array=array)
+        heard = encoder.encode(frames).split_by_sign()
+        spoke = np.flatnonzero(heard.counts)
+        told = {int(taxel_ % 12) for plane in on for taxel_ in np.flatnonzero(np.isin(plane, weights[spoke]))}
+        assert told == {0, 5, 10}
+    area = taxel.Readout(taxel.encode.ContactArea(), {"a": (taxel.Neuron(), np.ones(10))})
+    assert _planes(np.ones(10), area, 5) == []

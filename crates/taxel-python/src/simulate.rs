@@ -1,6 +1,5 @@
 //! Simulated touch, and the board that feels it, as fast as it goes.
 
-
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::board::{Board, session};

@@ -10,7 +10,8 @@ from rich.table import Table
 
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.live import delays
+from taxel.cli._app import OUTSIDE, WRONG_INPUT
+from taxel.live import Summary, delays
 
 __all__ = [
     "ArrayOption",
@@ -18,6 +19,7 @@ __all__ = [
     "PortOption",
     "PresetOption",
     "counters_table",
+    "exit_code",
     "geometry",
     "outside",
 ]
@@ -52,6 +54,13 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
         f"{wire['outside']:,} of {wire['words']:,} words name taxels outside {size}, and are dropped: "
         "give the board's own --array"
     )
+
+
+def exit_code(summary: Summary, array: Array) -> int:
+    """Return the exit code that what was heard deserves."""
+    if summary.nothing_came or summary.lost or summary.counters["events_dropped"]:
+        return OUTSIDE
+    return WRONG_INPUT if outside(summary.counters, array) else 0
 
 
 def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:

@@ -106,6 +106,12 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     return Tare.take(source, stop_us=min(ends), note=str(recording.path))
 
 
+def new_report(folder: Path) -> Path:
+    """Return the page of a report in a folder, which is made."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / "report.html"
+
+
 def references(said: str | None, option: str, recordings: Sequence[Recording]) -> list[dict[str, NDArray[np.int64]]]:
     """Return the reference events of each recording: from a table, or its own notes (a note's text is the label).
 

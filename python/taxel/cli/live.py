@@ -15,8 +15,9 @@ from rich.text import Text
 from taxel._core import ProblemError
 from taxel._files import try_whole
 from taxel.cable import Cable
-from taxel.cli._app import OUTSIDE, WRONG_INPUT, app
-from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, geometry, outside
+from taxel.cli._app import app
+from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, exit_code, geometry, outside
+from taxel.cli._listening import new_report
 from taxel.detect import Readout
 from taxel.live import Live, Said, Summary, delays
 from taxel.tare import Tare
@@ -48,6 +49,10 @@ def live(
     record: Annotated[Path | None, typer.Option(help="Keep everything in a new file (.mcap or .lsa).")] = None,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
     guard_frames: Annotated[float, typer.Option(min=0.0, help="In silence, frames behind the host's clock.")] = 5.0,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="With --record: a folder for a page: potential, weights, errors, the worst events."),
+    ] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a line of JSON a detection, and nothing else.")
     ] = False,
@@ -66,6 +71,10 @@ def live(
         raise ProblemError("--save-tare without a fresh tare: give --tare SECONDS")
     if save_tare is not None:
         try_whole(save_tare)
+    if report is not None:
+        if record is None or record.suffix != ".mcap":
+            raise ProblemError("--report is made from the recording: give --record FILE.mcap")
+        try_whole(new_report(report))
     if control is not None and not isinstance(rest, float):
         raise ProblemError("--control without a fresh tare: give --tare SECONDS")
     console = Console(stderr=True, quiet=as_json)
@@ -91,6 +100,9 @@ def live(
     if save_tare is not None and taken is not None:
         taken.save(save_tare)
         console.print(f"tare written to {save_tare}")
+    if report is not None and summary.path is not None:
+        _report(report, heard, summary.path, taken if taken is not None else rest)
+        console.print(f"report: {report / 'report.html'}", soft_wrap=True)
     if not as_json:
         _say(summary, guard_frames)
     elif summary.nothing_came or summary.lost:
@@ -99,10 +111,18 @@ def live(
         raise ProblemError(
             f"--tare {tare}: not complete after {summary.counters['seconds']:.1f} s; {save_tare} was not written"
         )
-    if summary.nothing_came or summary.lost or summary.counters["events_dropped"]:
-        raise typer.Exit(OUTSIDE)
-    if outside(summary.counters, pipeline.array):
-        raise typer.Exit(WRONG_INPUT)
+    raise typer.Exit(exit_code(summary, pipeline.array))
+
+
+def _report(folder: Path, readout: Readout, path: Path, tare: Tare | float | None) -> None:
+    """Write what was heard and said, from the recording."""
+    import taxel  # noqa: PLC0415
+    from taxel.report import Listened, write_listening  # noqa: PLC0415  pictures load slowly
+
+    recording = taxel.open(path)
+    rest = tare if isinstance(tare, Tare) else None
+    heard = Listened(str(path), recording.events, recording.detections, rest)
+    write_listening(folder, readout, [heard], title=f"What was said live, recorded to {path}")
 
 
 def _say(summary: Summary, guard_frames: float) -> None:

@@ -16,9 +16,17 @@ from rich.live import Live as Display
 
 from taxel import _core
 from taxel._core import ProblemError
-from taxel.array import Array
-from taxel.cli._app import OUTSIDE, WRONG_INPUT, app
-from taxel.cli._board import ArrayOption, HostOption, PortOption, PresetOption, counters_table, geometry, outside
+from taxel.cli._app import app
+from taxel.cli._board import (
+    ArrayOption,
+    HostOption,
+    PortOption,
+    PresetOption,
+    counters_table,
+    exit_code,
+    geometry,
+    outside,
+)
 from taxel.cli._noting import noting
 from taxel.live import Live, Summary
 
@@ -77,18 +85,11 @@ def record(
     if length is None:
         summary, _ = _one(file, live, seconds, markers, console)
         _say(summary, as_json)
-        code = _code(summary, live["array"])
+        code = exit_code(summary, live["array"])
     else:
         code = _automatic(file, live, length, countdown, start_index, trials, markers, console, as_json)
     if code:
         raise typer.Exit(code)
-
-
-def _code(summary: Summary, array: Array) -> int:
-    """Return the exit code that a recording deserves."""
-    if summary.nothing_came or summary.lost:
-        return OUTSIDE
-    return WRONG_INPUT if outside(summary.counters, array) else 0
 
 
 def _automatic(
@@ -114,7 +115,7 @@ def _automatic(
             break
         summary, stopped = _one(name, live, length, markers, console)
         _say(summary, as_json)
-        code, done = max(code, _code(summary, live["array"])), done + 1
+        code, done = max(code, exit_code(summary, live["array"])), done + 1
         if stopped:
             break
     return code

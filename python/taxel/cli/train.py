@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,12 +16,20 @@ from taxel.cli._listening import (
     SET_HELP,
     TARE_HELP,
     assignments,
+    new_report,
     open_recording,
     references,
     tare_before,
     tare_of,
     told,
 )
+
+if TYPE_CHECKING:
+    from taxel.detect import Example, Judged, Readout, Recipe, Score
+    from taxel.events import Events
+    from taxel.frames import Frames
+    from taxel.recording import Recording
+    from taxel.report import Listened
 
 __all__ = ["train"]
 
@@ -43,12 +53,24 @@ def train(
     tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Left out: what lies before the first label.")] = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="Where the readout goes.")] = Path("readout.json"),
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the readout where it exists.")] = False,
-    window_ms: Annotated[float, typer.Option(help="Of the score on the training recordings themselves.")] = 50.0,
+    window_ms: Annotated[float, typer.Option(help="How far a detection may lie from its event, either way.")] = 50.0,
+    folds: Annotated[
+        int | None,
+        typer.Option(min=2, help="Judge it on what it was not trained on: recordings, or of one blocks of time."),
+    ] = None,
+    search: Annotated[
+        bool, typer.Option("--search", help="Choose among the points that the recipe lists, on held-out data.")
+    ] = False,
+    report: Annotated[
+        Path | None, typer.Option(help="A folder for a page: potential, weights, errors, the worst events.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Train neurons to say when labelled events happen, and save them as a readout.
 
-    It starts from the recipe that fits the recordings; --recipe, --encoder and --set change that.
+    It starts from the recipe that fits the recordings; --recipe, --encoder and --set change that. With --folds it is
+    also trained as often without a part of the data, which it is then judged on; without, the score is on its own
+    training data.
 
     Example: taxel train walk.npz --labels events.csv --set neurons.contact.kappa=1.5 -o gait.json
 
@@ -56,11 +78,13 @@ def train(
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
     from taxel._files import try_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import Example, Recipe, recipes, run, score  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect import Recipe, choose, judge, recipes  # noqa: PLC0415
     from taxel.detect import train as train_readout  # noqa: PLC0415
     from taxel.detect.training import changed  # noqa: PLC0415
 
     try_whole(out, overwrite=overwrite)
+    if report is not None:
+        try_whole(new_report(report))
     changes = assignments(values or [])
     if encoder is not None:
         changes["encoder.name"] = encoder
@@ -74,41 +98,130 @@ def train(
         happened = references(labels, "--labels", opened)
         if not any(happened):
             raise ProblemError(f"--labels {labels}: names no event in {', '.join(str(one.path) for one in opened)}")
-        sources = [one.events if one.has_events else one.frames() for one in opened]
         if recipe is None and "encoder.name" not in changes:
-            recipe = recipes.fitting(sources[0])
+            recipe = recipes.fitting(_source(opened[0]))
         if recipe is not None:
             plan = Recipe.load(recipe, changes, sorted({label for events in happened for label in events}))
             tell(f"starting from the recipe {recipe}")
-        # An encoder that has a tare needs one.
-        rested = tare is not None or getattr(plan.encoder, "tare", True) is not None
-        tares = [
-            tare_of(tare, one) if rested else tare_before(events, one)
-            for one, events in zip(opened, happened, strict=True)
-        ]
-        examples = [Example(*parts) for parts in zip(sources, happened, tares, strict=True)]
+        examples = _examples(opened, happened, tare, plan)
+        if search and not any(len(plan.points_of(label)) > 1 for label in plan.neurons):
+            raise ProblemError("--search: the recipe lists no other points, as [neurons.LABEL] search = [{tau = 20.0}]")
+        judged = None
+        if folds is not None:
+            registers = opened[0].registers
+            frame_us = None if registers is None else registers.frame_us
+            judged = judge(examples, plan, folds, search=search, window_ms=window_ms, frame_us=frame_us, progress=tell)
+        if search:
+            plan = choose(examples, plan, window_ms=window_ms, progress=tell)
         readout = train_readout(examples, plan, progress=tell)
-        scores = []
-        for one, example in zip(opened, examples, strict=True):
-            tell(f"hearing {one.path} again")
-            truth = {label: example.labels.get(label, []) for label in readout.labels}
-            scores.append(score(run(readout, one, tare=example.tare), truth, window_ms))
+        heard = [] if judged is not None and report is None else _on_itself(readout, opened, examples, window_ms, tell)
     readout.save(out, overwrite=overwrite)
-    result: dict[str, Any] = {
-        "readout": str(out),
-        "labels": list(readout.labels),
-        "recipe": recipe,
-        "recordings": [
-            {"recording": str(one.path), "score_on_itself": each.to_dict()}
-            for one, each in zip(opened, scores, strict=True)
-        ],
-    }
-    if as_json:
-        typer.echo(json.dumps(result))
-        return
-    if recipe is not None:
-        typer.echo(f"recipe {recipe}" + (f": {plan.about}" if plan.about else ""))
-    typer.echo(repr(readout))
-    for one, each in zip(opened, scores, strict=True):
-        typer.echo(f"\n{one.path}, on which it was trained (window {window_ms:g} ms):\n{each!r}")
-    typer.echo(f"\nwritten to {out}")
+    scores = judged.scores if judged is not None else [one.score for one in heard if one.score is not None]
+    trained = _Trained(out, readout, recipe, plan, opened, scores, judged, window_ms, search, report)
+    if report is not None:
+        from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
+
+        write_listening(report, readout, heard, title=f"How {out} was trained", judged=trained.how)
+    typer.echo(json.dumps(trained.to_dict()) if as_json else trained.page())
+
+
+def _source(recording: Recording) -> Events | Frames:
+    return recording.events if recording.has_events else recording.frames()
+
+
+def _examples(
+    opened: Sequence[Recording], happened: Sequence[Mapping[str, Any]], tare: str | None, plan: Recipe
+) -> list[Example]:
+    """Return recordings as examples; without a tare, where the encoder wants one, the rest is taken from each."""
+    from taxel.detect import Example  # noqa: PLC0415
+
+    wants = tare is None and getattr(plan.encoder, "tare", True) is None
+    return [
+        Example(_source(one), events, tare_before(events, one) if wants else tare_of(tare, one))
+        for one, events in zip(opened, happened, strict=True)
+    ]
+
+
+def _on_itself(
+    readout: Readout,
+    opened: Sequence[Recording],
+    examples: Sequence[Example],
+    window_ms: float,
+    tell: Callable[[str], None],
+) -> list[Listened]:
+    from taxel.detect import run, score  # noqa: PLC0415
+    from taxel.report import Listened  # noqa: PLC0415
+
+    heard = []
+    for one, example in zip(opened, examples, strict=True):
+        tell(f"hearing {one.path} again")
+        truth = {label: example.labels.get(label, []) for label in readout.labels}
+        found = run(readout, one, tare=example.tare)
+        own = score(found, truth, window_ms)
+        heard.append(Listened(str(one.path), example.source, found, example.tare, truth, own))
+    return heard
+
+
+@dataclass(frozen=True)
+class _Trained:
+    """What came out."""
+
+    out: Path
+    readout: Readout
+    recipe: str | None
+    plan: Recipe
+    opened: Sequence[Recording]
+    scores: Sequence[Score]
+    judged: Judged | None
+    window_ms: float
+    searched: bool
+    report: Path | None
+
+    @property
+    def how(self) -> str:
+        """Return on what it was judged."""
+        if self.judged is None:
+            return "on its own training data"
+        one = self.judged.together
+        held = f"{one.found} of {one.events} found, {one.missed} missed, {one.false} false"
+        return f"on its own training data; held out ({self.judged.how}): {held}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as JSON holds it."""
+        said: dict[str, Any] = {
+            "readout": str(self.out),
+            "labels": list(self.readout.labels),
+            "recipe": self.recipe,
+            "judged_on": "its own training data" if self.judged is None else self.judged.how,
+            "window_ms": self.window_ms,
+            "recordings": [
+                {"recording": str(one.path), "score": each.to_dict()}
+                for one, each in zip(self.opened, self.scores, strict=True)
+            ],
+        }
+        if self.judged is not None:
+            said["score"] = self.judged.together.to_dict()
+        if self.report is not None:
+            said["report"] = str(self.report / "report.html")
+        if self.searched:
+            said["neurons"] = {label: dict(self.plan.neurons[label]) for label in self.readout.labels}
+        return said
+
+    def page(self) -> str:
+        """Return it as lines for people."""
+        lines = []
+        if self.recipe is not None:
+            lines.append(f"recipe {self.recipe}" + (f": {self.plan.about}" if self.plan.about else ""))
+        lines.append(repr(self.readout))
+        for label in self.readout.labels if self.searched else ():
+            chosen = ", ".join(f"{key} {value}" for key, value in self.plan.neurons[label].items() if key != "search")
+            lines.append(f"{label}, chosen: {chosen}")
+        how = "on its own training data" if self.judged is None else f"on what was held out: {self.judged.how}"
+        lines.append(f"\n{how} (window {self.window_ms:g} ms)")
+        lines += [f"\n{one.path}:\n{each!r}" for one, each in zip(self.opened, self.scores, strict=True)]
+        if self.judged is not None and len(self.scores) > 1:
+            lines.append(f"\nall recordings:\n{self.judged.together!r}")
+        lines.append(f"\nwritten to {self.out}")
+        if self.report is not None:
+            lines.append(f"report: {self.report / 'report.html'}")
+        return "\n".join(lines)

@@ -1,5 +1,6 @@
 """Spikes to detections, live and from recordings, and their score."""
 
+from taxel.detect.folds import Judged, choose, judge
 from taxel.detect.readout import Learner, Readout, ReadoutStream, run
 from taxel.detect.scoring import Score, Spread, score
 from taxel.detect.trained import TrainedNeuron
@@ -7,6 +8,7 @@ from taxel.detect.training import Example, Recipe, train
 
 __all__ = [
     "Example",
+    "Judged",
     "Learner",
     "Readout",
     "ReadoutStream",
@@ -14,6 +16,8 @@ __all__ = [
     "Score",
     "Spread",
     "TrainedNeuron",
+    "choose",
+    "judge",
     "run",
     "score",
     "train",

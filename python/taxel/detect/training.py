@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import callback, column, instance, number, parameters, several, shown, text
+from taxel._arguments import callback, column, instance, mapping, number, parameters, several, shown, text
 from taxel._core import ProblemError
+from taxel.array import Array
 from taxel.detect import recipes
 from taxel.detect.readout import Readout
 from taxel.encode import Encoder
@@ -50,7 +51,8 @@ class Recipe:
         Parameters of `taxel.learn.ConeR` for all neurons, and `delay_ms`: how much later than the event a neuron is
         trained to fire, the encoder's latency apart.
     neurons : mapping of str to mapping
-        The same by label, before those for all. Where there are any, only these labels are learnt.
+        The same by label, before those for all; a `search` lists other points, each as changes of that neuron. Where
+        there are any, only these labels are learnt.
     run_threshold : float, above 0
         See `taxel.Readout`.
     about, source : str
@@ -85,13 +87,25 @@ class Recipe:
         learner_from("learner", self.learner)
         for label in self.neurons:
             self.learner_of(text("label", label))
+            for point in self.points_of(label):
+                learner_from(f"neurons.{label}.search", {**self.learner, **point})
 
     def learner_of(self, label: str) -> tuple[ConeR, float]:
         """Return the learner of a label, not yet fitted, and the delay it is trained with (ms)."""
         own = self.neurons.get(text("label", label), {})
         if not isinstance(own, Mapping):
             raise ProblemError(f"neurons.{label} is {shown(own)}: must be parameters by name")
-        return learner_from(f"neurons.{label}", {**self.learner, **own})
+        return learner_from(f"neurons.{label}", {**self.learner, **self.points_of(label)[0]})
+
+    def points_of(self, label: str) -> list[dict[str, Any]]:
+        """Return the parameters of a label's neuron, and behind them the others that the recipe lists for a search."""
+        own = dict(self.neurons.get(text("label", label), {}))
+        listed = several(f"neurons.{label}.search", own.pop("search", ()))
+        return [own, *({**own, **mapping(f"neurons.{label}.search", point)} for point in listed)]
+
+    def learns(self, patterns: Sequence[Pattern] | Sequence[Example]) -> tuple[str, ...]:
+        """Return the labels that are learnt: the recipe's, or where it has none those of the patterns."""
+        return tuple(self.neurons) or tuple(sorted({label for pattern in patterns for label in pattern.labels}))
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Recipe:
@@ -217,17 +231,21 @@ def train(
     >>> train([Example(frames, {"contact": [20_000]})], recipe)
     Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
     """
-    instance("recipe", recipe, Recipe)
-    examples = _examples(examples)
+    examples = checked(examples)
     told = (lambda _: None) if progress is None else callback("progress", progress)
-    wanted = tuple(recipe.neurons) or tuple(sorted({label for example in examples for label in example.labels}))
-    if not wanted:
-        raise ProblemError("no label in any example: there is nothing to learn")
-    for label in {label for example in examples for label in example.labels} - set(wanted):
-        raise ProblemError(
-            f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, wanted))}; "
-            f"give it [neurons.{label}], or leave it out of the labels"
-        )
+    return learn(encoded(examples, recipe, told), recipe, examples[0].source.array, told)
+
+
+class Pattern(NamedTuple):
+    """An example as a learner sees it: its spike trains, and when what happened (us, by label)."""
+
+    trains: SpikeTrains
+    labels: Mapping[str, NDArray[np.int64]]
+
+
+def encoded(examples: Sequence[Example], recipe: Recipe, told: Callable[[str], object]) -> list[Pattern]:
+    """Return examples as a recipe's encoder turns them into spikes."""
+    instance("recipe", recipe, Recipe)
     arrays = [example.source.array for example in examples]
     for k, array in enumerate(arrays):
         if array != arrays[0]:
@@ -237,14 +255,27 @@ def train(
         told(f"encoding {k + 1} of {len(examples)}")
         encoder = recipe.encoder if example.tare is None else recipe.encoder.with_tare(example.tare)
         trains = encoder.encode(example.source)
-        patterns.append(trains.split_by_sign() if trains.signed else trains)
+        patterns.append(Pattern(trains.split_by_sign() if trains.signed else trains, example.labels))
+    return patterns
+
+
+def learn(patterns: Sequence[Pattern], recipe: Recipe, array: Array, told: Callable[[str], object]) -> Readout:
+    """Train a recipe's neurons on patterns, which its encoder made of recordings of an array; see `train`."""
+    wanted = recipe.learns(patterns)
+    if not wanted:
+        raise ProblemError("no label in any example: there is nothing to learn")
+    for label in {label for pattern in patterns for label in pattern.labels} - set(wanted):
+        raise ProblemError(
+            f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, wanted))}; "
+            f"give it [neurons.{label}], or leave it out of the labels"
+        )
     learners, delays = {}, {}
     for label in wanted:
         learner, delay_ms = recipe.learner_of(label)
         shift_ms = recipe.encoder.latency_ms + delay_ms
         targets = []
-        for k, (example, trains) in enumerate(zip(examples, patterns, strict=True)):
-            times = np.sort(example.labels.get(label, np.empty(0, np.int64))) / 1000.0
+        for k, (trains, labels) in enumerate(patterns):
+            times = np.sort(labels.get(label, np.empty(0, np.int64))) / 1000.0
             outside = times[(times < trains.start) | (times > trains.stop + SILENCE_MS)]
             if len(outside):
                 raise ProblemError(
@@ -254,11 +285,10 @@ def train(
         if not any(len(times) for times in targets):
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         told(f"learning {label} from {sum(map(len, targets))} events")
-        learners[label] = learner.fit([_until(*both) for both in zip(patterns, targets, strict=True)], targets)
+        heard = [_until(pattern.trains, times) for pattern, times in zip(patterns, targets, strict=True)]
+        learners[label] = learner.fit(heard, targets)
         delays[label] = delay_ms
-    return Readout(
-        recipe.encoder, learners, array=arrays[0], delay_ms=delays, run_threshold=float(recipe.run_threshold)
-    )
+    return Readout(recipe.encoder, learners, array=array, delay_ms=delays, run_threshold=float(recipe.run_threshold))
 
 
 def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:
@@ -286,11 +316,11 @@ def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
     return cone.set_params(**nested), delay_ms
 
 
-def _examples(examples: Sequence[Example]) -> list[Example]:
+def checked(examples: Sequence[Example]) -> list[Example]:
     """Return examples whose labels are columns of whole us."""
     if not isinstance(examples, Sequence) or not len(examples):
         raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")
-    checked = []
+    sound = []
     for k, example in enumerate(examples):
         if not isinstance(example, tuple) or len(example) not in (2, 3) or not isinstance(example[0], Events | Frames):
             raise ProblemError(f"example {k} is {shown(example)}: must be an Example of Events or Frames, and labels")
@@ -299,5 +329,5 @@ def _examples(examples: Sequence[Example]) -> list[Example]:
             raise ProblemError(f"example {k}: labels is {shown(labels)}: must be times (us) by label")
         times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
         tare = rest[0] if rest else None
-        checked.append(Example(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
-    return checked
+        sound.append(Example(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
+    return sound

@@ -1,5 +1,6 @@
 """Pages with pictures, each one file that needs no other."""
 
 from taxel.report.information import write_information
+from taxel.report.listening import Listened, write_listening
 
-__all__ = ["write_information"]
+__all__ = ["Listened", "write_information", "write_listening"]

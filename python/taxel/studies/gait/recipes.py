@@ -42,7 +42,10 @@ def _points(recipe: str, **encoders: dict[str, Any]) -> dict[str, Point]:
     """Return a recipe's points by event; an event named here has an encoder of its own."""
     said = recipes.read(recipe)
     return {
-        event: {"encoder": encoders.get(event, said["encoder"]), "learner": said["learner"] | own}
+        event: {
+            "encoder": encoders.get(event, said["encoder"]),
+            "learner": said["learner"] | {name: value for name, value in own.items() if name != "search"},
+        }
         for event, own in said["neurons"].items()
     }
 

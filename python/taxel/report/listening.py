@@ -1,0 +1,263 @@
+"""The page of ``taxel train``, ``detect`` and ``live``: what a readout heard in a recording, and what it made of it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import jinja2
+import matplotlib as mpl
+import numpy as np
+from markupsafe import Markup
+from matplotlib import pyplot as plt
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from numpy.typing import NDArray
+
+from taxel._arguments import instance
+from taxel._core import ProblemError
+from taxel._files import write_whole
+from taxel.array import Array
+from taxel.demo.pictures import STYLE, svg
+from taxel.detect import Readout, Score
+from taxel.detections import Detections
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.tare import Tare
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["Listened", "write_listening"]
+
+#: How many moments are drawn a label, and how much around each in time constants of the neuron.
+_MOMENTS, _AROUND = 4, 6.0
+#: Maps of weights that are drawn a label, those with the largest weights first.
+_MAPS = 8
+_SAID, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", "#2b2b2b"
+
+
+class Listened(NamedTuple):
+    """One recording, what was said of it, and what really happened where that is known."""
+
+    name: str
+    source: Events | Frames
+    found: Detections
+    tare: Tare | None = None
+    truth: Mapping[str, NDArray[np.int64]] | None = None
+    score: Score | None = None
+
+
+class _Moment(NamedTuple):
+    """Something worth a look: a label's event, when (us), and what became of it."""
+
+    recording: int
+    label: str
+    t: float
+    what: str
+    badness: float
+
+
+def write_listening(
+    folder: str | os.PathLike[str],
+    readout: Readout,
+    listened: list[Listened],
+    *,
+    title: str,
+    judged: str = "",
+) -> Path:
+    """Write what a readout heard in recordings as a page with pictures, ``report.html`` in a new folder.
+
+    Parameters
+    ----------
+    folder : path
+        New, or empty.
+    readout : Readout
+    listened : list of Listened, one or more
+    title : str
+    judged : str
+        On what the scores are: held-out data, or the readout's own training data.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    FileExistsError : the folder holds a report already
+    OSError : the folder cannot be made
+    """
+    instance("readout", readout, Readout)
+    if not listened:
+        raise ProblemError("listened is empty: there is nothing to report")
+    place = Path(folder)
+    place.mkdir(parents=True, exist_ok=True)
+    moments = {label: _moments(listened, label) for label in readout.labels}
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    template = environment.from_string(files("taxel.report").joinpath("listening.html.j2").read_text(encoding="utf-8"))
+    with mpl.rc_context(STYLE):
+        drawn = {
+            label: {
+                "potential": _drawn(_potential(readout, listened, label, moments[label])),
+                "weights": _drawn(_weights(readout, listened[0], label)),
+                "errors": _drawn(_errors(listened, label)),
+            }
+            for label in readout.labels
+        }
+    text = template.render(
+        title=title,
+        judged=judged,
+        readout=repr(readout),
+        labels=readout.labels,
+        drawn=drawn,
+        rows=[_row(one, label) for one in listened for label in readout.labels],
+        worst=[(listened[m.recording].name, m) for label in readout.labels for m in moments[label] if m.badness > 0],
+        scored=any(one.score is not None for one in listened),
+    )
+    return write_whole(place / "report.html", lambda file: file.write(text.encode()))
+
+
+def _drawn(figure: Figure | None) -> Markup | None:
+    return None if figure is None else Markup(svg(figure))
+
+
+def _row(one: Listened, label: str) -> dict[str, Any]:
+    own = None if one.score is None else one.score[label]
+    return {"recording": one.name, "label": label, "said": len(one.found[label]), "score": own}
+
+
+def _moments(listened: list[Listened], label: str) -> list[_Moment]:
+    """Return the worst of a label's events and detections, the worst first; without truth its first detections."""
+    moments = []
+    for k, one in enumerate(listened):
+        if one.score is None or one.truth is None:
+            moments += [_Moment(k, label, float(t), "said", 0.0) for t in one.found[label].t]
+            continue
+        own, said = one.score[label], one.found.t
+        happened = said[own.pairs[:, 0]] - np.rint(1000 * own.errors_ms).astype(np.int64)
+        true = np.asarray(one.truth.get(label, ()), np.int64)
+        moments += [_Moment(k, label, float(t), "missed", np.inf) for t in np.setdiff1d(true, happened)]
+        moments += [_Moment(k, label, float(t), "false", np.inf) for t in said[own.false_detections]]
+        moments += [
+            _Moment(k, label, float(t), f"{error:+.2f} ms", abs(float(error)))
+            for t, error in zip(happened, own.errors_ms, strict=True)
+        ]
+    return sorted(moments, key=lambda moment: -moment.badness)[:_MOMENTS]
+
+
+def _potential(readout: Readout, listened: list[Listened], label: str, moments: list[_Moment]) -> Figure | None:
+    """Draw potential and threshold around moments, with what was said and what is true."""
+    if not moments:
+        return None
+    one = readout.neurons[label]
+    figure, axes = plt.subplots(
+        1, len(moments), figsize=(2.9 * len(moments), 2.6), layout="constrained", squeeze=False, sharey=True
+    )
+    reach = _AROUND * one.neuron.tau + one.delay_ms
+    for axis, moment in zip(axes[0], moments, strict=True):
+        heard = listened[moment.recording]
+        trains = _trains(readout, heard)
+        found = heard.found[label].t / 1000.0
+        at = moment.t / 1000.0
+        times = np.linspace(at - reach, at + reach, 600)
+        crossings = found + readout.encoder.latency_ms + one.delay_ms
+        potential = one.neuron.potential(one.weights, trains, times, spikes=crossings)
+        axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1)
+        axis.axhline(readout.run_threshold * one.neuron.theta_0, color="#999999", linewidth=0.8, linestyle=":")
+        for t in found[np.abs(found - at) < reach]:
+            axis.axvline(t - at, color=_SAID, linewidth=1.2)
+        true = np.asarray((heard.truth or {}).get(label, ()), np.float64) / 1000.0
+        for t in true[np.abs(true - at) < reach]:
+            axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--")
+        axis.set_title(f"{moment.what}, {at / 1000.0:.3f} s", fontsize=9)
+        axis.set_xlabel("ms")
+    axes[0][0].set_ylabel("potential, mV")
+    return figure
+
+
+def _trains(readout: Readout, heard: Listened) -> Any:
+    encoder = readout.encoder if heard.tare is None else readout.encoder.with_tare(heard.tare)
+    trains = encoder.encode(heard.source)
+    trains = trains.split_by_sign() if trains.signed else trains
+    delays = readout.delays_ms
+    return trains if len(delays) == 1 and not delays[0] else trains.delayed(delays)
+
+
+def _weights(readout: Readout, heard: Listened, label: str) -> Figure:
+    """Draw weights over the array where trains are taxels', else as bars."""
+    weights = np.asarray(readout.neurons[label].weights)
+    array = heard.source.array
+    largest = float(np.abs(weights).max()) or 1.0
+    named = _planes(weights, readout, array.rows * array.columns)
+    if not named or array.rows * array.columns < 4:
+        figure, axis = plt.subplots(figsize=(6.5, 2.2), layout="constrained")
+        axis.bar(np.arange(len(weights)), weights, color=_POTENTIAL)
+        axis.axhline(0, color="#999999", linewidth=0.8)
+        axis.set_xlabel("input, in the encoder's order")
+        axis.set_ylabel("weight, mV")
+        return figure
+    named = sorted(named, key=lambda one: -float(np.abs(one[1]).max()))[:_MAPS]
+    columns = min(4, len(named))
+    rows = -(-len(named) // columns)
+    figure, axes = plt.subplots(rows, columns, figsize=(2.4 * columns, 2.4 * rows), layout="constrained", squeeze=False)
+    scale = Normalize(-largest, largest)
+    for axis in axes.flat:
+        axis.set_axis_off()
+    for axis, (name, plane) in zip(axes.flat, named, strict=False):
+        axis.set_axis_on()
+        picture = plane.reshape(array.shape)
+        axis.imshow(picture if array.exists is None else np.where(array.exists, picture, np.nan), "RdBu_r", scale)
+        axis.set_title(name or "weights", fontsize=9)
+        axis.set_xlabel("column")
+        axis.set_ylabel("row")
+    figure.colorbar(ScalarMappable(scale, "RdBu_r"), ax=axes, label="weight, mV")
+    return figure
+
+
+def _planes(weights: NDArray[np.float64], readout: Readout, taxels: int) -> list[tuple[str, NDArray[np.float64]]]:
+    """Return weights by taxel, with the names of what else tells trains apart; none where trains are not taxels'.
+
+    For each delay all ON trains stand before all OFF ones, in each taxel by taxel the levels, then the tonic ones.
+    """
+    if readout.encoder.trains(Array(taxels, 1)) == readout.encoder.trains(Array(taxels, 2)):
+        return []
+    halves, delays = 2 if readout.encoder.signed else 1, len(readout.delays_ms)
+    tonic = getattr(readout.encoder, "tonic_ms", None) is not None
+    levels, left = divmod(len(weights), taxels * halves * delays)
+    if left or not levels:
+        return []
+    planes = []
+    for d, delayed in enumerate(np.split(weights, delays)):
+        for s, half in enumerate(np.split(delayed, halves)):
+            crossing = half[: taxels * (levels - tonic)].reshape(taxels, levels - tonic)
+            behind = [("tonic", half[-taxels:])] if tonic else []
+            for name, plane in [*((_nth("level", levels - tonic, n), p) for n, p in enumerate(crossing.T)), *behind]:
+                words = (_sign(halves, s), name, _nth("delay", delays, d))
+                planes.append((" ".join(filter(None, words)), plane))
+    return planes
+
+
+def _sign(halves: int, n: int) -> str:
+    return ("ON", "OFF")[n] if halves == 2 else ""
+
+
+def _nth(what: str, count: int, n: int) -> str:
+    return f"{what} {n + 1}" if count > 1 else ""
+
+
+def _errors(listened: list[Listened], label: str) -> Figure | None:
+    """Draw how far detections lay from their events."""
+    errors = [one.score[label].errors_ms for one in listened if one.score is not None]
+    if not errors or not sum(map(len, errors)):
+        return None
+    figure, axis = plt.subplots(figsize=(4.2, 2.2), layout="constrained")
+    axis.hist(np.concatenate(errors), bins=30, color=_TRUE)
+    axis.axvline(0, color="#999999", linewidth=0.8)
+    axis.set_xlabel("said minus true, ms")
+    axis.set_ylabel("events")
+    return figure
