@@ -45,6 +45,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "wire",
                 "wire_v2",
             ],
+            &["described"],
         ],
     ),
 ];
@@ -72,7 +73,6 @@ const STILL: &[&[&str]] = &[
     &["capture", "capture::queue", "capture::socket"],
     &["emulate", "emulate::control"],
     &["pipeline", "pipeline::decode", "pipeline::read", "pipeline::recorder"],
-    &["learn", "parameters", "rivals"],
 ];
 
 type Name = Vec<String>;

@@ -6,6 +6,7 @@ mod errors;
 mod knock;
 
 mod cone_x;
+mod described;
 mod detect;
 mod encode;
 mod learn;
@@ -35,7 +36,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     metrics::register(module)?;
     learn::register(module)?;
     neuron::register(module)?;
-    parameters::register(module)?;
+    described::register(module)?;
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;

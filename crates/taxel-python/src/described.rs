@@ -1,0 +1,81 @@
+//! What is known of parameters, noun by noun, and their check: for the Python classes, whose defaults are read from here.
+
+use pyo3::prelude::*;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use taxel_core::encode::{Encoder, RunningRange};
+use taxel_core::learn::rivals::{Rival, Skim, Tempotron};
+use taxel_core::learn::{ConeR, ConeX, OnlineConeR};
+use taxel_core::metrics::{Metric, matching};
+use taxel_core::neuron::Neuron;
+use taxel_core::parameters::Described;
+use taxel_core::{Result as CoreResult, problem};
+
+use crate::errors::core;
+use crate::learn::to_online;
+use crate::parameters::parsed;
+use crate::rivals::to_rival;
+
+/// What is known of a noun's parameters: defaults, what must be given, ranges; as JSON.
+#[pyfunction]
+fn parameters(of: &str) -> PyResult<String> {
+    described(of).map(|d| d.to_json().to_string()).ok_or_else(|| unknown(of))
+}
+
+fn described(of: &str) -> Option<Described> {
+    match of {
+        "neuron" => Some(Neuron::described()),
+        "running_range" => Some(RunningRange::described()),
+        "cone_x" => Some(ConeX::described()),
+        "cone_r" => Some(ConeR::described()),
+        "online_cone_r" => Some(OnlineConeR::described()),
+        "tempotron" => Some(Tempotron::described()),
+        "skim" => Some(Skim::described()),
+        "matching" => Some(matching::described()),
+        _ => Encoder::described(of).or_else(|| Rival::described(of)).or_else(|| Metric::described(of)),
+    }
+}
+
+/// Checks a noun's parameters; gives them back with every default filled in.
+#[pyfunction]
+fn check_parameters(of: &str, parameters: &str) -> PyResult<String> {
+    match of {
+        "neuron" => checked("neuron", parameters, Neuron::check),
+        "running_range" => checked("running_range", parameters, RunningRange::check),
+        "cone_x" => checked("ConeX", parameters, ConeX::check),
+        "cone_r" => checked("ConeR", parameters, ConeR::check),
+        "online_cone_r" => {
+            let (cone, window) = to_online(parameters)?;
+            OnlineConeR::new(&cone, window).map_err(core)?;
+            written("OnlineConeR", &cone)
+        }
+        "tempotron" => checked("Tempotron", parameters, Tempotron::check),
+        "skim" => checked("SKIM", parameters, Skim::check),
+        _ if Rival::described(of).is_some() => written(of, &to_rival(parameters)?),
+        _ if Encoder::described(of).is_some() => Ok(Encoder::from_json(parameters).map_err(core)?.to_json()),
+        _ => Err(unknown(of)),
+    }
+}
+
+fn unknown(of: &str) -> PyErr {
+    core(problem!("{of}: nothing of that name has parameters"))
+}
+
+fn checked<T: DeserializeOwned + Serialize>(
+    what: &str,
+    json: &str,
+    check: impl Fn(&T) -> CoreResult<()>,
+) -> PyResult<String> {
+    let value: T = parsed(what, json)?;
+    check(&value).map_err(core)?;
+    written(what, &value)
+}
+
+fn written(what: &str, value: &impl Serialize) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|error| core(problem!("{what}: {error}")))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(parameters, module)?)?;
+    module.add_function(wrap_pyfunction!(check_parameters, module)?)
+}
