@@ -14,7 +14,7 @@ __all__ = ["STUDY"]
 
 STUDY = Study(
     name="gait",
-    title="gait events by one neuron an event, on published walking recordings",
+    title="gait events by one neuron an event, on published walking recordings (6.12 to 6.14)",
     where="thesis 6.5, figures 6.12 to 6.14, Table 6.2",
     protocol=(
         "The protocols of 6.5.2 and 6.5.3 on recordings of other people, as far as each recording's truth allows. "

@@ -1,0 +1,124 @@
+"""CONTRIBUTING is true: by its own pieces a copy gets a format and a study; without one of them a test says which."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+FORMAT, STUDY = "channel", "quiet"
+#: Where the laws and registries of formats and studies are tried.
+TESTS = {
+    FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py"],
+    STUDY: ["tests/studies/test_registry.py", "tests/studies/test_quiet.py", "tests/studies/test_studies.py"],
+}
+
+
+class Piece(NamedTuple):
+    """A fenced piece of CONTRIBUTING that begins with where it goes."""
+
+    path: str
+    after: str
+    text: str
+
+
+def pieces() -> list[Piece]:
+    said = (ROOT / "CONTRIBUTING.md").read_text()
+    found = re.findall(
+        r"^```python\n# (\S+?)(?:, (at the end|after [^\n]+))?\n(.*?)^```", said, re.MULTILINE | re.DOTALL
+    )
+    return [Piece(*piece) for piece in found]
+
+
+def of(name: str) -> list[Piece]:
+    """Return the pieces of a format or study: its files, and lines that name it."""
+    return [p for p in pieces() if name in p.path or name in p.text]
+
+
+def add(root: Path, piece: Piece) -> None:
+    """Do what CONTRIBUTING says."""
+    file = root / piece.path
+    if not piece.after:
+        assert not file.exists(), f"{piece.path} is there already"
+        file.write_text(piece.text)
+        return
+    lines = file.read_text().splitlines(keepends=True)
+    anchor = piece.after.removeprefix("after ")
+    at = len(lines) if piece.after == "at the end" else 1 + next(k for k, line in enumerate(lines) if anchor in line)
+    gap = "\n\n" if piece.after == "at the end" else ""
+    file.write_text("".join([*lines[:at], gap, piece.text, *lines[at:]]))
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """A copy of what these tests need: the package, its tests, their settings."""
+    unneeded = shutil.ignore_patterns("__pycache__", "*.so", ".hypothesis")
+    shutil.copytree(ROOT / "python", tmp_path / "python", ignore=unneeded)
+    for compiled in (ROOT / "python" / "taxel").glob("_core*.so"):
+        (tmp_path / "python" / "taxel" / compiled.name).symlink_to(compiled)
+    for room in ("formats", "studies"):
+        shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
+    """Run the tests that a new format or study has to pass, as far as they are about it or about the registry."""
+    tests = [test for test in TESTS[name] if (root / test).exists()]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests]
+    chosen = ["-k", f"{name} or registry or without_weight"] if name == STUDY else []
+    environment = os.environ | {"PYTHONPATH": str(root / "python")}
+    return subprocess.run([*command, *chosen], cwd=root, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
+    assert [(p.path, bool(p.after)) for p in of(FORMAT)] == [
+        ("python/taxel/formats/channel.py", False),
+        ("python/taxel/formats/__init__.py", True),
+        ("tests/formats/making.py", True),
+        ("tests/formats/test_channel.py", False),
+    ]
+    assert [(p.path, bool(p.after)) for p in of(STUDY)] == [
+        ("python/taxel/studies/quiet.py", False),
+        ("python/taxel/studies/__init__.py", True),
+        ("tests/studies/test_quiet.py", False),
+    ]
+    assert sorted(pieces()) == sorted([*of(FORMAT), *of(STUDY)])
+
+
+@pytest.mark.parametrize("name", [FORMAT, STUDY])
+def test_what_contributing_says_is_enough(copy: Path, name: str) -> None:
+    for piece in of(name):
+        add(copy, piece)
+    done = tried(copy, name)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+    assert " passed" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("name", "without", "said"),
+    [
+        (FORMAT, "formats/__init__.py", "FORMATS lacks channel"),
+        (FORMAT, "making.py", "write_channel"),
+        (FORMAT, "test_channel.py", "add tests/formats/test_channel.py"),
+        (FORMAT, "formats/channel.py", "No module named 'taxel.formats.channel'"),
+        (STUDY, "studies/__init__.py", "STUDIES lacks quiet"),
+        (STUDY, "test_quiet.py", "no test of tests/studies imports or names quiet"),
+        (STUDY, "studies/quiet.py", "No module named 'taxel.studies.quiet'"),
+    ],
+)
+def test_a_part_that_is_left_out_is_named(copy: Path, name: str, without: str, said: str) -> None:
+    left = [piece for piece in of(name) if not piece.path.endswith(without)]
+    assert len(left) == len(of(name)) - 1
+    for piece in left:
+        add(copy, piece)
+    done = tried(copy, name)
+    assert done.returncode != 0
+    assert said in done.stdout + done.stderr, done.stdout[-3000:] + done.stderr[-1000:]
