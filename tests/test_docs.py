@@ -1,6 +1,9 @@
-"""The documentation's Python runs, page by page, each in a folder of its own."""
+"""The documentation's Python runs, each page in a folder of its own; tutorials show what they print and draw."""
 
-import re
+from __future__ import annotations
+
+import doctest
+import importlib.util
 from pathlib import Path
 
 import pytest
@@ -8,13 +11,23 @@ import pytest
 DOCS = Path(__file__).parent.parent / "docs"
 PAGES = sorted(page for page in DOCS.glob("*.md") if "```python" in page.read_text())
 
+_spec = importlib.util.spec_from_file_location("pieces", DOCS / "pieces.py")
+assert _spec is not None
+assert _spec.loader is not None
+pieces = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(pieces)
+
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_python_piece_of_a_page_runs_in_order(page, tmp_path, monkeypatch):
+def test_every_python_piece_of_a_page_runs_in_order_and_does_what_the_page_says(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("MPLBACKEND", "Agg")
-    pieces = re.findall(r"^```python\n(.*?)^```", page.read_text(), re.MULTILINE | re.DOTALL)
-    assert pieces
-    names = {"__name__": "tutorial"}
-    for number, piece in enumerate(pieces):
-        exec(compile(piece, f"{page.name}, piece {number}", "exec"), names)
+    count = 0
+    for done in pieces.run(page):
+        count += 1
+        where = f"{page.name}, piece {done.number}: run docs/pieces.py on the page"
+        if page.stem.startswith("tutorial"):
+            same = doctest.OutputChecker().check_output(done.said or "", done.printed, doctest.NORMALIZE_WHITESPACE)
+            assert same, f"{where}: prints\n{done.printed}"
+            assert len(done.pictures) == len(done.figures), where
+        assert all((DOCS / picture).exists() for picture in done.pictures), where
+    assert count == page.read_text().count("```python")

@@ -210,7 +210,7 @@ def draw(p: Parameters, said: Said) -> Figure:
         line, height = np.array(found["line"]["weights"]), np.array(found["line"]["objective"])
         kept = np.array(found["line"]["kept"])
         ax = figure.add_subplot(2, 2, number, projection="3d", computed_zorder=False)
-        ax.plot_surface(first, second, surface, cmap="viridis", alpha=0.75, rcount=80, ccount=80, lw=0)
+        ax.plot_surface(first, second, surface, cmap="viridis", alpha=0.75, rcount=80, ccount=80, lw=0, rasterized=True)
         ax.plot(*line.T, height, color="0.2", lw=1.0, ls="--", label="target met")
         ax.plot(*line[kept].T, height[kept], color="C3", lw=2.5, label="target met, silence kept")
         ax.scatter(*found["weights"], found["optimum"], color="k", s=40, label="optimum", depthshade=False)

@@ -33,8 +33,10 @@ __all__ = [
     "Statement",
     "Study",
     "Table",
+    "drawn",
     "read_section",
     "refuse",
+    "svg",
 ]
 
 #: Experiment parameters by name: what JSON can hold.
@@ -255,8 +257,7 @@ class Study:
             "code": results.code,
             **_machine(),
         }
-        drawn = self.draw(parameters, said)
-        _write_section(folder, section, drawn if isinstance(drawn, Sequence) else [drawn])
+        _write_section(folder, section, drawn(self, parameters, said))
         return section
 
     def _recordings(self, data: Path | None) -> Path:
@@ -265,7 +266,8 @@ class Study:
         missing = [name for name in self.data if data is None or not (data / name).is_dir()]
         if data is None or len(missing) == len(self.data):
             raise FormatError(
-                f"{data or self.name}: holds no recordings; name a folder with any of {', '.join(self.data)} by --data"
+                f"{data or self.name}: holds no recordings; name a folder with any of {', '.join(self.data)} by --data "
+                "(taxel study gait --help says where they can be had)"
             )
         return data
 
@@ -306,15 +308,27 @@ def _machine() -> dict[str, Any]:
     }
 
 
-def _write_section(folder: Path, section: Section, pictures: Sequence[Figure]) -> None:
+def svg(figure: Figure) -> bytes:
+    """Return a picture as SVG, the same bytes for the same numbers."""
+    from matplotlib import rc_context  # noqa: PLC0415  loads slowly
+
+    buffer = io.BytesIO()
+    with rc_context({"svg.hashsalt": "taxel", "svg.fonttype": "none"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None}, bbox_inches="tight", facecolor="white")
+    return buffer.getvalue()
+
+
+def drawn(study: Study, parameters: Parameters, said: Said) -> list[bytes]:
+    """Return a study's pictures of what it found, as SVG."""
+    figures = study.draw(parameters, said)
+    return [svg(figure) for figure in (figures if isinstance(figures, Sequence) else [figures])]
+
+
+def _write_section(folder: Path, section: Section, pictures: Sequence[bytes]) -> None:
     """Write a study's summary and its pictures, each whole; the summary names the pictures."""
-    names = []
-    for number, figure in enumerate(pictures, 1):
-        name = "figure.png" if len(pictures) == 1 else f"figure-{number}.png"
-        buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=150, bbox_inches="tight", facecolor="white")
-        write_whole(folder / name, partial(_put, buffer.getvalue()), overwrite=True)
-        names.append(name)
+    names = ["figure.svg"] if len(pictures) == 1 else [f"figure-{k}.svg" for k in range(1, len(pictures) + 1)]
+    for name, picture in zip(names, pictures, strict=True):
+        write_whole(folder / name, partial(_put, picture), overwrite=True)
     text = json.dumps(section | {"pictures": names}) + "\n"
     write_whole(folder / "summary.json", partial(_put, text.encode()), overwrite=True)
 
@@ -334,6 +348,6 @@ def read_section(folder: Path) -> Section | None:
     except (ValueError, KeyError, TypeError):
         raise FormatError(f"{path}: is no summary of a study; name another folder by --report") from None
     section["images"] = [
-        f"data:image/png;base64,{base64.b64encode((folder / name).read_bytes()).decode()}" for name in names
+        f"data:image/svg+xml;base64,{base64.b64encode((folder / name).read_bytes()).decode()}" for name in names
     ]
     return section

@@ -1,0 +1,50 @@
+"""The page *Terms* knows every public name and every option of the command line, and none that is gone."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import re
+from pathlib import Path
+from typing import Any
+
+import typer
+
+import taxel
+from taxel.cli import app
+
+PAGE = (Path(__file__).parents[1] / "docs" / "terms.md").read_text()
+NAMES, OPTIONS = PAGE.split("## Names")[1].split("## Options of the command line")
+#: Rooms without underscore; what lies deeper is re-exported by them, or of studies, demo and command line alone.
+ROOMS = ["taxel", *(f"taxel.{m.name}" for m in pkgutil.iter_modules(taxel.__path__) if not m.name.startswith("_"))]
+UNSAID = {"taxel.cli", "taxel.demo"}
+
+
+def first_cells(part: str) -> set[str]:
+    """Return what stands in the first cells of a part's tables."""
+    rows = [line.split("|")[1] for line in part.splitlines() if line.startswith("| `")]
+    return {name for cell in rows for name in re.findall(r"`([^`]+)`", cell)}
+
+
+def public() -> set[str]:
+    found = {name for room in ROOMS if room not in UNSAID for name in importlib.import_module(room).__all__}
+    return found | {room.removeprefix("taxel.") for room in ROOMS if room.removeprefix("taxel.") in taxel.__all__}
+
+
+def options(command: Any) -> set[str]:
+    """Return the long options of a command and of those below it."""
+    below = getattr(command, "commands", {}).values()
+    own = {said for p in command.params for said in (*p.opts, *p.secondary_opts) if said.startswith("--")}
+    return own.union(*(options(one) for one in below)) - {"--help"}
+
+
+def test_every_public_name_has_its_line() -> None:
+    known, said = public(), first_cells(NAMES)
+    assert not known - said, f"docs/terms.md: add what {', '.join(sorted(known - said))} is, with its source"
+    assert not said - known, f"docs/terms.md: {', '.join(sorted(said - known))} is no public name"
+
+
+def test_every_option_has_its_line() -> None:
+    known, said = options(typer.main.get_command(app)), first_cells(OPTIONS)
+    assert not known - said, f"docs/terms.md: add what {', '.join(sorted(known - said))} says"
+    assert not said - known, f"docs/terms.md: no command has {', '.join(sorted(said - known))}"
