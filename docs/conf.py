@@ -1,4 +1,9 @@
+import sys
+from pathlib import Path
+
 import taxel
+
+sys.path.insert(0, str(Path(__file__).parent))
 
 project = "taxel"
 author = "The taxel developers"
@@ -10,11 +15,13 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx.ext.mathjax",
+    "from_program",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build"]
 html_theme = "furo"
 html_title = "taxel"
+smartquotes = False  # options begin with two dashes
 autosummary_generate = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"

@@ -1,0 +1,45 @@
+"""Keep what a report of studies found for the page of figures: numbers as JSON, pictures drawn from them as SVG.
+
+python docs/figures.py            draws all pictures again
+python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+from taxel.studies import STUDIES, load
+from taxel.studies.study import drawn
+
+FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
+
+
+def keep(report: Path) -> None:
+    """Copy the numbers of a report; its tables are made of them again where they are shown."""
+    for name in STUDIES:
+        summary = report / name / "summary.json"
+        if summary.exists():
+            section = json.loads(summary.read_text())
+            section.pop("tables")
+            (FIGURES / f"{name}.json").write_text(json.dumps(section) + "\n")
+
+
+def draw(name: str) -> list[str]:
+    """Draw a study's pictures from its numbers, and name them there."""
+    file = FIGURES / f"{name}.json"
+    section = json.loads(file.read_text())
+    pictures = drawn(load(name), section["parameters"], section["said"])
+    names = [f"{name}.svg"] if len(pictures) == 1 else [f"{name}-{k}.svg" for k in range(1, len(pictures) + 1)]
+    for picture, data in zip(names, pictures, strict=True):
+        (FIGURES / picture).write_bytes(data)
+    file.write_text(json.dumps(section | {"pictures": names}) + "\n")
+    return names
+
+
+if __name__ == "__main__":
+    for place in sys.argv[1:]:
+        keep(Path(place))
+    for found in sorted(FIGURES.glob("*.json")):
+        print(*draw(found.stem))

@@ -1,0 +1,147 @@
+"""Parts of the documentation that are made of the program: the studies' figures, every command's options.
+
+A page asks for them by ``{eval-rst}`` directives: ``.. studies::`` and ``.. commands::``.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import typer
+from docutils import nodes
+from docutils.parsers.rst import Directive
+from docutils.statemachine import StringList
+from sphinx.application import Sphinx
+
+from taxel.cli import app as command_line
+from taxel.studies import STUDIES
+
+FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
+VERDICTS = {True: "holds", False: "**does not hold**", None: "not judged"}
+
+
+class FromProgram(Directive):
+    """Parse the lines that a subclass makes, sections and all."""
+
+    def lines(self) -> list[str]:
+        """Return reStructuredText."""
+        raise NotImplementedError
+
+    def run(self) -> list[nodes.Node]:
+        """Give what the lines say."""
+        node = nodes.section()
+        node.document = self.state.document
+        content = StringList(self.lines(), source="made by the program")
+        self.state.nested_parse(content, self.content_offset, node, match_titles=1)
+        return node.children
+
+
+class Studies(FromProgram):
+    """Every study that was kept: pictures, statements, the command, the numbers."""
+
+    def lines(self) -> list[str]:
+        """Return a section a study."""
+        self.state.document.settings.env.note_dependency(str(FIGURES))
+        found = []
+        for name in STUDIES:
+            file = FIGURES / f"{name}.json"
+            if file.exists():
+                found += study(json.loads(file.read_text()))
+        return found
+
+
+def study(section: dict[str, Any]) -> list[str]:
+    """Return a study's section."""
+    name, title = section["name"], f"{section['title'][0].upper()}{section['title'][1:]}"
+    where = "../benchmarks/results/figures"
+    made = f"({section['date']}, {section['cpu_seconds']:.0f} s of CPU)"
+    lines = [
+        *heading(f"{name}: {title}"),
+        f"*{section['where']}.* Made by ``taxel study {name} --report figures`` {made};",
+        f"numbers: :download:`{name}.json <{where}/{name}.json>`.",
+    ]
+    for picture in section["pictures"]:
+        lines += ["", f".. image:: {where}/{picture}", f"   :alt: {name}: {section['title']}", "   :width: 100%", ""]
+    rows = [[s["says"], s["published"], s["ours"], VERDICTS[s["holds"]], s["why"]] for s in section["statements"]]
+    lines += table(["statement", "published", "ours", "", "why, or under which reading"], rows, "30 15 20 10 25")
+    return [*lines, "", f"**Protocol.** {literal(section['protocol'])}", ""]
+
+
+class Commands(FromProgram):
+    """Every command: what it does, its arguments and options."""
+
+    def lines(self) -> list[str]:
+        """Return a section a command."""
+        commands = typer.main.get_command(command_line).commands
+        return [line for name, one in sorted(commands.items()) for line in command(f"taxel {name}", one)]
+
+
+def command(name: str, one: Any) -> list[str]:
+    """Return a command's section, and those of its own commands; studies alike are shown once."""
+    lines = [*heading(name), *paragraphs(one.help or ""), ""]
+    rows = []
+    for parameter in one.params:
+        if parameter.param_type_name == "option":
+            said = ", ".join(f"``{option}``" for option in [*parameter.opts, *parameter.secondary_opts])
+            default = parameter.default
+            shown = "" if default in (None, False, True, "") or callable(default) else f" [{default}]"
+            rows.append([said, f"{parameter.help or ''}{shown}"])
+        else:
+            rows.append([f"``{parameter.name}``", getattr(parameter, "help", "") or ""])
+    lines += table(["", ""], rows, "30 70") if rows else []
+    if hasattr(one, "commands"):
+        seen: list[list[str]] = []
+        for inner, each in one.commands.items():
+            options = [option for parameter in each.params for option in parameter.opts]
+            if options not in seen:
+                seen.append(options)
+                alike = [
+                    other for other, its in one.commands.items() if [o for p in its.params for o in p.opts] == options
+                ]
+                lines += command(f"{name} {inner}" if len(alike) == 1 else f"{name} NAME", each)
+                if len(alike) > 1:
+                    lines += ["", f"NAME is one of {', '.join(f'``{other}``' for other in alike)}.", ""]
+    return lines
+
+
+def heading(text: str) -> list[str]:
+    """Return a section's title."""
+    return ["", text, "-" * len(text), ""]
+
+
+def paragraphs(text: str) -> list[str]:
+    """Return a help text; its examples as code."""
+    lines: list[str] = []
+    for part in text.replace("\b", "").split("\n\n"):
+        said = " ".join(part.split())
+        lines += (
+            ["::", "", f"   {said.removeprefix('Example: ')}", ""]
+            if said.startswith("Example: ")
+            else [literal(said), ""]
+        )
+    return lines
+
+
+def literal(text: str) -> str:
+    """Return text in which no character means anything to reStructuredText."""
+    return "".join(f"\\{c}" if c in "*_`|\\" else c for c in text)
+
+
+def table(head: list[str], rows: list[list[str]], widths: str) -> list[str]:
+    """Return a list table; a cell that begins with ``` `` ``` or ``**`` is markup of ours."""
+    lines = ["", ".. list-table::", f"   :widths: {widths}", *(["   :header-rows: 1"] if any(head) else []), ""]
+    for row in [head, *rows] if any(head) else rows:
+        for k, cell in enumerate(row):
+            text = " ".join(cell.split())
+            said = text if text.startswith(("``", "**")) else literal(text)
+            lines.append(f"   {'*' if k == 0 else ' '} - {said}")
+    return [*lines, ""]
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Register the directives."""
+    app.add_directive("studies", Studies)
+    app.add_directive("commands", Commands)
+    return {"parallel_read_safe": True}
