@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from tests.formats.test_loaders import interpolated
+from tests.formats.making import interpolated
 
 from taxel import FormatError, ProblemError
 from taxel.cli import main
