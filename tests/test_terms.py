@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import importlib
-import pkgutil
 import re
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import typer
@@ -15,9 +15,9 @@ from taxel.cli import app
 
 PAGE = (Path(__file__).parents[1] / "docs" / "terms.md").read_text()
 NAMES, OPTIONS = PAGE.split("## Names")[1].split("## Options of the command line")
-#: Rooms without underscore; what lies deeper is re-exported by them, or of studies, demo and command line alone.
-ROOMS = ["taxel", *(f"taxel.{m.name}" for m in pkgutil.iter_modules(taxel.__path__) if not m.name.startswith("_"))]
-UNSAID = {"taxel.cli", "taxel.demo"}
+#: What `import taxel` shows, and the rooms that are imported by their own names.
+ROOMS = [*(f"taxel.{n}" for n in taxel.__all__ if isinstance(getattr(taxel, n), ModuleType)), "taxel"]
+ROOMS += ["taxel.cable", "taxel.report", "taxel.studies"]
 
 
 def first_cells(part: str) -> set[str]:
@@ -27,8 +27,7 @@ def first_cells(part: str) -> set[str]:
 
 
 def public() -> set[str]:
-    found = {name for room in ROOMS if room not in UNSAID for name in importlib.import_module(room).__all__}
-    return found | {room.removeprefix("taxel.") for room in ROOMS if room.removeprefix("taxel.") in taxel.__all__}
+    return {name for room in ROOMS for name in importlib.import_module(room).__all__}
 
 
 def options(command: Any) -> set[str]:
