@@ -18,15 +18,25 @@ use crate::wire::v1::WORD_BYTES;
 const BLOCK_WORDS: usize = 32;
 
 /// Stamps ahead of the latest time that are surely ahead: see [`super::FARTHEST_BACK`].
-const FARTHEST_AHEAD: u16 = (super::TURN - super::FARTHEST_BACK - 1) as u16;
+const FARTHEST_AHEAD: i64 = super::TURN - super::FARTHEST_BACK - 1;
 
 /// What the block loop carries besides rows.
 pub(super) struct Carried {
-    /// The latest time, in stamps.
+    /// The time come to, in stamps: the latest, or that of a stretch behind it.
     pub(super) latest: i64,
+    /// Up to which time the words are plain, in stamps.
+    pub(super) until: i64,
     /// Intensities that found their change, and those that did not.
     pub(super) intensities: u64,
     pub(super) unpaired: u64,
+}
+
+impl Carried {
+    /// How far ahead of the time come to a stamp may lie; 0 or more as long as `until` is not passed.
+    #[inline(always)]
+    fn farthest(&self) -> u16 {
+        (self.until - self.latest).min(FARTHEST_AHEAD) as u16
+    }
 }
 
 /// Decodes plain words from the start of `bytes` into `filling`, up to the first that is not plain; gives how many

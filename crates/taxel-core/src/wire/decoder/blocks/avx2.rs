@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Carried, FARTHEST_AHEAD, indices, value};
+use super::{Carried, indices, value};
 use crate::wire::decoder::Filling;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
@@ -103,7 +103,7 @@ pub(super) unsafe fn blocks(
             let before = _mm256_alignr_epi8::<14>(ahead, carried);
             let rising = low_bits(_mm256_cmpeq_epi16(_mm256_max_epu16(ahead, before), ahead)) == u32::MAX;
             let farthest = value(bytes, at + WORD_BYTES * (WORDS - 1)).wrapping_sub(base);
-            if !rising || farthest > FARTHEST_AHEAD {
+            if !rising || farthest > state.farthest() {
                 break;
             }
             let p = _mm_packus_epi16(_mm256_castsi256_si128(polarity), _mm256_extracti128_si256::<1>(polarity));
@@ -142,7 +142,7 @@ pub(super) unsafe fn blocks(
             let before = _mm_slli_si128::<2>(ahead);
             let rising = _mm_movemask_epi8(_mm_cmpeq_epi16(_mm_max_epu16(ahead, before), ahead)) == 0xffff;
             let farthest = value(bytes, at + WORD_BYTES * (WORDS - 2)).wrapping_sub(base);
-            if !rising || farthest > FARTHEST_AHEAD {
+            if !rising || farthest > state.farthest() {
                 break;
             }
             filling.begin_pairs();

@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::{Carried, FARTHEST_AHEAD, indices, value};
+use super::{Carried, indices, value};
 use crate::wire::decoder::Filling;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
@@ -139,7 +139,7 @@ pub(super) unsafe fn blocks(
             let last = 31 - changes.leading_zeros() as usize;
             value(bytes, at + WORD_BYTES * last).wrapping_sub(base)
         };
-        if rising != u32::MAX || farthest > FARTHEST_AHEAD {
+        if rising != u32::MAX || farthest > state.farthest() {
             break;
         }
 

@@ -1,6 +1,6 @@
 //! Plain words one by one, on any machine.
 
-use super::{Carried, FARTHEST_AHEAD, value};
+use super::{Carried, value};
 use crate::wire::decoder::Filling;
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES};
 
@@ -24,20 +24,20 @@ pub(super) fn words(
     let back = usize::from(first > 0);
     let ticks = &mut filling.room.ticks[first - back..first + words];
     let present = &mut filling.room.present[first - back..first + words];
-    let (mut latest, mut n, mut done) = (state.latest, 0, 0);
+    let (mut n, mut done) = (0, 0);
     for word in bytes.chunks_exact(WORD_BYTES).take(words) {
         let taxel = (u16::from(word[3] & 0x3f), u16::from(word[4] & 0x3f));
-        let ahead = value(word, 0).wrapping_sub(latest as u16);
+        let ahead = value(word, 0).wrapping_sub(state.latest as u16);
         let in_place = word[0] & FIRST != 0 && (word[1] | word[2] | word[3] | word[4]) & FIRST == 0;
         if !in_place || word[0] & 0x08 != 0 || taxel.0 >= columns || taxel.1 >= rows {
             break;
         }
         if word[0] & 0x20 == 0 {
-            if ahead > FARTHEST_AHEAD {
+            if ahead > state.farthest() {
                 break;
             }
-            latest += i64::from(ahead);
-            t[n].write(latest * STAMP_US);
+            state.latest += i64::from(ahead);
+            t[n].write(state.latest * STAMP_US);
             x[n].write(taxel.0);
             y[n].write(taxel.1);
             p[n].write(word[0] & 0x40 != 0);
@@ -63,6 +63,5 @@ pub(super) fn words(
     }
     filling.rows = first + n;
     filling.open = open;
-    state.latest = latest;
     done
 }
