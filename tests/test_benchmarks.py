@@ -16,7 +16,7 @@ def peers() -> list[str]:
     """Return the modules of the extras that only tests and benchmarks want."""
     extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
     names = {re.split(r"[<>=!~]", wanted)[0] for extra in ("bench", "peers", "test") for wanted in extras[extra]}
-    return sorted(names - {"numpy", "pytest", "pytest-timeout", "hypothesis"} | {"neo", "quantities", "torch"})
+    return sorted(names - {"numpy", "pytest", "pytest-timeout", "hypothesis"} | {"neo", "quantities"})
 
 
 def without_peers(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taxel._arguments import callback, instance, number, whole
+from taxel._arguments import callback, flag, instance, number, whole
 from taxel._core import ProblemError
 from taxel.detect.readout import run
 from taxel.detect.scoring import Score, score
@@ -123,6 +123,7 @@ def judge(
     """
     examples, window = checked(examples), number("window_ms", window_ms)
     told = (lambda _: None) if progress is None else callback("progress", progress)
+    search = flag("search", search)
     ways, how = folds(examples, k)
     patterns = encoded(examples, instance("recipe", recipe, Recipe), told)
     said: list[list[Detections]] = [[] for _ in examples]
@@ -141,7 +142,7 @@ def judge(
             found = run(readout, examples[place].source, tare=examples[place].tare, frame_us=frame_us)
             said[place].append(found[(found.t >= start) & (found.t < stop)])
     heard = [reduce(add, parts) for parts in said]
-    labels = recipe.learns(examples)
+    labels = recipe._labels(examples)
     truths = [{label: example.labels.get(label, np.empty(0, np.int64)) for label in labels} for example in examples]
     scores = tuple(score(*both, window) for both in zip(heard, truths, strict=True))
     later = range(0, len(examples) * _APART_US, _APART_US)
@@ -181,7 +182,7 @@ def choose(
     examples, count = checked(examples), whole("k", k, 2, 2**31)
     told = (lambda _: None) if progress is None else callback("progress", progress)
     best: dict[str, Mapping[str, Any]] = {}
-    for label in recipe.learns(examples):
+    for label in recipe._labels(examples):
         points = recipe.points_of(label)
         alone = [example._replace(labels=_only(example.labels, label)) for example in examples]
         marks = []

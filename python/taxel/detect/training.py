@@ -103,7 +103,7 @@ class Recipe:
         listed = several(f"neurons.{label}.search", own.pop("search", ()))
         return [own, *({**own, **mapping(f"neurons.{label}.search", point)} for point in listed)]
 
-    def learns(self, patterns: Sequence[Pattern] | Sequence[Example]) -> tuple[str, ...]:
+    def _labels(self, patterns: Sequence[Pattern] | Sequence[Example]) -> tuple[str, ...]:
         """Return the labels that are learnt: the recipe's, or where it has none those of the patterns."""
         return tuple(self.neurons) or tuple(sorted({label for pattern in patterns for label in pattern.labels}))
 
@@ -261,7 +261,7 @@ def encoded(examples: Sequence[Example], recipe: Recipe, told: Callable[[str], o
 
 def learn(patterns: Sequence[Pattern], recipe: Recipe, array: Array, told: Callable[[str], object]) -> Readout:
     """Train a recipe's neurons on patterns, which its encoder made of recordings of an array; see `train`."""
-    wanted = recipe.learns(patterns)
+    wanted = recipe._labels(patterns)
     if not wanted:
         raise ProblemError("no label in any example: there is nothing to learn")
     for label in {label for pattern in patterns for label in pattern.labels} - set(wanted):
