@@ -53,7 +53,7 @@ def test_it_leaves_a_section_with_statements_tables_and_pictures(data, tmp_path)
     section = STUDY.run(tmp_path / "report", size="toy", changes={"mat_taxels": [8]}, data=data, quiet=True)
     assert {s["holds"] for s in section["statements"]} == {None}  # toy size is never judged
     assert [t["title"].split(":")[0] for t in section["tables"]] == ["hand, object", "mat, posture"]
-    assert sorted(p.name for p in (tmp_path / "report" / "information").glob("*.png")) == [
-        "figure-1.png",
-        "figure-2.png",
+    assert sorted(p.name for p in (tmp_path / "report" / "information").glob("*.svg")) == [
+        "figure-1.svg",
+        "figure-2.svg",
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import pkgutil
 from importlib import import_module
 from pathlib import Path
@@ -53,3 +54,12 @@ def test_a_study_says_what_it_is(name: str) -> None:
     assert study.title == studies.STUDIES[name]
     assert "toy" in study.sizes
     assert min(len(study.where), len(study.protocol)) > 10
+
+
+def test_every_kept_figure_lies_beside_its_numbers() -> None:
+    """The page of figures shows them; `python docs/figures.py` draws them."""
+    folder = HERE.parents[1] / "benchmarks" / "results" / "figures"
+    pictures = {file.stem: json.loads(file.read_text())["pictures"] for file in folder.glob("*.json")}
+    assert pictures.keys() <= studies.STUDIES.keys()
+    wanted = sorted(name for names in pictures.values() for name in names)
+    assert sorted(file.name for file in folder.glob("*.svg")) == wanted, "run docs/figures.py"
