@@ -135,7 +135,7 @@ def _region(recording: Recording, columns: slice | None, rows: slice | None) -> 
     """Return the part of a recording within a rectangle, as a sensor of its own; without one as it is."""
     if columns is None and rows is None:
         return recording
-    across, down = columns or slice(None), rows or slice(None)
+    across, down = (slice(None) if chosen is None else chosen for chosen in (columns, rows))
     array = recording.array
     (left, right), (top, bottom) = array.region(across, down)
     if right <= left or bottom <= top:
