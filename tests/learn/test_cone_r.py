@@ -314,7 +314,8 @@ def test_a_start_in_another_unit_of_potential_is_a_start_too():
     options = {"tau": 12.0, "theta_0": 15.0, "theta_plus": 10.0, "lb": -15.0, "ub": 15.0}
     cone = fitted(made(ConeR, **options), patterns, targets)
     again = fitted(made(ConeR, **options), patterns, targets, start=cone)
-    assert again.rounds_ <= 1
+    # The weights were moved onto the targets that they meet: the multipliers settle anew.
+    assert again.rounds_ <= cone.rounds_ / 2
     assert again.objective_ == pytest.approx(cone.objective_, rel=1e-6)
 
 
@@ -406,7 +407,10 @@ def test_progress_is_told_round_by_round_and_may_stop_the_fit_by_raising():
     told = []
     cone = fitted(ConeR(neuron=Neuron(tau=12.0)), patterns, targets, progress=lambda *round: told.append(round))
     assert [r[0] for r in told] == list(range(1, cone.rounds_ + 1))
-    assert told[-1] == (cone.rounds_, cone.rows_, cone.objective_, cone.gap_)
+    assert told[-1][:2] == (cone.rounds_, cone.rows_)
+    # The last step, onto what is met, moves the objective by less than the tolerance.
+    assert told[-1][2] == pytest.approx(cone.objective_, rel=1e-6)
+    assert max(told[-1][3], cone.gap_) <= 1e-6
     with pytest.raises(ZeroDivisionError):
         fitted(ConeR(neuron=Neuron(tau=12.0)), patterns, targets, progress=lambda *_: 1 / 0)
 
@@ -470,14 +474,14 @@ def test_max_seconds_ends_a_fit_with_the_best_so_far_and_a_warning(long_rows):
         ({"lambdas": (1, 2, 3, 4)}, "length 4"),
         ({"lambdas": (1, 2, 3, 4, -5)}, r"lambdas\[4\] is -5"),
         ({"lambdas": (0, 0, 0, 0, 0)}, "lambdas are all 0"),
-        ({"lb": 0.3, "ub": 0.3}, "lb must lie below ub"),
+        ({"lb": 0.31, "ub": 0.3}, "lb must not lie above ub"),
         ({"ub": float("inf")}, "ub is inf: must be finite"),
         ({"divide_b_by": "two"}, "unknown variant `two`"),
         ({"norm": "max"}, "unknown variant `max`"),
         ({"margin": -0.1}, "margin is -0.1"),
         ({"horizon": float("nan")}, "horizon is nan"),
         ({"tolerance": 0}, "tolerance is 0: must be from 1e-10 to 0.1"),
-        ({"lb": [-1.0, 0.5], "ub": 0.5}, "bounds of synapse 1: 0.5 to 0.5 mV: lb must lie below ub"),
+        ({"lb": [-1.0, 0.6], "ub": 0.5}, "bounds of synapse 1: 0.6 to 0.5 mV: lb must not lie above ub"),
         ({"lb": [-1.0], "ub": [1.0, 1.0]}, "lb holds 1 bounds, ub 2"),
         ({"lb": []}, "bounds: there is none"),
         ({"ub": [1.0, float("inf")]}, r"ub\[1\] is inf: must be finite"),
@@ -501,7 +505,6 @@ def lists(*times):
     [
         ([], [], "patterns: there is none"),
         ([lists([1.0])], [], "targets: 0 lists for 1 patterns"),
-        ([lists([1.0])], [[]], "targets: no pattern has one"),
         ([lists()], [[5.0]], "pattern 0: has no train"),
         ([lists([], [])], [[5.0]], "pattern 0: has no spike"),
         ([lists([1.0]), lists([1.0], [2.0])], [[5.0], [5.0]], "pattern 1: 2 trains, pattern 0 has 1"),

@@ -62,7 +62,7 @@ def outcome(seed):
     else:
         assert cone.status_ == "solved", f"{where}: {cone.gap_}, {cone.violation_}"
         assert cone.gap_ <= 1e-8, where
-        assert min(cone.margin_) >= 0.5e-3, where
+        assert min(cone.margin_) >= 0.499 * min(cone.problem_.margin), where
         for pattern, times in zip(patterns, wanted, strict=True):
             fired = cone.neuron_.run(cone.weights_, pattern)
             assert len(fired) == len(times), f"{where}: {fired} for {times}"

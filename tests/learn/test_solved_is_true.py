@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import signal
+import threading
+import time
+
 import numpy as np
 import pytest
-from bruteforce import looked_at
+from bruteforce import looked_at, potential
+from stated import examples
 
-from taxel import Neuron, SpikeTrains
-from taxel.learn import ConeX, check_certificate
+from taxel import Neuron, ProblemError, SpikeTrains
+from taxel.learn import ConeR, ConeX, OnlineConeR, check_certificate
 
 #: Further problems are tried by `pytest -m slow`.
 QUICK, ALL = 60, 1000
@@ -127,3 +132,125 @@ def test_what_says_solved_fires_at_its_targets_and_nowhere_else(kind):
 def test_a_thousand_that_say_solved_fire_at_their_targets_and_nowhere_else(kind):
     for seed in range(QUICK, ALL):
         judged(*KINDS[kind](seed))
+
+
+@pytest.mark.parametrize("margin", [None, 1e-3])
+def test_without_a_margin_from_the_caller_a_verdict_holds_for_any(margin):
+    given = {} if margin is None else {"margin": margin, "slope": margin}
+    said = {}
+    for seed in [*range(40), 61, 93, 104, 131]:
+        patterns, targets = examples(seed, trains=30, patterns=4 + seed % 6, targets=1)
+        cone = ConeX(lb=-1, ub=1, **given)
+        cone.fit(patterns, targets)
+        assert cone.status_ in ("solved", "infeasible"), f"seed {seed}: {cone.reason_}"
+        assert cone.reason_ is None
+        if cone.status_ == "solved":
+            judged(cone, patterns, targets, margin=cone.problem_.margin.mv)
+        else:
+            assert check_certificate(cone.problem_, cone.certificate_)
+            assert cone.certificate_.at_all or margin is not None
+        said[cone.status_, cone.problem_.margin.mv] = cone
+    assert ("solved", 1e-3) in said
+    if margin is not None:
+        assert {mv for _, mv in said} == {1e-3}
+
+
+def test_what_is_undecided_at_the_least_margin_is_stopped_and_says_why():
+    # One input, and the target at the very top of its kernel: it touches the threshold, and no margin can be kept.
+    trains = SpikeTrains.from_lists([[10.0]], stop=60.0)
+    cone = ConeX(lb=-3, ub=3).fit([trains], [[25.0]])
+    assert cone.status_ == "stopped"
+    assert "the least margin that is tried" in cone.reason_
+    assert cone.certificate_ is None
+    assert np.isnan(cone.weights_).all()
+    fixed = ConeX(lb=-3, ub=3, margin=1e-3).fit([trains], [[25.0]])
+    assert fixed.status_ == "infeasible"
+    assert not fixed.certificate_.at_all
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"lambdas": (1, 0, 0)}, {"lambdas": (2, 2, 200)}, {"lambdas": (0, 0, 1)}], ids=str
+)
+@pytest.mark.parametrize("learner", [ConeX, ConeR])
+def test_equal_bounds_freeze_a_synapse(learner, options):
+    options = options if learner is ConeX else {}
+    frozen = [0.1, 0.0, -0.2]
+    for seed in range(4):
+        patterns, targets = examples(seed, trains=30, patterns=2, targets=1)
+        lb, ub = [*frozen, *[-1.0] * 27], [*frozen, *[1.0] * 27]
+        cone = learner(lb=lb, ub=ub, **options)
+        if learner is ConeX:
+            assert judged(cone, patterns, targets) == "solved"
+        else:
+            assert cone.fit(patterns, targets).status_ == "solved"
+        assert cone.weights_[:3].tolist() == frozen
+
+
+@pytest.mark.parametrize("learner", [ConeX, ConeR])
+def test_a_pattern_without_a_spike_may_teach_silence_and_may_not_have_a_target(learner):
+    patterns, targets = examples(1, trains=20, patterns=2, targets=1)
+    empty = SpikeTrains.from_lists([[]] * 20, stop=90.0)
+    alone = learner(lb=-1.0, ub=1.0).fit(patterns, targets)
+    beside = learner(lb=-1.0, ub=1.0).fit([*patterns, empty], [*targets, []])
+    assert (alone.status_, beside.status_) == ("solved", "solved")
+    assert beside.objective_ == pytest.approx(alone.objective_, rel=1e-6)
+    with pytest.raises(ProblemError, match="pattern 2: has no spike, so no weight can matter at its target"):
+        learner().fit([*patterns, empty], [*targets, [5.0]])
+
+
+def test_a_window_without_targets_is_fitted_by_both_that_take_windows():
+    trains = SpikeTrains.from_lists([[1.0], [2.0]], stop=9.0)
+    whole, online = ConeR().fit([trains], [[]]), OnlineConeR().partial_fit(trains, [])
+    for cone in (whole, online):
+        assert cone.status_ == "solved"
+        assert cone.weights_.tolist() == [0.0, 0.0]
+        assert (cone.objective_, cone.gap_) == (0.0, 0.0)
+
+
+def test_a_grid_of_more_points_than_can_be_had_is_one_clear_error_beforehand():
+    trains = SpikeTrains.from_lists([[5.0], [12.0], [30.0]], stop=60.0)
+    neuron = Neuron(time="grid", step_ms=1e-9)
+    for call in (
+        lambda: ConeX(neuron=neuron).fit([trains], [[20.0]]),
+        lambda: ConeR(neuron=neuron).fit([trains], [[20.0]]),
+        lambda: OnlineConeR(neuron=neuron).partial_fit(trains, [20.0]),
+        lambda: neuron.run([1.0] * 3, trains),
+        lambda: neuron.run_many([[1.0] * 3], trains),
+    ):
+        with pytest.raises(ProblemError, match=r"step_ms is 0.000000001 ms: makes 6.0e10 grid points, at most"):
+            call()
+
+
+def test_control_c_is_heard_by_a_neuron_on_a_fine_grid():
+    # Near its threshold for 2e8 points: none of them can be left out.
+    trains, neuron = SpikeTrains.from_lists([[0.0]], stop=30.0), Neuron(time="grid", step_ms=1e-7)
+    threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
+    begun = time.monotonic()
+
+    def run_for_ever():
+        for _ in range(100):
+            neuron.run([0.9], trains)
+
+    with pytest.raises(KeyboardInterrupt):
+        run_for_ever()
+    assert time.monotonic() - begun < 60
+
+
+@pytest.mark.parametrize("after_spike", ["keep", "ignore", "reset"])
+def test_cone_r_fires_at_the_targets_that_its_optimum_meets(after_spike):
+    met = early = 0
+    for seed in range(20):
+        patterns, targets = examples(seed, trains=40, patterns=2, targets=1, whole_ms=True)
+        cone = ConeR(neuron=Neuron(after_spike=after_spike), lb=-1.0, ub=1.0).fit(patterns, targets)
+        assert cone.status_ == "solved"
+        for pattern, (target,) in zip(patterns, targets, strict=True):
+            at = potential(cone.neuron_, cone.weights_, pattern, np.array([target]), [])
+            if abs(at[0] - cone.neuron_.theta_0) <= 1e-5:
+                met += 1
+                assert abs(at[0] - cone.neuron_.theta_0) <= 1e-12
+                fired = cone.neuron_.run(cone.weights_, pattern)
+                assert fired[0] <= target
+                early += bool(fired[0] < target)
+    # A silent row that it pays to break may fire before; the others fire at the target itself.
+    assert met > 10
+    assert early < met / 2

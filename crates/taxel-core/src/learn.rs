@@ -47,6 +47,11 @@ fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>
         check_example(neuron, p, pattern, targets)?;
         check_trains(p, pattern, patterns[0].len())?;
     }
+    Ok(())
+}
+
+/// Checks that there is a target in some pattern, for learners that learn nothing from silence alone.
+fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
     if targets.iter().all(Vec::is_empty) {
         return Err(problem!("targets: no pattern has one, so nothing is to be learnt"));
     }
@@ -56,6 +61,9 @@ fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>
 /// Checks one pattern, number `p`, and its targets.
 fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<()> {
     check_pattern(p, pattern)?;
+    if pattern.times.is_empty() && !targets.is_empty() {
+        return Err(problem!("pattern {p}: has no spike, so no weight can matter at its target"));
+    }
     for (k, &t) in targets.iter().enumerate() {
         if !t.is_finite() {
             return Err(problem!("pattern {p}, target {k}: time is {t}, must be finite"));
@@ -93,9 +101,6 @@ fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
     pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
     if pattern.is_empty() {
         return Err(problem!("pattern {p}: has no train"));
-    }
-    if pattern.times.is_empty() {
-        return Err(problem!("pattern {p}: has no spike, so no weight can matter in it"));
     }
     if pattern.values.is_some() {
         return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));

@@ -96,6 +96,11 @@ pub(crate) const AT_EDGE: f64 = 1e-6;
 /// How far below the threshold a potential may end and still count as reaching it, mV where `theta_0` is 0.3 mV and in
 /// proportion elsewhere: rounding of a potential that was trained to touch the threshold.
 const TOUCH: f64 = 1e-12;
+/// So many grid points are laid out at most (some GB), and so many stepped through (some ten seconds).
+const MOST_LAID_OUT: f64 = 2e7;
+const MOST_STEPPED: f64 = 1e9;
+/// Grid points between two looks for Ctrl-C.
+const POINTS_A_LOOK: f64 = 65_536.0;
 
 impl Default for Neuron {
     fn default() -> Self {
@@ -203,6 +208,27 @@ impl Neuron {
         })
     }
 
+    /// How many points of the grid lie from `start` to `end`.
+    pub(crate) fn points(&self, start: f64, end: f64) -> f64 {
+        (((end - start) / self.step_ms + 1e-9).floor() + 1.0).max(0.0)
+    }
+
+    /// Refuses more grid points than can be laid out, before memory is asked for.
+    pub(crate) fn check_rows(&self, points: f64) -> Result<()> {
+        self.check_points(points, MOST_LAID_OUT)
+    }
+
+    fn check_points(&self, points: f64, most: f64) -> Result<()> {
+        if points <= most {
+            return Ok(());
+        }
+        Err(problem!(
+            "step_ms is {} ms: makes {points:.1e} grid points, at most {most:.0e} can be had; take a larger step, or fewer or \
+             shorter patterns (times are in ms)",
+            self.step_ms
+        ))
+    }
+
     /// How far below the threshold a potential may end and still count as reaching it, mV.
     pub(crate) fn touch(&self) -> f64 {
         TOUCH * self.unit()
@@ -230,16 +256,43 @@ impl Neuron {
         stop: Stop<'_>,
     ) -> Result<Vec<OutputSpike>> {
         self.check_inputs(weights, trains)?;
+        if self.time == Time::Grid {
+            self.check_points(self.points(trains.start, trains.stop), MOST_STEPPED)?;
+        }
         let mut stream = self.stream(weights, threshold, trains.start)?;
         let mut out = Vec::new();
         for (k, spike) in trains.by_time().iter().enumerate() {
             if k % 4096 == 0 {
                 stop.check()?;
             }
+            self.advance(&mut stream, trains.start, spike.t, &mut out, stop)?;
             stream.push(spike.t, spike.train, &mut out)?;
         }
+        self.advance(&mut stream, trains.start, trains.stop, &mut out, stop)?;
         stream.advance(trains.stop, &mut out);
         Ok(out)
+    }
+
+    /// Moves a stream towards `to`, so far on a grid that what is left takes no time worth a look for Ctrl-C.
+    fn advance(
+        &self,
+        stream: &mut NeuronStream,
+        start: f64,
+        to: f64,
+        out: &mut Vec<OutputSpike>,
+        stop: Stop<'_>,
+    ) -> Result<()> {
+        if self.time == Time::Continuous {
+            return Ok(());
+        }
+        let stretch = POINTS_A_LOOK * self.step_ms;
+        let mut next = ((stream.now() - start) / stretch).floor() + 1.0;
+        while start + next * stretch < to {
+            stop.check()?;
+            stream.advance(start + next * stretch, out);
+            next += 1.0;
+        }
+        Ok(())
     }
 
     /// The potential at `times` (ms, ascending), given that the neuron fired at `spikes` (ms, ascending); mV.

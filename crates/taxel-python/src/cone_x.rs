@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::learn::ConeX;
 use taxel_core::learn::cone_x::{Engine, Fit, Problem, Round, Status};
-use taxel_core::learn::statement::{Row, Stated};
+use taxel_core::learn::statement::{Margin, Row, Stated};
 use taxel_core::problem;
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
@@ -57,11 +57,11 @@ fn weighed<'py>(py: Python<'py>, rows: &[(Row, f64)]) -> Weighed<'py> {
 /// A certificate as Python gets it: rows and multipliers, gap, whether it needs no margin, what it says.
 type CertificateOut<'py> = (Weighed<'py>, f64, bool, String);
 
-/// A fit as Python gets it: status, weights, objective, parts, gap, violation, margin, engine, rounds, held rows, certificate;
-/// and the exception of a signal that came meanwhile.
+/// A fit as Python gets it: status, weights, objective, parts, gap, violation, margins that hold and were asked for, engine, rounds,
+/// held rows, certificate, why it is stopped; and the exception of a signal that came meanwhile.
 type FitOut<'py> = (
     (&'static str, Bound<'py, PyArray1<f64>>, f64, [f64; 3], f64, f64),
-    ((f64, f64), &'static str, usize, Weighed<'py>, Option<CertificateOut<'py>>),
+    ([(f64, f64); 2], &'static str, usize, Weighed<'py>, Option<CertificateOut<'py>>, Option<String>),
     Option<Py<PyAny>>,
 );
 
@@ -89,6 +89,16 @@ impl ConeXProblem {
         let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
         let problem = enter(py, |stop| Problem::new(&parameters, &patterns, &targets, stop))?;
         Ok(Self { problem, max_seconds: parameters.max_seconds })
+    }
+
+    /// The margin of its rows, mV and mV/ms.
+    fn margin(&self) -> (f64, f64) {
+        let Margin { height, slope } = self.0.margin();
+        (height, slope)
+    }
+
+    fn with_margin(&self, py: Python<'_>, height: f64, slope: f64) -> PyResult<Self> {
+        enter(py, |_| Ok::<_, taxel_core::Error>(self.0.with_margin(Margin { height, slope }))).map(Self)
     }
 
     /// Least and largest weights.
@@ -126,7 +136,9 @@ impl ConeXProblem {
             };
             self.problem.fit(&start, &mut report, stop)
         })?;
-        let Fit { status, weights, objective, parts, gap, violation, margin, engine, rounds, held, certificate } = fit;
+        let Fit {
+            status, weights, objective, parts, gap, violation, engine, rounds, held, certificate, reason, ..
+        } = fit;
         let status = match status {
             Status::Solved => "solved",
             Status::Infeasible => "infeasible",
@@ -140,7 +152,7 @@ impl ConeXProblem {
         let held = weighed(py, &held);
         Ok((
             (status, array(py, weights), objective, parts, gap, violation),
-            ((margin.height, margin.slope), engine, rounds, held, certificate),
+            ([fit.margin, fit.asked].map(|m| (m.height, m.slope)), engine, rounds, held, certificate, reason),
             signal,
         ))
     }

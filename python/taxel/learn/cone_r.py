@@ -95,7 +95,10 @@ class ConeR(SpikeLearner):
     -----
     Thesis 6.3.3, equations 6.12 to 6.14. Solved by a proximal augmented Lagrangian with semismooth Newton steps, in
     which only rows near threshold are ever written out, or by row generation around the cone solver Clarabel. The gap
-    is computed apart from either, over all rows. Choices that the thesis leaves open stand on the page *Readings*.
+    is computed apart from either, over all rows. A target that the optimum meets is met to 1e-12 mV, within which a
+    neuron fires (both at `theta_0` 0.3 mV, in proportion elsewhere), and a silent row that it touches stays 1e-9 of
+    `theta_0` below its limit, as far as the objective stays within the tolerance. Choices that the thesis leaves open
+    stand on the page *Readings*.
 
     Examples
     --------
@@ -103,7 +106,7 @@ class ConeR(SpikeLearner):
     >>> cone = ConeR(neuron=Neuron(tau=10.0, after_spike="reset"), lb=-1.0, ub=1.0).fit([trains], [[20.0]])
     >>> cone.status_
     'solved'
-    >>> cone.neuron_.run(cone.weights_, trains, threshold=0.999)  # a target is met to rounding, from below as well
+    >>> cone.neuron_.run(cone.weights_, trains)
     array([20.])
     """
 

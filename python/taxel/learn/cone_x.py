@@ -114,7 +114,10 @@ class ConeX(SpikeLearner):
     norm : {"norm", "square"}
         The l2 term as printed, or squared.
     margin : float, mV, 0 or more, optional
-        How far below the threshold silence shall stay; where left out 1e-3 in continuous time, 0 on the grid. There the
+        How far below the threshold silence shall stay; where left out 1e-3 in continuous time, 0 on the grid. Where
+        neither it nor `slope` is given and no weights keep it, in continuous time a tenth, a hundredth and a
+        thousandth of both are tried (`problem_.margin` says which it was), so that "infeasible" holds for any margin
+        (``certificate_.at_all``); with one that is given it holds for that one. On the grid the
         best weights touch the threshold at many points, and a neuron that is run on the grid fires where it is touched:
         ask for 1e-9 or more.
     slope : float, mV/ms, 0 or more, optional
@@ -144,8 +147,10 @@ class ConeX(SpikeLearner):
         How far, relative to it, the objective can lie above the least one over all weights that keep the whole margin:
         a proven bound, whatever the engine said. (In continuous time these weights keep `margin_`, a little less.)
     margin_ : Margin
-        The margin that holds, at least half of what was asked for; on the grid, as `mv`, the least threshold -
-        potential over the silent points.
+        The margin that holds, at least half of what was asked for (`problem_.margin`); on the grid, as `mv`, the least
+        threshold - potential over the silent points.
+    reason_ : str or None
+        Why, where stopped.
     violation_ : float, mV
         How far the worst row is broken: targets missed, silence with half its margin.
     engine_ : {"native", "cone solver"}
@@ -183,7 +188,6 @@ class ConeX(SpikeLearner):
 
     _kind = "cone_x"
     _nested: ClassVar = {"neuron": Neuron}
-
     neuron: Neuron | None = _DEFAULT.neuron
     kappa: float = _DEFAULT.kappa
     delta_t_ms: float | None = _DEFAULT.delta_t_ms
@@ -204,6 +208,7 @@ class ConeX(SpikeLearner):
     parts_: dict[str, float] = field(init=False)
     gap_: float = field(init=False)
     margin_: Margin = field(init=False)
+    reason_: str | None = field(init=False)
     violation_: float = field(init=False)
     engine_: Literal["native", "cone solver"] = field(init=False)
     certificate_: Certificate | None = field(init=False)
@@ -253,7 +258,7 @@ class ConeX(SpikeLearner):
         first = [tuple(row) for row, _ in held]
         found = problem._problem.fit(first, multipliers, progress)
         (status, weights, objective, parts, gap, violation), rest, signal = found
-        margin, engine, rounds, (rows, multipliers), certificate = rest
+        (margin, asked), engine, rounds, (rows, multipliers), certificate, reason = rest
         self.status_ = status
         self.weights_ = weights
         self.objective_ = objective
@@ -261,6 +266,7 @@ class ConeX(SpikeLearner):
         self.gap_ = gap
         self.violation_ = violation
         self.margin_ = Margin(*margin)
+        self.reason_ = reason
         self.engine_ = engine
         self.rounds_ = rounds
         self.held_ = list(zip(map(_row, rows), multipliers.tolist(), strict=True))
@@ -268,7 +274,7 @@ class ConeX(SpikeLearner):
         if certificate is not None:
             (rows, multipliers), proven, at_all, text = certificate
             self.certificate_ = Certificate([_row(row) for row in rows], multipliers, proven, at_all, text)
-        self.problem_ = problem
+        self.problem_ = problem._with_margin(asked)
         self.neuron_ = neuron
         if signal is not None:
             raise signal
@@ -293,6 +299,8 @@ class ConeXProblem:
     lb, ub : float64, shape (trains,), mV
     targets : list of float64, ms
         One array a pattern.
+    margin : Margin
+        How far below the threshold its rows keep silence.
     """
 
     def __init__(self, cone: ConeX, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
@@ -303,13 +311,21 @@ class ConeXProblem:
     def _lay_out(self) -> None:
         self._problem = _core.ConeXProblem(*self._stated, self.targets)
         self.lb, self.ub = self._problem.bounds()
+        self.margin = Margin(*self._problem.margin())
+
+    def _with_margin(self, margin: tuple[float, float]) -> Self:
+        if self.margin != margin:
+            self._problem = self._problem.with_margin(*margin)
+            self.margin = Margin(*margin)
+        return self
 
     def __getstate__(self) -> dict[str, Any]:
-        return {"_stated": self._stated, "targets": self.targets}
+        return {"_stated": self._stated, "targets": self.targets, "margin": self.margin}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._lay_out()
+        self._with_margin(state["margin"])
 
     def row(self, row: Row | tuple[str, int, float], *, margin: bool = True) -> tuple[NDArray[np.float64], float]:
         """State a row by its name: ``coefficients @ w == limit`` at a target, ``<= limit`` else.

@@ -51,7 +51,7 @@ impl Bound {
     }
 }
 
-/// Checks that `lb` lies below `ub`, both finite, at every synapse.
+/// Checks that `lb` does not lie above `ub`, both finite, at every synapse; where they are equal the synapse is frozen.
 ///
 /// # Errors
 ///
@@ -68,9 +68,9 @@ pub fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
     }
     for n in 0..each.unwrap_or(1) {
         let (low, high) = (lb.at(n), ub.at(n));
-        if !(low.is_finite() && high.is_finite() && low < high) {
+        if !(low.is_finite() && high.is_finite() && low <= high) {
             let place = if each.is_some() { format!("bounds of synapse {n}:") } else { "bounds".to_owned() };
-            return Err(problem!("{place} {low} to {high} mV: lb must lie below ub, both finite"));
+            return Err(problem!("{place} {low} to {high} mV: lb must not lie above ub, both finite"));
         }
     }
     Ok(())

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::augmented::Start;
 use super::bounds::{Bound, bounds_of, check_bounds};
+use super::cone_program::HardRows;
+use super::minimise::Found;
+use super::nearest::nearest;
 use super::rounds::START_NEAR_MS;
 use super::rows::{Layout, SilentRows, TargetRow, target_rows};
 use super::{check_examples, check_trains};
@@ -14,6 +17,17 @@ use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
 use crate::vectors::{add, dot};
 use crate::{Result, SpikeTrains, Stop, problem};
+
+/// A row counts as met by the optimum where its multiplier lies so far within its range (of 1) and it is missed by no more
+/// than this share of `theta_0`.
+const WITHIN: f64 = 1e-6;
+const NEARLY_MET: f64 = 1e-3;
+/// Silent rows that the optimum touches are kept so far below their limit, of `theta_0`.
+const BELOW: f64 = 1e-9;
+/// The share of the tolerance that this may take: a later fit that starts here has the rest.
+const SPARED: f64 = 0.3;
+/// Rows a synapse, of those that are touched, beyond which they are left as they are.
+const MOST_TOUCHED: usize = 4;
 
 /// What B(w) is divided by.
 ///
@@ -155,6 +169,12 @@ impl ConeR {
             }
             _ => Ok(()),
         }
+    }
+
+    /// How many grid points a pattern has: to its stop, or one `tau` past its last target, or the horizon.
+    pub(super) fn points(&self, pattern: &SpikeTrains, targets: &[f64]) -> f64 {
+        let last = targets.last().map_or(pattern.stop, |t| pattern.stop.max(t + self.neuron.tau));
+        self.neuron.points(pattern.start, self.horizon.unwrap_or(last))
     }
 
     pub(super) fn layout(&self) -> Layout<'_> {
@@ -327,6 +347,7 @@ impl Problem {
         for (p, targets) in targets.iter().enumerate() {
             parameters.check_horizon(p, targets)?;
         }
+        neuron.check_rows(patterns.iter().zip(targets).map(|(p, t)| parameters.points(p, t)).sum())?;
         Self::laid_out(parameters, patterns, targets, stop)
     }
 
@@ -469,10 +490,10 @@ impl Problem {
         let d_max: f64 = potential.iter().zip(&self.silent.limit).map(|(u, l)| (u - l).max(0.0)).sum();
         let square = dot(&largest, &largest);
         Ok(Objective {
-            l1: l1 / largest.iter().sum::<f64>(),
+            l1: over(l1, largest.iter().sum()),
             l2: match parameters.norm {
-                Norm::Norm => l2 / square.sqrt(),
-                Norm::Square => l2 / square,
+                Norm::Norm => over(l2, square.sqrt()),
+                Norm::Square => over(l2, square),
             },
             b: match parameters.divide_b_by {
                 Divisor::Largest => over(b, b_max),
@@ -521,7 +542,8 @@ impl Problem {
         self.check_same_rows(parameters)?;
         let objective = self.objective(parameters)?;
         let start = self.start_from(&objective, start)?;
-        let found = self.minimise(&objective, parameters.tolerance, parameters.engine, start, progress, stop)?;
+        let mut found = self.minimise(&objective, parameters.tolerance, parameters.engine, start, progress, stop)?;
+        self.meet(&objective, parameters.tolerance, &mut found, stop)?;
         let weights: Vec<f64> = found.weights.iter().map(|w| w * self.unit).collect();
         let kept = || found.shares.iter().enumerate().filter(|s| *s.1 != 0.0);
         Ok(Fit {
@@ -537,6 +559,48 @@ impl Problem {
             refires: self.refires(&weights, pattern)?,
             weights,
         })
+    }
+
+    /// Moves the weights onto what they miss by no more than the solver's rounding: a neuron fires where it is touched.
+    ///
+    /// At the optimum a target whose multiplier lies within its range is met exactly, and so is a silent row; a silent row
+    /// is kept a hair below its limit. Taken back where the objective would leave the tolerance.
+    fn meet(&self, objective: &Objective, tolerance: f64, found: &mut Found, stop: Stop<'_>) -> Result<()> {
+        let (silent, theta) = (self.silent.len(), self.base.neuron.theta_0);
+        if found.gap > tolerance || found.shares.len() != silent + self.targets.len() {
+            return Ok(());
+        }
+        let excess = self.point(objective, found.weights.clone()).excess;
+        let within = |row: usize, low: f64| {
+            let share = found.shares[row] - low;
+            excess[row].abs() <= NEARLY_MET * theta && share > WITHIN && share < 1.0 - WITHIN
+        };
+        let targets: Vec<usize> = (0..self.targets.len()).filter(|k| within(silent + k, -0.5)).collect();
+        let touched = |row: &usize| within(*row, 0.0) || (-BELOW..WITHIN).contains(&(excess[*row] / theta));
+        let rows: Vec<usize> = (0..silent).filter(touched).collect();
+        let met = targets.iter().all(|k| excess[silent + k].abs() <= 0.1 * self.base.neuron.touch());
+        if (met && rows.is_empty()) || targets.len() + rows.len() > MOST_TOUCHED * self.trains {
+            return Ok(());
+        }
+        let equal: Vec<f64> = targets.iter().flat_map(|k| self.targets[*k].at.iter().copied()).collect();
+        let equal_to: Vec<f64> = targets.iter().map(|k| self.targets[*k].threshold).collect();
+        let below = self.silent.coefficients(&rows);
+        let limit: Vec<f64> = rows.iter().map(|row| self.silent.limit[*row] - BELOW * theta).collect();
+        let all = HardRows { equal: &equal, equal_to: &equal_to, below: &below, limit: &limit };
+        let least = found.objective * (1.0 - found.gap);
+        for rows in [all, HardRows { below: &[], limit: &[], ..all }] {
+            let Some(weights) = nearest(&found.weights, &rows, &objective.lower, &objective.upper, stop)? else {
+                continue;
+            };
+            let point = self.point(objective, weights);
+            let sum = point.parts.sum();
+            let gap = if sum > least { (sum - least) / sum } else { 0.0 };
+            if gap <= SPARED * tolerance {
+                (found.weights, found.parts, found.objective, found.gap) = (point.weights, point.parts, sum, gap);
+                break;
+            }
+        }
+        Ok(())
     }
 
     fn start_from(&self, objective: &Objective, start: Option<(&[f64], Option<&Shares>)>) -> Result<Start> {
@@ -580,7 +644,7 @@ impl Problem {
     }
 
     fn unreachable(&self, objective: &Objective) -> Vec<(usize, usize)> {
-        let most = |row: &TargetRow| row.at.iter().zip(&objective.upper).map(|(v, u)| v * u.max(0.0)).sum::<f64>();
+        let most = |row: &TargetRow| row.at.iter().zip(&objective.upper).map(|(v, u)| v * u).sum::<f64>();
         let out_of_reach = |row: &&TargetRow| most(row) < row.threshold;
         self.targets.iter().filter(out_of_reach).map(|r| (r.pattern, r.target)).collect()
     }

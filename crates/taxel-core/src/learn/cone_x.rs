@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 
 use super::bounds::{Bound, bounds_of, check_bounds};
 use super::certificate::{Bounds, Certificate};
-use super::check_examples;
 use super::cone_r::{Divisor, Norm};
 use super::silence::{Peak, Silence};
 use super::statement::{Margin, Row, Stated, Statement};
+use super::{check_examples, check_some_target};
 use crate::allowed::{Numbers, Range, ranges};
 use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
@@ -32,6 +32,10 @@ const BROKEN_SHARE: f64 = 2e-16;
 const KEPT_SHARE: f64 = 0.5;
 /// The margin and the slope in continuous time where none is given, mV and mV/ms.
 const MARGIN: f64 = 1e-3;
+/// Where no weights keep it, a smaller one is tried, down to this share of it, and to so many units.
+const SMALLER: f64 = 0.1;
+const LEAST_SHARE: f64 = 1e-3;
+const LEAST_MARGIN: f64 = 0.99e-6;
 /// An objective that is known to this share of what B is of no weights at all is known: every lift may be reached.
 pub(super) const NOTHING: f64 = 1e-10;
 /// Rounds end without a verdict after so many.
@@ -196,6 +200,9 @@ pub enum Status {
     Stopped,
 }
 
+/// Why a fit is stopped that was asked to.
+const ASKED: &str = "asked to stop, by max_seconds or Ctrl-C";
+
 /// What solved the problem over the working set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Engine {
@@ -237,6 +244,10 @@ pub struct Fit {
     pub violation: f64,
     /// The margin that holds; on the grid the least threshold - potential over the silent points, as `height`.
     pub margin: Margin,
+    /// The margin that was asked for at last: smaller than the first where nobody fixed it and no weights keep that.
+    pub asked: Margin,
+    /// Why a fit is stopped.
+    pub reason: Option<String>,
     /// What solved it.
     pub engine: Engine,
     /// Rounds of row generation.
@@ -257,6 +268,8 @@ pub struct Problem {
     silence: Silence,
     bounds: Bounds,
     objective: Objective,
+    /// Whether nobody fixed the margin.
+    free_margin: bool,
 }
 
 /// What turns weights into 6.11: normalised factors and the rows of B.
@@ -333,7 +346,10 @@ impl Problem {
     pub fn new(parameters: &ConeX, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Self> {
         parameters.check()?;
         check_examples(&parameters.neuron, patterns, targets)?;
+        check_some_target(targets)?;
         let unit = parameters.neuron.unit();
+        let free_margin =
+            parameters.margin.is_none() && parameters.slope.is_none() && parameters.neuron.time == Time::Continuous;
         let parameters = parameters.in_units(unit);
         let neuron = &parameters.neuron;
         let trains = patterns[0].len();
@@ -353,11 +369,28 @@ impl Problem {
             }
         }
         stop.check()?;
+        if neuron.time == Time::Grid {
+            let points = patterns.iter().zip(&ends).map(|(pattern, end)| neuron.points(pattern.start, *end)).sum();
+            neuron.check_rows(points)?;
+        }
         let statement = Statement::new(neuron, parameters.margin(), unit, patterns, targets, &ends);
         let objective = Objective::new(&parameters, &statement, &bounds)?;
         stop.check()?;
         let silence = Silence::new(&statement);
-        Ok(Self { parameters, statement, silence, bounds, objective })
+        Ok(Self { parameters, statement, silence, bounds, objective, free_margin })
+    }
+
+    /// The same problem with another margin, mV and mV/ms.
+    #[must_use]
+    pub fn with_margin(&self, margin: Margin) -> Self {
+        let statement = self.statement.with_margin(margin.times(1.0 / self.statement.unit));
+        Self { silence: Silence::new(&statement), statement, ..self.clone() }
+    }
+
+    /// What margin its rows have, mV and mV/ms.
+    #[must_use]
+    pub fn margin(&self) -> Margin {
+        self.statement.margin.times(self.statement.unit)
     }
 
     /// A row, with or without its margin, mV (a slope row: mV/ms).
@@ -401,6 +434,20 @@ impl Problem {
         let unit = self.statement.unit;
         let start: Vec<(Row, f64)> = start.iter().map(|&(row, multiplier)| (row, multiplier / unit)).collect();
         let mut fit = self.solve(&start, progress, stop)?;
+        let (first, mut rounds) = (self.statement.margin, fit.rounds);
+        let not_at_all = |fit: &Fit| fit.certificate.as_ref().is_some_and(|proof| !proof.at_all);
+        while self.free_margin && not_at_all(&fit) {
+            let margin = fit.asked.times(SMALLER);
+            if margin.height < (0.99 * LEAST_SHARE * first.height).max(LEAST_MARGIN) {
+                fit = self.undecided(&fit, rounds);
+                break;
+            }
+            let mut told = |round: Round| progress(Round { round: rounds + round.round, ..round });
+            fit = self.with_margin(margin.times(unit)).solve(&start, &mut told, stop)?;
+            rounds += fit.rounds;
+        }
+        fit.rounds = rounds;
+        fit.asked = fit.asked.times(unit);
         fit.weights.iter_mut().for_each(|w| *w *= unit);
         fit.violation *= unit;
         fit.margin = fit.margin.times(unit);
@@ -423,10 +470,30 @@ impl Problem {
             End::Infeasible(certificate) => Ok(self.refuted(certificate, rounds)),
             End::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
                 let best = self.mix(best, start, progress, stop)?;
-                self.report(best, !stop.asked())
+                self.report(best, stop.asked().then_some(ASKED))
             }
-            End::Met => self.report(best, true),
-            End::Stopped => self.report(best, false),
+            End::Met => self.report(best, None),
+            End::Stopped if stop.asked() => self.report(best, Some(ASKED)),
+            End::Stopped => self.report(best, Some("rows that rounding cannot tell apart are neither met nor refuted")),
+        }
+    }
+
+    /// A verdict that holds for the least margin only says nothing of smaller ones.
+    fn undecided(&self, fit: &Fit, rounds: usize) -> Fit {
+        let Margin { height, slope } = fit.asked.times(self.statement.unit);
+        let proof = fit.certificate.as_ref().map_or("", |proof| proof.text.as_str());
+        let reason = format!(
+            "no weights keep silence {height:.1e} mV below the threshold and come up to targets by {slope:.1e} mV/ms, the \
+             least margin that is tried; whether any do with less is not known ({proof})"
+        );
+        Fit {
+            status: Status::Stopped,
+            reason: Some(reason),
+            certificate: None,
+            gap: f64::INFINITY,
+            rounds,
+            held: vec![],
+            ..fit.clone()
         }
     }
 
@@ -439,6 +506,8 @@ impl Problem {
             gap: 0.0,
             violation: f64::INFINITY,
             margin: Margin { height: f64::NAN, slope: f64::NAN },
+            asked: self.statement.margin,
+            reason: None,
             engine: Engine::Native,
             rounds,
             held: certificate.rows.clone(),
@@ -447,7 +516,7 @@ impl Problem {
     }
 
     /// Measures the weights over all rows, whatever engine they come from.
-    fn report(&self, best: Best, ended: bool) -> Result<Fit> {
+    fn report(&self, best: Best, cut_short: Option<&str>) -> Result<Fit> {
         let Best { mut weights, least, held, engine, rounds } = best;
         // A bound that binds is met to rounding, from either side.
         for ((w, &l), &u) in weights.iter_mut().zip(&self.bounds.lower).zip(&self.bounds.upper) {
@@ -461,9 +530,25 @@ impl Problem {
         let known = gap <= self.parameters.tolerance || above <= nothing;
         let (missed, broken) = (self.missed(&weights)?, self.worst(&weights));
         let kept = missed <= MET && broken <= self.rounding(&weights);
+        let unit = self.statement.unit;
+        let reason = if let Some(reason) = cut_short {
+            Some(reason.to_owned())
+        } else if !kept {
+            Some(format!(
+                "targets are missed by {:.1e} mV, silence is broken by {:.1e} mV",
+                missed * unit,
+                broken * unit
+            ))
+        } else if !known {
+            Some(format!("the objective is only proven to lie within {gap:.1e} of its least value"))
+        } else {
+            None
+        };
         Ok(Fit {
-            status: if ended && kept && known { Status::Solved } else { Status::Stopped },
-            margin: self.margin(&weights),
+            status: if reason.is_none() { Status::Solved } else { Status::Stopped },
+            reason,
+            asked: self.statement.margin,
+            margin: self.kept_margin(&weights),
             weights,
             objective,
             parts,
@@ -505,7 +590,7 @@ impl Problem {
     }
 
     /// The largest share of the margin that holds, 0 where silence is broken; on the grid the least threshold - potential.
-    fn margin(&self, weights: &[f64]) -> Margin {
+    fn kept_margin(&self, weights: &[f64]) -> Margin {
         if self.parameters.neuron.time == Time::Grid {
             let peaks = self.silence.broken(weights, 0.0, f64::NEG_INFINITY);
             return Margin { height: -largest(peaks.iter().map(|peak| peak.excess)), slope: 0.0 };

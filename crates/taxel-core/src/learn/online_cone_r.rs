@@ -62,6 +62,8 @@ impl OnlineConeR {
         let parameters = &self.parameters;
         check_example(&parameters.neuron, self.seen, pattern, targets)?;
         parameters.check_horizon(self.seen, targets)?;
+        let rows = self.problem.as_ref().map_or(0, Problem::silent_and_free_rows);
+        parameters.neuron.check_rows(rows as f64 + parameters.points(pattern, targets))?;
         if let Some(problem) = &mut self.problem {
             problem.check_trains(self.seen, pattern)?;
             let silent = problem.silent_and_free_rows();

@@ -185,6 +185,11 @@ impl Statement {
         }
     }
 
+    /// The same with another margin.
+    pub(super) fn with_margin(&self, margin: Margin) -> Self {
+        Self { margin, taper: Taper::new(self.shape, margin), ..self.clone() }
+    }
+
     /// What the margin takes off a row's limit, mV (mV/ms in a slope row).
     #[must_use]
     pub fn margin_of(&self, row: Row) -> f64 {

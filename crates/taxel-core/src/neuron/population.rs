@@ -101,6 +101,9 @@ impl Neuron {
             let (given, inputs) = (weights.len(), trains.len());
             return Err(problem!("weights: {given} for {neurons} neurons of {inputs} trains, must be one each"));
         }
+        if self.time == Time::Grid {
+            self.check_rows(self.points(trains.start, trains.stop))?;
+        }
         let script = match self.time {
             Time::Continuous => Script::Continuous(continuous::Script::new(self, trains, threshold)),
             Time::Grid => Script::Grid(grid::Script::new(self, trains, threshold)),

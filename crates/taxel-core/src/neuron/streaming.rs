@@ -78,6 +78,11 @@ impl NeuronStream {
         }
     }
 
+    /// What time has come to, ms.
+    pub(super) fn now(&self) -> f64 {
+        self.now
+    }
+
     /// The potential now, as 6.7 has it (0 in the refractory time), mV.
     #[must_use]
     pub fn potential(&self) -> f64 {

@@ -85,14 +85,15 @@ impl Problem {
         while needed < kept.len() && !stop.asked() {
             let others = kept.iter().enumerate().filter(|(k, _)| *k != needed).map(|(_, row)| *row).collect::<Vec<_>>();
             match self.conflict(&others, stop)? {
-                Some(fewer) => {
+                // A proof that needs no margin stays one.
+                Some(fewer) if fewer.at_all || !proof.at_all => {
                     kept.retain(|row| fewer.rows.iter().any(|r| r.0 == *row));
                     fewest = fewer;
                 }
-                None => needed += 1,
+                _ => needed += 1,
             }
         }
-        Ok(Some(if proof.at_all && !fewest.at_all { proof } else { fewest }))
+        Ok(Some(fewest))
     }
 
     /// A proof that these rows cannot be met together.

@@ -148,6 +148,7 @@ impl Rival {
             patterns,
             targets,
         )?;
+        crate::learn::check_some_target(targets)?;
         self.law.train(self, Examples { patterns, targets, start }, report, stop)
     }
 

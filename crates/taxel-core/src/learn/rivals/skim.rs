@@ -278,6 +278,7 @@ impl Skim {
     pub fn reduce(&self, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Normal> {
         self.check()?;
         crate::learn::check_examples(&Neuron { refractory: 0.0, ..Neuron::default() }, patterns, targets)?;
+        crate::learn::check_some_target(targets)?;
         let columns = self.columns(patterns[0].len());
         let mut normal = Normal::new(columns);
         for (pattern, targets) in patterns.iter().zip(targets) {

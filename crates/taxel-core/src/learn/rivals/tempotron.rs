@@ -319,6 +319,9 @@ fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
     }
     for (p, pattern) in patterns.iter().enumerate() {
         crate::learn::check_pattern(p, pattern)?;
+        if labels[p] && pattern.times.is_empty() {
+            return Err(problem!("pattern {p}: has no spike, so no weight can make the neuron fire in it"));
+        }
         crate::learn::check_trains(p, pattern, patterns[0].len())?;
     }
     Ok(())
