@@ -17,6 +17,7 @@ mod rounds;
 mod rows;
 mod silence;
 pub mod statement;
+mod touched;
 
 pub use bounds::Bound;
 pub use cone_r::{ConeR, Divisor, Engine, Fit, Norm, Parts, Problem, Round, Shares, Status};

@@ -93,12 +93,14 @@ impl ConeXProblem {
 
     /// The margin of its rows, mV and mV/ms.
     fn margin(&self) -> (f64, f64) {
-        let Margin { height, slope } = self.0.margin();
+        let Margin { height, slope } = self.problem.margin();
         (height, slope)
     }
 
     fn with_margin(&self, py: Python<'_>, height: f64, slope: f64) -> PyResult<Self> {
-        enter(py, |_| Ok::<_, taxel_core::Error>(self.0.with_margin(Margin { height, slope }))).map(Self)
+        let margin = Margin { height, slope };
+        let problem = enter(py, |_| Ok::<_, taxel_core::Error>(self.problem.with_margin(margin)))?;
+        Ok(Self { problem, max_seconds: self.max_seconds })
     }
 
     /// Least and largest weights.
