@@ -185,9 +185,11 @@ def test_detections_are_chosen_by_label_time_and_place() -> None:
     assert repr(found[:0]) == "Detections(none)"
     assert found != found[:2]
     assert found != 5
-    for wrong in (None, 9, [9], [True], 1.5, [[1]], object()):
+    for wrong in (None, [9], [True], 1.5, [[1]], object()):
         with pytest.raises(taxel.ProblemError):
             found[wrong]  # type: ignore[index]
+    with pytest.raises(IndexError):
+        found[9]
     for start, stop in ((5, 1), (None, 1), ("a", "b"), (math.nan, 1)):
         with pytest.raises(taxel.ProblemError, match="start"):
             found.between(start, stop)  # type: ignore[arg-type]
