@@ -23,7 +23,10 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
             &["detect"],
         ],
     ),
-    ("taxel-live", &[&["error", "address", "clock", "latency"], &["recording"], &["capture"], &["emulate", "pipeline"]]),
+    (
+        "taxel-live",
+        &[&["error", "address", "clock", "latency"], &["recording"], &["capture"], &["emulate", "pipeline"]],
+    ),
     (
         "taxel-python",
         &[

@@ -248,12 +248,16 @@ mod tests {
         let mut board = Board::new(Registers { wire_version: 2, ..Registers::default() }, &array).unwrap();
         let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
         let (mut events, mut repaired) = (Events::empty(array), vec![]);
-        play(&mut board, 3, |datagram| drop(receiver.push(datagram, Some(0), &mut events, &mut repaired)));
+        play(&mut board, 3, |datagram| {
+            receiver.push(datagram, Some(0), &mut events, &mut repaired);
+        });
         assert_eq!((receiver.version(), receiver.changes()), (2, 1));
         speak(&mut board, 1);
         receiver.expect(1, &mut events);
         let heard = events.len();
-        play(&mut board, 2, |datagram| drop(receiver.push(datagram, Some(400), &mut events, &mut repaired)));
+        play(&mut board, 2, |datagram| {
+            receiver.push(datagram, Some(400), &mut events, &mut repaired);
+        });
         assert_eq!((receiver.version(), receiver.refused()), (1, 0));
         assert_eq!(events.len(), heard + 2 * 4096);
     }
