@@ -194,7 +194,7 @@ def rust_table(source: Table) -> str:
             defaults.append(
                 f"    pub(super) const fn {field['name']}() -> {rust_type(field)} {{\n        {field['default']}\n    }}"
             )
-        unit = "" if field["unit"] in ("flag", "lines", "channels", "version") else f" [{field['unit']}]"
+        unit = "" if field["unit"] in ("flag", "lines", "channels", "version") else f" In units of {field['unit']}."
         struct.append(f"    /// {field['text']}{unit}\n{rename}    pub {field['name']}: {rust_type(field)},")
     words, masks, stores = [], [], []
     for register in range(8):
@@ -484,7 +484,7 @@ def schema(source: Table) -> str:
     properties = {}
     for f in source["field"]:
         kind: Table = {"type": "boolean"} if f["unit"] == "flag" else {"type": "integer", "minimum": f["least"]}
-        unit = "" if f["unit"] in ("flag", "lines", "channels", "version") else f" [{f['unit']}]"
+        unit = "" if f["unit"] in ("flag", "lines", "channels", "version") else f" In units of {f['unit']}."
         properties[f["name"]] = kind | {"description": f["text"] + unit}
     title = {"title": "taxel.Registers", "description": "What the board's registers hold", "type": "object"}
     return json.dumps(title | {"properties": properties}, indent=2) + "\n"

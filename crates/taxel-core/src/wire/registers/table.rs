@@ -22,31 +22,31 @@ pub struct Registers {
     /// Which version of the wire the board speaks (read: the manual has one).
     #[serde(default = "at_reset::wire_version")]
     pub wire_version: u8,
-    /// FA-1: by how much a spike raises the threshold, T A of Table 5.3. [1/256 theta_0]
+    /// FA-1: by how much a spike raises the threshold, T A of Table 5.3. In units of 1/256 theta_0.
     #[serde(default = "at_reset::threshold_jump")]
     pub threshold_jump: u16,
-    /// Time from one driven line to the next. [10 ns]
+    /// Time from one driven line to the next. In units of 10 ns.
     #[serde(alias = "row_change_period")]
     pub line_period: u32,
-    /// Part of it in which the line is read. [10 ns]
+    /// Part of it in which the line is read. In units of 10 ns.
     #[serde(alias = "row_read_duration")]
     pub line_read: u32,
-    /// Time from one multiplexer step to the next. [10 ns]
+    /// Time from one multiplexer step to the next. In units of 10 ns.
     #[serde(alias = "col_change_period")]
     pub step_period: u16,
-    /// Part of it in which the channels are read. [10 ns]
+    /// Part of it in which the channels are read. In units of 10 ns.
     #[serde(alias = "col_read_duration")]
     pub step_read: u16,
-    /// How long the ramp rises. [ticks]
+    /// How long the ramp rises. In units of ticks.
     #[serde(alias = "ramp_time")]
     pub ramp: u16,
-    /// FA-1: theta_0, in ticks after the power law. [1/1024]
+    /// FA-1: theta_0, in ticks after the power law. In units of 1/1024.
     #[serde(default = "at_reset::threshold_rest")]
     pub threshold_rest: u16,
-    /// FA-1: by how much a quiet frame lowers the threshold, B of Table 5.3. [1/1024 theta_0]
+    /// FA-1: by how much a quiet frame lowers the threshold, B of Table 5.3. In units of 1/1024 theta_0.
     #[serde(default = "at_reset::threshold_decay")]
     pub threshold_decay: u8,
-    /// Smallest difference that makes no event. [ticks]
+    /// Smallest difference that makes no event. In units of ticks.
     pub noise_floor: u8,
     /// Driven lines (the register holds one less; the manual's field has 6 bits, read: 8).
     pub lines: u16,
