@@ -1,7 +1,7 @@
 //! Vector instructions: what the machine has, how a function is compiled for it, and eight numbers at once.
 //!
-//! Two ways in. [`wide!`] compiles a plain loop for each width and changes nothing else, so all machines give the same
-//! bits. [`kernel!`] compiles a function over [`Vector`]s, whose [`Vector::add_product`] rounds once where the machine
+//! Two ways in. `wide!` compiles a plain loop for each width and changes nothing else, so all machines give the same
+//! bits. `kernel!` compiles a function over `Vector`s, whose `Vector::add_product` rounds once where the machine
 //! fuses multiply and add, so its sums differ between machines in their last places.
 
 mod aligned;

@@ -20,7 +20,7 @@ pub fn of_host(host: &str, port: u16) -> Result<SocketAddr> {
     Ok(*first)
 }
 
-/// The address that a text such as "127.0.0.1:5208", "localhost:5208" or "[::1]:5208" names.
+/// The address that a text such as "127.0.0.1:5208", "localhost:5208" or "`[::1]`:5208" names.
 ///
 /// # Errors
 ///
