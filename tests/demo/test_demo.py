@@ -126,7 +126,7 @@ def test_footfalls_of_a_plate_are_laid_over_the_array(tmp_path):
     [
         (["--noise", "0"], "noise"),
         (["--data", "nowhere"], "plate"),
-        (["-o", "nowhere/x.json"], "no folder"),
+        (["-o", "nowhere/x.json"], "nowhere: no such folder"),
     ],
 )
 def test_what_the_user_got_wrong_is_one_line(arguments, said, tmp_path):

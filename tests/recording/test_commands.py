@@ -94,7 +94,7 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("info",), "Missing argument"),
+        (("info",), "FILE is missing"),
         (("info", "nothing.mcap"), "nothing.mcap: no such file or directory"),
         (("info", "."), ".: holds no recording; there are .mcap"),
         (("convert", "WALK", "walk.xyz"), "must be .mcap, .lsa, .npz, .csv"),

@@ -40,7 +40,7 @@ def test_the_insole_has_92_taxels_and_loses_no_load():
     mine = insole.footprint(trial)
     cut = insole.cut(trial, mine.origin_mm, insole.placement([mine]))
     assert cut.values.shape == (60, 1, 92)
-    assert np.allclose(cut.total, trial.frames.total, rtol=1e-5)
+    assert np.allclose(cut.total(), trial.frames.total(), rtol=1e-5)
     heel = cut.values[:, 0, insole.HEEL].sum(axis=1)
     toes = cut.values[:, 0, insole.TOES].sum(axis=1)
     assert heel[3] > 0.9 * cut.total()[3]

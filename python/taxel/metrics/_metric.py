@@ -40,7 +40,8 @@ def _plain(metric: str, name: str, value: Any) -> Any:
         # JSON has no number for what is not finite; where infinity makes sense, the compiled part reads its name.
         cost = number(name, value, known["unit"])
         return cost if math.isfinite(cost) else str(cost)
-    return bare(name, value, known.get("unit") or None)
+    plain = bare(name, value, known.get("unit") or None)
+    return float(plain) if isinstance(plain, np.ndarray) and plain.ndim == 0 else plain
 
 
 def distance(metric: str, a: Pattern, b: Pattern, given: Mapping[str, Any]) -> float:
