@@ -25,7 +25,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
     ),
     (
         "taxel-live",
-        &[&["error", "address", "clock", "latency"], &["recording"], &["capture"], &["emulate", "pipeline"]],
+        &[&["error", "clock", "latency"], &["address"], &["recording"], &["capture"], &["emulate", "pipeline"]],
     ),
     (
         "taxel-python",
