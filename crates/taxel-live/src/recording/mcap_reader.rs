@@ -365,6 +365,9 @@ impl Blocks {
                     reader.notify_read(more);
                     given += more;
                 }
+                // Nothing else is looked at, and what nobody parses cannot be wrong.
+                Ok(LinearReadEvent::Record { opcode, .. }) if !matches!(opcode, op::CHANNEL | op::MESSAGE) => {}
+                Ok(LinearReadEvent::Record { data, opcode }) if !texts_fit(opcode, data) => return Ok(false),
                 Ok(LinearReadEvent::Record { data, opcode }) => match parse_record(opcode, data) {
                     Ok(record) => {
                         if !take(record) {
@@ -377,6 +380,30 @@ impl Blocks {
             }
         }
         Ok(true)
+    }
+}
+
+/// Whether the texts of a channel's or a metadata record end within it: the parser asks for their memory before it looks.
+fn texts_fit(opcode: u8, data: &[u8]) -> bool {
+    fn text(data: &[u8]) -> Option<&[u8]> {
+        let (length, rest) = data.split_first_chunk::<4>()?;
+        rest.get(u32::from_le_bytes(*length) as usize..)
+    }
+    /// A table of texts by name, as long as it says.
+    fn table(data: &[u8]) -> Option<()> {
+        let (length, rest) = data.split_first_chunk::<4>()?;
+        let mut pairs = rest.get(..u32::from_le_bytes(*length) as usize)?;
+        while !pairs.is_empty() {
+            pairs = text(text(pairs)?)?;
+        }
+        Some(())
+    }
+    match opcode {
+        // Two numbers of 16 bits, topic, encoding, table.
+        op::CHANNEL => data.get(4..).and_then(text).and_then(text).and_then(table).is_some(),
+        // Name, table.
+        op::METADATA => text(data).and_then(table).is_some(),
+        _ => true,
     }
 }
 
@@ -521,6 +548,9 @@ impl<'a> Walk<'a> {
             return Ok(());
         }
         let body = self.bytes(at + RECORD_HEAD, length)?;
+        if !texts_fit(op::METADATA, &body) {
+            return Ok(());
+        }
         let Ok(Record::Metadata(record)) = parse_record(op::METADATA, &body) else { return Ok(()) };
         let header = record.metadata.get("header").and_then(|text| serde_json::from_str(text).ok());
         match record.name.as_str() {
