@@ -411,3 +411,7 @@ class ConeXProblem:
         tuple[list[tuple[float, float]], Any, int, _Weighed, tuple[_Weighed, float, bool, str] | None, str | None],
         Any,
     ]: ...
+
+# panel: the files of its page, by their names below crates/taxel-live/web
+
+def page_file(name: str) -> bytes: ...

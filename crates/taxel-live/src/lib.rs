@@ -7,6 +7,7 @@ pub mod latency;
 
 pub mod capture;
 pub mod emulate;
+pub mod panel;
 pub mod pipeline;
 pub mod recording;
 

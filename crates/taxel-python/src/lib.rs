@@ -14,6 +14,7 @@ mod live;
 mod metrics;
 mod neuron;
 mod nouns;
+mod panel;
 mod parameters;
 mod recording;
 mod rivals;
@@ -37,6 +38,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     learn::register(module)?;
     neuron::register(module)?;
     described::register(module)?;
+    panel::register(module)?;
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;

@@ -1,0 +1,3 @@
+//! The live panel: what a browser is shown.
+
+pub mod assets;
