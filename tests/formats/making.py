@@ -152,3 +152,59 @@ def write_popu(folder: Path, readings=None, names=("left1_0", "supine2_1")) -> P
     given = np.arange(48).reshape(2, 2, 4, 3) if readings is None else readings
     np.savez(file, readings=np.asarray(given, np.uint8), pose=np.array(names))
     return file
+
+
+def write_tekscan(folder: Path, change=lambda rows: rows, unit="raw", name="press.csv") -> Path:
+    """Write a movie of 6 frames of 4 x 5 cells, one of which does not exist; frame 4 is missing."""
+    head = [
+        "DATA_TYPE MOVIE",
+        "VERSION made here",
+        "SENSOR_TYPE 6900",
+        "ROWS 4",
+        "COLS 5",
+        "ROW_SPACING 0.2 centimeters",
+    ]
+    head += [
+        "COL_SPACING 5 mm",
+        "SECONDS_PER_FRAME 0.032",
+        "COMMENTS:",
+        "a thumb",
+        f"UNITS {unit}",
+        "ASCII_DATA @@",
+        "",
+    ]
+    rows = []
+    for number in (1, 2, 3, 5, 6):
+        cells = (np.arange(20).reshape(4, 5) * number) % 50
+        cells[0, 0] = 0
+        told = f", {0.032 * (number - 1):g},, 1/2/2024,,,Raw Sum=,,{cells.sum()}" if unit == "raw" else ""
+        rows.append(f"Frame {number}{told}")
+        rows += [
+            ",".join("B" if (r, c) == (0, 0) else str(v) for c, v in enumerate(row)) for r, row in enumerate(cells)
+        ]
+        rows.append("")
+    file = folder / name
+    file.write_text("\n".join(change([*head, *rows[:-1], "@@"])) + "\n")
+    return file
+
+
+def write_emed(folder: Path, change=lambda rows: rows) -> Path:
+    """Write a step of 3 pictures, of which rows 3 to 6 and columns 2 to 4 of 8 x 10 sensors are printed."""
+    lines = []
+    for page in (1, 2, 3):
+        lines += [
+            f"\t\t\t\tPage {page}",
+            "",
+            "\tFile: 2.dat \tMatrix: 8x10 ",
+            "\tSensor area: 0.25 cm²\tTime/picture:10.0 ms",
+        ]
+        lines += ["\tSensor size: 0.500x0.500 cm", f"\tPict-No.: {page}  Force[N]=sum*sensor_area in row/column", ""]
+        cells = 5.0 * page * np.array([[0, 1, 0], [2, 3, 1], [4, 6, 2], [1, 2, 0]])
+        lines.append("\t" + "\t".join(["2", "3", "4", "Force"]))
+        for row, values in zip(range(3, 7), cells, strict=True):
+            lines.append("\t".join([str(row), *(f"{v:.2f}" for v in values), f"{values.sum() * 0.025:.2f}"]))
+        forces = [*(cells.sum(axis=0) * 0.025), cells.sum() * 0.025]
+        lines += ["Force\t" + "\t".join(f"{v:.2f}" for v in forces), "\x0c"]
+    file = folder / "step.lst"
+    file.write_bytes("\n".join(change(lines)).encode("latin-1"))
+    return file

@@ -25,8 +25,8 @@ def test_a_folder_of_no_or_of_several_formats_is_refused(tmp_path):
     with pytest.raises(FormatError, match=r"several formats \(gaitpdb, pedar\)"):
         list(formats.trials(tmp_path))
     assert len(list(formats.trials(tmp_path, "pedar"))) == 2
-    with pytest.raises(ProblemError, match="format is 'emed': must be one of"):
-        list(formats.trials(tmp_path, "emed"))
+    with pytest.raises(ProblemError, match="format is 'zebris': must be one of"):
+        list(formats.trials(tmp_path, "zebris"))
     with pytest.raises(FileNotFoundError):
         list(formats.trials(tmp_path / "nothing"))
 

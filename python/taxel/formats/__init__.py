@@ -4,7 +4,7 @@ Examples
 --------
 >>> from taxel import formats
 >>> sorted(formats.FORMATS)
-['gaitndd', 'gaitpdb', 'icub', 'moticon', 'pedar', 'plate', 'popu']
+['emed', 'gaitndd', 'gaitpdb', 'icub', 'moticon', 'pedar', 'plate', 'popu', 'tekscan']
 """
 
 from __future__ import annotations
@@ -56,6 +56,8 @@ FORMATS = {
         "gaitndd",
         "moticon",
         "pedar",
+        "emed",
+        "tekscan",
         "icub",
         "popu",
     )

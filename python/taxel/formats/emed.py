@@ -1,0 +1,210 @@
+"""novel emed plates: the ``.lst`` export, a page a picture, kPa on 64 x 95 sensors or other sizes.
+
+Each page has a head, the numbers of the columns that are printed, a line a row with its number first, and margins: the
+last column and the last line, ``Force``, are the forces of row and column in N, not sensors. What is not printed was
+not loaded. Pages without a picture's number are summaries and are left out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _arguments as arguments
+from taxel._core import FormatError
+from taxel._limits import TIME_US, sensor, unpacked
+from taxel.array import Array
+from taxel.formats import text
+from taxel.formats.trial import Trial
+from taxel.frames import Frames
+
+__all__ = ["files", "trials"]
+
+_MARGIN = "Force"
+_NUMBER = r"(\d{1,9}(?:\.\d{1,9})?)"
+_HEAD = {
+    "matrix": re.compile(r"Matrix:\s*(\d{1,5})\s*x\s*(\d{1,5})"),
+    "size": re.compile(rf"Sensor size:\s*{_NUMBER}\s*x\s*{_NUMBER}\s*cm"),
+    "period": re.compile(rf"Time/picture:\s*{_NUMBER}\s*ms"),
+}
+_PICTURE = re.compile(r"Pict-No\.:\s*(\d{1,9})\b")
+#: Force in N over the sum of cells times their area in cm2, by the unit of the cells.
+_NEWTON = {"kPa": 0.1, "N/cm2": 1.0}
+
+
+def files(path: Path) -> list[Path]:
+    """Find the files of this format: ``.lst`` whose head names the matrix and the time a picture."""
+    found = sorted(path.glob("*.lst")) if path.is_dir() else [path]
+    return [f for f in found if f.suffix == ".lst" and _is_export(f)]
+
+
+def _is_export(path: Path) -> bool:
+    with path.open("rb") as file:
+        head = file.read(65_536)
+    return b"Matrix:" in head and b"Time/picture:" in head
+
+
+def trials(path: str | Path) -> Iterator[Trial]:
+    """Read the step of one file, or of all in a folder, one after the other.
+
+    Picture 1 is at 0 us. The file does not say its unit: it is the one in which the cells make the forces that the file
+    states, and where a page's cells do not make its force, that page is wrong.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Yields
+    ------
+    Trial
+        ``series["total"]`` is the force that each page states, N.
+
+    Raises
+    ------
+    FormatError : a file that does not hold what it should (names file and line)
+    """
+    place = Path(arguments.path("path", path))
+    found = files(place)
+    if not found:
+        raise FormatError(f"{place}: no emed .lst in it")
+    for file in found:
+        yield _read(file)
+
+
+@dataclass(frozen=True)
+class _Page:
+    """One picture: its number, the line that says so, the printed rectangle, the force that the page states."""
+
+    number: int
+    line: int
+    rows: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    values: NDArray[np.float64]
+    force: float
+    force_line: int
+
+
+def _read(file: Path) -> Trial:
+    content = text.lines(file)
+    shape, size, period = _head(file, content)
+    begins = [k for k, line in enumerate(content) if _PICTURE.search(line)]
+    if not begins:
+        raise FormatError(f"{file.name}: no page with a picture's number (Pict-No.: 1)")
+    pages = [
+        _page(file, content, begin, end, shape) for begin, end in zip(begins, [*begins[1:], len(content)], strict=True)
+    ]
+    for before, page in pairwise(pages):
+        if page.number <= before.number:
+            raise FormatError(f"{file.name}, line {page.line}: picture {page.number} after picture {before.number}")
+    t = np.rint((np.array([page.number for page in pages], np.float64) - 1) * period * 1000)
+    if t[-1] > TIME_US or (np.diff(t) <= 0).any():
+        raise FormatError(f"{file.name}: {period:g} ms a picture; must be .001 ms or more, and end within 142 years")
+    unpacked(file.name, 4 * len(pages) * shape[0] * shape[1])
+    values = np.zeros((len(pages), *shape), np.float32)
+    for picture, page in zip(values, pages, strict=True):
+        picture[np.ix_(page.rows, page.columns)] = page.values
+    # An aspect other than 1 would show in the two sizes: areas hold all the same.
+    array = Array(*shape, pitch_mm=10 * float(np.sqrt(size[0] * size[1])), name="emed plate")
+    return Trial(
+        name=file.stem,
+        person=file.stem,
+        recorded=Frames(values, t.astype(np.int64), unit=_unit(file, pages, size[0] * size[1]), array=array),
+        truth={},
+        source="none: the file has no truth",
+        series={"total": np.array([page.force for page in pages])},
+        about={"sensor_cm": f"{size[0]:g} x {size[1]:g}"},
+    )
+
+
+def _head(file: Path, content: Sequence[str]) -> tuple[tuple[int, int], tuple[float, float], float]:
+    """Return rows and columns, the size of a sensor in cm, and the time a picture in ms."""
+    first = next((k for k, line in enumerate(content) if _PICTURE.search(line)), len(content))
+    head = "\n".join(content[: first + 1])
+    found = {name: pattern.search(head) for name, pattern in _HEAD.items()}
+    wanted = {"matrix": "Matrix: 64x95", "size": "Sensor size: 0.500x0.500 cm", "period": "Time/picture:10.0 ms"}
+    for name, match in found.items():
+        if match is None:
+            raise FormatError(f"{file.name}, line {first + 1}: no '{wanted[name]}' before it")
+    said = {name: tuple(float(n) for n in match.groups()) for name, match in found.items() if match is not None}
+    for name, numbers in said.items():
+        if min(numbers) <= 0:
+            raise FormatError(f"{file.name}, line {first + 1}: before it a {name} of 0; must be as '{wanted[name]}'")
+    # Columns come first: the rows that are printed reach beyond the first number.
+    columns, rows = (int(n) for n in said["matrix"])
+    if max(rows, columns) > 65_535:
+        raise FormatError(f"{file.name}: a matrix of {columns} x {rows}; at most 65535 a side")
+    sensor(file.name, Array(rows, columns))
+    return (rows, columns), (said["size"][0], said["size"][1]), said["period"][0]
+
+
+def _page(file: Path, content: Sequence[str], begin: int, end: int, shape: tuple[int, int]) -> _Page:
+    match = _PICTURE.search(content[begin])
+    assert match is not None  # it was found by this
+    head = next((k for k in range(begin + 1, end) if content[k].strip()), end)
+    names = content[head].split() if head < end else []
+    if len(names) < 2 or names[-1] != _MARGIN:
+        raise FormatError(f"{file.name}, line {head + 1}: no line of column numbers that ends in {_MARGIN}")
+    last = next((k for k in range(head + 1, end) if content[k].startswith(_MARGIN)), None)
+    if last is None:
+        raise FormatError(f"{file.name}, line {end}: picture {match[1]} ends without the line {_MARGIN}")
+    lines = [line.split() for line in content[head + 1 : last]]
+    read = text.numbers(lines, file, head + 2, ["row", *(f"column {n}" for n in names[:-1]), _MARGIN])
+    margin = content[last].split()
+    if len(margin) != len(names) + 1:
+        raise FormatError(f"{file.name}, line {last + 1}: {len(margin) - 1} forces, must have {len(names)}")
+    return _Page(
+        int(match[1]),
+        begin + 1,
+        _places(file, head + 2, "row", read[:, 0], shape[0], step=1),
+        _places(
+            file,
+            head + 1,
+            "column",
+            np.array([text.number(n, file, head + 1, "column number") for n in names[:-1]]),
+            shape[1],
+            step=0,
+        ),
+        read[:, 1:-1],
+        text.number(margin[-1], file, last + 1, _MARGIN),
+        last + 1,
+    )
+
+
+def _places(
+    file: Path, line: int, what: str, numbers: NDArray[np.float64], most: int, *, step: int
+) -> NDArray[np.int64]:
+    """Return numbers from 1 as indices; they ascend and lie on the plate."""
+    wrong = (numbers != np.rint(numbers)) | (numbers < 1) | (numbers > most)
+    wrong |= np.diff(numbers, prepend=0) <= 0
+    if wrong.any():
+        k = int(np.flatnonzero(wrong)[0])
+        raise FormatError(
+            f"{file.name}, line {line + step * k}: {what} {numbers[k]:g}; must ascend, whole numbers of 1 to {most}"
+        )
+    return np.asarray(numbers.astype(np.int64) - 1)
+
+
+def _unit(file: Path, pages: Sequence[_Page], area_cm2: float) -> str:
+    """Return the unit in which the cells make the forces that the pages state.
+
+    Cells and forces are rounded to hundredths; a page that agrees with neither unit is damaged.
+    """
+    sums = np.array([page.values.sum() for page in pages]) * area_cm2
+    forces = np.array([page.force for page in pages])
+    rounding = 0.006 + 0.005 * area_cm2 * np.array([np.count_nonzero(page.values) for page in pages])
+    fits = {unit: np.abs(forces - factor * sums) <= rounding for unit, factor in _NEWTON.items()}
+    unit = max(fits, key=lambda name: int(fits[name].sum()))
+    wrong = np.flatnonzero(~fits[unit])
+    if len(wrong):
+        page, made = pages[int(wrong[0])], _NEWTON[unit] * sums[wrong[0]]
+        raise FormatError(
+            f"{file.name}, line {page.force_line}: {_MARGIN} is {page.force:g} N; the cells of picture {page.number} "
+            f"make {made:g} N ({unit} on {area_cm2:g} cm2)"
+        )
+    return unit

@@ -1,0 +1,272 @@
+"""Tekscan F-Scan insoles and I-Scan sheets: the ASCII export of a movie (``.asf``, ``.csv``, ``.txt``).
+
+Header lines ``KEY value``, then after ``ASCII_DATA @@`` for each frame a line ``Frame 7`` (I-Scan: with its time and
+the sum of its cells) and a line of cells a row, separated by commas, ``B`` where no cell is; ``@@`` ends the file. Unit
+and spacings stand in the header only.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _arguments as arguments
+from taxel._core import FormatError
+from taxel._limits import TIME_US, VALUE, sensor, unpacked
+from taxel.array import Array
+from taxel.formats import text
+from taxel.formats.trial import Trial
+from taxel.frames import Frames
+
+__all__ = ["files", "trials"]
+
+_ENDINGS = {".asf", ".csv", ".txt"}
+_BEGINS = b"DATA_TYPE"
+_LENGTHS_MM = {
+    **dict.fromkeys(("mm", "millimeter", "millimeters", "millimetres"), 1.0),
+    **dict.fromkeys(("cm", "centimeter", "centimeters", "centimetres"), 10.0),
+    **dict.fromkeys(("in", "inch", "inches"), 25.4),
+}
+#: How Tekscan spells the units that have a spelling here; any other stays as it is.
+_UNITS = {"kpa": "kPa", "raw": "counts"}
+_KEY = re.compile(r"([A-Z][A-Z0-9_]*)[ \t]+(\S.*?)\s*")
+_FRAME = re.compile(r"Frame\s+(\d+)\s*(?:,\s*([^,\s]*)\s*,.*?)?")
+_RAW_SUM = re.compile(r"Raw Sum=\s*,*\s*([^,\s]+)")
+
+
+def files(path: Path) -> list[Path]:
+    """Find the files of this format: ``.asf``, ``.csv`` and ``.txt`` whose first line names the data's type."""
+    found = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [f for f in found if f.suffix.lower() in _ENDINGS and _is_export(f)]
+
+
+def _is_export(path: Path) -> bool:
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(64).removeprefix(b"\xef\xbb\xbf").lstrip().startswith(_BEGINS)
+
+
+def trials(path: str | Path) -> Iterator[Trial]:
+    """Read the movie of one file, or of all in a folder, one after the other.
+
+    Cells that do not exist (``B``) read 0. Times are those that the frames state; where they do not, frame 1 is at 0
+    us, and a missing frame makes the time jump. The pitch is the square root of the two spacings' product, so that
+    areas hold where rows and columns are spaced differently.
+
+    Parameters
+    ----------
+    path : str or Path
+
+    Yields
+    ------
+    Trial
+        `about` has the header, and the spacings as ``row_spacing_mm`` and ``column_spacing_mm``;
+        ``series["raw_sum"]`` is the sum that each frame of an I-Scan file states; raw cells must make it.
+
+    Raises
+    ------
+    FormatError : a file that does not hold what it should (names file, line and cell)
+    """
+    place = Path(arguments.path("path", path))
+    found = files(place)
+    if not found:
+        raise FormatError(f"{place}: no Tekscan movie in it (text that begins with DATA_TYPE)")
+    for file in found:
+        yield _read(file)
+
+
+def _read(file: Path) -> Trial:
+    content = text.lines(file)
+    begin = next((k for k, line in enumerate(content) if line.rstrip(", \t") == "ASCII_DATA @@"), None)
+    if begin is None:
+        raise FormatError(f"{file.name}: no line ASCII_DATA @@ after the header")
+    header = _Header(file, content[:begin])
+    if header.text("DATA_TYPE") != "MOVIE":
+        raise FormatError(
+            f"{file.name}, line {header.line('DATA_TYPE')}: DATA_TYPE is "
+            f"{arguments.shown(header.text('DATA_TYPE'))}; only a MOVIE is read"
+        )
+    rows, columns = header.whole("ROWS"), header.whole("COLS")
+    down, across = header.length_mm("ROW_SPACING"), header.length_mm("COL_SPACING")
+    period, unit = header.positive("SECONDS_PER_FRAME"), header.text("UNITS")
+    unit = _UNITS.get(unit.lower(), unit)
+    sensor(f"{file.name}, line {header.line('ROWS')}", Array(rows, columns))
+    numbers, places, stated = _frames(file, content, begin + 1, rows)
+    if not numbers:
+        raise FormatError(f"{file.name}, line {begin + 1}: no frame after it")
+    t = _times(file, numbers, period, places, stated)
+    unpacked(file.name, 4 * len(numbers) * rows * columns)
+    exists: NDArray[np.bool_] | None = None
+    values = np.zeros((len(numbers), rows, columns), np.float32)
+    sums = np.full(len(numbers), np.nan)
+    for k, at in enumerate(places):
+        cells = _cells(file, content[at + 1 : at + 1 + rows], at + 2, columns)
+        there = cells != "B"
+        if exists is None:
+            exists = there
+        elif not np.array_equal(there, exists):
+            row, column = np.argwhere(there != exists)[0]
+            raise FormatError(
+                f"{file.name}, line {at + 2 + row}: cell {column + 1} is {arguments.shown(str(cells[row, column]))}; "
+                f"in frame {numbers[0]} it is {'a number' if exists[row, column] else 'B'}"
+            )
+        values[k][there] = _numbers(file, cells, there, at + 2)
+        said = _RAW_SUM.search(content[at])
+        if said is not None:
+            sums[k] = text.number(said[1], file, at + 1, "Raw Sum")
+        made = values[k].sum(dtype=np.float64)
+        if unit == "counts" and not np.isnan(sums[k]) and sums[k] != made:
+            raise FormatError(f"{file.name}, line {at + 1}: Raw Sum is {sums[k]:g}; the cells make {made:g}")
+    about: dict[str, str | float] = {**header.values, "row_spacing_mm": down, "column_spacing_mm": across}
+    array = Array(
+        rows,
+        columns,
+        math.sqrt(down * across),
+        None if exists is None or exists.all() else exists,
+        f"Tekscan {header.values.get('SENSOR_TYPE', 'sensor')}",
+    )
+    return Trial(
+        name=file.stem,
+        person=file.stem,
+        recorded=Frames(values, t, unit=unit, array=array),
+        truth={},
+        source="none: the file has no truth",
+        series={"raw_sum": sums} if np.isfinite(sums).all() else {},
+        about=about,
+    )
+
+
+class _Header:
+    """The lines before the data, by their keys."""
+
+    def __init__(self, file: Path, lines: Sequence[str]) -> None:
+        self.file = file
+        self.values: dict[str, str] = {}
+        self._lines: dict[str, int] = {}
+        for k, line in enumerate(lines, start=1):
+            match = _KEY.fullmatch(line.rstrip(", \t"))
+            # Lines of comment are free: a key that comes again is one of them, or one is.
+            if match and match[1] in self.values and match[1] in _NEEDED and match[2] != self.values[match[1]]:
+                raise FormatError(f"{file.name}, line {k}: {match[1]} is said a second time, and differently")
+            if match:
+                self.values.setdefault(match[1], match[2])
+                self._lines.setdefault(match[1], k)
+
+    def line(self, key: str) -> int:
+        return self._lines[key]
+
+    def text(self, key: str) -> str:
+        if key not in self.values:
+            raise FormatError(f"{self.file.name}: no line {key} in the header")
+        return self.values[key]
+
+    def positive(self, key: str) -> float:
+        value = text.number(self.text(key), self.file, self.line(key), key)
+        if value <= 0:
+            raise FormatError(f"{self.file.name}, line {self.line(key)}: {key} is {value:g}; must be above 0")
+        return value
+
+    def whole(self, key: str) -> int:
+        value = self.positive(key)
+        if value != int(value) or value > 65_535:
+            raise FormatError(f"{self.file.name}, line {self.line(key)}: {key} is {value:g}; must be 1 to 65535")
+        return int(value)
+
+    def length_mm(self, key: str) -> float:
+        words = self.text(key).split()
+        if len(words) != 2 or words[1].lower() not in _LENGTHS_MM:
+            said = arguments.shown(self.text(key))
+            raise FormatError(
+                f"{self.file.name}, line {self.line(key)}: {key} is {said}; must be a number and "
+                "millimeters, centimeters or inches"
+            )
+        value = text.number(words[0], self.file, self.line(key), key) * _LENGTHS_MM[words[1].lower()]
+        if not 0 < value <= VALUE:
+            raise FormatError(f"{self.file.name}, line {self.line(key)}: {key} is {value:g} mm; must be above 0")
+        return value
+
+
+_NEEDED = {"DATA_TYPE", "ROWS", "COLS", "ROW_SPACING", "COL_SPACING", "SECONDS_PER_FRAME", "UNITS"}
+
+
+def _frames(file: Path, content: Sequence[str], begin: int, rows: int) -> tuple[list[int], list[int], list[str]]:
+    """Return each frame's number, the index of its line, and the time that it states ("" where none)."""
+    numbers: list[int] = []
+    places: list[int] = []
+    stated: list[str] = []
+    k, ended = begin, False
+    while k < len(content):
+        line = content[k].strip()
+        if not line.strip(","):
+            k += 1
+            continue
+        if line.rstrip(",") == "@@":
+            ended = True
+            break
+        match = _FRAME.fullmatch(line)
+        if match is None or len(match[1]) > 15:
+            raise FormatError(f"{file.name}, line {k + 1}: {arguments.shown(line)}; must begin a frame, as 'Frame 7'")
+        number = int(match[1])
+        if numbers and number <= numbers[-1]:
+            raise FormatError(f"{file.name}, line {k + 1}: frame {number} after frame {numbers[-1]}")
+        if k + rows >= len(content):
+            raise FormatError(f"{file.name}, line {len(content)}: ends within frame {number}; the file was cut short")
+        numbers.append(number)
+        places.append(k)
+        stated.append(match[2] or "")
+        k += 1 + rows
+    if not ended:
+        raise FormatError(f"{file.name}, line {len(content)}: ends without @@; the file was cut short")
+    return numbers, places, stated
+
+
+def _times(
+    file: Path, numbers: Sequence[int], period: float, places: Sequence[int], stated: Sequence[str]
+) -> NDArray[np.int64]:
+    """Return the frames' times, us: those that they state, where all do, else from their numbers.
+
+    The two differ: a movie of 0.1 s a frame states steps of 0.1 and 0.11 s.
+    """
+    if all(stated):
+        said = zip(stated, places, strict=True)
+        seconds = np.array([text.number(time, file, at + 1, "time") for time, at in said])
+    else:
+        seconds = (np.array(numbers, np.float64) - 1) * period
+    far = np.flatnonzero(np.abs(seconds) * 1e6 > TIME_US)
+    if len(far):
+        k = int(far[0])
+        raise FormatError(f"{file.name}, line {places[k] + 1}: at {seconds[k]:g} s; must lie within 142 years of 0")
+    t = np.rint(seconds * 1e6).astype(np.int64)
+    back = np.flatnonzero(np.diff(t) <= 0)
+    if len(back):
+        k = int(back[0])
+        raise FormatError(f"{file.name}, line {places[k + 1] + 1}: at {t[k + 1]} us, not after {t[k]} us")
+    return np.asarray(t)
+
+
+def _cells(file: Path, lines: Sequence[str], first_line: int, columns: int) -> NDArray[np.str_]:
+    """Return the cells of one frame as they stand there, shape (rows, columns)."""
+    rows = [[cell.strip() for cell in line.split(",")] for line in lines]
+    for k, row in enumerate(rows):
+        if len(row) != columns:
+            raise FormatError(f"{file.name}, line {first_line + k}: {len(row)} cells, must have {columns}")
+    return np.array(rows)
+
+
+def _numbers(file: Path, cells: NDArray[np.str_], there: NDArray[np.bool_], first_line: int) -> NDArray[np.float64]:
+    """Return the numbers of the cells that exist."""
+    try:
+        values = cells[there].astype(np.float64)
+        if (np.abs(values) <= VALUE).all():
+            return values
+    except ValueError:
+        pass  # the slow way below says where
+    return np.array(
+        [text.number(cells[row, c], file, first_line + int(row), f"cell {c + 1}") for row, c in np.argwhere(there)]
+    )
