@@ -230,13 +230,24 @@ def rust_table(source: Table) -> str:
 
 use serde::{{Deserialize, Serialize}};
 
-use super::{{Field, Preset, Scanned, us}};
+use super::field::{{Field, Scanned, us}};
 
 /// What the registers hold, in the registers' own units (Table 5.5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Registers {{
 {newline.join(struct)}
+}}
+
+/// A set of registers by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Preset {{
+    /// What it is called.
+    pub name: &'static str,
+    /// For how many sense lines it is made.
+    pub sense_lines: u16,
+    /// What the registers hold.
+    pub registers: Registers,
 }}
 
 /// What fields that older files lack hold at reset.

@@ -4,6 +4,7 @@
 //! host, emulator and logic agree. It has no clock of its own: each frame moves its time on.
 
 mod afferents;
+mod counts;
 mod outbox;
 mod scan;
 mod session;
@@ -13,6 +14,7 @@ use outbox::Outbox;
 use scan::Lfsr;
 use serde::{Deserialize, Serialize};
 
+pub use counts::BoardCounts;
 pub use session::session;
 
 use crate::wire::registers::Registers;
@@ -54,25 +56,6 @@ pub enum IntensityWord {
     Difference,
     /// There is none: a change says its taxel, time and polarity only.
     Nothing,
-}
-
-/// What the board did and lost.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct BoardCounts {
-    /// Frames scanned.
-    pub frames: u64,
-    /// Taxels that changed by more than the noise floor.
-    pub changes: u64,
-    /// Words that entered the queue; an event of version 2 counts as two.
-    pub words: u64,
-    /// Datagrams that the sink took.
-    pub datagrams: u64,
-    /// Words that the sink took.
-    pub sent: u64,
-    /// Changes dropped with their intensities, and markers, because the queue was full.
-    pub dropped: u64,
-    /// Conversions whose comparator had not returned.
-    pub not_returned: u64,
 }
 
 /// The board: registers, previous values, time and queue.

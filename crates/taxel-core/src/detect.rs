@@ -4,11 +4,13 @@ mod frame_clock;
 mod readout;
 mod score;
 mod stream;
+mod trained;
 
 pub use frame_clock::FrameClock;
-pub use readout::{Readout, TrainedNeuron};
+pub use readout::Readout;
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;
+pub use trained::TrainedNeuron;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,102 +1,27 @@
 //! Events or frames to spikes, live or whole: the same spikes either way.
 
 mod bracket;
+mod law;
 mod loaded;
+mod periods;
 mod power;
 mod running_range;
 mod sampled;
+mod stream;
 mod tare;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 pub use running_range::{FirstWindow, RunningRange};
+pub use stream::Stream;
 pub use tare::{Tare, TareBuilder};
 
-use crate::allowed::{Parameter, Range};
+use law::Law;
+
 use crate::parameters::Described;
+use crate::spikes::ms;
 use crate::{Array, Error, Events, Result, Spike, SpikeTrains, Stop, problem};
-
-/// An encoder at work: takes what comes, in order of time, and hands on spikes as soon as they are certain.
-///
-/// A stamp is over when a later one comes or when the caller moves time on with [`Stream::advance`]; what depends on a
-/// whole stamp is reckoned then, and its spikes have the stamp's time. So pieces and the whole give the same spikes,
-/// in the same order: by time, then by train.
-pub trait Stream: Send {
-    /// How many trains the encoder speaks on.
-    fn trains(&self) -> usize;
-
-    /// Whether spikes carry a signed value (polarity, bits), to be split into ON and OFF for a neuron.
-    fn signed(&self) -> bool;
-
-    /// How much later than the touch itself a spike comes, ms: what the encoder's own rule costs.
-    fn latency_ms(&self) -> f64;
-
-    /// Takes the next events; one behind the time come to counts as of that time, far behind it also as [`Stream::late`].
-    ///
-    /// # Errors
-    ///
-    /// `Problem` where the encoder needs intensities that are not there, or the stream was begun with frames.
-    fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()>;
-
-    /// Takes the next picture, row by row, at `t` us.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` where the picture has another size, holds NaN, comes out of order, or the stream was begun with events.
-    fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()>;
-
-    /// Says that nothing will come any more before `t` us (exclusive).
-    fn advance(&mut self, t: i64, out: &mut Vec<Spike>);
-
-    /// Says that nothing more will come: holds what came last for one period and the latency, so that all spikes that
-    /// it owes come out. Gives the end of that, ms, or `None` where nothing ever came.
-    fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64>;
-
-    /// A copy that goes on by itself: to see what would be said if nothing came.
-    fn fork(&self) -> Box<dyn Stream>;
-
-    /// How many events came farther than [`FARTHEST_BACK_US`](crate::events::FARTHEST_BACK_US) behind the time come to.
-    fn late(&self) -> u64;
-}
-
-impl Clone for Box<dyn Stream> {
-    fn clone(&self) -> Self {
-        self.fork()
-    }
-}
-
-/// What an encoder's file says of it.
-trait Law {
-    /// Its parameters, with their defaults and ranges.
-    fn described() -> Described
-    where
-        Self: Sized;
-
-    /// Checks every parameter.
-    fn check(&self) -> Result<()>;
-
-    /// Begins to encode what an array feels; the parameters are checked.
-    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>>;
-
-    /// On how many trains it speaks for an array of so many taxels.
-    fn trains(&self, taxels: usize) -> usize {
-        taxels
-    }
-
-    /// Whether its spikes carry a signed value.
-    fn signed(&self) -> bool {
-        true
-    }
-
-    /// How much later than the touch itself a spike comes, ms: what its own rule costs.
-    fn latency_ms(&self) -> f64 {
-        0.0
-    }
-
-    /// Takes the taxels' rest; most read none.
-    fn set_tare(&mut self, _tare: &Tare) {}
-}
 
 /// The registry: a line an encoder, `NAME: Kind`, whose file is `encode/NAME.rs` and whose name in JSON is `NAME`.
 macro_rules! encoders {
@@ -293,38 +218,4 @@ fn said(json: &str, error: &serde_json::Error) -> Error {
         }
     }
     problem!("encoder {name}: {error}")
-}
-
-/// us to ms.
-fn ms(t: i64) -> f64 {
-    t as f64 / 1000.0
-}
-
-/// Spikes from place `from` on by time, then by train.
-fn sort_from(out: &mut [Spike], from: usize) {
-    out[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
-}
-
-/// A time in ms that must be a whole number of us, in us.
-fn micros(name: &'static str, ms: f64) -> Result<i64> {
-    Parameter { name, unit: "ms", range: Range::WHOLE_US }.check(&ms)?;
-    Ok((ms * 1000.0).round() as i64)
-}
-
-fn check_levels(levels: &[f64]) -> Result<()> {
-    if levels.is_empty() {
-        return Err(problem!("levels: must hold one level or more"));
-    }
-    if let Some(level) = levels.iter().find(|l| !(l.is_finite() && l.abs() <= f64::from(f32::MAX))) {
-        return Err(problem!("levels hold {level}: must be finite"));
-    }
-    match levels.windows(2).find(|w| w[1] as f32 <= w[0] as f32) {
-        Some(w) => Err(problem!("levels: {} after {}, must ascend", w[1], w[0])),
-        None => Ok(()),
-    }
-}
-
-/// The step of the wire's stamps, ms (wire.md, section 1).
-fn stamp_period() -> f64 {
-    0.1
 }

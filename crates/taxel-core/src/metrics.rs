@@ -5,6 +5,7 @@
 //! `spatial` or `multi_unit` in their names know of the other trains themselves.
 
 mod edges;
+mod law;
 pub mod matching;
 mod merged;
 mod pairwise;
@@ -18,40 +19,11 @@ pub use patterns::Patterns;
 pub use van_rossum::Normalisation;
 pub use van_rossum_spatial::{OwnTrain, Smoothing};
 
-use crate::parameters::Described;
-use crate::{Result, Stop, problem};
+use law::{Law, Ready};
 use pairwise::Matrix;
 
-/// What a metric's file says of it.
-trait Law {
-    /// Its parameters, with their defaults and ranges.
-    fn described() -> Described
-    where
-        Self: Sized;
-
-    /// Checks every parameter.
-    fn check(&self) -> Result<()>;
-
-    /// Works out what all pairs of these patterns share.
-    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>>;
-}
-
-/// A metric with what all pairs share.
-trait Ready: Sync {
-    /// The distance between two patterns.
-    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64>;
-
-    /// Fills a whole matrix, where there is a quicker way than pair by pair.
-    fn fill(
-        &self,
-        _matrix: &Matrix,
-        _a: &Patterns<'_>,
-        _b: Option<&Patterns<'_>>,
-        _work: &mut Work<'_>,
-    ) -> Option<Result<()>> {
-        None
-    }
-}
+use crate::parameters::Described;
+use crate::{Result, Stop, problem};
 
 /// The registry: a line a metric, `NAME: Kind`, whose file is `metrics/NAME.rs` and whose name in JSON is `NAME`.
 macro_rules! metrics {
@@ -157,37 +129,5 @@ impl Metric {
             }
         }
         self.law().ready(a, b)
-    }
-}
-
-/// A pattern: which of several.
-type One<'p> = (&'p Patterns<'p>, usize);
-
-/// The sum over trains of a distance between trains.
-fn summed(
-    (a, p): One<'_>,
-    (b, q): One<'_>,
-    stop: Stop<'_>,
-    between: impl Fn(&[f64], &[f64]) -> Result<f64>,
-) -> Result<f64> {
-    let mut sum = 0.0;
-    for n in 0..a.trains {
-        stop.check()?;
-        sum += between(a.train(p, n), b.train(q, n))?;
-    }
-    Ok(sum)
-}
-
-/// Reads a cost that may be infinite, which JSON has no number for: a number, or its name as text.
-fn number_or_name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<f64, D::Error> {
-    #[derive(Deserialize)]
-    #[serde(untagged)]
-    enum Either {
-        Number(f64),
-        Name(String),
-    }
-    match Either::deserialize(deserializer)? {
-        Either::Number(value) => Ok(value),
-        Either::Name(name) => name.parse().map_err(serde::de::Error::custom),
     }
 }

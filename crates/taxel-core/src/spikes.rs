@@ -2,6 +2,18 @@
 
 use crate::{Result, problem};
 
+/// A time of the wire, us, as neurons count it, ms.
+#[must_use]
+pub fn ms(us: i64) -> f64 {
+    us as f64 / 1000.0
+}
+
+/// A time of neurons, ms, as the wire counts it, us; not rounded.
+#[must_use]
+pub fn us(ms: f64) -> f64 {
+    ms * 1000.0
+}
+
 /// One spike on its way, as encoders hand them on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Spike {

@@ -11,7 +11,7 @@ pub mod v1;
 pub mod v2;
 
 pub use command::{Command, CommandReader};
-pub use decoder::{Counts, Decoder, Filled, Pairing, Room};
+pub use decoder::{Counts, Decoder, Filled, Pairing, Room, decode};
 pub use receiver::{Receiver, Took};
 pub use registers::{Refusal, Registers};
-pub use v1::{STAMP_US, WORD_BYTES, Word, decode, encode};
+pub use v1::{STAMP_US, WORD_BYTES, Word, encode};

@@ -6,6 +6,8 @@
 //! A *message* is what one receive call gives: a datagram, or, with `UDP_GRO`, a train of datagrams that travelled as
 //! one. The kernel counts its drops in messages, so a datagram-exact count of what it dropped needs `gro` off.
 
+mod counts;
+mod options;
 mod queue;
 mod sender;
 mod socket;
@@ -16,60 +18,16 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
-
 use crate::{Error, Result};
+pub use counts::Counts;
+pub use options::ReceiverOptions;
 use queue::Queue;
 pub use queue::{Batch, Datagram};
 pub use sender::{SendCounts, Sender};
 use socket::Socket;
 
-/// A blocking receive ends after this, to look whether the owner asked to stop.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
-
 /// After a stop the socket is emptied for no longer than this, even when a sender never pauses.
 const EMPTY_FOR: Duration = Duration::from_millis(50);
-
-/// How a [`Receiver`] listens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ReceiverOptions {
-    /// Asked of the kernel for its own queue, bytes; [`Counts::kernel_buffer_bytes`] says what it gave.
-    pub kernel_buffer_bytes: usize,
-    /// How much may wait for the one who takes, bytes; memory is bounded by twice this.
-    pub queue_bytes: usize,
-    /// Take trains of datagrams in one call where the kernel can (`UDP_GRO`).
-    pub gro: bool,
-}
-
-impl Default for ReceiverOptions {
-    /// 32 MiB in the kernel and 64 MiB here: 0.9 s at the sensor's worst case of 107 MB/s.
-    fn default() -> Self {
-        Self { kernel_buffer_bytes: 32 << 20, queue_bytes: 64 << 20, gro: true }
-    }
-}
-
-/// What came and what was lost up to now; see the module for the sums.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
-pub struct Counts {
-    /// Receive calls that gave something.
-    pub messages: u64,
-    /// Datagrams in them.
-    pub datagrams: u64,
-    /// Payload bytes in them.
-    pub bytes: u64,
-    /// Messages that the kernel threw away because its own queue was full.
-    pub dropped_by_kernel: u64,
-    /// Datagrams that were thrown away because nobody took them in time.
-    pub dropped_by_queue: u64,
-    /// Payload bytes in those.
-    pub bytes_dropped_by_queue: u64,
-    /// Datagrams that wait to be taken.
-    pub waiting: u64,
-    /// What the kernel's own queue may hold, bytes, as it counts them (its overhead included).
-    pub kernel_buffer_bytes: u64,
-    /// Whether trains of datagrams come in one call.
-    pub gro: bool,
-}
 
 /// Receives UDP datagrams in a thread of its own, from [`Receiver::bind`] until it is dropped.
 #[derive(Debug)]
@@ -180,7 +138,7 @@ fn empty(socket: &mut Socket, scratch: &mut Batch, queue: &Queue) -> io::Result<
     }
 }
 
-/// Receives until nothing waits or the batch is full; `wait`s for the first message no longer than [`LOOK_EVERY`].
+/// Receives until nothing waits or the batch is full; `wait`s for the first message no longer than [`socket::LOOK_EVERY`].
 fn fill(socket: &mut Socket, batch: &mut Batch, wait: bool) -> io::Result<u64> {
     let mut messages = 0;
     while batch.room() >= socket::LARGEST && socket.receive(batch, wait && messages == 0)? {

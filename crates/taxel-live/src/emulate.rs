@@ -10,10 +10,10 @@ use taxel_core::board::{Board, BoardCounts};
 use taxel_core::wire::Command;
 use taxel_core::{Array, Stop};
 
+use crate::Result;
 use crate::capture::{SendCounts, Sender};
 use crate::latency::{Latencies, Quantiles};
 use crate::recording::now_ns;
-use crate::{Error, Result};
 use control::Control;
 
 /// How often [`Emulator::run`] looks for commands, asks whether to stop, and reports.
@@ -192,9 +192,4 @@ fn wait_until(due: Instant) -> Instant {
 fn wake_sharply() {
     // SAFETY: PR_SET_TIMERSLACK takes one number and touches no memory of ours; where it fails, sleeps are coarser.
     unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64) };
-}
-
-/// Names a socket in an error.
-fn place(address: SocketAddr) -> impl FnOnce(std::io::Error) -> Error {
-    Error::socket(format!("TCP {address}"))
 }

@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use super::BoardCounts;
+use super::counts::BoardCounts;
 
 /// Datagrams that the sink has not taken yet, and how many words of the queue they fill.
 #[derive(Debug, Clone, Default)]

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::allowed::above_0;
-use crate::detect::{Detection, FrameClock, ReadoutStream};
+use crate::detect::{Detection, FrameClock, ReadoutStream, TrainedNeuron};
 use crate::encode::{Encoder, Tare};
-use crate::neuron::{AfterSpike, Neuron, Time};
+use crate::neuron::{AfterSpike, Time};
 use crate::{Array, Error, Events, Result, Stop, problem};
 
 /// What a readout's file says that it is.
@@ -20,19 +20,6 @@ const VERSION: u64 = 1;
 /// How long time moves on after the last event or picture of a recording, us: longer than what was heard can keep a
 /// potential rising (the slowest neuron of Table 6.2 peaks after 190 ms).
 const SILENCE_US: i64 = 1_000_000;
-
-/// A neuron with the weights it was trained to.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TrainedNeuron {
-    /// Its parameters.
-    pub neuron: Neuron,
-    /// How much later than the event it was trained to fire, the encoder's latency apart, ms.
-    #[serde(default)]
-    pub delay_ms: f64,
-    /// One a train of the encoder, mV; where its spikes are signed first all ON trains, then all OFF.
-    pub weights: Vec<f64>,
-}
 
 /// Trained neurons with names, the encoder that they were trained behind, and how they were trained.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -302,6 +289,7 @@ fn word(option: &impl Serialize) -> String {
 mod tests {
     use super::*;
     use crate::encode::ContactArea;
+    use crate::neuron::Neuron;
 
     fn readout() -> Readout {
         let neuron = Neuron { tau: 0.5, time: Time::Grid, step_ms: 0.192, ..Neuron::default() };

@@ -1,6 +1,7 @@
-//! Between which values a channel crosses nothing, so that most channels need no closer look.
+//! Levels, and between which values a channel crosses none of them, so that most channels need no closer look.
 
 use super::sampled::{BLOCK, Block};
+use crate::{Result, problem};
 
 /// For each channel the values `low <= value < high` that change nothing.
 #[derive(Clone)]
@@ -34,5 +35,19 @@ impl Bracket {
     pub(super) fn holds(&self, channel: usize, value: f32) -> bool {
         let (block, lane) = (channel / BLOCK, channel % BLOCK);
         self.low[block][lane] <= value && value < self.high[block][lane]
+    }
+}
+
+/// Refuses levels that do not ascend.
+pub(super) fn check_levels(levels: &[f64]) -> Result<()> {
+    if levels.is_empty() {
+        return Err(problem!("levels: must hold one level or more"));
+    }
+    if let Some(level) = levels.iter().find(|l| !(l.is_finite() && l.abs() <= f64::from(f32::MAX))) {
+        return Err(problem!("levels hold {level}: must be finite"));
+    }
+    match levels.windows(2).find(|w| w[1] as f32 <= w[0] as f32) {
+        Some(w) => Err(problem!("levels: {} after {}, must ascend", w[1], w[0])),
+        None => Ok(()),
     }
 }

@@ -3,7 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
-use super::{Law, Stream, ms};
+use super::law::Law;
+use super::stream::Stream;
+use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 pub use crate::board::Previous;
 use crate::parameters::Described;
@@ -30,7 +32,7 @@ pub struct ChangeEvents {
     #[serde(default)]
     pub rounding: Rounding,
     /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    #[serde(default = "super::stamp_period")]
+    #[serde(default = "super::periods::stamp_period")]
     pub period_ms: f64,
 }
 
@@ -60,7 +62,7 @@ impl Default for ChangeEvents {
             bits: one_bit(),
             previous: Previous::default(),
             rounding: Rounding::default(),
-            period_ms: super::stamp_period(),
+            period_ms: super::periods::stamp_period(),
         }
     }
 }

@@ -4,7 +4,10 @@ use serde::{Deserialize, Serialize};
 
 use super::loaded::Loaded;
 use super::sampled::{BLOCK, Block, Channels, Source, blocks};
-use super::{Law, Stream, Tare, ms};
+use super::law::Law;
+use super::stream::Stream;
+use super::tare::Tare;
+use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Events, Result, Spike, problem};

@@ -12,7 +12,9 @@ use serde::{Deserialize, Serialize};
 
 use super::power::power;
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
-use super::{Law, Stream, ms};
+use super::law::Law;
+use super::stream::Stream;
+use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result, Spike, problem};

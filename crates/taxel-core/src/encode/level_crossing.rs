@@ -4,10 +4,13 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::bracket::Bracket;
+use super::bracket::{Bracket, check_levels};
 use super::running_range::{RunningRange, Window};
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
-use super::{Law, Stream, check_levels, micros, ms, sort_from};
+use super::law::Law;
+use super::periods::micros;
+use super::stream::{Stream, sort_from};
+use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result, Spike, problem};
@@ -42,7 +45,7 @@ pub struct LevelCrossing {
     #[serde(default)]
     pub running_range: Option<RunningRange>,
     /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    #[serde(default = "super::stamp_period")]
+    #[serde(default = "super::periods::stamp_period")]
     pub period_ms: f64,
 }
 
@@ -66,7 +69,7 @@ impl LevelCrossing {
             tonic_ms: None,
             tonic_level: None,
             running_range: None,
-            period_ms: super::stamp_period(),
+            period_ms: super::periods::stamp_period(),
         }
     }
 

@@ -7,7 +7,11 @@ use serde::{Deserialize, Serialize};
 
 use super::loaded::Loaded;
 use super::sampled::{BLOCK, Block, Rule, Sampled};
-use super::{Law, Stream, Tare, micros, ms, sort_from};
+use super::law::Law;
+use super::periods::micros;
+use super::stream::{Stream, sort_from};
+use super::tare::Tare;
+use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result, Spike, problem};
@@ -46,7 +50,7 @@ pub struct Moments {
     #[serde(default = "half")]
     pub tonic_ms: Option<f64>,
     /// How often events are sampled, ms; default 0.1, the step of the wire's stamps, which loses nothing.
-    #[serde(default = "super::stamp_period")]
+    #[serde(default = "super::periods::stamp_period")]
     pub period_ms: f64,
     /// The taxels' rest. It belongs to a board and a day: a saved readout has none and is given one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -92,7 +96,7 @@ impl Default for Moments {
             peak: peaks(),
             displacement_mm: ways(),
             tonic_ms: half(),
-            period_ms: super::stamp_period(),
+            period_ms: super::periods::stamp_period(),
             tare: None,
         }
     }

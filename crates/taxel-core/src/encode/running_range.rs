@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::micros;
+use super::periods::micros;
 use super::sampled::{BLOCK, Block};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;

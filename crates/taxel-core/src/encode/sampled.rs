@@ -3,8 +3,10 @@
 //! A [`Rule`] knows one encoder's law and nothing of events, pieces or order; [`Sampled`] brings it the samples. What
 //! did not change since the last sample is known by block, so a rule need not look at it.
 
-use super::{Stream, micros, ms};
+use super::periods::micros;
+use super::stream::Stream;
 use crate::events::FARTHEST_BACK_US;
+use crate::spikes::ms;
 use crate::vectors::wide;
 use crate::{Array, Events, Result, Spike, problem};
 

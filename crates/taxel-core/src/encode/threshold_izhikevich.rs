@@ -2,9 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::bracket::Bracket;
+use super::bracket::{Bracket, check_levels};
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
-use super::{Law, Stream, check_levels, ms, sort_from};
+use super::law::Law;
+use super::stream::{Stream, sort_from};
+use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result, Spike};
@@ -29,7 +31,7 @@ pub struct ThresholdIzhikevich {
     #[serde(default)]
     pub begin: Begin,
     /// How often events are sampled, ms; default 0.1, the step.
-    #[serde(default = "super::stamp_period")]
+    #[serde(default = "super::periods::stamp_period")]
     pub period_ms: f64,
 }
 
@@ -76,7 +78,7 @@ impl ThresholdIzhikevich {
     #[must_use]
     pub fn at(levels: Vec<f64>) -> Self {
         let (published, begin) = (Published::default(), Begin::default());
-        Self { levels, published, begin, period_ms: super::stamp_period() }
+        Self { levels, published, begin, period_ms: super::periods::stamp_period() }
     }
 }
 

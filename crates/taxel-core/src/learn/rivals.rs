@@ -3,6 +3,7 @@
 mod epochs;
 mod rival;
 mod skim;
+mod source;
 mod stepped;
 mod tempotron;
 
@@ -16,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{Result, SpikeTrains, Stop};
 use epochs::{Examples, change_of};
-use rival::Source;
+use source::Source;
 
 /// The registry of rules by epochs: a line each, its file `learn/rivals/NAME.rs`, which is also its name in JSON, and the
 /// laws in it.
@@ -44,7 +45,8 @@ macro_rules! rules {
 
             fn train(
                 &self,
-                Rival { neuron, training, .. }: &Rival,
+                neuron: &SteppedNeuron,
+                training: &Training,
                 examples: Examples<'_>,
                 report: &mut dyn FnMut(usize, f64),
                 stop: Stop<'_>,

@@ -1,6 +1,6 @@
 //! The window of ISI and SPIKE distances, and what lies outside the first and the last spike.
 
-use super::Patterns;
+use super::patterns::Patterns;
 use crate::{Result, problem};
 
 /// From when to when, ms.

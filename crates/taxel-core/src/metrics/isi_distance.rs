@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::edges::{Window, begun, distinct, interval};
 use super::van_rossum_absolute::Exposure;
-use super::{Law, One, Patterns, Ready, summed};
+use super::law::{Law, One, Ready, summed};
+use super::patterns::Patterns;
 use crate::parameters::Described;
 use crate::{Result, Stop};
 

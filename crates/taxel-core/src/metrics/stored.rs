@@ -7,7 +7,7 @@
 //! is cut into stretches short enough for `rise` to stay a number; a stretch's edge is an entry without a spike, at which
 //! sums go from one stretch's unit to the next's.
 
-use super::Patterns;
+use super::patterns::Patterns;
 
 /// Length of a stretch in tau; `rise` goes from its inverse of half of that to half of that, as a power.
 const STRETCH: f64 = 512.0;

@@ -5,8 +5,9 @@ mod matrix;
 use serde::{Deserialize, Serialize};
 
 use super::merged::merged;
-use super::pairwise::Matrix;
-use super::{Law, One, Patterns, Ready, Work, summed};
+use super::pairwise::{Matrix, Work};
+use super::law::{Law, One, Ready, summed};
+use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop};

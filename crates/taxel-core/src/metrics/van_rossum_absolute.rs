@@ -3,7 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::merged::merged;
-use super::{Law, One, Patterns, Ready, summed};
+use super::law::{Law, One, Ready, summed};
+use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop, problem};

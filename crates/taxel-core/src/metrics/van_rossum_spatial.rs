@@ -4,9 +4,10 @@ mod matrix;
 
 use serde::{Deserialize, Serialize};
 
-use super::pairwise::Matrix;
+use super::pairwise::{Matrix, Work};
 use super::van_rossum::Normalisation;
-use super::{Law, One, Patterns, Ready, Work};
+use super::law::{Law, One, Ready};
+use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result, Stop, problem};

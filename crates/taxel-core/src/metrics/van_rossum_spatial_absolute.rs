@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::van_rossum_absolute::Exposure;
 use super::van_rossum_spatial::{Gauge, Kernel, Smoothing};
-use super::{Law, One, Patterns, Ready};
+use super::law::{Law, One, Ready};
+use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop};

@@ -5,7 +5,8 @@ use std::collections::BinaryHeap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Law, One, Patterns, Ready, number_or_name};
+use super::law::{Law, One, Ready, number_or_name};
+use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop};

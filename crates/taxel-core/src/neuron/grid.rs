@@ -1,7 +1,8 @@
 //! The neuron on a grid: potential and threshold are compared at the points `start + k step` only.
 
-use super::streaming::{OutputSpike, Threshold};
-use super::{AfterSpike, Neuron, Shape, State, Step};
+use super::kernel::{Shape, State, Step};
+use super::model::{AfterSpike, Neuron};
+use super::threshold::{OutputSpike, Threshold};
 
 /// The grid neuron at work.
 #[derive(Debug, Clone)]

@@ -1,24 +1,20 @@
 //! Bytes to events, as they come: finds its place after damage, unwraps time, pairs intensities, counts every loss.
 
 mod blocks;
+mod clock;
+mod columns;
 
-use std::mem::MaybeUninit;
-
-use serde::{Deserialize, Serialize};
+pub use clock::FARTHEST_BACK;
+pub use columns::{Filled, Room};
 
 use blocks::Carried;
+use clock::Clock;
+use columns::{Change, Filling};
+use serde::{Deserialize, Serialize};
 
-use crate::events::FARTHEST_BACK_US;
 use crate::vectors::Instructions;
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
 use crate::{Array, Events, Intensities, Marker, Result, problem};
-
-/// How far a stamp may lie behind the latest time and still be a step back (reordered datagrams), in stamps: 0.1 s.
-/// Reading: any other lies ahead, so silences up to 6.45 s are right from the stamps alone.
-pub const FARTHEST_BACK: i64 = FARTHEST_BACK_US / STAMP_US;
-
-/// Stamps to a turn of the 16-bit counter: 6.5536 s.
-const TURN: i64 = 65_536;
 
 /// Which change an intensity belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -60,50 +56,6 @@ pub struct Counts {
     pub outside: u64,
     /// Changes and markers that lie behind the latest time; kept.
     pub back: u64,
-}
-
-/// Unwraps stamps into 64 bits.
-#[derive(Debug, Clone, Copy, Default)]
-struct Clock {
-    /// The latest time, in stamps.
-    latest: Option<i64>,
-    /// Where the last stamp was a step back: its time, in stamps.
-    behind: Option<i64>,
-    /// When, by the host's clock, the last stamp came, us.
-    heard: Option<i64>,
-}
-
-impl Clock {
-    /// Gives the unwrapped time in stamps, and whether it is a step back.
-    fn unwrap(&mut self, stamp: u16, arrived: Option<i64>) -> (i64, bool) {
-        let Some(latest) = self.latest else {
-            (self.latest, self.heard) = (Some(i64::from(stamp)), arrived);
-            return (i64::from(stamp), false);
-        };
-        let ahead = (i64::from(stamp) - latest).rem_euclid(TURN);
-        let mut time = if ahead >= TURN - FARTHEST_BACK { latest + ahead - TURN } else { latest + ahead };
-        if let (Some(now), Some(before)) = (arrived, self.heard) {
-            // The silence as the host heard it says how many whole turns the stamps do not show.
-            let expected = latest + now.saturating_sub(before).clamp(0, LONGEST_SILENCE) / STAMP_US;
-            time += ((expected - time + TURN / 2).div_euclid(TURN)).max(0) * TURN;
-        }
-        self.heard = arrived;
-        self.latest = Some(latest.max(time));
-        self.behind = (time < latest).then_some(time);
-        (time, time < latest)
-    }
-}
-
-/// A year, us: no arrival time can carry the clock out of its 64 bits.
-const LONGEST_SILENCE: i64 = 365 * 86_400 * 1_000_000;
-
-/// A change whose intensity may be the next word.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Change {
-    t: i64,
-    x: u16,
-    y: u16,
-    p: bool,
 }
 
 /// Turns bytes into events as they come, wherever they are cut.
@@ -469,121 +421,13 @@ impl Decoder {
     }
 }
 
-/// Columns to be filled; all equally long.
-#[derive(Debug)]
-pub struct Room<'a> {
-    t: &'a mut [MaybeUninit<i64>],
-    x: &'a mut [MaybeUninit<u16>],
-    y: &'a mut [MaybeUninit<u16>],
-    p: &'a mut [MaybeUninit<bool>],
-    ticks: &'a mut [MaybeUninit<u16>],
-    present: &'a mut [MaybeUninit<bool>],
-}
-
-impl<'a> Room<'a> {
-    /// Room in the given columns; polarity and presence become 0 or 1.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` where they are not equally long.
-    pub fn new(t: &'a mut [i64], [x, y, ticks]: [&'a mut [u16]; 3], [p, present]: [&'a mut [u8]; 2]) -> Result<Self> {
-        if [x.len(), y.len(), ticks.len(), p.len(), present.len()].iter().any(|&n| n != t.len()) {
-            return Err(problem!("columns to fill must be equally long"));
-        }
-        // SAFETY: the decoder writes whole values only, never leaves an entry uninitialised, and a bool that it writes
-        // is a byte of 0 or 1; sizes and alignments are those of the given types.
-        unsafe {
-            Ok(Self { t: open(t), x: open(x), y: open(y), p: open(p), ticks: open(ticks), present: open(present) })
-        }
-    }
-
-    fn len(&self) -> usize {
-        self.t.len()
-    }
-}
-
-/// The same entries, to be written only.
-///
-/// # Safety
-///
-/// `U` must have the size and alignment of `T`, and whoever writes must write valid `U` that are valid `T` too.
-unsafe fn open<T, U>(column: &mut [T]) -> &mut [MaybeUninit<U>] {
-    // SAFETY: the caller's promise; length and lifetime are the slice's own.
-    unsafe { std::slice::from_raw_parts_mut(column.as_mut_ptr().cast(), column.len()) }
-}
-
-/// What [`Decoder::fill`] wrote.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Filled {
-    /// Rows.
-    pub rows: usize,
-    /// Whether the columns of intensities were written too; else no event has one.
-    pub paired: bool,
-}
-
-/// Columns as they fill: the first `rows` entries of t, x, y, p are written, and with `paired` those of ticks, present.
-pub(crate) struct Filling<'a> {
-    pub(crate) room: Room<'a>,
-    pub(crate) rows: usize,
-    pub(crate) paired: bool,
-    /// The last row's intensity may be the next word.
-    pub(crate) open: bool,
-}
-
-impl Filling<'_> {
-    #[inline]
-    fn change(&mut self, change: Change) {
-        let k = self.rows;
-        self.room.t[k].write(change.t);
-        self.room.x[k].write(change.x);
-        self.room.y[k].write(change.y);
-        self.room.p[k].write(change.p);
-        if self.paired {
-            self.room.ticks[k].write(0);
-            self.room.present[k].write(false);
-        }
-        self.rows = k + 1;
-        self.open = true;
-    }
-
-    /// Gives the last row its intensity, if it is of that taxel.
-    #[inline]
-    fn pair(&mut self, ticks: u16, x: u16, y: u16) -> bool {
-        if self.last_taxel() != (x, y) {
-            return false;
-        }
-        self.begin_pairs();
-        let k = self.rows - 1;
-        self.room.ticks[k].write(ticks);
-        self.room.present[k].write(true);
-        true
-    }
-
-    /// Column and row of the last row; there must be one.
-    #[inline]
-    pub(crate) fn last_taxel(&self) -> (u16, u16) {
-        let k = self.rows - 1;
-        // SAFETY: rows below `rows` are written.
-        unsafe { (self.room.x[k].assume_init(), self.room.y[k].assume_init()) }
-    }
-
-    /// Writes "none" for the rows so far, before the first intensity.
-    #[inline]
-    pub(crate) fn begin_pairs(&mut self) {
-        if !self.paired {
-            self.room.ticks[..self.rows].fill(MaybeUninit::new(0));
-            self.room.present[..self.rows].fill(MaybeUninit::new(false));
-            self.paired = true;
-        }
-    }
-
-    fn take_last(&mut self) -> Change {
-        self.rows -= 1;
-        let k = self.rows;
-        let Room { t, x, y, p, .. } = &self.room;
-        // SAFETY: the row was written; now it is free again.
-        unsafe { Change { t: t[k].assume_init(), x: x[k].assume_init(), y: y[k].assume_init(), p: p[k].assume_init() } }
-    }
+/// Decodes a whole stream at once.
+#[must_use]
+pub fn decode(bytes: &[u8], array: Array, pairing: Pairing) -> (Events, Counts) {
+    let mut decoder = Decoder::new(array).pairing(pairing);
+    let mut events = decoder.push(bytes, None);
+    decoder.finish_into(&mut events);
+    (events, *decoder.counts())
 }
 
 fn append(out: &mut Events, change: Change, ticks: Option<u16>) {
@@ -651,6 +495,7 @@ impl ByTaxel {
 mod tests {
     use rand::{Rng, SeedableRng, rngs::StdRng, seq::IndexedRandom};
 
+    use super::clock::TURN;
     use super::*;
 
     fn change(stamp: u16, x: u8, y: u8) -> Word {

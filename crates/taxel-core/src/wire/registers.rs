@@ -4,9 +4,12 @@
 //! inner one, the multiplexer's (the manual's "col"). The manual's names are aliases when reading JSON and in
 //! [`Registers::set`]. Fields, rules and presets are made from `registers.toml`.
 
+mod field;
 mod table;
 
-pub use table::{POWER_LAW, POWER_LAW_FRACTION, PRESETS, Registers};
+pub use field::Field;
+use field::{Scanned, us};
+pub use table::{POWER_LAW, POWER_LAW_FRACTION, PRESETS, Preset, Registers};
 
 use crate::wire::Command;
 use crate::{Array, Error, Result, problem};
@@ -16,49 +19,6 @@ const SENSE_LINES: u16 = 64;
 
 /// Registers whose order of writing matters.
 const TIMING: [u8; 4] = [1, 2, 3, 4];
-
-/// Where a field lies, and what it may hold (Table 5.5).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
-pub struct Field {
-    /// taxel's name.
-    pub name: &'static str,
-    /// The manual's.
-    pub manual: &'static str,
-    /// "flag" for one that is on or off.
-    pub unit: &'static str,
-    /// What it is for.
-    pub text: &'static str,
-    /// Which of the eight.
-    pub register: u8,
-    /// Its lowest bit.
-    pub shift: u32,
-    /// Its bits, shifted down.
-    pub mask: u32,
-    /// What is added to the bits.
-    pub offset: u32,
-    /// The least value.
-    pub least: u32,
-    /// The greatest value.
-    pub greatest: u32,
-}
-
-/// A set of registers by name.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Preset {
-    /// What it is called.
-    pub name: &'static str,
-    /// For how many sense lines it is made.
-    pub sense_lines: u16,
-    /// What the registers hold.
-    pub registers: Registers,
-}
-
-/// What the rules know of an array on a board.
-struct Scanned {
-    steps: u32,
-    driven_lines: u16,
-    sense_lines: u16,
-}
 
 /// All fields, in the order of the registers.
 #[must_use]
@@ -307,12 +267,6 @@ impl Registers {
 /// The sense lines that a board for this array converts.
 pub(crate) fn sense_lines(array: &Array) -> u16 {
     array.rows.max(SENSE_LINES)
-}
-
-/// 10 ns units as us, with two places.
-fn us(units: i64) -> String {
-    let sign = if units < 0 { "-" } else { "" };
-    format!("{sign}{}.{:02}", units.abs() / 100, units.abs() % 100)
 }
 
 #[cfg(test)]

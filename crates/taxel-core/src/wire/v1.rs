@@ -11,8 +11,7 @@
 //! Reading: byte 0 is sent first; Z1 and U are sent as 0 and ignored; a marker's X and Y likewise; Pol 1 is more
 //! pressure, and start.
 
-use crate::wire::{Counts, Decoder, Pairing};
-use crate::{Array, Events, Result, problem};
+use crate::{Events, Result, problem};
 
 /// Bytes of a word.
 pub const WORD_BYTES: usize = 5;
@@ -135,13 +134,4 @@ pub fn encode(events: &Events) -> Result<Vec<u8>> {
         bytes.extend(Word::Marker { stamp: stamp(m.t), start: m.start }.to_bytes());
     }
     Ok(bytes)
-}
-
-/// Decodes a whole stream at once.
-#[must_use]
-pub fn decode(bytes: &[u8], array: Array, pairing: Pairing) -> (Events, Counts) {
-    let mut decoder = Decoder::new(array).pairing(pairing);
-    let mut events = decoder.push(bytes, None);
-    decoder.finish_into(&mut events);
-    (events, *decoder.counts())
 }

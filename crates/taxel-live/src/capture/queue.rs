@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::Counts;
+use super::counts::Counts;
 
 /// One datagram of a [`Batch`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

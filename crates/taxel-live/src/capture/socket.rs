@@ -5,11 +5,16 @@ use std::mem::{size_of, size_of_val, zeroed};
 use std::net::{SocketAddr, UdpSocket};
 use std::os::fd::{AsRawFd, RawFd};
 use std::ptr::{from_mut, from_ref};
+use std::time::Duration;
 
 use libc::{c_int, c_void};
 
-use super::{Batch, LOOK_EVERY, ReceiverOptions};
+use super::options::ReceiverOptions;
+use super::queue::Batch;
 use crate::recording::now_ns;
+
+/// A blocking receive ends after this, to look whether the owner asked to stop.
+pub(super) const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// No UDP message, train or single, is longer than this, bytes.
 pub(super) const LARGEST: usize = 1 << 16;

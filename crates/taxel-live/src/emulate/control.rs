@@ -5,8 +5,7 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 
 use taxel_core::board::Board;
 
-use super::place;
-use crate::Result;
+use crate::{Error, Result};
 
 /// Takes commands from whoever is connected; one at a time, as a UART has one cable: a new one takes the place of the old.
 #[derive(Debug)]
@@ -61,4 +60,9 @@ impl Control {
             self.cable = None;
         }
     }
+}
+
+/// Names a socket in an error.
+fn place(address: SocketAddr) -> impl FnOnce(std::io::Error) -> Error {
+    Error::socket(format!("TCP {address}"))
 }

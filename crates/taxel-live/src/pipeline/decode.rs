@@ -5,7 +5,9 @@ use std::time::{Duration, Instant};
 use taxel_core::Events;
 use taxel_core::wire::{Receiver, Took};
 
-use super::{LiveOptions, Shared, handover};
+use super::handover;
+use super::options::LiveOptions;
+use super::shared::Shared;
 use crate::Result;
 use crate::capture::Batch;
 use crate::clock::BoardClock;
@@ -147,7 +149,7 @@ impl Work<'_> {
                     self.clock.note(t + self.frame_us(), datagram.arrived_ns);
                 }
             }
-            self.shared.board().decode_latency.note(now - datagram.arrived_ns);
+            self.shared.shown().decode_latency.note(now - datagram.arrived_ns);
             if self.events.len() >= HAND_ON {
                 self.hand_on()?;
             }
@@ -175,9 +177,9 @@ impl Work<'_> {
             events.markers.iter().try_for_each(|m| recorder.marker(*m))?;
         }
         {
-            let mut board = self.shared.board();
-            board.markers.extend_from_slice(&events.markers);
-            let counters = &mut board.counters;
+            let mut shown = self.shared.shown();
+            shown.markers.extend_from_slice(&events.markers);
+            let counters = &mut shown.counters;
             counters.decoded = self.decoded;
             counters.wire = *self.sender.counts();
             counters.wire_v2 = self.sender.two().counts();
@@ -192,7 +194,7 @@ impl Work<'_> {
         }
         if self.listens {
             let dropped = self.shared.handover.put(events);
-            self.shared.board().counters.events_dropped = dropped;
+            self.shared.shown().counters.events_dropped = dropped;
         }
         handover::clear(events);
         self.repaired.clear();
@@ -227,10 +229,10 @@ impl Work<'_> {
         let new = self.decoded != self.counted;
         self.counted = self.decoded;
         let (counters, tare) = {
-            let mut board = self.shared.board();
-            board.picture.copy_from_slice(&self.held);
-            let tare = if self.tared { None } else { board.tare.clone() };
-            (board.counters.clone(), tare)
+            let mut shown = self.shared.shown();
+            shown.picture.copy_from_slice(&self.held);
+            let tare = if self.tared { None } else { shown.tare.clone() };
+            (shown.counters.clone(), tare)
         };
         let Some(recorder) = &self.shared.recorder else { return Ok(()) };
         if let Some(tare) = tare {

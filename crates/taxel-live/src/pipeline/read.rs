@@ -8,8 +8,10 @@ use taxel_core::detect::{Detection, Readout, ReadoutStream};
 
 use super::ahead::Ahead;
 use super::handover::Taken;
+use super::options::LiveOptions;
 use super::rest::Rest;
-use super::{LiveOptions, Said, Shared, Sink};
+use super::said::{Said, Sink};
+use super::shared::Shared;
 use crate::Error;
 use crate::recording::now_ns;
 
@@ -52,7 +54,7 @@ impl Reader {
     }
 
     pub(super) fn run(mut self, shared: &Shared) {
-        shared.board().counters.taring = matches!(self.mode, Mode::Taring(_));
+        shared.shown().counters.taring = matches!(self.mode, Mode::Taring(_));
         loop {
             let taken = shared.handover.take(&mut self.events);
             if let Err(error) = self.hear(shared, taken) {
@@ -84,7 +86,7 @@ impl Reader {
             Mode::Idle => {}
         }
         if !self.events.is_empty() || taken.last {
-            let counters = &mut shared.board().counters;
+            let counters = &mut shared.shown().counters;
             counters.read_out += self.events.len() as u64;
             if let Mode::Reading(readout) = &self.mode {
                 (counters.late, counters.wrong) = (readout.late(), readout.wrong());
@@ -100,9 +102,9 @@ impl Reader {
         let mut readout = Ahead::new(Box::new(stream));
         readout.push(&self.events.piece(inside..self.events.len()), &mut self.found)?;
         self.mode = Mode::Reading(readout);
-        let mut board = shared.board();
-        board.counters.taring = false;
-        board.tare = Some(tare);
+        let mut shown = shared.shown();
+        shown.counters.taring = false;
+        shown.tare = Some(tare);
         Ok(())
     }
 
@@ -110,7 +112,7 @@ impl Reader {
     fn say_all(&mut self, shared: &Shared) -> crate::Result<()> {
         for detection in self.found.drain(..) {
             let said_ns = now_ns();
-            let offset = shared.board().counters.offset;
+            let offset = shared.shown().counters.offset;
             let said = Said { said: offset.map_or(detection.known, |o| o.board_us(said_ns)), detection, said_ns };
             self.sinks.iter_mut().try_for_each(|sink| sink.take(&said)).map_err(Error::Sink)?;
             if let Some(recorder) = &shared.recorder {
@@ -118,10 +120,10 @@ impl Reader {
             }
             let late_ns = (said.said - said.detection.known) * 1000;
             let dropped = self.say.try_send(said).is_err();
-            let mut board = shared.board();
-            board.counters.detections += 1;
-            board.counters.detections_dropped += u64::from(dropped);
-            board.said_latency.note(late_ns);
+            let mut shown = shared.shown();
+            shown.counters.detections += 1;
+            shown.counters.detections_dropped += u64::from(dropped);
+            shown.said_latency.note(late_ns);
         }
         Ok(())
     }

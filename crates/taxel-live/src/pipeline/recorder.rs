@@ -9,7 +9,9 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use taxel_core::encode::Tare;
 use taxel_core::{Marker, problem};
 
-use super::{Counters, LiveOptions, Record, Said};
+use super::counters::Counters;
+use super::options::{LiveOptions, Record};
+use super::said::Said;
 use crate::capture::Batch;
 use crate::recording::{self, Header, LsaWriter, Writer, now_ns};
 use crate::{Error, Result};

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use super::epochs::{Correction, Presented, Rule};
-use super::rival::Source;
+use super::source::Source;
 use super::stepped::{Shape, SteppedNeuron};
 use crate::allowed::{Range, ranges};
 use crate::{Result, problem};

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::epochs::Rule;
 use super::inst::{published_eta, published_initial};
-use super::rival::Source;
+use super::source::Source;
 use super::stepped::{Current, SteppedNeuron, peak_factor};
 use crate::allowed::{Range, ranges};
 use crate::{Result, problem};

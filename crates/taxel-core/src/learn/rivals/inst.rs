@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::epochs::Rule;
-use super::rival::Source;
+use super::source::Source;
 use super::stepped::{Shape, SteppedNeuron};
 use crate::Result;
 

@@ -4,9 +4,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
 use super::epochs::{Examples, Trained, Training};
+use super::source::Source;
 use super::stepped::SteppedNeuron;
 use super::{Law, SOURCES};
-use crate::allowed::{Parameter, one_weight_a_train};
+use crate::allowed::one_weight_a_train;
 use crate::neuron::Neuron;
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
@@ -21,20 +22,6 @@ pub struct Rival {
     pub neuron: SteppedNeuron,
     /// How it is trained.
     pub training: Training,
-}
-
-/// What the source of a rule says of its parameters, and how they are put together.
-pub struct Source {
-    /// By which the rule is called.
-    pub(super) name: &'static str,
-    /// The parameters that are the rule's own.
-    pub(super) own: &'static [&'static str],
-    /// Their ranges.
-    pub(super) ranges: &'static [&'static [Parameter]],
-    /// What the source gives; what stands neither here nor among what all rules share, the caller must give.
-    pub(super) defaults: fn() -> Value,
-    /// Works out what is left out; may name `law` and `current` itself.
-    pub(super) arrange: fn(&mut Map<String, Value>) -> Result<()>,
 }
 
 /// Parameters of the neuron that each rule has, and of its training.
@@ -149,7 +136,7 @@ impl Rival {
             targets,
         )?;
         crate::learn::check_some_target(targets)?;
-        self.law.train(self, Examples { patterns, targets, start }, report, stop)
+        self.law.train(&self.neuron, &self.training, Examples { patterns, targets, start }, report, stop)
     }
 
     /// What one presentation of a pattern changes, over the learning rate, and the output spikes in it (ms).

@@ -1,9 +1,11 @@
 //! A block in continuous time: from one input time to the next, exact.
 
-use super::{FADED, LANES, Lanes, SLACK, Weight};
+use super::lanes::{FADED, LANES, Lanes, SLACK, Weight};
 use crate::SpikeTrains;
-use crate::neuron::streaming::{ContinuousStream, OutputSpike};
-use crate::neuron::{AT_EDGE, AfterSpike, Neuron, State, Step};
+use crate::neuron::continuous::ContinuousStream;
+use crate::neuron::kernel::{State, Step};
+use crate::neuron::model::{AT_EDGE, AfterSpike, Neuron};
+use crate::neuron::threshold::OutputSpike;
 use crate::vectors::wide;
 
 /// From this share of tau on the tangent says less than the kernel's largest value.

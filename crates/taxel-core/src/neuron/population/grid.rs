@@ -1,9 +1,10 @@
 //! A block on a grid: from point to point.
 
-use super::{FADED, LANES, Lanes, SLACK, Weight};
+use super::lanes::{FADED, LANES, Lanes, SLACK, Weight};
 use crate::SpikeTrains;
-use crate::neuron::streaming::{EDGE, Threshold};
-use crate::neuron::{AfterSpike, Neuron, State, Step};
+use crate::neuron::kernel::{State, Step};
+use crate::neuron::model::{AfterSpike, Neuron};
+use crate::neuron::threshold::{EDGE, Threshold};
 use crate::vectors::wide;
 
 /// What all neurons have in common: the grid and its inputs.

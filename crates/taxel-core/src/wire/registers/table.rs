@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Field, Preset, Scanned, us};
+use super::field::{Field, Scanned, us};
 
 /// What the registers hold, in the registers' own units (Table 5.5).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,6 +54,17 @@ pub struct Registers {
     pub record: bool,
     /// Channels of the converter, 16 or 64: the board's build, not a register.
     pub channels: u8,
+}
+
+/// A set of registers by name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Preset {
+    /// What it is called.
+    pub name: &'static str,
+    /// For how many sense lines it is made.
+    pub sense_lines: u16,
+    /// What the registers hold.
+    pub registers: Registers,
 }
 
 /// What fields that older files lack hold at reset.

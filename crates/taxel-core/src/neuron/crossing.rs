@@ -1,11 +1,10 @@
-//! The exact event-driven neuron, and the potential with given spikes.
+//! Where the potential meets the threshold, exactly, between two inputs.
 //!
 //! Between input spikes potential less threshold, `g(s) = U(s) - theta - c e^{-s/tau_rec}`, is a sum of few exponentials, and
 //! ends at `-theta`. Its derivative changes sign twice at most, so that `g` has one inner maximum at most, with a rise
 //! before it: the only stretch in which the threshold can be crossed from below.
 
-use super::{AfterSpike, Kernel, Neuron, Shape, State};
-use crate::SpikeTrains;
+use super::kernel::{Kernel, Shape, State};
 
 /// The inner maximum of potential less threshold, ms from now.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -177,44 +176,4 @@ fn zero(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
         }
     }
     f64::midpoint(low, high)
-}
-
-/// The potential at ascending `times` of a neuron that fired at ascending `spikes`.
-pub(super) fn potential(
-    neuron: &Neuron,
-    weights: &[f64],
-    trains: &SpikeTrains,
-    times: &[f64],
-    spikes: &[f64],
-) -> Vec<f64> {
-    let (inputs, shape) = (trains.by_time(), neuron.shape());
-    let (mut state, mut at) = (State::default(), trains.start);
-    let (mut next_input, mut next_spike, mut last) = (0, 0, None);
-    let mut out = Vec::with_capacity(times.len());
-    for &t in times {
-        // A spike takes effect after its own time, an input from it on; at equal times the spike sees the input (as 0).
-        loop {
-            let spike = spikes.get(next_spike).copied().filter(|&s| s < t);
-            let input = inputs.get(next_input).filter(|i| i.t < t && spike.is_none_or(|s| i.t <= s));
-            if let Some(input) = input {
-                next_input += 1;
-                if !neuron.loses(input.t, last) {
-                    state = shape.after(state, input.t - at);
-                    at = input.t;
-                    shape.add(&mut state, weights[input.train as usize], 0.0);
-                }
-            } else if let Some(spike) = spike {
-                next_spike += 1;
-                last = Some(spike);
-                if neuron.after_spike == AfterSpike::Reset {
-                    state = State::default();
-                }
-            } else {
-                break;
-            }
-        }
-        let refractory = last.is_some_and(|s| t <= s + neuron.refractory);
-        out.push(if refractory { 0.0 } else { shape.after(state, (t - at).max(0.0)).b });
-    }
-    out
 }

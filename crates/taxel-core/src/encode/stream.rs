@@ -1,0 +1,57 @@
+//! An encoder at work, piece by piece.
+
+use crate::{Events, Result, Spike};
+
+/// An encoder at work: takes what comes, in order of time, and hands on spikes as soon as they are certain.
+///
+/// A stamp is over when a later one comes or when the caller moves time on with [`Stream::advance`]; what depends on a
+/// whole stamp is reckoned then, and its spikes have the stamp's time. So pieces and the whole give the same spikes,
+/// in the same order: by time, then by train.
+pub trait Stream: Send {
+    /// How many trains the encoder speaks on.
+    fn trains(&self) -> usize;
+
+    /// Whether spikes carry a signed value (polarity, bits), to be split into ON and OFF for a neuron.
+    fn signed(&self) -> bool;
+
+    /// How much later than the touch itself a spike comes, ms: what the encoder's own rule costs.
+    fn latency_ms(&self) -> f64;
+
+    /// Takes the next events; one behind the time come to counts as of that time, far behind it also as [`Stream::late`].
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the encoder needs intensities that are not there, or the stream was begun with frames.
+    fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()>;
+
+    /// Takes the next picture, row by row, at `t` us.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the picture has another size, holds NaN, comes out of order, or the stream was begun with events.
+    fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()>;
+
+    /// Says that nothing will come any more before `t` us (exclusive).
+    fn advance(&mut self, t: i64, out: &mut Vec<Spike>);
+
+    /// Says that nothing more will come: holds what came last for one period and the latency, so that all spikes that
+    /// it owes come out. Gives the end of that, ms, or `None` where nothing ever came.
+    fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64>;
+
+    /// A copy that goes on by itself: to see what would be said if nothing came.
+    fn fork(&self) -> Box<dyn Stream>;
+
+    /// How many events came farther than [`FARTHEST_BACK_US`](crate::events::FARTHEST_BACK_US) behind the time come to.
+    fn late(&self) -> u64;
+}
+
+impl Clone for Box<dyn Stream> {
+    fn clone(&self) -> Self {
+        self.fork()
+    }
+}
+
+/// Spikes from place `from` on by time, then by train.
+pub(super) fn sort_from(out: &mut [Spike], from: usize) {
+    out[from..].sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
+}

@@ -1,0 +1,71 @@
+//! What every metric of the registry says of itself.
+
+use serde::Deserialize;
+
+use super::pairwise::{Matrix, Work};
+use super::patterns::Patterns;
+use crate::parameters::Described;
+use crate::{Result, Stop};
+
+/// What a metric's file says of it.
+pub(super) trait Law {
+    /// Its parameters, with their defaults and ranges.
+    fn described() -> Described
+    where
+        Self: Sized;
+
+    /// Checks every parameter.
+    fn check(&self) -> Result<()>;
+
+    /// Works out what all pairs of these patterns share.
+    fn ready<'m>(&'m self, a: &Patterns<'_>, b: Option<&Patterns<'_>>) -> Result<Box<dyn Ready + 'm>>;
+}
+
+/// A metric with what all pairs share.
+pub(super) trait Ready: Sync {
+    /// The distance between two patterns.
+    fn between(&self, a: One<'_>, b: One<'_>, stop: Stop<'_>) -> Result<f64>;
+
+    /// Fills a whole matrix, where there is a quicker way than pair by pair.
+    fn fill(
+        &self,
+        _matrix: &Matrix,
+        _a: &Patterns<'_>,
+        _b: Option<&Patterns<'_>>,
+        _work: &mut Work<'_>,
+    ) -> Option<Result<()>> {
+        None
+    }
+}
+
+/// A pattern: which of several.
+pub(super) type One<'p> = (&'p Patterns<'p>, usize);
+
+/// The sum over trains of a distance between trains.
+pub(super) fn summed(
+    (a, p): One<'_>,
+    (b, q): One<'_>,
+    stop: Stop<'_>,
+    between: impl Fn(&[f64], &[f64]) -> Result<f64>,
+) -> Result<f64> {
+    let mut sum = 0.0;
+    for n in 0..a.trains {
+        stop.check()?;
+        sum += between(a.train(p, n), b.train(q, n))?;
+    }
+    Ok(sum)
+}
+
+/// Reads a cost that may be infinite, which JSON has no number for: a number, or its name as text.
+pub(super) fn number_or_name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<f64, D::Error> {
+    #[derive(Deserialize)]
+    #[serde(untagged)]
+    enum Either {
+        Number(f64),
+        Name(String),
+    }
+    match Either::deserialize(deserializer)? {
+        Either::Number(value) => Ok(value),
+        Either::Name(name) => name.parse().map_err(serde::de::Error::custom),
+    }
+}

@@ -1,0 +1,139 @@
+//! The neuron in continuous time: the next crossing is known exactly from the state after the last input.
+
+use super::crossing::next_crossing;
+use super::kernel::{Shape, State};
+use super::model::{AT_EDGE, AfterSpike, Neuron};
+use super::threshold::{OutputSpike, Threshold};
+
+/// The neuron of continuous time at work.
+#[derive(Debug, Clone)]
+pub(super) struct ContinuousStream {
+    neuron: Neuron,
+    shape: Shape,
+    pub(super) threshold: Threshold,
+    /// The potential at `at`.
+    state: State,
+    at: f64,
+    /// The end of the refractory time (or the start of the printed first rise), while it lies ahead.
+    edge: Option<f64>,
+    next: Next,
+}
+
+/// The next crossing if no input comes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Next {
+    Unknown,
+    Never,
+    At(f64),
+}
+
+impl ContinuousStream {
+    pub(super) fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
+        let threshold = Threshold::new(neuron, factor, start);
+        let edge = threshold.edge();
+        let (shape, state) = (neuron.shape(), State::default());
+        Self { neuron: neuron.clone(), shape, threshold, state, at: start, edge, next: Next::Never }
+    }
+
+    /// Goes from a state that somebody else kept at `at` to `until`, where an input comes or the end; gives the state there.
+    pub(super) fn resume(
+        &mut self,
+        state: State,
+        at: f64,
+        until: f64,
+        input: bool,
+        out: &mut Vec<OutputSpike>,
+    ) -> State {
+        (self.state, self.at, self.next) = (state, at, Next::Unknown);
+        if input {
+            self.settle_at_input(until, until + AT_EDGE, out);
+        } else {
+            self.settle(until, until, out);
+        }
+        self.shape.after(self.state, until - self.at)
+    }
+
+    /// The potential at `t`, not before what came last, mV.
+    pub(super) fn potential(&self, t: f64) -> f64 {
+        self.shape.after(self.state, (t - self.at).max(0.0)).b
+    }
+
+    /// The end of the refractory time, or where the printed first rise sets in, while it lies ahead.
+    pub(super) fn edge(&self) -> Option<f64> {
+        self.edge
+    }
+
+    /// What is left of the threshold's rise at `t`, mV.
+    pub(super) fn rise(&self, t: f64) -> f64 {
+        self.threshold.rise(t)
+    }
+
+    pub(super) fn push(&mut self, t: f64, weight: f64, out: &mut Vec<OutputSpike>) {
+        self.settle_at_input(t, f64::INFINITY, out);
+        if self.neuron.loses(t, self.threshold.fired) {
+            return;
+        }
+        self.move_to(t);
+        self.shape.add(&mut self.state, weight, self.at - t);
+    }
+
+    /// Fires whatever crosses up to an input at `t`, included.
+    fn settle_at_input(&mut self, t: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
+        self.settle(t, horizon, out);
+        // An input a hair before a crossing is at it and comes too late: it could turn the potential down there.
+        if let Next::At(crossing) = self.next
+            && crossing - t <= AT_EDGE
+            && self.edge.is_none_or(|edge| crossing < edge)
+        {
+            self.fire(crossing, out);
+        }
+    }
+
+    fn move_to(&mut self, t: f64) {
+        if t > self.at {
+            self.state = self.shape.after(self.state, t - self.at);
+            self.at = t;
+        }
+        self.next = Next::Unknown;
+    }
+
+    /// Fires whatever crosses up to `until`, included; what crosses after `horizon` is not asked for.
+    pub(super) fn settle(&mut self, until: f64, horizon: f64, out: &mut Vec<OutputSpike>) {
+        loop {
+            let waiting = self.edge.is_some() && self.threshold.fired.is_some();
+            // At the state's own time the potential has been compared already: an input adds 0 there.
+            if !waiting && until > self.at && self.next == Next::Unknown {
+                self.next = self.crossing(horizon);
+            }
+            match (self.next, self.edge) {
+                (Next::At(t), edge) if !waiting && t <= until && edge.is_none_or(|e| t < e) => self.fire(t, out),
+                (_, Some(edge)) if edge <= until => {
+                    self.move_to(edge);
+                    self.edge = None;
+                    // The neuron is free again: it fires at once where the potential is above the threshold already.
+                    self.next = self.crossing(horizon);
+                }
+                _ => return,
+            }
+        }
+    }
+
+    fn crossing(&self, horizon: f64) -> Next {
+        // Before the printed first rise sets in there is none; it is an edge of its own.
+        let rise = if self.edge.is_some() { 0.0 } else { self.threshold.rise(self.at) };
+        let Threshold { base, touch, tau_rec, .. } = self.threshold;
+        let found = next_crossing(&self.shape, self.state, (base, touch), rise, tau_rec, horizon - self.at);
+        found.map_or(Next::Never, |s| Next::At(self.at + s))
+    }
+
+    fn fire(&mut self, t: f64, out: &mut Vec<OutputSpike>) {
+        let slope = self.shape.slope(self.shape.after(self.state, t - self.at));
+        out.push(OutputSpike { t, slope });
+        self.threshold.fire(t);
+        self.edge = self.threshold.edge();
+        if self.neuron.after_spike == AfterSpike::Reset {
+            self.state = State::default();
+        }
+        self.move_to(t);
+    }
+}

@@ -1,0 +1,231 @@
+//! The parameters of an SRM0 neuron, and what follows from them at once.
+
+use serde::{Deserialize, Serialize};
+
+use super::kernel::{Kernel, Shape};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
+use crate::{Result, problem};
+
+/// What remains of the inputs after the neuron's own spike.
+///
+/// Reading: 6.7 masks the potential for the refractory time and then has the whole linear sum back (`Keep`), while the
+/// sentence before it says that inputs of that time have no effect (`Ignore`); figures 6.9 to 6.11 need `Reset`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AfterSpike {
+    /// Every input counts (6.7 as printed).
+    #[default]
+    Keep,
+    /// Inputs of the refractory time are lost.
+    Ignore,
+    /// Every input up to the end of the refractory time is lost.
+    Reset,
+}
+
+/// The threshold before the first output spike.
+///
+/// Reading: 6.9 sets the time of a spike number 0 to 0, which raises the threshold from the start; a neuron that has not
+/// fired has no threshold rise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum FirstThreshold {
+    /// `theta_0` until the first spike.
+    #[default]
+    #[serde(rename = "theta_0")]
+    Base,
+    /// Raised as though the neuron had fired where the listening starts.
+    #[serde(rename = "printed")]
+    Printed,
+}
+
+/// Where the potential is compared with the threshold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Time {
+    /// At every instant: crossings are found exactly between the input spikes.
+    #[default]
+    Continuous,
+    /// At the points `start + k step_ms`.
+    Grid,
+}
+
+/// Parameters of an SRM0 neuron; the defaults are those of Table 6.1.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Neuron {
+    /// What an input spike does to the potential.
+    pub kernel: Kernel,
+    /// Membrane time constant, ms.
+    pub tau: f64,
+    /// Synaptic time constant of the double exponential kernel, ms; `tau/4` where left out, as the Tempotron has it.
+    pub tau_s: Option<f64>,
+    /// Baseline threshold, mV.
+    pub theta_0: f64,
+    /// Rise of the threshold by a spike, mV.
+    pub theta_plus: f64,
+    /// Time constant by which that rise decays, ms; `2 tau` where left out, as in Tables 6.1 and 6.2.
+    pub tau_rec: Option<f64>,
+    /// Absolute refractory time, ms.
+    pub refractory: f64,
+    /// What remains after a spike.
+    pub after_spike: AfterSpike,
+    /// The threshold before the first spike.
+    pub first_threshold: FirstThreshold,
+    /// Continuous time or a grid.
+    pub time: Time,
+    /// Step of the grid, ms.
+    pub step_ms: f64,
+}
+
+/// An input so near an end of a refractory time counts as at it, and one so short a time before the neuron's own spike as at
+/// the spike, ms: trained neurons fire within 1e-6 ms of their targets, and inputs at whole ms often lie just there.
+pub(crate) const AT_EDGE: f64 = 1e-6;
+/// How far below the threshold a potential may end and still count as reaching it, mV where `theta_0` is 0.3 mV and in
+/// proportion elsewhere: rounding of a potential that was trained to touch the threshold.
+const TOUCH: f64 = 1e-12;
+/// So many grid points are laid out at most (some GB), and so many stepped through (some ten seconds).
+const MOST_LAID_OUT: f64 = 2e7;
+pub(super) const MOST_STEPPED: f64 = 1e9;
+
+impl Default for Neuron {
+    fn default() -> Self {
+        Self {
+            kernel: Kernel::Alpha,
+            tau: 15.0,
+            tau_s: None,
+            theta_0: 0.3,
+            theta_plus: 0.2,
+            tau_rec: None,
+            refractory: 3.0,
+            after_spike: AfterSpike::Keep,
+            first_threshold: FirstThreshold::Base,
+            time: Time::Continuous,
+            step_ms: 1.0,
+        }
+    }
+}
+
+impl Neuron {
+    ranges! {
+        tau: "ms", Range::ABOVE_0;
+        theta_0: "mV", Range::ABOVE_0;
+        theta_plus: "mV", Range::FROM_0;
+        tau_rec(tau_rec): "ms", Range::ABOVE_0;
+        refractory: "ms", Range::FROM_0;
+        step_ms: "ms", Range::ABOVE_0;
+        tau_s(tau_s): "ms", Range::ABOVE_0;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter, its value and what would be right.
+    pub fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
+            return Err(problem!("tau_s is {} ms: must be below tau, {} ms", self.tau_s(), self.tau));
+        }
+        if self.kernel == Kernel::Exponential && self.time == Time::Continuous {
+            return Err(problem!(
+                "kernel is \"exponential\" and time \"continuous\": its potential only jumps, at inputs, so it never crosses \
+                 the threshold at a time of its own; take time \"grid\" or another kernel"
+            ));
+        }
+        if self.refractory == 0.0 && self.after_spike != AfterSpike::Reset {
+            return Err(problem!(
+                "refractory is 0 ms: must be above 0 unless after_spike is \"reset\", else the neuron fires without end"
+            ));
+        }
+        Ok(())
+    }
+
+    /// In units of how many mV the threshold is near its default: so what counts as met need not depend on the scale.
+    ///
+    /// A power of 2, so that nothing is rounded on the way there and back.
+    pub(crate) fn unit(&self) -> f64 {
+        (self.theta_0 / Self::default().theta_0).log2().round().exp2()
+    }
+
+    /// The same with its thresholds in units of this many mV.
+    pub(crate) fn in_units(&self, unit: f64) -> Self {
+        Self { theta_0: self.theta_0 / unit, theta_plus: self.theta_plus / unit, ..self.clone() }
+    }
+
+    /// The time constant by which the threshold recovers, ms.
+    #[must_use]
+    pub fn tau_rec(&self) -> f64 {
+        self.tau_rec.unwrap_or(2.0 * self.tau)
+    }
+
+    /// The synaptic time constant, ms.
+    #[must_use]
+    pub fn tau_s(&self) -> f64 {
+        self.tau_s.unwrap_or(0.25 * self.tau)
+    }
+
+    /// The kernel with its constants.
+    #[must_use]
+    pub fn shape(&self) -> Shape {
+        Shape::new(self.kernel, self.tau, self.tau_s())
+    }
+
+    /// The threshold `since` ms after the last spike (6.8), or before the first one, mV.
+    ///
+    /// In the refractory time the potential is 0 and the threshold does not matter.
+    #[must_use]
+    pub fn threshold(&self, since: Option<f64>) -> f64 {
+        self.theta_0 + self.rise(since)
+    }
+
+    /// What is left of the threshold's rise `since` ms after the last spike, mV.
+    pub(crate) fn rise(&self, since: Option<f64>) -> f64 {
+        since.map_or(0.0, |s| {
+            let recovering = s - self.refractory;
+            // A rise that rounding puts a hair before its time must still be there (an input can lie just on the edge).
+            if recovering < -1e-9 { 0.0 } else { self.theta_plus * (-recovering / self.tau_rec()).exp() }
+        })
+    }
+
+    /// How many points of the grid lie from `start` to `end`.
+    pub(crate) fn points(&self, start: f64, end: f64) -> f64 {
+        (((end - start) / self.step_ms + 1e-9).floor() + 1.0).max(0.0)
+    }
+
+    /// Refuses more grid points than can be laid out, before memory is asked for.
+    pub(crate) fn check_rows(&self, points: f64) -> Result<()> {
+        self.check_points(points, MOST_LAID_OUT)
+    }
+
+    pub(super) fn check_points(&self, points: f64, most: f64) -> Result<()> {
+        if points <= most {
+            return Ok(());
+        }
+        Err(problem!(
+            "step_ms is {} ms: makes {points:.1e} grid points, at most {most:.0e} can be had; take a larger step, or fewer or \
+             shorter patterns (times are in ms)",
+            self.step_ms
+        ))
+    }
+
+    /// How far below the threshold a potential may end and still count as reaching it, mV.
+    pub(crate) fn touch(&self) -> f64 {
+        TOUCH * self.unit()
+    }
+
+    /// Whether an input at `t` is lost, given the last output spike before it.
+    pub(crate) fn loses(&self, t: f64, last_spike: Option<f64>) -> bool {
+        let Some(spike) = last_spike else { return false };
+        match self.after_spike {
+            AfterSpike::Keep => false,
+            AfterSpike::Ignore => spike + AT_EDGE < t && t <= spike + self.refractory + AT_EDGE,
+            AfterSpike::Reset => t <= spike + self.refractory + AT_EDGE,
+        }
+    }
+}

@@ -1,0 +1,143 @@
+//! A neuron on whole trains: its spikes, and its potential where they are given.
+
+use super::kernel::State;
+use super::model::{AfterSpike, MOST_STEPPED, Neuron, Time};
+use super::streaming::NeuronStream;
+use super::threshold::OutputSpike;
+use crate::allowed::one_weight_a_train;
+use crate::{Result, SpikeTrains, Stop, problem};
+
+/// Grid points between two looks for Ctrl-C.
+const POINTS_A_LOOK: f64 = 65_536.0;
+
+impl Neuron {
+    /// Starts the neuron at `start` ms with its threshold multiplied by `threshold`.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for parameters, weights or a factor that make no sense.
+    pub fn stream(&self, weights: &[f64], threshold: f64, start: f64) -> Result<NeuronStream> {
+        NeuronStream::new(self, weights, threshold, start)
+    }
+
+    /// The output spikes to whole trains, from their start to their stop.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for parameters, weights, a factor or trains that make no sense; `Interrupted` where the caller stops it.
+    pub fn run(
+        &self,
+        weights: &[f64],
+        trains: &SpikeTrains,
+        threshold: f64,
+        stop: Stop<'_>,
+    ) -> Result<Vec<OutputSpike>> {
+        self.check_inputs(weights, trains)?;
+        if self.time == Time::Grid {
+            self.check_points(self.points(trains.start, trains.stop), MOST_STEPPED)?;
+        }
+        let mut stream = self.stream(weights, threshold, trains.start)?;
+        let mut out = Vec::new();
+        for (k, spike) in trains.by_time().iter().enumerate() {
+            if k % 4096 == 0 {
+                stop.check()?;
+            }
+            self.advance(&mut stream, trains.start, spike.t, &mut out, stop)?;
+            stream.push(spike.t, spike.train, &mut out)?;
+        }
+        self.advance(&mut stream, trains.start, trains.stop, &mut out, stop)?;
+        stream.advance(trains.stop, &mut out);
+        Ok(out)
+    }
+
+    /// Moves a stream towards `to`, so far on a grid that what is left takes no time worth a look for Ctrl-C.
+    fn advance(
+        &self,
+        stream: &mut NeuronStream,
+        start: f64,
+        to: f64,
+        out: &mut Vec<OutputSpike>,
+        stop: Stop<'_>,
+    ) -> Result<()> {
+        if self.time == Time::Continuous {
+            return Ok(());
+        }
+        let stretch = POINTS_A_LOOK * self.step_ms;
+        let mut next = ((stream.now() - start) / stretch).floor() + 1.0;
+        while start + next * stretch < to {
+            stop.check()?;
+            stream.advance(start + next * stretch, out);
+            next += 1.0;
+        }
+        Ok(())
+    }
+
+    /// The potential at `times` (ms, ascending), given that the neuron fired at `spikes` (ms, ascending); mV.
+    ///
+    /// Without spikes this is the linear sum 6.4. With them it is 6.7: 0 in the refractory time, then what `after_spike`
+    /// leaves. At a spike itself it is what the potential came up to.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for parameters, weights or trains that make no sense, or times that do not ascend.
+    pub fn potential(&self, weights: &[f64], trains: &SpikeTrains, times: &[f64], spikes: &[f64]) -> Result<Vec<f64>> {
+        self.check()?;
+        self.check_inputs(weights, trains)?;
+        for (name, list) in [("times", times), ("spikes", spikes)] {
+            if let Some(k) = list.iter().position(|t| !t.is_finite()) {
+                return Err(problem!("{name}[{k}] is {}: must be finite", list[k]));
+            }
+            if let Some(k) = list.windows(2).position(|w| w[1] < w[0]) {
+                return Err(problem!(
+                    "{name}[{}] is {} ms, after {} ms: times must ascend",
+                    k + 1,
+                    list[k + 1],
+                    list[k]
+                ));
+            }
+        }
+        Ok(potential(self, weights, trains, times, spikes))
+    }
+
+    pub(super) fn check_inputs(&self, weights: &[f64], trains: &SpikeTrains) -> Result<()> {
+        trains.check()?;
+        if trains.values.is_some() {
+            return Err(problem!("trains: spikes are signed, split them into ON and OFF trains first"));
+        }
+        one_weight_a_train(weights, trains.len())
+    }
+}
+
+/// The potential at ascending `times` of a neuron that fired at ascending `spikes`.
+fn potential(neuron: &Neuron, weights: &[f64], trains: &SpikeTrains, times: &[f64], spikes: &[f64]) -> Vec<f64> {
+    let (inputs, shape) = (trains.by_time(), neuron.shape());
+    let (mut state, mut at) = (State::default(), trains.start);
+    let (mut next_input, mut next_spike, mut last) = (0, 0, None);
+    let mut out = Vec::with_capacity(times.len());
+    for &t in times {
+        // A spike takes effect after its own time, an input from it on; at equal times the spike sees the input (as 0).
+        loop {
+            let spike = spikes.get(next_spike).copied().filter(|&s| s < t);
+            let input = inputs.get(next_input).filter(|i| i.t < t && spike.is_none_or(|s| i.t <= s));
+            if let Some(input) = input {
+                next_input += 1;
+                if !neuron.loses(input.t, last) {
+                    state = shape.after(state, input.t - at);
+                    at = input.t;
+                    shape.add(&mut state, weights[input.train as usize], 0.0);
+                }
+            } else if let Some(spike) = spike {
+                next_spike += 1;
+                last = Some(spike);
+                if neuron.after_spike == AfterSpike::Reset {
+                    state = State::default();
+                }
+            } else {
+                break;
+            }
+        }
+        let refractory = last.is_some_and(|s| t <= s + neuron.refractory);
+        out.push(if refractory { 0.0 } else { shape.after(state, (t - at).max(0.0)).b });
+    }
+    out
+}

@@ -1,0 +1,77 @@
+//! The threshold after a spike, and the spike that crossed it.
+
+use super::model::{FirstThreshold, Neuron};
+
+/// A spike of the neuron.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OutputSpike {
+    /// When the potential crossed the threshold (on a grid: the first point at or above it), ms.
+    pub t: f64,
+    /// How steeply it crossed, mV/ms.
+    pub slope: f64,
+}
+
+/// The threshold with its memory of the last spike.
+#[derive(Debug, Clone)]
+pub(super) struct Threshold {
+    /// `theta_0` times the factor, mV.
+    pub(super) base: f64,
+    /// How far below it counts as reaching it, mV.
+    pub(super) touch: f64,
+    plus: f64,
+    pub(super) tau_rec: f64,
+    refractory: f64,
+    /// The last spike, or where the printed reading puts spike number 0.
+    since: Option<f64>,
+    /// The last spike proper.
+    pub(super) fired: Option<f64>,
+}
+
+/// Rounding of a grid point or an input on the very edge of the refractory time, ms.
+pub(super) const EDGE: f64 = 1e-9;
+
+impl Threshold {
+    pub(super) fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
+        Self {
+            base: neuron.theta_0 * factor,
+            touch: neuron.touch(),
+            plus: neuron.theta_plus * factor,
+            tau_rec: neuron.tau_rec(),
+            refractory: neuron.refractory,
+            since: (neuron.first_threshold == FirstThreshold::Printed).then_some(start),
+            fired: None,
+        }
+    }
+
+    pub(super) fn fire(&mut self, t: f64) {
+        self.since = Some(t);
+        self.fired = Some(t);
+    }
+
+    /// What is left of the rise at `t`, mV.
+    pub(super) fn rise(&self, t: f64) -> f64 {
+        if self.plus == 0.0 {
+            return 0.0;
+        }
+        self.since.map_or(0.0, |since| {
+            let recovering = t - since - self.refractory;
+            if recovering < -EDGE { 0.0 } else { self.plus * (-recovering / self.tau_rec).exp() }
+        })
+    }
+
+    /// Whether the neuron cannot fire at `t`: `0 < t - spike <= refractory` (6.6).
+    pub(super) fn silent_at(&self, t: f64) -> bool {
+        self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + EDGE)
+    }
+
+    /// Whether a potential on a grid has reached the threshold at `t`, and the neuron may fire.
+    pub(super) fn reached(&self, t: f64, potential: f64) -> bool {
+        let potential = potential + self.touch;
+        potential >= self.base && !self.silent_at(t) && potential >= self.base + self.rise(t)
+    }
+
+    /// When the rise sets in and the refractory time ends.
+    pub(super) fn edge(&self) -> Option<f64> {
+        self.since.map(|since| since + self.refractory)
+    }
+}

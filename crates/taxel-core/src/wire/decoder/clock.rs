@@ -1,0 +1,46 @@
+//! Stamps to time: which turn of the 16-bit counter a stamp belongs to.
+
+use crate::events::FARTHEST_BACK_US;
+use crate::wire::v1::STAMP_US;
+
+/// How far a stamp may lie behind the latest time and still be a step back (reordered datagrams), in stamps: 0.1 s.
+/// Reading: any other lies ahead, so silences up to 6.45 s are right from the stamps alone.
+pub const FARTHEST_BACK: i64 = FARTHEST_BACK_US / STAMP_US;
+
+/// Stamps to a turn of the 16-bit counter: 6.5536 s.
+pub(super) const TURN: i64 = 65_536;
+
+/// Unwraps stamps into 64 bits.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Clock {
+    /// The latest time, in stamps.
+    pub(super) latest: Option<i64>,
+    /// Where the last stamp was a step back: its time, in stamps.
+    pub(super) behind: Option<i64>,
+    /// When, by the host's clock, the last stamp came, us.
+    pub(super) heard: Option<i64>,
+}
+
+impl Clock {
+    /// Gives the unwrapped time in stamps, and whether it is a step back.
+    pub(super) fn unwrap(&mut self, stamp: u16, arrived: Option<i64>) -> (i64, bool) {
+        let Some(latest) = self.latest else {
+            (self.latest, self.heard) = (Some(i64::from(stamp)), arrived);
+            return (i64::from(stamp), false);
+        };
+        let ahead = (i64::from(stamp) - latest).rem_euclid(TURN);
+        let mut time = if ahead >= TURN - FARTHEST_BACK { latest + ahead - TURN } else { latest + ahead };
+        if let (Some(now), Some(before)) = (arrived, self.heard) {
+            // The silence as the host heard it says how many whole turns the stamps do not show.
+            let expected = latest + now.saturating_sub(before).clamp(0, LONGEST_SILENCE) / STAMP_US;
+            time += ((expected - time + TURN / 2).div_euclid(TURN)).max(0) * TURN;
+        }
+        self.heard = arrived;
+        self.latest = Some(latest.max(time));
+        self.behind = (time < latest).then_some(time);
+        (time, time < latest)
+    }
+}
+
+/// A year, us: no arrival time can carry the clock out of its 64 bits.
+const LONGEST_SILENCE: i64 = 365 * 86_400 * 1_000_000;

@@ -1,0 +1,26 @@
+//! What a receiver counts.
+
+use serde::Serialize;
+
+/// What came and what was lost up to now; see [`crate::capture`] for the sums.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Counts {
+    /// Receive calls that gave something.
+    pub messages: u64,
+    /// Datagrams in them.
+    pub datagrams: u64,
+    /// Payload bytes in them.
+    pub bytes: u64,
+    /// Messages that the kernel threw away because its own queue was full.
+    pub dropped_by_kernel: u64,
+    /// Datagrams that were thrown away because nobody took them in time.
+    pub dropped_by_queue: u64,
+    /// Payload bytes in those.
+    pub bytes_dropped_by_queue: u64,
+    /// Datagrams that wait to be taken.
+    pub waiting: u64,
+    /// What the kernel's own queue may hold, bytes, as it counts them (its overhead included).
+    pub kernel_buffer_bytes: u64,
+    /// Whether trains of datagrams come in one call.
+    pub gro: bool,
+}

@@ -1,0 +1,83 @@
+//! What the pipeline counts, and how it ended.
+
+use std::path::PathBuf;
+
+use serde::Serialize;
+use taxel_core::wire;
+
+use crate::capture;
+use crate::clock::Offset;
+use crate::latency::Quantiles;
+
+/// What came, what became of it, and what was lost where.
+///
+/// Once [`Live::stop`](super::Live::stop) has returned, `capture.datagrams = decoded + capture.dropped_by_queue` and
+/// `wire.bytes = 5 wire.words + wire.skipped`; `events = read_out + events_dropped` where there is a readout.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct Counters {
+    /// At the socket and in the queue behind it.
+    pub capture: capture::Counts,
+    /// Datagrams that were decoded.
+    pub decoded: u64,
+    /// What the decoder saw in them.
+    pub wire: wire::Counts,
+    /// The version of the wire that the board speaks.
+    pub wire_version: u8,
+    /// What was heard and missed of version 2.
+    pub wire_v2: wire::v2::Counts,
+    /// Bytes of version 1 that were refused, because the board speaks version 2.
+    pub wire_refused: u64,
+    /// How often the board changed its version.
+    pub wire_changes: u64,
+    /// Events that it gave.
+    pub events: u64,
+    /// Events that the readout has heard.
+    pub read_out: u64,
+    /// Events that found no room before the readout.
+    pub events_dropped: u64,
+    /// Events that came out of order, or more than 0.1 s after a silence that was believed: the readout heard them as of
+    /// the time that it had come to.
+    pub late: u64,
+    /// Detections that were said.
+    pub detections: u64,
+    /// Those among them that were said in a silence that was none: an event came later than the guard, and what the
+    /// recording says was said after them.
+    pub wrong: u64,
+    /// Detections that [`Live::next`](super::Live::next) was too slow for; the sinks had them.
+    pub detections_dropped: u64,
+    /// From the kernel's stamp to the end of decoding, a datagram each.
+    pub decode_latency: Quantiles,
+    /// From `known` to said, by the board's clock.
+    pub said_latency: Quantiles,
+    /// What the host's clock shows when the board's shows a time; from the first datagram on.
+    pub offset: Option<Offset>,
+    /// The latest stamp, us.
+    pub board_us: Option<i64>,
+    /// Starts and stops that the board marked.
+    pub markers: u64,
+    /// Whether the last marker was a start; `None` before the first.
+    pub marked_start: Option<bool>,
+    /// Since the socket was opened, s.
+    pub seconds: f64,
+    /// Whether a tare is being taken.
+    pub taring: bool,
+}
+
+impl Counters {
+    /// Whether not even a datagram that was lost has come.
+    #[must_use]
+    pub fn nothing_came(&self) -> bool {
+        self.capture.messages + self.capture.dropped_by_kernel == 0
+    }
+}
+
+/// How a [`Live`](super::Live) ended.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// All of them, closed.
+    pub counters: Counters,
+    /// One line: nothing lost after arrival, what was lost where, or that nothing came.
+    pub verdict: String,
+    /// The file, where something was recorded: one to which nothing came is not kept, and none is replaced by it.
+    pub path: Option<PathBuf>,
+}

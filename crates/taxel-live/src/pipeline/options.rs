@@ -1,0 +1,55 @@
+//! How the pipeline is told to work.
+
+use std::path::PathBuf;
+
+use taxel_core::Array;
+use taxel_core::wire::Registers;
+
+use crate::capture::ReceiverOptions;
+use crate::recording::Compression;
+
+/// How a [`Live`](super::Live) works.
+#[derive(Debug, Clone)]
+pub struct LiveOptions {
+    /// The sensor.
+    pub array: Array,
+    /// The board's registers, as far as they are known: its frame's length is taken from them.
+    pub registers: Registers,
+    /// Whether the board sends differences for intensities (the panel's "delta intensity").
+    pub differences: bool,
+    /// In silence the readout's time follows the host's clock, this many frames behind it.
+    pub guard_frames: f64,
+    /// How many events may wait for the readout.
+    pub readout_events: usize,
+    /// The socket and the queue behind it.
+    pub capture: ReceiverOptions,
+    /// Where everything is kept, if anywhere.
+    pub record: Option<Record>,
+}
+
+impl LiveOptions {
+    /// The usual ones for an array: the first preset's registers, 5 frames' guard, nothing recorded.
+    #[must_use]
+    pub fn new(array: Array) -> Self {
+        Self {
+            array,
+            registers: Registers::default(),
+            differences: false,
+            guard_frames: 5.0,
+            readout_events: 1 << 20,
+            capture: ReceiverOptions::default(),
+            record: None,
+        }
+    }
+}
+
+/// Where and how to record: `.lsa` for the manual's raw bytes, `.mcap` for all that is known.
+#[derive(Debug, Clone)]
+pub struct Record {
+    /// The file.
+    pub path: PathBuf,
+    /// Of the chunks of `.mcap`.
+    pub compression: Compression,
+    /// Whether an existing file may be replaced.
+    pub overwrite: bool,
+}

@@ -1,0 +1,51 @@
+//! Detections as they are said, and who hears them.
+
+use taxel_core::detect::Detection;
+
+/// A detection, and when it was said.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Said {
+    /// What was said.
+    pub detection: Detection,
+    /// When it was said by the host's clock, ns since 1970.
+    pub said_ns: i64,
+    /// The same by the board's clock, as far as the host can tell: `said_ns` less the estimated offset; us.
+    pub said: i64,
+}
+
+/// Takes detections in the thread that made them; what it does there, the next detection waits for.
+pub trait Sink: Send {
+    /// One was said.
+    ///
+    /// # Errors
+    ///
+    /// Where it cannot be handed on: then the whole way ends.
+    fn take(&mut self, said: &Said) -> std::io::Result<()>;
+}
+
+impl<F: FnMut(&Said) -> std::io::Result<()> + Send> Sink for F {
+    fn take(&mut self, said: &Said) -> std::io::Result<()> {
+        self(said)
+    }
+}
+
+/// Writes each detection as a line of JSON, with the keys of `taxel detect --json` and when it was said.
+#[derive(Debug)]
+pub struct Lines<W>(pub W);
+
+impl<W: std::io::Write + Send> Sink for Lines<W> {
+    fn take(&mut self, said: &Said) -> std::io::Result<()> {
+        let Said { detection, said_ns, said } = said;
+        let mut line = serde_json::to_vec(&serde_json::json!({
+            "label": detection.label,
+            "t_us": detection.t,
+            "known_us": detection.known,
+            "slope_mv_per_ms": detection.slope,
+            "said_us": said,
+            "said_ns": said_ns,
+        }))?;
+        line.push(b'\n');
+        self.0.write_all(&line)?;
+        self.0.flush()
+    }
+}
