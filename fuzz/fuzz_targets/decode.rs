@@ -5,7 +5,8 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use taxel_core::wire::{Decoder, Instructions, Pairing};
+use taxel_core::vectors::Instructions;
+use taxel_core::wire::{Decoder, Pairing};
 use taxel_core::{Array, Events};
 
 fuzz_target!(|input: &[u8]| {

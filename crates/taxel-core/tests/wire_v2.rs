@@ -462,3 +462,26 @@ fn a_vector_means_what_its_json_says() {
     }
     assert!(seen >= 12, "{seen} vectors");
 }
+
+#[test]
+fn a_number_drawn_twice_is_a_reset_once() {
+    let mut decoder = Decoder::new(Array::thesis());
+    let (mut events, mut repaired) = (Events::empty(Array::thesis()), Vec::new());
+    let mut datagram = Vec::new();
+    let mut hear = |sequence, base| {
+        let header = Header { kind: 1, board: 1, sequence, base, session: 9, stride: 6, flags: 0, span: 192 };
+        header.write(&[0x05, 0x80], &mut datagram);
+        decoder.push(&datagram, None, &mut events, &mut repaired)
+    };
+    let intact = |heard| matches!(heard, Heard::Intact { .. });
+    assert!(intact(hear(70_000, 20_000_000)));
+    assert!(intact(hear(70_001, 20_000_192)));
+    // After the reset, each once; what comes again stays a repetition, and the old session is over.
+    for sequence in 0..5 {
+        assert!(intact(hear(sequence, 192 * u64::from(sequence))));
+        assert!(matches!(hear(sequence, 192 * u64::from(sequence)), Heard::Repeated));
+    }
+    let counts = decoder.counts();
+    assert_eq!((counts.intact, counts.repeated, counts.resets, counts.missing), (7, 5, 1, 0));
+    assert!(events.t.is_sorted());
+}

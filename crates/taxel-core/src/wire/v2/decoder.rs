@@ -280,7 +280,8 @@ impl Decoder {
 
     /// Which session a datagram belongs to, and whether it begins one.
     fn session(&mut self, header: &Header, arrived: Option<i64>) -> (usize, bool) {
-        if let Some(which) = self.sessions.iter().position(|session| session.number == header.session) {
+        // The latest of a number, should two have drawn it.
+        if let Some(which) = self.sessions.iter().rposition(|session| session.number == header.session) {
             let session = &self.sessions[which];
             // The same number drawn twice: everything begins at 0 again.
             let again = session.number_of(header.sequence) <= session.highest - WINDOW as i64
