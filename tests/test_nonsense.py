@@ -63,6 +63,10 @@ TRAINS = taxel.SpikeTrains.from_lists([[1.0, 2.0], [3.0]], 0.0, 20.0, [[1.0, -1.
 UNSIGNED = taxel.SpikeTrains.from_lists([[1.0, 2.0], [3.0]], 0.0, 20.0)
 FOUND = taxel.Detections(["a", "b"], [10, 20], [11, 22], [0.5, 0.5])
 TARE = taxel.Tare.take(FRAMES)
+LAID = taxel.Load(FRAMES, 9.81)
+CALIBRATION = taxel.Calibration.table(ARRAY, [5.0, 50.0], [1.0, 9.0], unit="N")
+TICKS = taxel.Calibration.table(ARRAY, [5.0, 50.0], [1.0, 9.0], unit="N", of="ticks")
+CALIBRATION_HOW = {"gain": 1.0, "rest": TARE, "floor": 0.5, "date": "2026-11-21", "note": "bench 2"}
 LEVELS = taxel.encode.LevelCrossing([0.5])
 READOUT = taxel.Readout(LEVELS, {"a": (taxel.Neuron(tau=2.0), [0.5] * 32)}, array=ARRAY)
 RECIPE = taxel.detect.Recipe(LEVELS, {"tau": 5.0}, {"a": {"ub": 1.0}})
@@ -210,6 +214,41 @@ SOUND: dict[str, Sound] = {
     "taxel.Tare.from_json": plain(taxel.Tare.from_json, text=TARE.to_json()),
     "taxel.Tare.save": method(TARE, "save", path="tare.json", overwrite=True),
     "taxel.Tare.load": plain(taxel.Tare.load, path="here_tare.json"),
+    "taxel.Calibration.law": plain(
+        taxel.Calibration.law, array=ARRAY, ramp=150.0, sensor={"exponent": 0.8}, unit="N", **CALIBRATION_HOW
+    ),
+    "taxel.Calibration.table": plain(
+        taxel.Calibration.table,
+        array=ARRAY,
+        readings=[5.0, 50.0],
+        values=[1.0, 9.0],
+        unit="kPa",
+        of="counts",
+        **CALIBRATION_HOW,
+    ),
+    "taxel.Calibration.fit": plain(
+        taxel.Calibration.fit,
+        loads=[LAID],
+        unit="N",
+        start=CALIBRATION,
+        exponent=None,
+        each=False,
+        rest=None,
+        floor=0.5,
+        date="2026-11-21",
+        note="bench 2",
+    ),
+    "taxel.Calibration.apply": method(CALIBRATION, "apply", frames=FRAMES, rest=TARE),
+    "taxel.Calibration.readings": method(
+        CALIBRATION,
+        "readings",
+        frames=taxel.Frames(np.ones((3, 4, 4)), [0, 192, 384], unit="N", array=ARRAY),
+        rest=TARE,
+    ),
+    "taxel.Calibration.from_json": plain(taxel.Calibration.from_json, text=CALIBRATION.to_json()),
+    "taxel.Calibration.save": method(CALIBRATION, "save", path="calibration.json", overwrite=True),
+    "taxel.Calibration.load": plain(taxel.Calibration.load, path="here_calibration.json"),
+    "taxel.Calibration.beside": plain(taxel.Calibration.beside, recording="here_events.npz"),
     "taxel.Neuron": plain(
         taxel.Neuron,
         kernel="double_exponential",
@@ -453,6 +492,10 @@ SOUND: dict[str, Sound] = {
     "taxel.open": plain(taxel.open, path="here_events.npz", array=ARRAY, pairing="direct", differences=False),
     "taxel.Recording.between": lambda: (taxel.open("here_events.npz").between, {"start": 0, "stop": 300}),
     "taxel.Recording.frames": lambda: (taxel.open("here_events.npz").frames, {"rate_hz": 1000.0}),
+    "taxel.Recording.calibrated": lambda: (
+        taxel.open("here_events.npz").calibrated,
+        {"rate_hz": 1000.0, "rest": TARE},
+    ),
     "taxel.cut": lambda: (
         taxel.cut,
         {
@@ -712,6 +755,7 @@ LEFT_OUT = {
     "taxel.Datagrams": "of a recording",
     "taxel.Health": "a result",
     "taxel.Label": "a row of Labels",
+    "taxel.Load": "what Calibration.fit checks",
     "taxel.Note": "of a recording",
     "taxel.Recording": "made by taxel.open",
     "taxel.detect.Score": "a result",
@@ -807,6 +851,8 @@ def somewhere(tmp_path, monkeypatch):
     FOUND.to_csv("here.csv")
     TRAINS.save("here.npz")
     TARE.save("here_tare.json")
+    CALIBRATION.save("here_calibration.json")
+    TICKS.save("here_events.calibration.json")
     READOUT.save("here_readout.json")
     READOUT.to_nir("here.nir")
     TRAINS.to_nwb("here.nwb")

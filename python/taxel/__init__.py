@@ -11,6 +11,7 @@ from taxel._health import Health, health
 from taxel._opening import open_any as open  # noqa: A004  taxel.open is a recording's
 from taxel._parts import cut, merge
 from taxel.array import Array
+from taxel.calibration import Calibration, Load
 from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.events import Events
@@ -28,6 +29,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Array",
+    "Calibration",
     "Clock",
     "Datagrams",
     "Detections",
@@ -39,6 +41,7 @@ __all__ = [
     "Health",
     "Label",
     "Labels",
+    "Load",
     "Neuron",
     "NotFittedError",
     "Note",

@@ -21,9 +21,11 @@ from taxel._h5 import read_h5
 from taxel._remarks import Note, Remarks, array_of, detections_of, notes_of
 from taxel._tables import read_csv, read_npz
 from taxel.array import Array
+from taxel.calibration import Calibration
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.tare import Tare
 from taxel.wire import Registers
 
 if TYPE_CHECKING:
@@ -237,6 +239,48 @@ class Recording:
             held = own.values[np.searchsorted(own.t, t, side="right") - 1]
             own = Frames(held, t, unit=own.unit, array=own.array)
         return own if self._window is None else own.between(*self._window)
+
+    @cached_property
+    def calibration(self) -> Calibration | None:
+        """The calibration that lies beside the file (`Calibration.beside`); None where there is none.
+
+        Raises
+        ------
+        FormatError : it cannot be read
+        ProblemError : it is of another array, or of readings in another unit
+        """
+        place = Calibration.beside(self.path)
+        if place is None:
+            return None
+        found = Calibration.load(place)
+        read = "ticks" if self.has_events else self.frames().unit
+        if found.array != self.array or found.of != read:
+            raise ProblemError(
+                f"{place}: turns {found.of} of {found.array!r} into {found.unit}; {self.name} holds {read} of "
+                f"{self.array!r}, another array"
+            )
+        return found
+
+    def calibrated(self, rate_hz: float | None = None, rest: Tare | None = None) -> Frames:
+        """Return pictures in N or kPa, by the calibration that lies beside the file.
+
+        Parameters
+        ----------
+        rate_hz : float, above 0, optional
+            As of `frames`.
+        rest : Tare, optional
+            Today's rest; the calibration's own where it is left out.
+
+        Raises
+        ------
+        ProblemError : no calibration lies beside it, or one of another array
+        """
+        if self.calibration is None:
+            raise ProblemError(
+                f"{self.path}: no calibration lies beside it; taxel calibrate makes one, and without one nothing is N "
+                "or kPa"
+            )
+        return self.calibration.apply(self.frames(rate_hz), rest)
 
     @property
     def is_slice(self) -> bool:

@@ -5,6 +5,7 @@ mod enter;
 mod errors;
 mod knock;
 
+mod calibration;
 mod cone_x;
 mod described;
 mod detect;
@@ -30,6 +31,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     knock::register(module)?;
     nouns::register(module)?;
+    calibration::register(module)?;
     cone_x::register(module)?;
     detect::register(module)?;
     encode::register(module)?;

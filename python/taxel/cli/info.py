@@ -134,6 +134,8 @@ def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[st
             "drift_ppm": clock.drift_ppm,
             "delay_us": {"median": float(late[0]), "p99": float(late[1])},
         }
+    calibration = recording.calibration
+    said["calibration"] = None if calibration is None else calibration.described()
     said["pressure"] = None if pressed is None else _pressure(*pressed)
     return said | {
         "notes": [{"t_us": note.t, "text": note.text} for note in recording.notes],
@@ -199,6 +201,8 @@ def _contents(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "events", f"{said['events']}, {words}"
     else:
         yield "pictures", f"{said['pictures']} ({said['unit']})"
+    if said["calibration"] is not None:
+        yield "calibration", said["calibration"]
     pressed = said["pressure"]
     if pressed is not None:
         for name, words, unit in (

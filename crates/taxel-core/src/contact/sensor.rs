@@ -94,6 +94,33 @@ impl Sensor {
         let conductance = self.rest_us + self.touch_us * (force_n.max(0.0) / 0.02).powf(self.exponent);
         self.v_trans * (1.0 + 1e-3 * self.feedback_kohm * conductance)
     }
+
+    /// Volts that 0.02 N add.
+    fn touch_v(&self) -> f64 {
+        self.v_trans * 1e-3 * self.feedback_kohm * self.touch_us
+    }
+
+    /// What a taxel reads under a force, ticks, where it reads `rest` without one; the ramp's end at most.
+    #[must_use]
+    pub fn reading(&self, force_n: f64, rest: f64, ramp: f64) -> f64 {
+        ramp_ticks(ramp_volts(rest, ramp) + self.touch_v() * (force_n.max(0.0) / 0.02).powf(self.exponent), ramp)
+    }
+
+    /// Force on a taxel that reads `ticks`, N, where it reads `rest` without one: the inverse of [`Sensor::reading`].
+    ///
+    /// 0 at the rest and below; at the ramp's end the least force that it can be.
+    #[must_use]
+    pub fn force(&self, ticks: f64, rest: f64, ramp: f64) -> f64 {
+        let gained = (ramp_volts(ticks, ramp) - ramp_volts(rest, ramp)).max(0.0);
+        0.02 * (gained / self.touch_v()).powf(self.exponent.recip())
+    }
+}
+
+/// Where the ramp stands after `ticks` of the counter, V: the inverse of [`ramp_ticks`].
+#[must_use]
+pub fn ramp_volts(ticks: f64, ramp: f64) -> f64 {
+    let constant = ramp / (SUPPLY_V / (SUPPLY_V - RAMP_END_V)).ln();
+    -SUPPLY_V * (-ticks.clamp(0.0, ramp) / constant).exp_m1()
 }
 
 /// When the ramp passes a voltage, in ticks of the counter.
@@ -256,6 +283,19 @@ mod tests {
         assert!((touch - rest - 0.1).abs() < 5e-4, "{}", touch - rest);
         let ticks = ramp_ticks(touch, 150.0) - ramp_ticks(rest, 150.0);
         assert!((ticks - 4.5).abs() < 0.1, "{ticks}");
+    }
+
+    #[test]
+    fn a_force_is_read_back_from_its_ticks_up_to_the_ramps_end() {
+        let sensor = Sensor::default();
+        let rest = ramp_ticks(sensor.volts(0.0), 150.0);
+        for force in [0.0, 1e-6, 0.02, 0.5, 1.1] {
+            let ticks = sensor.reading(force, rest, 150.0);
+            assert!((ticks - ramp_ticks(sensor.volts(force), 150.0)).abs() < 1e-9, "{force} N reads {ticks}");
+            assert!((sensor.force(ticks, rest, 150.0) - force).abs() < 1e-9, "{force} N");
+        }
+        assert!(sensor.force(rest - 5.0, rest, 150.0) == 0.0);
+        assert!(sensor.force(150.0, rest, 150.0) == sensor.force(1e9, rest, 150.0));
     }
 
     #[test]

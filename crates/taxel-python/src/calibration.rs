@@ -1,0 +1,57 @@
+//! The law of fabric, amplifier and ramp, for calibrations: forces from ticks, and back.
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use taxel_core::contact::Sensor;
+use taxel_core::contact::sensor::ramp_ticks;
+use taxel_core::{Error, Result};
+
+use crate::convert::{array, slice};
+use crate::enter::enter;
+use crate::errors::core;
+use crate::parameters::read;
+
+fn law(json: &str) -> Result<Sensor> {
+    let sensor: Sensor = read(json).map_err(|said| Error::Scene(format!("law: {said}")))?;
+    sensor.check()?;
+    Ok(sensor)
+}
+
+/// Gives all parameters of a law as JSON, checked.
+#[pyfunction]
+fn check_law(json: &str) -> PyResult<String> {
+    Ok(serde_json::to_string(&law(json).map_err(core)?).unwrap_or_default())
+}
+
+/// Gives what a taxel without spread reads at rest, ticks.
+#[pyfunction]
+fn law_rest(json: &str, ramp: f64) -> PyResult<f64> {
+    Ok(ramp_ticks(law(json).map_err(core)?.volts(0.0), ramp))
+}
+
+/// Gives forces in N of readings in ticks, each with its rest; or, `back`, the readings of forces.
+#[pyfunction]
+fn law_of<'py>(
+    py: Python<'py>,
+    json: &str,
+    ramp: f64,
+    given: PyReadonlyArray1<'py, f64>,
+    rest: PyReadonlyArray1<'py, f64>,
+    back: bool,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (given, rest) = (slice("given", &given)?, slice("rest", &rest)?);
+    let out = enter(py, |_| -> Result<Vec<f64>> {
+        let sensor = law(json)?;
+        let one = |(&value, &rest): (&f64, &f64)| {
+            if back { sensor.reading(value, rest, ramp) } else { sensor.force(value, rest, ramp) }
+        };
+        Ok(given.iter().zip(rest).map(one).collect())
+    })?;
+    Ok(array(py, out))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(check_law, module)?)?;
+    module.add_function(wrap_pyfunction!(law_rest, module)?)?;
+    module.add_function(wrap_pyfunction!(law_of, module)?)
+}

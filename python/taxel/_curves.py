@@ -1,0 +1,153 @@
+"""How a taxel turns what it reads into N or kPa: a power, a table, the law of fabric, amplifier and ramp."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._arguments import floats, mapping, number, parameters, shown
+from taxel._core import ProblemError
+
+__all__ = ["N_PER_KPA_MM2", "Curve", "Law", "Power", "Table", "Values", "above_0", "curve_of"]
+
+#: Of a load that uniform pressure in kPa makes on 1 mm2: N.
+N_PER_KPA_MM2 = 1e-3
+
+Values = NDArray[np.float64]
+
+
+class Curve(Protocol):
+    """How a taxel of gain 1 turns readings into values, and back; both rise."""
+
+    def values(self, readings: Values, rest: Values) -> Values:
+        """Return the values of readings, each with its rest."""
+        ...
+
+    def readings(self, values: Values, rest: Values) -> Values:
+        """Return the readings of values: the inverse."""
+        ...
+
+    def said(self) -> dict[str, Any]:
+        """Return what a file holds of it."""
+        ...
+
+    def bent(self, exponent: float) -> Curve:
+        """Return the same with another exponent of the value by what is read."""
+        ...
+
+
+class Power:
+    """The reading above rest to a power; of a gain, the value where it is 1."""
+
+    def __init__(self, exponent: object) -> None:
+        self.exponent = above_0("exponent", exponent)
+
+    def values(self, readings: Values, rest: Values) -> Values:
+        return np.asarray(np.maximum(readings - rest, 0.0) ** self.exponent)
+
+    def readings(self, values: Values, rest: Values) -> Values:
+        return np.asarray(rest + values ** (1 / self.exponent))
+
+    def said(self) -> dict[str, Any]:
+        return {"power": {"exponent": self.exponent}}
+
+    def bent(self, exponent: float) -> Power:
+        return Power(exponent)
+
+
+class Table:
+    """Straight lines through known points; nothing at rest, and beyond the last point what stands there."""
+
+    def __init__(self, readings: object, values: object) -> None:
+        self.x, self.y = (floats(name, column) for name, column in (("readings", readings), ("values", values)))  # type: ignore[arg-type]
+        for name, column in (("readings", self.x), ("values", self.y)):
+            if not len(column) or len(self.x) != len(self.y):
+                raise ProblemError(
+                    f"a table of {len(self.x)} readings and {len(self.y)} values: must be as many, 1 or more"
+                )
+            wrong = np.flatnonzero(~(np.isfinite(column) & (np.diff(column, prepend=-np.inf) > 0)) | (column < 0))
+            if len(wrong):
+                k = int(wrong[0])
+                raise ProblemError(f"{name}[{k}] is {column[k]:g}: must rise from 0 or more")
+        if (self.x[0] == 0) != (self.y[0] == 0):
+            raise ProblemError(f"the table begins at {self.x[0]:g}, {self.y[0]:g}: what reads 0 above rest bears 0")
+        if self.x[0] > 0:
+            self.x, self.y = np.append(0.0, self.x), np.append(0.0, self.y)
+
+    def values(self, readings: Values, rest: Values) -> Values:
+        return np.asarray(np.interp(readings - rest, self.x, self.y))
+
+    def readings(self, values: Values, rest: Values) -> Values:
+        return np.asarray(rest + np.interp(values, self.y, self.x))
+
+    def said(self) -> dict[str, Any]:
+        return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}
+
+    def bent(self, exponent: float) -> Table:  # noqa: ARG002  what a curve with an exponent takes
+        raise ProblemError("exponent: a table has none; its gain alone is fitted")
+
+
+class Law:
+    """Fabric, amplifier and ramp: G = G0 + k F^n, V = V_trans (1 + R_f G), and the time at which a ramp passes V."""
+
+    def __init__(self, ramp: object, unit: str, **sensor: object) -> None:
+        self.ramp, self.unit = above_0("ramp", ramp), unit
+        if self.ramp > 65_535:
+            raise ProblemError(f"ramp is {self.ramp:g} ticks: must be 65535 or less")
+        try:
+            self.text = _core.check_law(parameters(sensor))
+        except _core.SceneError as error:
+            raise ProblemError(str(error)) from None
+        self.sensor: dict[str, float] = json.loads(self.text)
+        # The law gives the force on a taxel's own face.
+        self.share = 1.0 if unit == "N" else 1 / (N_PER_KPA_MM2 * self.sensor["side_mm"] ** 2)
+
+    def rest(self) -> float:
+        return _core.law_rest(self.text, self.ramp)
+
+    def _of(self, given: Values, rest: Values, back: bool) -> Values:
+        both = np.broadcast_arrays(given, rest)
+        values, at_rest = (np.ascontiguousarray(column, np.float64).ravel() for column in both)
+        return _core.law_of(self.text, self.ramp, values, at_rest, back).reshape(both[0].shape)
+
+    def values(self, readings: Values, rest: Values) -> Values:
+        return self.share * self._of(readings, rest, back=False)
+
+    def readings(self, values: Values, rest: Values) -> Values:
+        return self._of(values / self.share, rest, back=True)
+
+    def said(self) -> dict[str, Any]:
+        return {"law": {"ramp": self.ramp, **self.sensor}}
+
+    def bent(self, exponent: float) -> Law:
+        return Law(self.ramp, self.unit, **{**self.sensor, "exponent": 1 / exponent})
+
+
+def curve_of(said: Mapping[str, Any], unit: str) -> Curve:
+    """Return the curve that a file describes."""
+    kinds: dict[str, Any] = {
+        "power": Power,
+        "table": Table,
+        "law": lambda ramp, **sensor: Law(ramp, unit, **sensor),
+    }
+    if len(said) != 1 or next(iter(said)) not in kinds:
+        raise ProblemError(f"{shown(dict(said))}: must be one of {', '.join(kinds)}")
+    ((kind, values),) = said.items()
+    try:
+        curve: Curve = kinds[kind](**mapping(kind, values))
+    except TypeError as error:
+        raise ProblemError(f"{kind}: {error}") from None
+    return curve
+
+
+def above_0(name: str, value: object) -> float:
+    found = number(name, value)
+    if not 0 < found < math.inf:
+        raise ProblemError(f"{name} is {shown(value)}: must be above 0 and finite")
+    return found

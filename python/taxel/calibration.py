@@ -1,0 +1,610 @@
+"""From a sensor's readings to N or kPa: of one array, on one day."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from datetime import date as day
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._arguments import flag, instance, mapping, number, numbers, several, shown, whole
+from taxel._arguments import path as checked_path
+from taxel._arguments import text as checked_text
+from taxel._core import FormatError, ProblemError
+from taxel._curves import N_PER_KPA_MM2, Curve, Law, Power, Table, Values, above_0, curve_of
+from taxel._files import write_whole
+from taxel.array import Array
+from taxel.frames import Frames
+from taxel.tare import Tare
+
+__all__ = ["Calibration", "Load"]
+
+#: What a calibration may be in: force on a taxel, or pressure at it.
+UNITS = ("N", "kPa")
+#: Between which an exponent is sought: conductance of a fabric and counts of common sheets lie well within.
+_EXPONENTS = (0.2, 5.0)
+
+
+class Load(NamedTuple):
+    """A known load, and what the sensor read while it lay there.
+
+    Parameters
+    ----------
+    frames : Frames
+        While it lies; the mean of each taxel counts.
+    load : float, above 0
+    unit : {"N", "kPa"}
+        Force in all, however it is spread, or the same pressure at every taxel.
+    taxel : (int, int), optional
+        Column and row of the only taxel that bears it.
+    """
+
+    frames: Frames
+    load: float
+    unit: str = "N"
+    taxel: tuple[int, int] | None = None
+
+
+class Calibration:
+    """Turn readings into N on each taxel, or kPa at each: of one array, on one day.
+
+    Made by `Calibration.law`, `Calibration.table`, `Calibration.fit`, `Calibration.load` or `Calibration.from_json`.
+    A value is ``gain * curve(reading, rest)``, 0 where a taxel does not read more than `floor` above its rest.
+
+    Attributes
+    ----------
+    array : Array
+        The sensor; pictures of another are refused.
+    unit : {"N", "kPa"}
+    of : str
+        What readings are in: "ticks" of a board, "counts" of a file.
+    gain : float64, shape (rows, columns)
+    rest : float64, shape (rows, columns), or None
+        What taxels read without a load, where it is known; NaN where it is not, and such taxels give 0.
+    floor : float, in readings
+    date : str
+        The day, as 2026-11-21.
+    residual : float or None
+        Of a fit: root mean square of what the known loads are missed by, as a share of each; None where there were no
+        more loads than unknowns, so that they fit themselves.
+    loads : tuple of (float, str, float)
+        Of a fit: each load, its unit, and what the calibration makes of the pictures under it.
+    note : str
+
+    Examples
+    --------
+    >>> array = Array(1, 2, pitch_mm=10.0, name="two")
+    >>> light = Load(Frames([[[20.0, 10.0]]], [0], array=array), 3.0)
+    >>> calibration = Calibration.fit([light], exponent=1.0, date="2026-11-21")
+    >>> calibration
+    Calibration(counts to N, power 1, fit to 1 load, 2026-11-21, of two: 1 x 2 taxels)
+    >>> calibration.apply(Frames([[[40.0, 0.0]]], [0], array=array)).values
+    array([[[4., 0.]]], dtype=float32)
+    """
+
+    array: Array
+    unit: str
+    of: str
+    gain: NDArray[np.float64]
+    rest: NDArray[np.float64] | None
+    floor: float
+    date: str
+    residual: float | None
+    loads: tuple[tuple[float, str, float], ...]
+    note: str
+    _curve: Curve
+
+    def __init__(self) -> None:
+        raise ProblemError(
+            "a calibration is made (Calibration.law, .table, .fit) or loaded (Calibration.load), not built"
+        )
+
+    @classmethod
+    def _made(cls, array: Array, curve: Curve, unit: str, of: str, how: Mapping[str, Any]) -> Calibration:
+        """Build one of its parts, checked."""
+        made = cls.__new__(cls)
+        made.array, made._curve = instance("array", array, Array), curve
+        made.unit, made.of = checked_text("unit", unit, UNITS), checked_text("of", of)
+        if not of or of in UNITS:
+            raise ProblemError(f"of is {of!r}: must say what is read: ticks, counts")
+        made.gain = _by_taxel("gain", how.get("gain", 1.0), array)
+        if not (np.isfinite(made.gain) & (made.gain > 0)).all():
+            raise ProblemError("gain: must be above 0 and finite at every taxel")
+        rest = how.get("rest")
+        if isinstance(rest, Tare):
+            _same(array, rest.array, "the tare")
+            rest = rest.rest
+        made.rest = None if rest is None else _by_taxel("rest", rest, array)
+        made.floor = number("floor", how.get("floor", 0.0))
+        if not 0 <= made.floor < math.inf:
+            raise ProblemError(f"floor is {made.floor}: must be 0 or more")
+        made.date = _iso(how.get("date"))
+        residual = how.get("residual")
+        made.residual = None if residual is None else number("residual", residual)
+        if made.residual is not None and not 0 <= made.residual < math.inf:
+            raise ProblemError(f"residual is {made.residual}: must be 0 or more")
+        made.loads = tuple(how.get("loads", ()))
+        made.note = checked_text("note", how.get("note", ""))
+        return made
+
+    @classmethod
+    def law(
+        cls,
+        array: Array,
+        *,
+        ramp: float = 150.0,
+        sensor: Mapping[str, float] | None = None,
+        unit: str = "N",
+        gain: ArrayLike = 1.0,
+        rest: Tare | ArrayLike | None = None,
+        floor: float = 0.0,
+        date: str | None = None,
+        note: str = "",
+    ) -> Calibration:
+        """Take the law of the fabric, its amplifier and its ramp: ticks to N or kPa.
+
+        Parameters
+        ----------
+        array : Array
+        ramp : float, ticks
+            How long the board's ramp lasts (its register `ramp_time`).
+        sensor : mapping, optional
+            What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm ...
+        unit : {"N", "kPa"}
+        gain : float or float64, shape (rows, columns)
+        rest : Tare or float64 of the array's shape, optional
+            The law's own where it is left out.
+        floor : float, ticks
+        date : str, optional
+            Today where it is left out.
+        note : str
+
+        Raises
+        ------
+        ProblemError : a parameter that makes no sense, or a tare of another array
+
+        Notes
+        -----
+        Thesis 4.3.2. The exponent and the conductance at rest are guesses that no maker's curve supports; a fit to a
+        known load corrects the gain, and the exponent too.
+
+        Examples
+        --------
+        >>> law = Calibration.law(Array(1, 1), date="2026-11-21")
+        >>> law.readings(Frames([[[0.02]]], [0], unit="N")).values.round(1) - law.readings(
+        ...     Frames([[[0.0]]], [0], unit="N")).values.round(1)
+        array([[[4.5]]], dtype=float32)
+        """
+        given = {} if sensor is None else mapping("sensor", sensor)
+        curve = Law(ramp, checked_text("unit", unit, UNITS), **given)
+        how = {"gain": gain, "rest": rest, "floor": floor, "date": date, "note": note}
+        return cls._made(array, curve, unit, "ticks", how)
+
+    @classmethod
+    def table(
+        cls,
+        array: Array,
+        readings: ArrayLike,
+        values: ArrayLike,
+        *,
+        unit: str,
+        of: str = "counts",
+        gain: ArrayLike = 1.0,
+        rest: Tare | ArrayLike | None = None,
+        floor: float = 0.0,
+        date: str | None = None,
+        note: str = "",
+    ) -> Calibration:
+        """Take known points of one taxel, straight lines between them: the same for all, but for their gains.
+
+        Parameters
+        ----------
+        array : Array
+        readings : float64, shape (points,), above rest, rising
+        values : float64, shape (points,), in `unit`, rising
+            A first point (0, 0) is added. Beyond the last point the last value holds.
+        unit : {"N", "kPa"}
+        of : str
+            What readings are in.
+        gain : float or float64, shape (rows, columns)
+        rest : Tare or float64 of the array's shape, optional
+            0 where it is left out.
+        floor : float, in readings
+        date : str, optional
+            Today where it is left out.
+        note : str
+
+        Raises
+        ------
+        ProblemError : points that do not rise, or a tare of another array
+
+        Examples
+        --------
+        >>> table = Calibration.table(Array(1, 1), [10.0, 30.0], [1.0, 5.0], unit="kPa", date="2026-11-21")
+        >>> table.apply(Frames([[[5.0]], [[20.0]], [[99.0]]], [0, 1, 2])).values.ravel()
+        array([0.5, 3. , 5. ], dtype=float32)
+        """
+        how = {"gain": gain, "rest": rest, "floor": floor, "date": date, "note": note}
+        return cls._made(array, Table(readings, values), unit, of, how)
+
+    @classmethod
+    def fit(
+        cls,
+        loads: Sequence[Load],
+        *,
+        unit: str = "N",
+        start: Calibration | None = None,
+        exponent: float | None = None,
+        each: bool = False,
+        rest: Tare | ArrayLike | None = None,
+        floor: float = 0.0,
+        date: str | None = None,
+        note: str = "",
+    ) -> Calibration:
+        """Fit a calibration to known loads laid on the array.
+
+        The gain is the one with the least squares of relative error. Where the loads differ, the exponent of the curve
+        is fitted with it.
+
+        Parameters
+        ----------
+        loads : list of Load, one or more
+            All of one array and in one unit of readings.
+        unit : {"N", "kPa"}
+            Of the calibration. Between N and kPa stands the pitch squared.
+        start : Calibration, optional
+            Whose curve is taken (a law, a table); else a power of the reading.
+        exponent : float, above 0, optional
+            Of the value by the reading's conductance or count, not to be fitted. Left out, it is 1 (of a law, its own)
+            where all loads are alike.
+        each : bool
+            A gain of its own for each taxel that a load says something of: uniform pressure (kPa), or a load on one
+            taxel. The others keep the common one.
+        rest : Tare or float64 of the array's shape, optional
+            That of `start`, or 0, where it is left out.
+        floor : float, in readings
+        date : str, optional
+            Today where it is left out.
+        note : str
+
+        Raises
+        ------
+        ProblemError : no load, loads of several arrays or units, a load under which nothing is read
+        """
+        checked_text("unit", unit, UNITS)
+        given = [instance("loads", load, Load) for load in several("loads", loads)]
+        if not given:
+            raise ProblemError("loads is empty: lay at least one known load on the array")
+        array, of = instance("frames", given[0].frames, Frames).array, given[0].frames.unit
+        curve: Curve = Power(1.0)
+        if start is not None:
+            instance("start", start, Calibration)
+            _same(array, start.array, "start")
+            if (start.of, start.unit) != (of, unit):
+                raise ProblemError(f"start turns {start.of} into {start.unit}: must turn {of} into {unit}")
+            curve, rest = start._curve, start.rest if rest is None else rest
+        whole_fit = cls._made(array, curve, unit, of, {"rest": rest, "floor": floor, "date": date, "note": note})
+        laid = [_Laid.of(load, k, whole_fit) for k, load in enumerate(given, start=1)]
+        differ = len({load.load for load in given}) > 1
+        if exponent is not None:
+            whole_fit._curve = curve.bent(above_0("exponent", exponent))
+        elif differ and not isinstance(curve, Table):
+            whole_fit._curve = curve.bent(_best_exponent(whole_fit, curve, laid))
+        gains, gain = _gains(whole_fit, laid, flag("each", each))
+        whole_fit.gain = gains
+        made = [one.made(whole_fit) for one in laid]
+        missed = np.concatenate([one.errors(whole_fit) for one in laid])
+        unknown = 1 + (differ and exponent is None and not isinstance(curve, Table))
+        unknown += int(np.count_nonzero(gains[_there(array)] != gain)) if each else 0
+        whole_fit.residual = float(np.sqrt(np.mean(missed**2))) if len(missed) > unknown else None
+        whole_fit.loads = tuple((load.load, load.unit, value) for load, value in zip(given, made, strict=True))
+        return whole_fit
+
+    def apply(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
+        """Return pictures in N or kPa; taxels that do not read more than the floor above rest give 0.
+
+        Parameters
+        ----------
+        frames : Frames
+            Readings as the sensor gives them, rest and all.
+        rest : Tare or float64 of the array's shape, optional
+            Today's; the calibration's own where it is left out.
+
+        Raises
+        ------
+        ProblemError : pictures of another array, or in another unit
+        """
+        _same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.of)
+        return Frames(self._values(frames.values, self._rest(rest)), frames.t, unit=self.unit, array=frames.array)
+
+    def readings(self, frames: Frames, rest: Tare | ArrayLike | None = None) -> Frames:
+        """Return what the sensor would read under pictures in N or kPa: the inverse of `apply`.
+
+        Raises
+        ------
+        ProblemError : pictures of another array, or in another unit
+        """
+        _same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.unit)
+        held = np.nan_to_num(self._rest(rest))
+        values = self._curve.readings(np.maximum(frames.values, 0.0) / self.gain, held)
+        return Frames(_32_bits(values), frames.t, unit=self.of, array=frames.array)
+
+    def _rest(self, given: Tare | ArrayLike | None) -> Values:
+        if isinstance(given, Tare):
+            _same(self.array, given.array, "the tare")
+            given = given.rest
+        if given is not None:
+            return _by_taxel("rest", given, self.array)
+        if self.rest is not None:
+            return self.rest
+        return np.full(self.array.shape, self._curve.rest() if isinstance(self._curve, Law) else 0.0)
+
+    def _values(self, readings: NDArray[Any], rest: Values) -> NDArray[np.float32]:
+        known = np.nan_to_num(rest)
+        read = np.asarray(readings, np.float64)
+        loaded = (read > known + self.floor) & ~np.isnan(rest) & _there(self.array)
+        return _32_bits(np.where(loaded, self.gain * self._curve.values(read, known), 0.0))
+
+    def to_json(self) -> str:
+        """Return the calibration as JSON that people can read."""
+        even = bool((self.gain == self.gain[0, 0]).all())
+        said: dict[str, Any] = {
+            "taxel": "calibration",
+            "unit": self.unit,
+            "of": self.of,
+            "date": self.date,
+            "residual": self.residual,
+            "loads": [{"load": load, "unit": unit, "made": made} for load, unit, made in self.loads],
+            "note": self.note,
+            "curve": self._curve.said(),
+            "floor": self.floor,
+            "array": self.array._geometry(),
+            "gain": float(self.gain[0, 0]) if even else self.gain.tolist(),
+            "rest": None
+            if self.rest is None
+            else [[None if np.isnan(r) else r for r in row] for row in self.rest.tolist()],
+        }
+        lines = (f" {json.dumps(name)}: {json.dumps(value, ensure_ascii=False)}" for name, value in said.items())
+        return "{\n" + ",\n".join(lines) + "\n}\n"
+
+    @classmethod
+    def from_json(cls, text: str) -> Calibration:
+        """Return the calibration that `to_json` wrote.
+
+        Raises
+        ------
+        FormatError : no calibration (names the entry)
+        """
+        if not isinstance(text, str):
+            raise ProblemError(f"calibration is {shown(text)}: must be JSON text")
+        entry = "the whole"
+        try:
+            said = json.loads(text)
+            if not isinstance(said, dict) or said.get("taxel") != "calibration":
+                raise ProblemError('must be an object with "taxel": "calibration"')
+            entry = "array"
+            array = Array._from_geometry(mapping(entry, said[entry]))
+            entry = "curve"
+            unit = checked_text("unit", said["unit"], UNITS)
+            curve = curve_of(mapping(entry, said[entry]), unit)
+            entry = "loads"
+            loads = [
+                (number("load", x["load"]), str(x["unit"]), number("made", x["made"])) for x in said.get(entry, ())
+            ]
+            entry = "rest"
+            rest = said.get(entry)
+            if rest is not None:
+                rest = [[math.nan if r is None else r for r in row] for row in rest]
+            entry = "values"
+            names = ("gain", "floor", "date", "residual", "note")
+            how = {name: said[name] for name in names if name in said} | {"rest": rest, "loads": loads}
+            return cls._made(array, curve, unit, said["of"], how)
+        except RecursionError:
+            raise FormatError("the calibration is nested too deeply; must be as Calibration.save writes it") from None
+        except KeyError as error:
+            raise FormatError(f"{entry}: {error.args[0]} is missing; must be as Calibration.save writes it") from None
+        except (ValueError, TypeError, AttributeError, IndexError, OverflowError, ProblemError) as error:
+            line = str(error).split("\n", maxsplit=1)[0][:200]
+            raise FormatError(f"{entry}: {line}; must be as Calibration.save writes it") from None
+
+    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write the calibration to a JSON file, whole or not at all.
+
+        Beside ``walk.mcap`` it is found by itself where it is called ``walk.calibration.json``, or, for all recordings
+        of the folder, ``calibration.json``.
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false
+        """
+        return write_whole(path, lambda file: file.write(self.to_json().encode()), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Calibration:
+        """Read a calibration from the file that `save` wrote.
+
+        Raises
+        ------
+        FormatError : no calibration (names the file)
+        """
+        place = Path(checked_path("path", path))
+        try:
+            return cls.from_json(place.read_text(encoding="utf-8"))
+        except (_core.Error, UnicodeDecodeError) as error:
+            raise FormatError(f"{place}: {error}") from None
+
+    @staticmethod
+    def beside(recording: str | os.PathLike[str]) -> Path | None:
+        """Return the file of the calibration that lies beside a recording; None where there is none."""
+        place = Path(checked_path("recording", recording))
+        for name in (f"{place.stem}.calibration.json", "calibration.json"):
+            if place.with_name(name).is_file():
+                return place.with_name(name)
+        return None
+
+    def described(self) -> str:
+        """Return what it is in a line: the curve, its day, its residual."""
+        (kind, values), count = next(iter(self._curve.said().items())), len(self.loads)
+        curve = {
+            "power": f"power {values.get('exponent', 0):.3g}",
+            "table": f"table of {len(values.get('values', ()))}",
+        }
+        parts = [curve.get(kind, "law of the fabric")]
+        parts += [f"fit to {count} load{'s' * (count > 1)}"] * bool(count)
+        parts += [] if self.residual is None else [f"residual {100 * self.residual:.1f} %"]
+        return ", ".join([f"{self.of} to {self.unit}", *parts, self.date])
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Calibration):
+            return NotImplemented
+        return self.to_json() == other.to_json()
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        size = f"{self.array.name}: {self.array.rows} x {self.array.columns} taxels"
+        return f"Calibration({self.described()}, of {size})"
+
+
+class _Laid(NamedTuple):
+    """A load as equations: which taxels, weighed how, make how much; mean readings above the floor."""
+
+    load: float
+    weight: float
+    readings: Values
+    rest: Values
+    chosen: NDArray[np.bool_]
+    alone: bool
+    """Whether each chosen taxel has to make the load by itself."""
+
+    @classmethod
+    def of(cls, load: Load, number_of: int, calibration: Calibration) -> _Laid:
+        frames, place = instance("frames", load.frames, Frames), f"load {number_of}"
+        _same(calibration.array, frames.array, f"the pictures of {place}", frames.unit, calibration.of)
+        value, unit = above_0(place, load.load), checked_text("unit", load.unit, UNITS)
+        if not len(frames):
+            raise ProblemError(f"{place}: no picture while it lies")
+        rest = calibration._rest(None)
+        readings = frames.values.mean(axis=0, dtype=np.float64)
+        chosen = _there(calibration.array) & ~np.isnan(rest)
+        if load.taxel is not None:
+            x, y = (whole(f"{place}, taxel", n, 0) for n in load.taxel)
+            index = int(calibration.array.index(x, y))
+            chosen &= np.arange(chosen.size).reshape(chosen.shape) == index
+        rest = np.nan_to_num(rest)
+        loaded = chosen & (readings > rest + calibration.floor)
+        if not loaded.any():
+            raise ProblemError(
+                f"{place}: no taxel reads more than {calibration.floor:g} {calibration.of} above its rest"
+            )
+        area = calibration.array.pitch_mm**2 * N_PER_KPA_MM2
+        if unit == "kPa":
+            weight = 1.0 if calibration.unit == "kPa" else 1 / area
+        else:
+            weight = 1.0 if calibration.unit == "N" else area
+        alone = unit == "kPa" or load.taxel is not None
+        # Uniform pressure is on every taxel: one that reads nothing is broken, and no measure of the others.
+        return cls(value, weight, readings, rest, loaded, alone)
+
+    def by_taxel(self, calibration: Calibration, curve: Curve | None = None) -> Values:
+        """Return what each chosen taxel makes, in the load's own unit; 0 elsewhere."""
+        curve = calibration._curve if curve is None else curve
+        values = self.weight * calibration.gain * curve.values(self.readings, self.rest)
+        return np.where(self.chosen, values, 0.0)
+
+    def made(self, calibration: Calibration, curve: Curve | None = None) -> float:
+        """Return what all chosen taxels make: their sum of a force, their mean of a pressure."""
+        every = self.by_taxel(calibration, curve)[self.chosen]
+        return float(every.mean() if self.alone else every.sum())
+
+    def errors(self, calibration: Calibration) -> Values:
+        """Return by which share of the load each equation is missed."""
+        if self.alone:
+            return np.asarray(self.by_taxel(calibration)[self.chosen] / self.load - 1.0)
+        return np.array([self.made(calibration) / self.load - 1.0])
+
+
+def _least(made: Sequence[float], loads: Sequence[float]) -> tuple[float, float]:
+    """Return the gain with the least squares of relative error, and their mean."""
+    share = np.array(made) / np.array(loads)
+    gain = float(share.sum() / (share**2).sum()) if (share > 0).any() else 1.0
+    return gain, float(np.mean((gain * share - 1.0) ** 2))
+
+
+def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]) -> float:
+    """Return the exponent whose best gain misses the loads by least."""
+    from scipy.optimize import minimize_scalar  # noqa: PLC0415  loads slowly
+
+    loads = [one.load for one in laid]
+
+    def missed(log: float) -> float:
+        bent = curve.bent(math.exp(log))
+        return _least([one.made(calibration, bent) for one in laid], loads)[1]
+
+    # From a grid first: the squares need not have a single valley.
+    grid = np.linspace(math.log(_EXPONENTS[0]), math.log(_EXPONENTS[1]), 33)
+    k = int(np.argmin([missed(log) for log in grid]))
+    around = (grid[max(0, k - 1)], grid[min(len(grid) - 1, k + 1)])
+    found = minimize_scalar(missed, bounds=around, method="bounded", options={"xatol": 1e-9})
+    return math.exp(float(found.x))
+
+
+def _gains(calibration: Calibration, laid: Sequence[_Laid], each: bool) -> tuple[Values, float]:
+    """Return the gain of each taxel, and the common one."""
+    common, _ = _least([one.made(calibration) for one in laid], [one.load for one in laid])
+    gains = np.full(calibration.array.shape, common)
+    if not each:
+        return gains, common
+    if not any(one.alone for one in laid):
+        raise ProblemError("each: no load says what a single taxel bears; give a uniform pressure (kPa), or its taxel")
+    share = np.array([one.by_taxel(calibration) / one.load for one in laid if one.alone])
+    squares = (share**2).sum(axis=0)
+    np.divide(share.sum(axis=0), squares, out=gains, where=squares > 0)
+    return gains, common
+
+
+def _32_bits(values: Values) -> NDArray[np.float32]:
+    """Return values as pictures hold them; what does not fit is the largest that does."""
+    return np.minimum(values, np.finfo(np.float32).max).astype(np.float32)
+
+
+def _there(array: Array) -> NDArray[np.bool_]:
+    return np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists)
+
+
+def _same(own: Array, other: Array, what: str, unit: str | None = None, wanted: str | None = None) -> None:
+    """Refuse what is of another array, or in another unit."""
+    if own != other:
+        raise ProblemError(f"{what}: of {other!r}; the calibration is of another array, {own!r}")
+    if unit != wanted:
+        raise ProblemError(f"{what}: in {unit}; the calibration takes {wanted}")
+
+
+def _by_taxel(name: str, given: Any, array: Array) -> Values:
+    values = numbers(name, given, np.float64)
+    if isinstance(given, bool):
+        raise ProblemError(f"{name} is {given}: must be a number, or {array.shape}")
+    if values.shape not in ((), array.shape):
+        raise ProblemError(f"{name} has shape {values.shape}: must be a number, or {array.shape}")
+    if np.isinf(values).any():
+        raise ProblemError(f"{name}: must be finite")
+    every = np.broadcast_to(values, array.shape).copy()
+    every.setflags(write=False)
+    return every
+
+
+def _iso(given: object) -> str:
+    if given is None:
+        return day.today().isoformat()
+    said = checked_text("date", given)
+    try:
+        return day.fromisoformat(said).isoformat()
+    except ValueError:
+        raise ProblemError(f"date is {shown(said)}: must be a day as 2026-11-21") from None

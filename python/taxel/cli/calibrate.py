@@ -1,0 +1,198 @@
+"""``taxel calibrate``: from readings to N or kPa."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from taxel._core import FormatError, ProblemError
+from taxel.cli._app import app
+from taxel.cli._listening import TARE_HELP, assignments, tare_of
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from taxel.calibration import Calibration, Load
+    from taxel.frames import Frames
+    from taxel.recording import Recording
+
+__all__ = ["calibrate"]
+
+
+@app.command()
+def calibrate(
+    recording: Annotated[Path, typer.Argument(help="A recording of the sensor, under the loads where there are any.")],
+    load: Annotated[float | None, typer.Option(help="A known load that lies there from --from to --to.")] = None,
+    start: Annotated[float | None, typer.Option("--from", metavar="S", help="Time of the board, s.")] = None,
+    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="Time of the board, s.")] = None,
+    load_unit: Annotated[str, typer.Option(help="Of --load: N in all, or kPa at every taxel.")] = "N",
+    loads: Annotated[
+        Path | None,
+        typer.Option(help="A .csv of loads: load,unit,from_s,to_s and, for one taxel alone, x,y."),
+    ] = None,
+    law: Annotated[
+        bool, typer.Option("--law", help="By the law of the fabric, its amplifier and its ramp; loads correct it.")
+    ] = False,
+    table: Annotated[Path | None, typer.Option(help="By a .csv of reading,value (above rest); loads scale it.")] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="KEY=VALUE of the law: v_trans, feedback_kohm, exponent ...")
+    ] = None,
+    unit: Annotated[str, typer.Option(help="Of the values: N on a taxel, or kPa at it.")] = "N",
+    each: Annotated[
+        bool, typer.Option("--each", help="A gain of its own for each taxel (uniform kPa, or loads on single taxels).")
+    ] = False,
+    exponent: Annotated[float | None, typer.Option(help="Not fitted, but this.")] = None,
+    tare: Annotated[str | None, typer.Option(help=f"{TARE_HELP} Left out: the lowest that each taxel reads.")] = None,
+    date: Annotated[str | None, typer.Option(help="The day, as 2026-11-21; today where it is left out.")] = None,
+    note: Annotated[str, typer.Option(help="Which sensor, which weights.")] = "",
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="The new file; beside the recording where it is left out.")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the file where it exists.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Make a calibration, ticks or counts to N or kPa, from a known load, a table or the fabric's law.
+
+    It lies beside the recording, where taxel info and Recording.calibrated find it; called calibration.json it holds
+    for all recordings of the folder.
+
+    Example: taxel calibrate weight.mcap --load 9.81 --from 2 --to 4 --tare 1
+    """
+    from taxel._files import try_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel.calibration import Calibration  # noqa: PLC0415
+
+    if load is None and (start is not None or stop is not None):
+        raise ProblemError("--from, --to: when --load lay there; give --load")
+    if load is None and loads is None and not law and table is None:
+        raise ProblemError("nothing to calibrate by: give --load, --loads, --table or --law")
+    if law and table is not None:
+        raise ProblemError("--law and --table: one of the two")
+    if set_ and not law:
+        raise ProblemError("--set: values of the law; say --law with it")
+    opened = _opened(recording)
+    place = recording.with_name(f"{recording.stem}.calibration.json") if out is None else out
+    try_whole(place, overwrite=overwrite)
+    read = _read(opened, tare)
+    how: dict[str, Any] = {"unit": unit, "rest": read.rest, "floor": read.floor, "date": date, "note": note}
+    made: Calibration | None = None
+    if law:
+        if read.frames.unit != "ticks":
+            raise ProblemError(f"--law: turns ticks of a board into {unit}; {recording} holds {read.frames.unit}")
+        held = opened.registers
+        ramp = 150.0 if held is None else float(held.ramp)
+        made = Calibration.law(opened.array, ramp=ramp, sensor=assignments(set_ or []), **how)
+    elif table is not None:
+        points = _points(table)
+        made = Calibration.table(opened.array, points[:, 0], points[:, 1], of=read.frames.unit, **how)
+    laid = [] if loads is None else _loads(loads, read.frames)
+    if load is not None:
+        laid.append(_load(read.frames, "--load", load, load_unit, (start, stop), None))
+    if laid:
+        made = Calibration.fit(laid, start=made, exponent=exponent, each=each, **how)
+    elif each or exponent is not None:
+        raise ProblemError("--each, --exponent: of a fit; give --load or --loads")
+    assert made is not None  # one of the four was given
+    made.save(place, overwrite=overwrite)
+    if as_json:
+        said = {"calibration": str(place), "unit": made.unit, "of": made.of, "date": made.date}
+        told = [{"load": a, "unit": b, "made": c} for a, b, c in made.loads]
+        typer.echo(json.dumps(said | {"residual": made.residual, "loads": told}))
+        return
+    typer.echo(f"{made.described()}: written to {place}")
+    for number, (given, of, value) in enumerate(made.loads, start=1):
+        typer.echo(f"  load {number}: {given:g} {of}, made of it {value:.4g} {of}")
+    if made.loads and made.residual is None:
+        typer.echo(
+            "  no residual: no more loads than unknowns, so they fit themselves; lay others to know how good it is"
+        )
+
+
+@dataclass(frozen=True)
+class _Read:
+    """What was read, at rest too, and what a loaded taxel reads more than that."""
+
+    frames: Frames
+    rest: NDArray[np.float64] | None
+    floor: float
+
+
+def _opened(path: Path) -> Recording:
+    import taxel  # noqa: PLC0415  the command line starts quickly
+
+    found = taxel.open(path)
+    every = found if isinstance(found, list) else [found]
+    if len(every) != 1:
+        raise ProblemError(f"{path}: holds {len(every)} recordings; a calibration is made of one")
+    one: Recording = every[0]
+    return one
+
+
+def _read(recording: Recording, tare: str | None) -> _Read:
+    from taxel._pressure import readings  # noqa: PLC0415
+
+    found = readings(recording)
+    if found is None:
+        raise ProblemError(f"{recording.path}: holds events without intensities, so there is nothing to calibrate")
+    frames, lowest, floor = found
+    if tare is not None:
+        own = tare_of(tare, recording)
+        assert own is not None  # of no tare only None is made
+        return _Read(frames, own.rest, floor)
+    return _Read(frames, np.where(np.isinf(lowest), np.nan, lowest) if recording.has_events else None, floor)
+
+
+def _load(
+    frames: Frames,
+    place: str,
+    load: float,
+    unit: str,
+    stretch: tuple[float | None, float | None],
+    taxel: tuple[int, int] | None,
+) -> Load:
+    from taxel.calibration import Load  # noqa: PLC0415
+
+    first, last = (None if s is None else s * 1e6 for s in stretch)
+    held = frames.between(float("-inf") if first is None else first, float("inf") if last is None else last)
+    if not len(held):
+        raise ProblemError(f"{place}: nothing was recorded from {stretch[0]} to {stretch[1]} s")
+    return Load(held, load, unit, taxel)
+
+
+def _loads(path: Path, frames: Frames) -> list[Load]:
+    """Read a table of loads."""
+    from taxel.formats import text  # noqa: PLC0415
+
+    found = []
+    for row in text.table(path, ["load", "unit", "from_s", "to_s"]):
+        line = int(row["line"])
+
+        def value(name: str, row: dict[str, str] = row, line: int = line) -> float:
+            return text.number(row[name], path, line, name)
+
+        place = f"{path.name}, line {line}"
+        if row["unit"].strip() not in {"N", "kPa"}:
+            raise FormatError(f"{place}: unit is {row['unit']!r}; must be N or kPa")
+        taxel = None
+        if row.get("x", "").strip() or row.get("y", "").strip():
+            x, y = value("x"), value("y")
+            if x != int(x) or y != int(y):
+                raise FormatError(f"{place}: taxel {x:g}, {y:g}; must be whole numbers, column and row")
+            taxel = (int(x), int(y))
+        stretch = (value("from_s"), value("to_s"))
+        found.append(_load(frames, place, value("load"), row["unit"].strip(), stretch, taxel))
+    if not found:
+        raise FormatError(f"{path.name}: no load in it")
+    return found
+
+
+def _points(path: Path) -> NDArray[np.float64]:
+    """Read a table of readings and values."""
+    from taxel.formats import text  # noqa: PLC0415
+
+    rows = [[row["reading"], row["value"]] for row in text.table(path, ["reading", "value"])]
+    return text.numbers(rows, path, 2, ["reading", "value"])

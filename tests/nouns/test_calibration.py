@@ -1,0 +1,266 @@
+"""Calibrations: each curve rises and can be inverted, fits find what was put in, another array is refused."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Calibration, FormatError, Frames, Load, ProblemError
+
+ARRAY = Array(3, 4, pitch_mm=5.0, name="small")
+DAY = "2026-11-21"
+
+
+def frames(values, unit="counts", array=ARRAY):
+    values = np.broadcast_to(np.asarray(values, float), (1, *array.shape)) if np.ndim(values) < 3 else values
+    return Frames(values, np.arange(len(values)), unit=unit, array=array)
+
+
+exponents = st.floats(0.3, 3.0)
+gains = st.floats(1e-3, 1e3)
+
+
+@st.composite
+def calibrations(draw):
+    """One of each curve, with a gain for each taxel and a rest."""
+    gain = np.array(draw(st.lists(gains, min_size=12, max_size=12))).reshape(ARRAY.shape)
+    unit = draw(st.sampled_from(["N", "kPa"]))
+    rest = draw(st.sampled_from([None, np.full(ARRAY.shape, 7.0), np.arange(12.0).reshape(ARRAY.shape)]))
+    common = {"unit": unit, "gain": gain, "rest": rest, "date": DAY}
+    kind = draw(st.sampled_from(["law", "table", "power"]))
+    if kind == "law":
+        return Calibration.law(ARRAY, ramp=draw(st.sampled_from([150.0, 1000.0])), **common)
+    if kind == "table":
+        steps = st.lists(st.floats(0.5, 50.0), min_size=1, max_size=6)
+        x = np.cumsum(draw(steps))
+        return Calibration.table(ARRAY, x, np.cumsum(draw(st.lists(gains, min_size=len(x), max_size=len(x)))), **common)
+    power = Calibration.fit([Load(frames(10.0), 5.0)], exponent=draw(exponents), date=DAY)
+    text = json.loads(power.to_json())
+    text |= {"unit": unit, "gain": gain.tolist(), "rest": None if rest is None else rest.tolist()}
+    return Calibration.from_json(json.dumps(text))
+
+
+@given(calibrations(), st.lists(st.floats(0.0, 200.0), min_size=2, max_size=8))
+def test_more_reading_is_never_less_load(calibration, readings):
+    pictures = np.sort(np.array(readings))[:, None, None] * np.ones(ARRAY.shape)
+    values = calibration.apply(frames(pictures, calibration.of)).values
+    assert (np.diff(values, axis=0) >= 0).all()
+    assert (values >= 0).all()
+    assert np.isfinite(values).all()
+
+
+@given(calibrations(), st.floats(0.0, 1.0))
+def test_what_is_read_under_a_load_gives_the_load_back(calibration, share):
+    most = calibration.apply(frames(140.0 if calibration.of == "ticks" else 60.0, calibration.of)).values
+    load = frames(share * most, calibration.unit)
+    again = calibration.apply(calibration.readings(load))
+    assert again.unit == calibration.unit
+    # float32 readings: near a rest of 50 ticks they step by 4e-6, and a power below 1 widens that.
+    assert np.allclose(again.values, load.values, rtol=2e-2, atol=1e-3 * most.max())
+
+
+@given(calibrations())
+@settings(max_examples=40)
+def test_json_gives_it_back(calibration):
+    again = Calibration.from_json(calibration.to_json())
+    assert again == calibration
+    read = frames(33.0, calibration.of)
+    assert again.apply(read) == calibration.apply(read)
+
+
+def test_the_law_is_that_of_the_circuit():
+    """G = G0 + k F^0.7, V = V_trans (1 + R_f G), and a ramp that charges to 3 of 5 V in 150 ticks."""
+    force = np.array([0.0, 0.005, 0.02, 0.3, 1.0])
+    conductance = 0.1e-6 + 1.64e-6 * (force / 0.02) ** 0.7
+    volts = 1.3 * (1 + 47e3 * conductance)
+    ticks = 150 / np.log(2.5) * np.log(5 / (5 - volts))
+    one = Array(1, len(force))
+    read = Frames(ticks.reshape(1, 1, -1), [0], unit="ticks", array=one)
+    assert Calibration.law(one).apply(read).values.ravel() == pytest.approx(force, rel=1e-4, abs=1e-6)
+    side = 2.29
+    pressure = Calibration.law(one, unit="kPa").apply(read).values.ravel()
+    assert pressure == pytest.approx(1e3 * force / side**2, rel=1e-4, abs=1e-3)
+
+
+def test_the_law_finds_the_force_of_a_ball_that_the_emulated_board_felt():
+    """Taxels of 2.29 mm every 2.67 mm feel their share of the force, but for what the noise floor hides.
+
+    The fabric is one that conducts three times as much as usual, so that the floor hides little.
+    """
+    acts = [taxel.simulate.Silence(60.0), taxel.simulate.Scene.draw(3)]
+    sensor = {"touch_us": 5.0, "gain_spread": 0.0, "offset_mv": 0.0, "noise_ticks": 0.0}
+    events = taxel.simulate.play(acts, seed=1, sensor=sensor).events
+    contacts, force = taxel.simulate.truth(acts)
+    law = Calibration.law(events.array, sensor=sensor)
+    pictures = Frames.from_events(events, 960, int(contacts[0].start_us), int(contacts[0].stop_us))
+    # A taxel that said nothing is at rest.
+    rest = law.readings(frames(0.0, "N", events.array)).values[0]
+    held = Frames(np.maximum(pictures.values, rest), pictures.t, unit="ticks", array=events.array)
+    assert held.values.max() < 150
+    felt, k = law.apply(held).total(), int(law.apply(held).total().argmax())
+    assert felt[k] == pytest.approx((2.29 / 2.67) ** 2 * force[int(pictures.t[k] / 192)], rel=0.1)
+
+
+# fits
+
+
+@given(exponents, gains, st.integers(0, 2**31))
+@settings(max_examples=30)
+def test_a_fit_to_several_loads_finds_gain_and_exponent(exponent, gain, seed):
+    rng = np.random.default_rng(seed)
+    loads = []
+    for scale in (1.0, 3.0, 10.0):
+        read = rng.uniform(1.0, 10.0, (1, *ARRAY.shape)) * scale
+        loads.append(Load(frames(read), float((gain * read**exponent).sum())))
+    found = Calibration.fit(loads, date=DAY)
+    assert found.apply(loads[1].frames).total() == pytest.approx([loads[1].load], rel=1e-4)
+    assert json.loads(found.to_json())["curve"]["power"]["exponent"] == pytest.approx(exponent, rel=1e-3)
+    assert found.residual == pytest.approx(0.0, abs=1e-4)
+    assert [made for *_, made in found.loads] == pytest.approx([load.load for load in loads], rel=1e-3)
+
+
+def test_the_residual_is_how_far_the_loads_are_missed():
+    read = np.ones((1, *ARRAY.shape))
+    loads = [Load(frames(read), 12.0 * 1.1), Load(frames(read * 2), 24.0 * 0.9), Load(frames(read * 4), 48.0)]
+    found = Calibration.fit(loads, exponent=1.0, date=DAY)
+    share = np.array([1 / 1.1, 1 / 0.9, 1.0])
+    gain = share.sum() / (share**2).sum()
+    assert found.gain == pytest.approx(np.full(ARRAY.shape, gain))
+    assert found.residual == pytest.approx(np.sqrt(np.mean((gain * share - 1) ** 2)))
+
+
+def test_one_load_fits_itself_and_has_no_residual():
+    found = Calibration.fit([Load(frames(2.0), 6.0)], date=DAY)
+    assert found.residual is None
+    assert found.apply(frames(4.0)).total() == pytest.approx([12.0])
+
+
+def test_uniform_pressure_gives_each_taxel_its_own_gain():
+    own = np.linspace(0.5, 2.0, 12).reshape(ARRAY.shape)
+    loads = [Load(frames(20.0 / own), 20.0, "kPa"), Load(frames(60.0 / own), 60.0, "kPa")]
+    found = Calibration.fit(loads, unit="kPa", each=True, date=DAY)
+    assert found.gain == pytest.approx(own, rel=1e-5)
+    assert found.residual == pytest.approx(0.0, abs=1e-4)
+    # kPa on 5 mm x 5 mm: the same in N.
+    force = Calibration.fit(loads, unit="N", each=True, date=DAY)
+    assert force.apply(loads[0].frames).values == pytest.approx(20.0 * 25e-3, rel=1e-5)
+
+
+def test_a_probe_on_single_taxels_gives_these_their_gain_and_the_others_the_common_one():
+    read = np.zeros((2, 1, *ARRAY.shape))
+    read[0, 0, 1, 2], read[1, 0, 0, 3] = 10.0, 10.0
+    loads = [Load(frames(read[0]), 1.0, "N", (2, 1)), Load(frames(read[1]), 3.0, "N", (3, 0))]
+    found = Calibration.fit(loads, exponent=1.0, each=True, date=DAY)
+    assert (found.gain[1, 2], found.gain[0, 3]) == (pytest.approx(0.1), pytest.approx(0.3))
+    assert 0.1 < found.gain[2, 0] < 0.3
+
+
+def test_a_law_is_corrected_by_a_known_load():
+    law = Calibration.law(ARRAY, date=DAY)
+    true = frames(0.4, "N")
+    read = law.readings(true)
+    found = Calibration.fit([Load(read, 2 * 12 * 0.4)], start=law, date=DAY)
+    assert found.apply(read).values == pytest.approx(0.8, rel=1e-5)
+    assert "law" in json.loads(found.to_json())["curve"]
+
+
+# what lies beside a recording
+
+
+def made_beside(folder, calibration, name="press.calibration.json"):
+    taxel.convert(frames(np.arange(36.0).reshape(3, 3, 4)), folder / "press.npz")
+    calibration.save(folder / name)
+    return taxel.open(folder / "press.npz")
+
+
+@pytest.mark.parametrize("name", ["press.calibration.json", "calibration.json"])
+def test_a_recording_finds_the_calibration_beside_it(tmp_path, name):
+    calibration = Calibration.table(ARRAY, [40.0], [4.0], unit="N", date=DAY)
+    recording = made_beside(tmp_path, calibration, name)
+    assert recording.calibration == calibration
+    assert recording.calibrated().unit == "N"
+    assert np.array_equal(recording.calibrated().values, calibration.apply(recording.frames()).values)
+    # Nothing turns into N unasked: what encoders and readouts hear stays as it was read.
+    assert recording.frames().unit == "counts"
+
+
+def test_without_one_nothing_is_called_newton(tmp_path):
+    taxel.convert(frames(5.0), tmp_path / "press.npz")
+    recording = taxel.open(tmp_path / "press.npz")
+    assert recording.calibration is None
+    with pytest.raises(ProblemError, match="no calibration lies beside it; taxel calibrate makes one"):
+        recording.calibrated()
+
+
+def test_a_calibration_of_another_array_is_one_clear_error(tmp_path):
+    other = Calibration.table(Array(3, 4, pitch_mm=6.0, name="other"), [40.0], [4.0], unit="N", date=DAY)
+    with pytest.raises(ProblemError, match="the calibration is of another array"):
+        other.apply(frames(1.0))
+    recording = made_beside(tmp_path, other)
+    with pytest.raises(ProblemError, match=r"press.calibration.json: .* another array") as error:
+        recording.calibrated()
+    assert "\n" not in str(error.value)
+
+
+def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
+    exists = np.ones((1, 3), bool)
+    exists[0, 2] = False
+    array = Array(1, 3, exists=exists)
+    table = Calibration.table(array, [10.0], [1.0], unit="N", rest=[[2.0, np.nan, 0.0]], floor=1.0)
+    values = table.apply(Frames([[[7.0, 7.0, 7.0]], [[3.0, 0.0, 0.0]]], [0, 1], array=array)).values
+    assert values.tolist() == [[[0.5, 0.0, 0.0]], [[0.0, 0.0, 0.0]]]
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (Calibration, "not built"),
+        (lambda: Calibration.fit([]), "loads is empty"),
+        (lambda: Calibration.fit([Load(frames(0.0), 1.0)]), "load 1: no taxel reads more than 0 counts above its rest"),
+        (lambda: Calibration.fit([Load(frames(1.0), -1.0)]), "load 1 is -1.0: must be above 0"),
+        (lambda: Calibration.fit([Load(frames(1.0), 1.0, "kg")]), "unit is 'kg': must be one of 'N', 'kPa'"),
+        (lambda: Calibration.fit([Load(frames(1.0), 1.0, "N", (9, 0))]), "x reaches from 9 to 9"),
+        (lambda: Calibration.fit([Load(frames(1.0), 1.0)], each=True), "each: no load says what a single taxel bears"),
+        (
+            lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
+            "pictures of load 2: in ticks; the calibration takes counts",
+        ),
+        (lambda: Calibration.fit([Load(frames(1.0, "N"), 1.0)]), "of is 'N': must say what is read"),
+        (lambda: Calibration.table(ARRAY, [1.0, 1.0], [1.0, 2.0], unit="N"), r"readings\[1\] is 1: must rise"),
+        (lambda: Calibration.table(ARRAY, [1.0], [1.0, 2.0], unit="N"), "1 readings and 2 values"),
+        (lambda: Calibration.table(ARRAY, [0.0, 1.0], [1.0, 2.0], unit="N"), "what reads 0 above rest bears 0"),
+        (lambda: Calibration.table(ARRAY, [1.0], [1.0], unit="bar"), "unit is 'bar': must be one of 'N', 'kPa'"),
+        (lambda: Calibration.law(ARRAY, sensor={"exponent": 2.0}), "exponent is 2: must be from 0.5 to 1"),
+        (lambda: Calibration.law(ARRAY, sensor={"foam": 1.0}), "foam"),
+        (lambda: Calibration.law(ARRAY, ramp=0.0), "ramp is 0.0: must be above 0"),
+        (lambda: Calibration.law(ARRAY, date="yesterday"), "date is 'yesterday': must be a day as 2026-11-21"),
+        (lambda: Calibration.law(ARRAY, rest=[[1.0]]), "rest has shape"),
+        (lambda: Calibration.law(ARRAY, gain=0.0), "gain: must be above 0"),
+        (lambda: Calibration.law(ARRAY).apply(frames(1.0)), "the pictures: in counts; the calibration takes ticks"),
+    ],
+)
+def test_what_makes_no_sense_is_said(call, said):
+    with pytest.raises(ProblemError, match=said) as error:
+        call()
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("entry", ["unit", "of", "curve", "array", "gain", "rest", "date", "floor", "loads", "taxel"])
+@pytest.mark.parametrize("nonsense", [None, "x", -1, [], {}, [[1]], 1e400, True])
+def test_a_spoilt_file_is_one_line(tmp_path, entry, nonsense):
+    said = json.loads(Calibration.fit([Load(frames(2.0), 6.0)], rest=np.ones(ARRAY.shape), date=DAY).to_json())
+    file = tmp_path / "calibration.json"
+    file.write_text(json.dumps(said | {entry: nonsense}))
+    # What is left out, or just as good.
+    if (entry, nonsense) in [("rest", None), ("loads", []), ("loads", {}), ("of", "x"), ("date", None)]:
+        assert isinstance(Calibration.load(file), Calibration)
+        return
+    with pytest.raises(FormatError, match=f"^{re.escape(str(file))}: [^\n]*$") as error:
+        Calibration.load(file)
+    assert len(str(error.value)) < 500

@@ -1,0 +1,112 @@
+"""`taxel calibrate`: from a known load, a table or the law, to a file beside the recording that `taxel info` reads."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+
+from .test_commands import run
+from .test_pressure import pressed
+
+
+def weighed(path: Path) -> None:
+    """Pictures of a sensor that reads 2 counts a newton: nothing, 3 N in all, 12 N in all, one second each."""
+    picture = np.array([[[1.0, 2.0], [3.0, 0.0]]])
+    values = np.concatenate([np.repeat(picture * load / 3, 10, axis=0) for load in (0, 3, 12)])
+    frames = taxel.Frames(values, np.arange(30) * 100_000, array=taxel.Array(2, 2, 4.0, name="pad"))
+    taxel.convert(frames, path)
+
+
+def test_a_weight_laid_on_the_array_makes_newtons_of_events(tmp_path: Path) -> None:
+    path = tmp_path / "a.npz"
+    pressed(path)
+    before = json.loads(run("info", path, "--json").stdout)
+    assert (before["calibration"], before["pressure"]["unit"]) == (None, "ticks")
+    done = run(
+        "calibrate", path, "--load", "2", "--from", "0.1", "--to", "0.2", "--date", "2026-11-21", "--note", "scale"
+    )
+    assert done.returncode == 0, done.stderr
+    place = tmp_path / "a.calibration.json"
+    assert str(place) in done.stdout
+    assert "no residual" in done.stdout
+    after = json.loads(run("info", path, "--json").stdout)
+    assert after["calibration"] == "ticks to N, power 1, fit to 1 load, 2026-11-21"
+    # 40 ticks above rest in all are 2 N; nothing else is loaded.
+    assert after["pressure"]["unit"] == "N"
+    assert after["pressure"]["sum"]["most"] == pytest.approx(2.0)
+    assert after["pressure"]["peak"]["most"] == pytest.approx(1.5)
+    assert after["pressure"]["area_mm2"] == before["pressure"]["area_mm2"]
+    assert "calibration         ticks to N" in run("info", path).stdout
+    # The file is for people, too.
+    said = json.loads(place.read_text())
+    assert (said["unit"], said["of"], said["date"], said["note"]) == ("N", "ticks", "2026-11-21", "scale")
+
+
+def test_loads_in_a_table_have_a_residual_and_find_the_exponent(tmp_path: Path) -> None:
+    path, loads = tmp_path / "pad.npz", tmp_path / "loads.csv"
+    weighed(path)
+    loads.write_text("load,unit,from_s,to_s\n3,N,1,2\n12,N,2,3\n")
+    done = run("calibrate", path, "--loads", loads, "--json")
+    assert done.returncode == 0, done.stderr
+    said = json.loads(done.stdout)
+    assert said["residual"] is None  # two loads, gain and exponent
+    done = run("calibrate", path, "--loads", loads, "--exponent", "1", "--json", "--overwrite")
+    said = json.loads(done.stdout)
+    assert said["residual"] == pytest.approx(0.0, abs=1e-6)
+    recording = taxel.open(path)
+    assert recording.calibrated().total()[[0, 15, 25]] == pytest.approx([0.0, 3.0, 12.0])
+
+
+def test_a_table_and_the_law_need_no_load(tmp_path: Path) -> None:
+    path, table = tmp_path / "a.npz", tmp_path / "table.csv"
+    pressed(path)
+    table.write_text("reading,value\n10,1\n30,4\n")
+    assert run("calibrate", path, "--table", table, "--unit", "kPa").returncode == 0
+    pressure = json.loads(run("info", path, "--json").stdout)["pressure"]
+    assert (pressure["unit"], pressure["peak"]["most"]) == ("kPa", 4.0)
+    assert run("calibrate", path, "--law", "--set", "exponent=1.0", "--overwrite").returncode == 0
+    peak = taxel.open(path).calibrated().peak().max()
+    # From 50 to 80 ticks of a ramp of 150 that charges towards 5 V; 1.3 V x 47 kOhm x 1.64 uS a 0.02 N.
+    volts = 5 * (2.5 ** (-50 / 150) - 2.5 ** (-80 / 150))
+    assert peak == pytest.approx(0.02 * volts / (1.3 * 47e-3 * 1.64), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ((), "nothing to calibrate by: give --load, --loads, --table or --law"),
+        (("--load", "0"), "load 1 is 0.0: must be above 0"),
+        (("--load", "3", "--from", "7", "--to", "9"), "--load: nothing was recorded from 7.0 to 9.0 s"),
+        (("--load", "3", "--to", "1"), "no taxel reads more than 0 counts above its rest"),
+        (("--load", "3", "--load-unit", "kg"), "unit is 'kg': must be one of 'N', 'kPa'"),
+        (("--load", "3", "--each"), "no load says what a single taxel bears"),
+        (("--law",), "--law: turns ticks of a board into N;"),
+        (("--from", "1"), "when --load lay there; give --load"),
+        (("--loads", "loads.csv"), "loads.csv, line 2: unit is 'kg'; must be N or kPa"),
+        (("--law", "--set", "exponent=9"), "exponent is 9: must be from 0.5 to 1"),
+    ],
+)
+def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path: Path, options: tuple[str, ...], said: str) -> None:
+    path = tmp_path / "pad.npz"
+    weighed(path)
+    (tmp_path / "loads.csv").write_text("load,unit,from_s,to_s\n3,kg,1,2\n")
+    where = [str(tmp_path / option) if option.endswith(".csv") else option for option in options]
+    done = run("calibrate", path, *where)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert said in done.stderr
+    assert not (tmp_path / "pad.calibration.json").exists()
+
+
+def test_a_calibration_of_another_sensor_beside_a_recording_is_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "pad.npz"
+    weighed(path)
+    other = taxel.Calibration.table(taxel.Array(3, 3, name="other"), [1.0], [1.0], unit="N")
+    other.save(tmp_path / "calibration.json")
+    done = run("info", path)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "another array" in done.stderr
