@@ -88,7 +88,7 @@ def test_a_table_and_the_law_need_no_load(tmp_path: Path) -> None:
         (("--law",), "--law: turns ticks of a board into N;"),
         (("--from", "1"), "when --load lay there; give --load"),
         (("--loads", "loads.csv"), "loads.csv, line 2: unit is 'kg'; must be N or kPa"),
-        (("--law", "--set", "exponent=9"), "exponent is 9: must be from 0.5 to 1"),
+        (("--set", "exponent=9", "--load", "3"), "--set: values of the law; say --law with it"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path: Path, options: tuple[str, ...], said: str) -> None:

@@ -66,14 +66,21 @@ def calibrate(
     from taxel._files import try_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.calibration import Calibration  # noqa: PLC0415
 
-    if load is None and (start is not None or stop is not None):
-        raise ProblemError("--from, --to: when --load lay there; give --load")
-    if load is None and loads is None and not law and table is None:
-        raise ProblemError("nothing to calibrate by: give --load, --loads, --table or --law")
-    if law and table is not None:
-        raise ProblemError("--law and --table: one of the two")
-    if set_ and not law:
-        raise ProblemError("--set: values of the law; say --law with it")
+    for wrong, said in (
+        (load is None and (start is not None or stop is not None), "--from, --to: when --load lay there; give --load"),
+        (
+            load is None and loads is None and not law and table is None,
+            "nothing to calibrate by: give --load, --loads, --table or --law",
+        ),
+        (law and table is not None, "--law and --table: one of the two"),
+        (bool(set_) and not law, "--set: values of the law; say --law with it"),
+        (
+            load is None and loads is None and (each or exponent is not None),
+            "--each, --exponent: of a fit; give --load",
+        ),
+    ):
+        if wrong:
+            raise ProblemError(said)
     opened = _opened(recording)
     place = recording.with_name(f"{recording.stem}.calibration.json") if out is None else out
     try_whole(place, overwrite=overwrite)
@@ -94,8 +101,6 @@ def calibrate(
         laid.append(_load(read.frames, "--load", load, load_unit, (start, stop), None))
     if laid:
         made = Calibration.fit(laid, start=made, exponent=exponent, each=each, **how)
-    elif each or exponent is not None:
-        raise ProblemError("--each, --exponent: of a fit; give --load or --loads")
     assert made is not None  # one of the four was given
     made.save(place, overwrite=overwrite)
     if as_json:
