@@ -56,6 +56,7 @@ lint: build
 	$(BIN)/lint-imports --no-cache
 	$(BIN)/python -m pytest -q tests/test_floors.py
 	$(BIN)/python -m mypy.stubtest taxel._core --allowlist tests/stubtest-allowed.txt
+	$(BIN)/python tools/page_types.py
 
 format:
 	cargo fmt --all

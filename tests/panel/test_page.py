@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -9,10 +10,16 @@ import pytest
 import taxel
 from taxel import _core
 
-WEB = Path(__file__).resolve().parents[2] / "crates/taxel-live/web"
+ROOT = Path(__file__).resolve().parents[2]
+WEB = ROOT / "crates/taxel-live/web"
+SERVED = sorted(
+    str(file.relative_to(WEB))
+    for file in WEB.rglob("*")
+    if file.is_file() and not file.name.endswith((".d.ts", "README.md"))
+)
 
 
-@pytest.mark.parametrize("name", ["registers.js", "vendor/uPlot.js", "vendor/uPlot.css", "vendor/uPlot.LICENSE"])
+@pytest.mark.parametrize("name", SERVED)
 def test_a_file_is_handed_out_as_it_lies_in_the_folder(name: str) -> None:
     assert _core.page_file(name) == (WEB / name).read_bytes()
 
@@ -21,3 +28,42 @@ def test_a_file_is_handed_out_as_it_lies_in_the_folder(name: str) -> None:
 def test_no_other_name_is_known(name: str) -> None:
     with pytest.raises(taxel.ProblemError, match=r"no file of the panel: must be one of .*vendor/uPlot\.js"):
         _core.page_file(name)
+
+
+def test_every_part_that_the_program_looks_for_is_in_the_page() -> None:
+    html = (WEB / "index.html").read_text()
+    ids = re.findall(r'\bid="([^"]+)"', html)
+    assert len(ids) == len(set(ids))
+    said = {name for file in WEB.glob("*.js") for name in re.findall(r'\bpart\("([^"]+)"', file.read_text())}
+    assert said
+    assert said <= set(ids)
+    for attribute in ("for", "aria-labelledby", "aria-describedby", "aria-controls", "list"):
+        for names in re.findall(rf'\b{attribute}="([^"]+)"', html):
+            assert set(names.split()) <= set(ids), f"{attribute}={names}"
+
+
+def test_the_page_asks_nobody_else_for_anything() -> None:
+    for name in SERVED:
+        if not name.endswith("LICENSE") and name != "vendor/uPlot.js":
+            text = (WEB / name).read_text().replace("http://www.w3.org/2000/svg", "")
+            assert not re.search(r"https?://", text), name
+    html = (WEB / "index.html").read_text()
+    # The content security policy has no place for these.
+    assert not re.search(r"\bstyle=|\bon[a-z]+=|<style|<script(?![^>]*\bsrc=)", html)
+
+
+@pytest.mark.parametrize("theme", ["dark", "light"])
+def test_text_stands_out_from_its_ground(theme: str) -> None:
+    """Contrast by WCAG 2.2, 1.4.3 (4.5 is asked for); text, dim text and what colours say, on every ground."""
+
+    def luminance(colour: str) -> float:
+        parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts]
+        return sum(share * c for share, c in zip((0.2126, 0.7152, 0.0722), linear, strict=True))
+
+    blocks = re.findall(r":root[^{]*\{([^}]*)\}", (WEB / "style.css").read_text())
+    colours = dict(re.findall(r"--([\w-]+): (#\w{6});", blocks[("dark", "light").index(theme)]))
+    for ground in ("ground", "card", "raised", "well"):
+        for text in ("text", "dim", "more", "less", "bad", "good", "label"):
+            light, dark = sorted((luminance(colours[ground]), luminance(colours[text])), reverse=True)
+            assert (light + 0.05) / (dark + 0.05) >= 4.5, f"{text} on {ground}"

@@ -22,9 +22,14 @@ macro_rules! assets {
 
 /// All of them.
 pub const ASSETS: &[Asset] = assets! {
-    "text/javascript; charset=utf-8": "registers.js" "vendor/uPlot.js";
-    "text/css; charset=utf-8": "vendor/uPlot.css";
-    "text/plain; charset=utf-8": "vendor/uPlot.LICENSE";
+    "text/html; charset=utf-8": "index.html";
+    "text/javascript; charset=utf-8":
+        "board.js" "colours.js" "dom.js" "image.js" "keys.js" "labels.js" "lanes.js" "main.js" "maps.js" "player.js"
+        "protocol.js" "raster.js" "recorder.js" "registers.js" "server.js" "settings.js" "strip.js" "timeline.js"
+        "tones.js" "view.js" "vendor/uPlot.js" "words.js";
+    "text/css; charset=utf-8": "style.css" "vendor/uPlot.css";
+    "image/svg+xml": "icon.svg";
+    "text/plain; charset=utf-8": "vendor/colour-maps.LICENSE" "vendor/uPlot.LICENSE";
 };
 
 /// Gives the file of exactly this name.

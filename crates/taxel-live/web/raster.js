@@ -1,0 +1,82 @@
+// Ups and downs of each row over the last five seconds; or an encoder's spikes.
+
+import { fitted, ground, themed } from "./dom.js";
+import { SPAN } from "./timeline.js";
+
+/** @typedef {import("./timeline.js").Timeline} Timeline */
+
+/** The raster's canvas. Columns of time and rows are gathered, most first, where the screen has fewer pixels. */
+export class Raster {
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
+    this.canvas = canvas;
+    this.context = ground(canvas);
+    this.image = new ImageData(1, 1);
+    this.pixels = new Uint32Array(1);
+    this.words = new Uint32Array(256);
+    this.unscaled = document.createElement("canvas");
+    this.colour();
+  }
+
+  /** Makes the colours again, after the theme has changed. */
+  colour() {
+    /** @param {string} name of a colour that the style sheet gives as #rrggbb */
+    const read = (name) => [1, 3, 5].map((at) => parseInt(themed(name).slice(at, at + 2), 16));
+    const [more, less, back] = ["more", "less", "well"].map(read);
+    for (let i = 0; i < 256; i++) {
+      const [ups, downs] = [i & 15, i >> 4];
+      const strength = Math.min(1, (ups + downs) / 6 + 0.35) * (ups + downs ? 1 : 0);
+      const [r, g, b] = [0, 1, 2].map((c) => {
+        const ink = ups + downs ? (ups * more[c] + downs * less[c]) / (ups + downs) : 0;
+        return Math.round(back[c] + (ink - back[c]) * strength);
+      });
+      this.words[i] = ((255 << 24) | (b << 16) | (g << 8) | r) >>> 0;
+    }
+  }
+
+  /**
+   * @param {Timeline} timeline
+   * @param {"changes" | "spikes"} what
+   */
+  draw(timeline, what) {
+    const { width, height } = fitted(this.canvas);
+    const { end, rows } = timeline;
+    if (end === null || !width || !height) {
+      this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
+      return;
+    }
+    const columns = Math.ceil(SPAN / this.canvas.width);
+    const gathered = Math.ceil(rows / this.canvas.height);
+    const [wide, high] = [Math.ceil(SPAN / columns) + 1, Math.ceil(rows / gathered)];
+    if (this.image.width !== wide || this.image.height !== high) {
+      this.image = new ImageData(wide, high);
+      this.pixels = new Uint32Array(this.image.data.buffer);
+    }
+    const [values, numbers] = what === "spikes" ? [timeline.spikes, timeline.spiked] : [timeline.raster, timeline.number];
+    this.pixels.fill(this.words[0]);
+    // Groups begin at whole multiples of their width, so that what is seen moves and does not flicker.
+    const begin = end - SPAN + 1;
+    const group = Math.floor(begin / columns);
+    const seen = new Uint8Array(high);
+    for (let i = 0; i < wide; i++) {
+      seen.fill(0);
+      for (let k = (group + i) * columns; k < (group + i + 1) * columns; k++) {
+        const place = timeline.place(k);
+        if (k < begin || k > end || numbers[place] !== k) continue;
+        for (let row = 0; row < rows; row++) {
+          const value = values[place * rows + row];
+          if (!value) continue;
+          const at = gathered === 1 ? row : Math.floor(row / gathered);
+          const old = seen[at];
+          seen[at] = Math.max(old & 15, value & 15) | Math.max(old & 240, value & 240);
+        }
+      }
+      for (let y = 0; y < high; y++) if (seen[y]) this.pixels[y * wide + i] = this.words[seen[y]];
+    }
+    if (this.unscaled.width !== wide || this.unscaled.height !== high) [this.unscaled.width, this.unscaled.height] = [wide, high];
+    ground(this.unscaled).putImageData(this.image, 0, 0);
+    this.context.imageSmoothingEnabled = false;
+    const scale = this.canvas.width / SPAN;
+    this.context.drawImage(this.unscaled, -(begin - group * columns) * scale, 0, wide * columns * scale, this.canvas.height);
+  }
+}

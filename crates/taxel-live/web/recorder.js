@@ -1,0 +1,160 @@
+// Recording: names with an index, countdown with tones, length, advance, label of the trial.
+
+import { make, part, write } from "./dom.js";
+import { size } from "./words.js";
+import { Tones } from "./tones.js";
+
+/** @typedef {import("./protocol.js").Recorder} Told */
+/** @typedef {import("./protocol.js").Recordings} Recordings */
+/** @typedef {import("./server.js").Server} Server */
+
+/** The tab of recordings, and the button at the foot of the page. */
+export class Recorder {
+  /**
+   * @param {Server} server
+   * @param {(error: unknown) => void} failed
+   * @param {() => void} shown called to bring the tab to the front
+   */
+  constructor(server, failed, shown) {
+    this.server = server;
+    this.failed = failed;
+    this.shown = shown;
+    this.tones = new Tones();
+    this.able = false;
+    /** @type {Told | null} */
+    this.told = null;
+    /** Seconds of the countdown that were sounded. @type {number | null} */
+    this.sounded = null;
+    this.button = part("record", HTMLButtonElement);
+    this.button.onclick = () => this.toggle();
+    part("record-form", HTMLFormElement).onsubmit = (event) => {
+      event.preventDefault();
+      this.toggle();
+    };
+    part("note-form", HTMLFormElement).onsubmit = (event) => {
+      event.preventDefault();
+      const text = part("note", HTMLInputElement);
+      server.ask({ type: "note", text: text.value.trim() }).then(() => {
+        text.value = "";
+      }, failed);
+    };
+    for (const id of ["record-name", "record-index", "record-format"]) part(id, HTMLElement).addEventListener("input", () => this.preview());
+    this.preview();
+  }
+
+  /** @returns {number | null} */
+  number(/** @type {string} */ id) {
+    const text = part(id, HTMLInputElement).value.trim().replace(",", ".");
+    return text === "" ? null : Number(text);
+  }
+
+  preview() {
+    const name = part("record-name", HTMLInputElement).value.trim();
+    const index = part("record-index", HTMLInputElement).value.trim();
+    write(part("record-file", HTMLElement), name ? `${name}${index}.${part("record-format", HTMLSelectElement).value}` : "");
+  }
+
+  get busy() {
+    return this.told !== null && this.told.state !== "idle";
+  }
+
+  /** Starts, or ends what runs. */
+  toggle() {
+    if (!this.able) return;
+    this.tones.wake();
+    if (this.busy) {
+      this.server.ask({ type: "stop" }).catch(this.failed);
+      return;
+    }
+    const refuse = part("record-reason", HTMLElement);
+    refuse.hidden = true;
+    const label = part("record-label", HTMLInputElement).value.trim();
+    const format = part("record-format", HTMLSelectElement).value;
+    const message = {
+      type: "record",
+      name: part("record-name", HTMLInputElement).value.trim(),
+      index: this.number("record-index"),
+      countdown_s: this.number("record-countdown") ?? 0,
+      length_s: this.number("record-length"),
+      advance: part("record-advance", HTMLInputElement).checked,
+      label: label || null,
+      format,
+    };
+    this.server.ask(message).catch((error) => {
+      this.shown();
+      refuse.hidden = false;
+      write(refuse, error.message);
+    });
+  }
+
+  /** @param {Told} told */
+  take(told) {
+    const before = this.told;
+    this.told = told;
+    const { state, left_s, advance, error } = told;
+    if (state === "countdown" && left_s !== null) {
+      const left = Math.ceil(left_s - 0.05);
+      if (left > 0 && left !== this.sounded) this.tones.second();
+      this.sounded = left;
+    } else this.sounded = null;
+    if (state === "recording" && before?.state !== "recording") this.tones.start();
+    if (before?.state === "recording" && state !== "recording") this.tones.stop();
+    // The index moves on by itself; a number that a person is typing stays.
+    const index = part("record-index", HTMLInputElement);
+    if (before && before.index !== told.index && told.index !== null && document.activeElement !== index) {
+      index.value = String(told.index);
+      this.preview();
+    }
+    this.button.classList.toggle("on", this.busy);
+    write(part("record-word", HTMLElement), { idle: "Record", countdown: "Cancel", recording: "Stop", finishing: "Saving" }[state]);
+    write(part("record-start", HTMLButtonElement), this.busy ? (state === "countdown" ? "Cancel (R)" : "Stop (R)") : "Record (R)");
+    const reason = part("record-reason", HTMLElement);
+    if (error || this.busy) {
+      reason.hidden = !error;
+      write(reason, error ?? "");
+    }
+    for (const id of ["note-form"]) part(id, HTMLElement).hidden = state !== "recording";
+    const last = part("record-last", HTMLElement);
+    last.hidden = !told.last;
+    if (told.last) {
+      write(part("record-last-file", HTMLElement), told.last.file);
+      write(part("record-last-verdict", HTMLElement), told.last.verdict);
+    }
+    this.write();
+    const said = part("recorder-said", HTMLElement);
+    if (state === "countdown" && left_s !== null) write(said, `${Math.ceil(left_s)}`);
+    else if (before?.state !== state) write(said, state === "recording" ? `recording ${told.file ?? ""}` : state === "idle" && before ? `stopped${advance ? "" : ", saved"}` : "");
+  }
+
+  /** Writes what runs. */
+  write() {
+    const { told } = this;
+    const big = part("record-state", HTMLElement);
+    const more = part("record-more", HTMLElement);
+    const bar = part("record-bar", HTMLProgressElement);
+    if (!told || told.state === "idle") {
+      write(big, "Ready");
+      write(more, "");
+      bar.hidden = true;
+      return;
+    }
+    const { state, left_s, seconds, length_s, file } = told;
+    if (state === "countdown") write(big, `${Math.ceil(left_s ?? 0)}`);
+    else write(big, state === "recording" ? `${(seconds ?? 0).toFixed(0)} s` : "Saving");
+    write(more, `${state === "countdown" ? "then" : ""} ${file ?? ""}`.trim() + (told.label ? ` · ${told.label}` : ""));
+    bar.hidden = !(state === "recording" && length_s);
+    if (length_s && seconds !== null) bar.value = Math.min(1, seconds / length_s);
+  }
+
+  /** @param {Recordings} told @param {string | null} open */
+  list(told, open) {
+    const select = part("files", HTMLSelectElement);
+    const files = [...told.files].sort((a, b) => b.modified_ns - a.modified_ns);
+    const option = (/** @type {typeof files[0]} */ { name, bytes, labels }) =>
+      make("option", { value: name }, `${name} (${size(bytes)}${labels ? `, ${labels} labelled` : ""})`);
+    const first = make("option", { value: "" }, files.length ? "Open a recording…" : "No recordings yet");
+    select.replaceChildren(first, ...files.map(option));
+    select.value = open ?? "";
+    write(part("folder", HTMLElement), told.folder);
+  }
+}

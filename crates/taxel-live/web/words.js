@@ -1,0 +1,29 @@
+// Numbers as people read them.
+
+/** @param {number | null} us @returns {string} seconds with three places */
+export const seconds = (us) => (us === null ? "–" : `${(us / 1e6).toFixed(3)} s`);
+
+/** @param {number} value @returns {string} a whole number, in groups of three */
+export const whole = (value) => Math.round(value).toLocaleString("en");
+
+/**
+ * @param {number} count
+ * @param {string} one
+ * @param {string} [many]
+ * @returns {string}
+ */
+export const counted = (count, one, many = `${one}s`) => `${whole(count)} ${count === 1 ? one : many}`;
+
+/** @param {number} us @returns {string} a short time in the unit that suits */
+export function short(us) {
+  if (us < 1000) return `${us.toFixed(us < 10 ? 1 : 0)} µs`;
+  if (us < 1e6) return `${(us / 1000).toFixed(us < 1e5 ? 1 : 0)} ms`;
+  return `${(us / 1e6).toFixed(1)} s`;
+}
+
+/** @param {number} bytes @returns {string} */
+export function size(bytes) {
+  if (bytes < 1000) return `${bytes} B`;
+  if (bytes < 1e6) return `${(bytes / 1e3).toFixed(0)} kB`;
+  return bytes < 1e9 ? `${(bytes / 1e6).toFixed(1)} MB` : `${(bytes / 1e9).toFixed(2)} GB`;
+}
