@@ -646,6 +646,18 @@ SOUND: dict[str, Sound] = {
         keep="folds",
         progress=lambda *_: None,
     ),
+    "taxel.information.FoldSums": plain(
+        taxel.information.FoldSums, x=CLOUD, y=[0, 1] * 4, folds=[0, 0, 0, 0, 1, 1, 1, 1], keep="folds", progress=print
+    ),
+    "taxel.information.FoldSums.predictions": method(
+        taxel.information.FoldSums(CLOUD, ["a", "b"] * 4, [0, 0, 0, 0, 1, 1, 1, 1]),
+        "predictions",
+        merge={"a": "x", "b": "y"},
+        features=1,
+        ridge=0.1,
+        priors="training",
+        progress=lambda *_: None,
+    ),
     "taxel.information.GramLDA": plain(taxel.information.GramLDA, features=2, ridge=0.1, priors="equal"),
     "taxel.information.GramLDA.fit": method(
         taxel.information.GramLDA(features=2), "fit", gram=CLOUD @ CLOUD.T, y=[0, 1] * 4
@@ -774,6 +786,7 @@ LEFT_OUT = {
     "taxel.information.Answer": "a result",
     "taxel.information.Control": "a result",
     "taxel.information.Estimate": "a result",
+    "taxel.information.LDA.from_moments": "for FoldSums, which checks",
     "taxel.information.Nested": "a result",
     "taxel.information.Point": "a result",
     "taxel.information.Verdict": "a result",

@@ -10,8 +10,10 @@ from sklearn.model_selection import cross_val_score
 from sklearn.neighbors import KNeighborsClassifier
 
 import taxel
+from taxel import ProblemError
 from taxel.information import (
     LDA,
+    FoldSums,
     GramLDA,
     NearestNeighbours,
     distances_of,
@@ -61,7 +63,7 @@ def test_a_ridge_is_scikit_learns_shrinkage_also_from_inner_products(ridge):
         assert apart(gram.decision_function(new @ x.T), ours.decision_function(new)) < 1e-8
         primal = LDA(ridge=ridge)
         primal.classes_ = np.arange(3)
-        primal._from(ClassMoments.of(x, y, 3))
+        primal.from_moments(ClassMoments.of(x, y, 3))
         assert apart(primal.decision_function(new), ours.decision_function(new)) < 1e-8
 
 
@@ -106,6 +108,24 @@ def test_folds_from_sums_are_folds_trained_one_by_one(dtype, tmp_path):
     assert np.array_equal(fold_predictions(x, y, fold, keep="total"), expected)
     np.save(tmp_path / "x.npy", x)
     assert np.array_equal(fold_predictions(np.load(tmp_path / "x.npy", mmap_mode="r"), y, fold), expected)
+
+
+@pytest.mark.parametrize("dtype", [np.int8, np.float64])
+def test_one_set_of_sums_answers_for_coarser_labels_and_for_the_first_features(dtype):
+    random = np.random.default_rng(9)
+    y = random.integers(0, 6, 600)
+    x = (random.random((600, 30)) < 0.1 + 0.1 * (np.arange(30) % 6 == y[:, None])).astype(dtype)
+    fold = folds(y, count=5, seed=1)
+    sums = FoldSums(x, y, fold)
+    parity = {k: "even" if k % 2 == 0 else "odd" for k in range(6)}
+    merged = [parity[k] for k in y.tolist()]
+    assert np.array_equal(sums.predictions(), fold_predictions(x, y, fold))
+    assert np.array_equal(sums.predictions(merge=parity), fold_predictions(x, merged, fold))
+    assert np.array_equal(sums.predictions(features=12), fold_predictions(x[:, :12], y, fold))
+    both = sums.predictions(merge=parity, features=12)
+    assert np.array_equal(both, fold_predictions(x[:, :12], merged, fold))
+    with pytest.raises(ProblemError, match="merge says nothing of class 5"):
+        sums.predictions(merge={k: k for k in range(5)})
 
 
 def test_sums_of_spikes_in_float32_are_exact():

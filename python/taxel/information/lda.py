@@ -9,12 +9,12 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import callback, number, numbers, shown, text
+from taxel._arguments import number, numbers, shown, text
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.gram_lda import GramLDA
 
-__all__ = ["LDA", "ClassMoments", "fold_predictions"]
+__all__ = ["LDA", "ClassMoments", "blocks", "feature_table", "is_exact"]
 
 #: Rows that are turned into floats at a time.
 _ROWS = 2048
@@ -80,7 +80,7 @@ class ClassMoments:
         moments = cls(classes, x.shape[1], dtype)
         product, pack = (blas.ssyrk, lapack.strttf) if dtype == np.float32 else (blas.dsyrk, lapack.dtrttf)
         square = np.zeros((x.shape[1], x.shape[1]), dtype, order="F")
-        for block, mine in _blocks(x, rows, dtype, shift):
+        for block, mine in blocks(x, rows, dtype, shift):
             square = product(1.0, block.T, beta=1.0, c=square, lower=1, overwrite_c=1)
             label = y[mine]
             moments.counts += np.bincount(label, minlength=classes)
@@ -95,6 +95,27 @@ class ClassMoments:
 
     def __sub__(self, other: ClassMoments) -> ClassMoments:
         return self._joined(other, np.subtract)
+
+    def merged(self, into: NDArray[np.int64], classes: int) -> ClassMoments:
+        """Return the sums of coarser classes: class k goes into class ``into[k]``. The scatter is shared."""
+        merged = ClassMoments.__new__(ClassMoments)
+        merged.counts, merged.sums = np.zeros(classes, np.int64), np.zeros((classes, self.sums.shape[1]))
+        np.add.at(merged.counts, into, self.counts)
+        np.add.at(merged.sums, into, self.sums)
+        merged.scatter = self.scatter
+        return merged
+
+    def first(self, features: int) -> ClassMoments:
+        """Return the sums of the first so many features."""
+        from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
+
+        single = self.scatter.dtype == np.float32
+        unpack, pack = (lapack.stfttr, lapack.strttf) if single else (lapack.dtfttr, lapack.dtrttf)
+        square = unpack(self.sums.shape[1], self.scatter, uplo="L")[0]
+        part = ClassMoments.__new__(ClassMoments)
+        part.counts, part.sums = self.counts, self.sums[:, :features]
+        part.scatter = pack(np.asfortranarray(square[:features, :features]), uplo="L")[0]
+        return part
 
     def _joined(self, other: ClassMoments, how: Callable[..., Any]) -> ClassMoments:
         joined = ClassMoments.__new__(ClassMoments)
@@ -166,11 +187,11 @@ class LDA(Classifier):
         ------
         ProblemError : trials or labels that make no sense
         """
-        table = _features(x)
+        table = feature_table(x)
         self.classes_, row = labelled(y, len(table))
         if table.shape[1] < len(table) - len(self.classes_):
             shift = table.mean(0, dtype=np.float64)
-            return self._from(ClassMoments.of(table, row, len(self.classes_), shift=shift), shift)
+            return self.from_moments(ClassMoments.of(table, row, len(self.classes_), shift=shift), shift)
         values = table.astype(np.float64)
         centre = values.mean(0)
         values -= centre
@@ -192,8 +213,8 @@ class LDA(Classifier):
         self.rank_ = gram.rank_
         return self
 
-    def _from(self, moments: ClassMoments, shift: NDArray[np.float64] | None = None) -> Self:
-        """Learn from sums over trials from which `shift` was taken off."""
+    def from_moments(self, moments: ClassMoments, shift: NDArray[np.float64] | None = None) -> Self:
+        """Learn from sums over trials from which `shift` was taken off; `classes_` is the caller's to set."""
         from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
 
         there = moments.counts > 0
@@ -247,11 +268,11 @@ class LDA(Classifier):
         ProblemError : not fitted, or other features
         """
         weights = self._fitted("coef_")
-        table = _features(x)
+        table = feature_table(x)
         if table.shape[1] != weights.shape[1]:
             raise ProblemError(f"x has {table.shape[1]} features: it was fitted to {weights.shape[1]}")
         found = np.empty((len(table), len(weights)))
-        for block, mine in _blocks(table, None, np.float64, None):
+        for block, mine in blocks(table, None, np.float64, None):
             found[mine] = block @ weights.T + self.intercept_
         return found
 
@@ -259,91 +280,6 @@ class LDA(Classifier):
         """Return the class of the largest discriminant, trial by trial."""
         scores = self.decision_function(x)
         return np.asarray(self.classes_[scores.argmax(1)])
-
-
-def fold_predictions(
-    x: ArrayLike,
-    y: ArrayLike,
-    folds: ArrayLike,
-    *,
-    ridge: float = 0.0,
-    priors: str = "training",
-    keep: str = "folds",
-    progress: Callable[[int, int], object] | None = None,
-) -> NDArray[Any]:
-    """Predict each trial by an `LDA` that was trained on all other folds.
-
-    Each fold's sums are taken once; a training set is the whole less a fold, so ten folds cost little more than one.
-
-    Parameters
-    ----------
-    x : shape (trials, features)
-        More trials than features. int8 for spikes; may be a memory map (``numpy.load(..., mmap_mode="r")``).
-    y : shape (trials,)
-    folds : int, shape (trials,)
-        The fold in which each trial is tested, as `taxel.information.folds` gives it.
-    ridge, priors
-        As in `LDA`.
-    keep : {"folds", "total"}
-        "folds": every fold's scatter stays in memory, ``folds * features ** 2 / 2`` numbers (of four bytes for spikes,
-        eight else). "total": only their sum stays and each is reckoned twice, for very many features.
-    progress : function of (done, all), optional
-        Steps: a fold summed, a fold predicted. What it raises ends the work.
-
-    Returns
-    -------
-    shape (trials,), of the kind of `y`
-
-    Raises
-    ------
-    ProblemError : shapes that do not fit, or a training set of one class
-
-    Notes
-    -----
-    Exact: whole numbers whose squares sum up below 2^24 are summed in float32 without rounding, all else in float64.
-    150 000 trials of 5000 features, 300 classes, 10 folds: 3.75 TFLOP of products and 0.4 of factors.
-    """
-    model = LDA(ridge=ridge, priors=priors)
-    text("keep", keep, ("folds", "total"))
-    if progress is not None:
-        callback("progress", progress)
-    table = _features(x)
-    classes, row = labelled(y, len(table))
-    fold = numbers("folds", folds, np.int64)
-    if fold.shape != (len(table),):
-        raise ProblemError(f"folds has shape {fold.shape}: must be ({len(table)},), one a trial")
-    names = np.unique(fold)
-    if len(names) < 2:
-        raise ProblemError(f"folds names {len(names)}: must be two at least")
-    dtype = np.float32 if _is_exact(table) else np.float64
-    steps = 2 * len(names)
-
-    shift = None if dtype == np.float32 else table.mean(0, dtype=np.float64)
-
-    def summed(name: np.int64) -> ClassMoments:
-        mine = np.flatnonzero(fold == name)
-        return ClassMoments.of(table, row, len(classes), rows=mine, dtype=dtype, shift=shift)
-
-    total: ClassMoments | None = None
-    kept: dict[int, ClassMoments] = {}
-    for k, name in enumerate(names):
-        one = summed(name)
-        total = one if total is None else total + one
-        if keep == "folds":
-            kept[int(name)] = one
-        del one
-        if progress is not None:
-            progress(k + 1, steps)
-    assert total is not None  # there are two folds at least
-    found = np.empty(len(table), classes.dtype)
-    for k, name in enumerate(names):
-        model.classes_ = classes
-        model._from(total - (kept.pop(int(name)) if keep == "folds" else summed(name)), shift)
-        for block, mine in _blocks(table, np.flatnonzero(fold == name), np.float64, None):
-            found[mine] = classes[(block @ model.coef_.T + model.intercept_).argmax(1)]
-        if progress is not None:
-            progress(len(names) + k + 1, steps)
-    return found
 
 
 def _within(moments: ClassMoments) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -380,7 +316,8 @@ def _by_eigenvectors(
     return solved, int(kept.sum())
 
 
-def _is_exact(table: NDArray[Any]) -> bool:
+def is_exact(table: NDArray[Any]) -> bool:
+    """Return whether sums of products of these trials are exact in float32."""
     if table.dtype.kind not in "biu":
         return False
     largest = max(
@@ -390,9 +327,10 @@ def _is_exact(table: NDArray[Any]) -> bool:
     return largest**2 * len(table) <= _EXACT
 
 
-def _blocks(
+def blocks(
     table: NDArray[Any], rows: NDArray[np.int64] | None, dtype: type[Any], shift: NDArray[np.float64] | None
 ) -> Iterator[tuple[NDArray[Any], NDArray[np.int64]]]:
+    """Give trials as floats, some at a time, with their numbers."""
     every = np.arange(len(table)) if rows is None else rows
     for first in range(0, len(every), _ROWS):
         mine = every[first : first + _ROWS]
@@ -402,7 +340,8 @@ def _blocks(
         yield (block if shift is None else block - shift), mine
 
 
-def _features(x: ArrayLike) -> NDArray[Any]:
+def feature_table(x: ArrayLike) -> NDArray[Any]:
+    """Return trials by features; raise `ProblemError` for what is no such table."""
     table = x if isinstance(x, np.ndarray) and x.dtype.kind in "biuf" else numbers("x", x, np.float64)
     if table.ndim != 2 or 0 in table.shape:
         raise ProblemError(f"x has shape {table.shape}: must be (trials, features)")

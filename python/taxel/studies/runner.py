@@ -7,7 +7,6 @@ kill, power) loses no more than the realisations at work.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -25,6 +24,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from taxel import _arguments as arguments
 from taxel import _core
 from taxel._core import DeviceError, ProblemError
+from taxel._files import source_digest
 
 __all__ = ["BACKENDS", "HERE", "Results", "Task", "Workers", "code_digest", "run"]
 
@@ -115,12 +115,10 @@ def code_digest(modules: Sequence[ModuleType]) -> str:
     >>> len(code_digest([taxel.formats]))
     16
     """
-    digest = hashlib.sha256()
-    for module in (*modules, _core):
-        file = Path(str(module.__file__))
-        for part in sorted(file.parent.glob("*.py")) if file.name == "__init__.py" else [file]:
-            digest.update(part.name.encode() + b"\0" + part.read_bytes())
-    return digest.hexdigest()[:16]
+    files = [Path(str(module.__file__)) for module in (*modules, _core)]
+    return source_digest(
+        part for file in files for part in (sorted(file.parent.glob("*.py")) if file.name == "__init__.py" else [file])
+    )
 
 
 @dataclass(frozen=True)

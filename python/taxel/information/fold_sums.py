@@ -1,0 +1,200 @@
+"""Linear discriminants of all folds but one, from sums that are taken once a fold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel._arguments import callback, instance, numbers, text, whole
+from taxel._core import ProblemError
+from taxel.information._estimator import labelled
+from taxel.information._labels import words
+from taxel.information.lda import LDA, ClassMoments, blocks, feature_table, is_exact
+
+__all__ = ["FoldSums", "fold_predictions"]
+
+
+class FoldSums:
+    """Hold trials summed up by fold and class, so that many questions about the same trials share the sums.
+
+    Parameters
+    ----------
+    x : shape (trials, features)
+        More trials than features. int8 for spikes; may be a memory map (``numpy.load(..., mmap_mode="r")``).
+    y : shape (trials,)
+    folds : int, shape (trials,)
+        The fold in which each trial is tested, as `taxel.information.folds` gives it.
+    keep : {"folds", "total"}
+        "folds": every fold's scatter stays in memory, ``folds * features ** 2 / 2`` numbers (of four bytes for spikes,
+        eight else). "total": only their sum stays and each is reckoned again for each question, for very many features.
+    progress : function of (done, all), optional
+        Folds summed. What it raises ends the work.
+
+    Attributes
+    ----------
+    classes : shape (classes,)
+
+    Raises
+    ------
+    ProblemError : shapes that do not fit
+
+    Notes
+    -----
+    Exact: whole numbers whose squares sum up below 2^24 are summed in float32 without rounding, all else in float64.
+
+    Examples
+    --------
+    >>> x = [[0.0, 1.0], [1.0, 0.2], [0.5, 0.4], [0.4, 0.9], [3.0, 2.0], [4.0, 2.5], [3.5, 3.0], [3.1, 2.2]]
+    >>> sums = FoldSums(x, ["ball", "ball", "edge", "edge", "rod", "rod", "pin", "pin"], [0, 1] * 4)
+    >>> sums.predictions(merge={"ball": "soft", "edge": "soft", "rod": "hard", "pin": "hard"}).tolist()
+    ['soft', 'soft', 'soft', 'soft', 'hard', 'hard', 'hard', 'hard']
+    """
+
+    def __init__(
+        self,
+        x: ArrayLike,
+        y: ArrayLike,
+        folds: ArrayLike,
+        *,
+        keep: str = "folds",
+        progress: Callable[[int, int], object] | None = None,
+    ) -> None:
+        text("keep", keep, ("folds", "total"))
+        if progress is not None:
+            callback("progress", progress)
+        self._table = feature_table(x)
+        self.classes, self._row = labelled(y, len(self._table))
+        self._fold = numbers("folds", folds, np.int64)
+        if self._fold.shape != (len(self._table),):
+            raise ProblemError(f"folds has shape {self._fold.shape}: must be ({len(self._table)},), one a trial")
+        self._names = np.unique(self._fold)
+        if len(self._names) < 2:
+            raise ProblemError(f"folds names {len(self._names)}: must be two at least")
+        self._dtype = np.float32 if is_exact(self._table) else np.float64
+        self._shift = None if self._dtype == np.float32 else self._table.mean(0, dtype=np.float64)
+        self._kept: dict[int, ClassMoments] = {}
+        total: ClassMoments | None = None
+        for k, name in enumerate(self._names):
+            one = self._summed(name)
+            total = one if total is None else total + one
+            if keep == "folds":
+                self._kept[int(name)] = one
+            del one
+            if progress is not None:
+                progress(k + 1, len(self._names))
+        assert total is not None  # there are two folds at least
+        self._total = total
+
+    def _summed(self, name: np.int64) -> ClassMoments:
+        if int(name) in self._kept:
+            return self._kept[int(name)]
+        mine = np.flatnonzero(self._fold == name)
+        return ClassMoments.of(
+            self._table, self._row, len(self.classes), rows=mine, dtype=self._dtype, shift=self._shift
+        )
+
+    def predictions(
+        self,
+        *,
+        merge: dict[Any, Any] | None = None,
+        features: int | None = None,
+        ridge: float = 0.0,
+        priors: str = "training",
+        progress: Callable[[int, int], object] | None = None,
+    ) -> NDArray[Any]:
+        """Predict each trial by an `LDA` that was trained on all other folds.
+
+        Parameters
+        ----------
+        merge : dict from class to class, optional
+            What each class counts as: the trials are told apart by that, as if they had been so labelled.
+        features : int, optional
+            Only the first so many: in rasters sample by sample, what was there until some time.
+        ridge, priors
+            As in `LDA`.
+        progress : function of (done, all), optional
+            Folds predicted. What it raises ends the work.
+
+        Returns
+        -------
+        shape (trials,), of the kind of `y`, or of what it is merged into
+
+        Raises
+        ------
+        ProblemError : a training set of one class, a class that is merged into none
+        """
+        if progress is not None:
+            callback("progress", progress)
+        model = LDA(ridge=ridge, priors=priors)
+        count = self._table.shape[1]
+        used = count if features is None else whole("features", features, 1, count)
+        classes, into = self.classes, None
+        if merge is not None:
+            merge = instance("merge", merge, dict)
+            missing = [one for one in self.classes.tolist() if one not in merge]
+            if missing:
+                raise ProblemError(f"merge says nothing of class {missing[0]!r}")
+            classes, into = np.unique(
+                words("merge", [merge[one] for one in self.classes.tolist()]), return_inverse=True
+            )
+        model.classes_ = classes
+        shift = None if self._shift is None else self._shift[:used]
+        found = np.empty(len(self._table), classes.dtype)
+        for k, name in enumerate(self._names):
+            training = self._total - self._summed(name)
+            if into is not None:
+                training = training.merged(into, len(classes))
+            model.from_moments(training if used == count else training.first(used), shift)
+            for block, mine in blocks(self._table[:, :used], np.flatnonzero(self._fold == name), np.float64, None):
+                found[mine] = classes[(block @ model.coef_.T + model.intercept_).argmax(1)]
+            if progress is not None:
+                progress(k + 1, len(self._names))
+        return found
+
+
+def fold_predictions(
+    x: ArrayLike,
+    y: ArrayLike,
+    folds: ArrayLike,
+    *,
+    ridge: float = 0.0,
+    priors: str = "training",
+    keep: str = "folds",
+    progress: Callable[[int, int], object] | None = None,
+) -> NDArray[Any]:
+    """Predict each trial by an `LDA` that was trained on all other folds.
+
+    Each fold's sums are taken once; a training set is the whole less a fold, so ten folds cost little more than one.
+
+    Parameters
+    ----------
+    x, y, folds, keep
+        As in `FoldSums`, which answers several questions about the same trials.
+    ridge, priors
+        As in `LDA`.
+    progress : function of (done, all), optional
+        Steps: a fold summed, a fold predicted. What it raises ends the work.
+
+    Returns
+    -------
+    shape (trials,), of the kind of `y`
+
+    Raises
+    ------
+    ProblemError : shapes that do not fit, or a training set of one class
+
+    Notes
+    -----
+    150 000 trials of 5000 features, 300 classes, 10 folds: 3.75 TFLOP of products and 0.4 of factors.
+    """
+    if progress is not None:
+        callback("progress", progress)
+
+    def part(begun: int) -> Callable[[int, int], object] | None:
+        return None if progress is None else lambda done, every: progress(begun * every + done, 2 * every)
+
+    sums = FoldSums(x, y, folds, keep=keep, progress=part(0))
+    return sums.predictions(ridge=ridge, priors=priors, progress=part(1))

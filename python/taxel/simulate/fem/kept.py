@@ -1,0 +1,84 @@
+"""Courses of indentations kept in a folder, each under a digest of all that made it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+
+from taxel._arguments import instance
+from taxel._arguments import path as checked_path
+from taxel._files import source_digest
+from taxel.simulate.fem import contact, indentation, material, mesh, solids, solver
+from taxel.simulate.fem.indentation import Course, Indentation, press
+
+__all__ = ["KeptCourses"]
+
+#: What a course depends on beside its parameters.
+_CODE = (mesh, material, solids, contact, solver, indentation)
+
+
+class KeptCourses:
+    """Keep courses in a folder that the caller names.
+
+    Parameters
+    ----------
+    folder : path
+        Must be there.
+
+    Attributes
+    ----------
+    code : str
+        A digest of the solver's source: courses of other code count no more.
+
+    Raises
+    ------
+    FileNotFoundError : no such folder
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     kept = KeptCourses(folder)
+    ...     small = Indentation(depth_mm=0.1, mesh_mm=0.5, step_um=100)
+    ...     before, course, after = small in kept, kept.made(small), small in kept
+    >>> before, after
+    (False, True)
+    """
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(checked_path("folder", folder))
+        if not self.folder.is_dir():
+            raise FileNotFoundError(2, "No such folder", str(self.folder))
+        self.code = source_digest([Path(str(module.__file__)) for module in _CODE])
+
+    def path(self, asked: Indentation) -> Path:
+        """Return where a course lies or would lie: its name tells the object and path, the digest the rest."""
+        i = instance("asked", asked, Indentation)
+        all_of_it = json.dumps([i.to_dict(), self.code], sort_keys=True)
+        digest = hashlib.sha256(all_of_it.encode()).hexdigest()[:16]
+        return self.folder / f"{i.diameter_mm:g}mm-{i.modulus_kpa:g}kPa-{i.angle_deg:g}deg-{digest}.npz"
+
+    def __contains__(self, asked: Indentation) -> bool:
+        return self.path(asked).exists()
+
+    def __getitem__(self, asked: Indentation) -> Course:
+        """Return a course that is there.
+
+        Raises
+        ------
+        FileNotFoundError : it is not
+        FormatError : its file is damaged
+        """
+        return Course.load(self.path(asked))
+
+    def add(self, course: Course) -> Path:
+        """Write a course into the folder; one that is there already is left."""
+        path = self.path(course.indentation)
+        return path if path.exists() else course.save(path, made_by=self.code, overwrite=True)
+
+    def made(self, asked: Indentation) -> Course:
+        """Return a course; run it and keep it where it is not there."""
+        if asked not in self:
+            self.add(press(asked))
+        return self[asked]
