@@ -67,13 +67,22 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             "levels is 40: must be a list",
         ),
         (("encode", "walk.npz", "s.npz", "--encoder", "level_crossing"), "levels is missing"),
-        (("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "alpha=soon"), "alpha is soon: must be a number"),
+        (
+            ("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "alpha=soon"),
+            'alpha is "soon": must be a number',
+        ),
         (
             ("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "alpha=[1]"),
-            "alpha is a sequence: must be a number",
+            "alpha is [1]: must be a number",
         ),
-        (("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "wings=2"), "no parameter wings: must be one of"),
-        (("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "decay=s"), "decay is s: must be one of"),
+        (
+            ("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "wings=2"),
+            'wings is not known: there is "alpha", "a", "b"',
+        ),
+        (
+            ("encode", "walk.npz", "s.npz", "--encoder", "fa1", "--set", "decay=s"),
+            'decay is "s": must be "sample" or "ms"',
+        ),
         (("encode", "walk.npz", "s.npz", "--encoder", "contact_area"), "give --tare SECONDS or --tare FILE"),
         (("encode", "walk.npz", "nowhere/s.npz", "--encoder", "fa1"), "nowhere: no such folder"),
         (("detect", "walk.npz", "--readout", "touch.json"), "give --tare SECONDS or --tare FILE"),

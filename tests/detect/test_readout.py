@@ -292,9 +292,9 @@ def test_files_that_are_no_readout_are_refused_by_name(readout: Readout, tmp_pat
         (b"", "not JSON"),
         (b"{}", "does not say"),
         (json.dumps({**good, "version": 2}).encode(), "version 2, this taxel reads version 1 only"),
-        (json.dumps({**good, "wings": 2}).encode(), "unknown field `wings`"),
+        (json.dumps({**good, "wings": 2}).encode(), 'readout: wings is not known: there is "encoder", "array"'),
         (json.dumps({**good, "neurons": {}}).encode(), "without a neuron"),
-        (json.dumps({**good, "time": "always"}).encode(), "unknown variant `always`"),
+        (json.dumps({**good, "time": "always"}).encode(), 'readout: time is "always": must be "continuous" or "grid"'),
         (readout.to_json()[:500].encode(), "not JSON"),
     ]
     for content, said in cases:

@@ -82,7 +82,7 @@ def test_a_lone_taxel_and_one_never_heard_of_are_no_contact():
         (lambda: ContactArea(levels=[]), "levels: must hold"),
         (lambda: ContactArea(levels=[0, 2]), r"levels are \[0, 2\]"),
         (lambda: ContactArea(levels=[2, 2]), r"levels are \[2, 2\]"),
-        (lambda: ContactArea(levels=[2.5]), "levels: invalid type"),
+        (lambda: ContactArea(levels=[2.5]), r"levels\[0\] is 2.5: must be a whole number"),
         (lambda: ContactArea(tare="soon"), "tare is .soon.: must be a taxel.Tare, or seconds"),
         (lambda: ContactArea().encode(Frames(np.zeros((1, 3, 4)), [0])), "without a tare"),
         (lambda: ContactArea().stream(ARRAY), "without a tare"),

@@ -70,7 +70,7 @@ def test_fa1_on_ticks_by_table_equals_fa1_on_the_same_numbers_without_it():
         (lambda: FA1(theta_0=-1), "theta_0 is -1"),
         (lambda: FA1(range=0), "range is 0"),
         (lambda: FA1(range=1, theta_0=1), "theta_0 and range: give one"),
-        (lambda: FA1(decay="s"), "decay: unknown variant"),
+        (lambda: FA1(decay="s"), 'decay is "s": must be "sample" or "ms"'),
     ],
 )
 def test_nonsense_gets_one_clear_line(call, said):

@@ -103,7 +103,7 @@ def test_renewals_go_on_over_a_gap_longer_than_the_window():
     ("call", "said"),
     [
         (lambda: LevelCrossing([]), "levels: must hold"),
-        (lambda: LevelCrossing(5.0), "levels: invalid type"),
+        (lambda: LevelCrossing(5.0), "levels is 5.0: must be a list"),
         (lambda: LevelCrossing([1.0, 1.0]), "levels: 1 after 1, must ascend"),
         (lambda: LevelCrossing([2.0, float("inf")]), r"levels\[1\] is inf"),
         (lambda: LevelCrossing([1e300]), "levels hold"),

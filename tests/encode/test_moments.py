@@ -157,11 +157,11 @@ def test_it_begins_settled():
     ("wrong", "said"),
     [
         ({"levels": 0}, "levels is 0: must be from 1 to 1000"),
-        ({"levels": 2.5}, "levels: "),
+        ({"levels": 2.5}, "levels is 2.5: must be a whole number"),
         ({"area": (0, 5)}, r"area\[0\] is 0: must be above 0"),
         ({"total": (5, 5)}, "total is 5 to 5"),
         ({"peak": (5, 4)}, "peak is 5 to 4"),
-        ({"peak": (5,)}, "peak: "),
+        ({"peak": (5,)}, r"peak is \[5\]: must be a list of 2"),
         ({"displacement_mm": (-1, 4)}, r"displacement_mm\[0\] is -1 mm"),
         (dict.fromkeys(RANGES), "all left out"),
         ({"tonic_ms": 0}, "tonic_ms is 0"),

@@ -82,7 +82,7 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
         (Tare, "is taken"),
         (lambda: Tare.from_json(5), "must be JSON text"),
         (lambda: Tare.from_json("[1"), "tare: "),
-        (lambda: Tare.from_json('{"rest": []}'), "tare: missing field"),
+        (lambda: Tare.from_json('{"rest": []}'), "tare: array is missing"),
         (
             lambda: Tare.from_json(Tare.take(EVENTS).to_json().replace("[5.0]", "[5.0, 6.0]")),
             "2 rests for 1 x 1 taxels",

@@ -272,8 +272,8 @@ def test_other_arguments_that_make_no_sense_are_one_clear_error_each():
         (lambda: Neuron().potential([1.0], trains, [float("nan")]), r"times\[0\] is NaN: must be finite"),
         (lambda: Neuron().potential([1.0], trains, [1.0], spikes=[5.0, 3.0]), r"spikes\[1\] is 3 ms, after 5 ms"),
         (lambda: Neuron(tau=-1), "tau is -1 ms: must be above 0 and finite"),
-        (lambda: Neuron(time="often"), "unknown variant `often`, expected `continuous` or `grid`"),
-        (lambda: Neuron(step_ms=None), "invalid type: null"),
+        (lambda: Neuron(time="often"), 'time is "often": must be "continuous" or "grid"'),
+        (lambda: Neuron(step_ms=None), "step_ms is None: must be a number"),
     ):
         with pytest.raises(ProblemError, match=said):
             call()

@@ -114,7 +114,7 @@ def test_pictures_touch_from_the_empty_one_before_to_the_empty_one_after():
         (lambda: Scene.draw(1, array=64), ProblemError, "array"),
         (lambda: Scene.draw(1, array=Array(8, 8)), SceneError, "too small"),
         (lambda: Scene("ball"), ProblemError, "parameters"),
-        (lambda: Scene({}).motion(), SceneError, "missing field"),
+        (lambda: Scene({}).motion(), SceneError, "^scene: ball is missing$"),
         (lambda: Scene.draw(1).replace(colour="red"), ProblemError, "colour"),
         (lambda: Scene.draw(1).replace(drop_mm=-5).motion(), SceneError, "drop_mm"),
         (lambda: Scene.draw(1).replace(foam={"poisson": 0.5}).motion(), SceneError, "poisson"),

@@ -11,7 +11,7 @@ mod stream;
 mod tare;
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 pub use running_range::{FirstWindow, RunningRange};
 pub use stream::Stream;
@@ -20,6 +20,7 @@ pub use tare::{Tare, TareBuilder};
 use law::Law;
 
 use crate::parameters::Described;
+use crate::reading::{self, Unfit};
 use crate::spikes::ms;
 use crate::{Array, Error, Events, Result, Spike, SpikeTrains, Stop, problem};
 
@@ -46,6 +47,14 @@ macro_rules! encoders {
 
             fn law_mut(&mut self) -> &mut dyn Law {
                 match self { $(Self::$Kind(e) => e,)* }
+            }
+
+            /// Reads the parameters of the encoder of a name; none where there is none of that name.
+            fn read(name: &str, parameters: Value) -> Option<std::result::Result<Self, Unfit>> {
+                $(if name == stringify!($name) {
+                    return Some(reading::from_value(parameters).map(Self::$Kind));
+                })*
+                None
             }
 
             /// The parameters of an encoder, by its name, with their defaults and ranges.
@@ -83,7 +92,17 @@ impl Encoder {
     ///
     /// `Problem`, naming the parameter.
     pub fn from_json(json: &str) -> Result<Self> {
-        let encoder: Self = serde_json::from_str(json).map_err(|e| said(json, &e))?;
+        let mut given: Map<String, Value> =
+            reading::from_text(json).map_err(|unfit| Error::Problem(unfit.of("encoder")))?;
+        let names = NAMES.join(", ");
+        let name = match given.remove("name") {
+            Some(Value::String(name)) => name,
+            Some(other) => return Err(problem!("encoder {other}: must be one of {names}")),
+            None => return Err(problem!("encoder without a name: must be one of {names}")),
+        };
+        let encoder = Self::read(&name, given.into())
+            .ok_or_else(|| problem!("encoder {name}: must be one of {names}"))?
+            .map_err(|unfit| Error::Problem(unfit.of(&format!("encoder {name}"))))?;
         encoder.check()?;
         Ok(encoder)
     }
@@ -188,34 +207,4 @@ fn collect(mut stream: Box<dyn Stream>, mut out: Vec<Spike>, first: Option<i64>)
     let start = first.map_or(0.0, ms);
     let end = stream.finish(&mut out).unwrap_or(start);
     SpikeTrains::from_spikes(&out, stream.trains(), stream.signed(), start, end)
-}
-
-/// Names the parameter that serde could not read: it says only what is wrong with it.
-fn said(json: &str, error: &serde_json::Error) -> Error {
-    let value: Value = match serde_json::from_str(json) {
-        Ok(value) => value,
-        Err(error) => return problem!("encoder: not JSON: {error}"),
-    };
-    let Some(object) = value.as_object() else {
-        return problem!("encoder is {value}: must be an object with a name and parameters");
-    };
-    let Some(name) = object.get("name").and_then(Value::as_str) else {
-        return problem!("encoder without a name: must be one of {}", NAMES.join(", "));
-    };
-    if !NAMES.contains(&name) {
-        return problem!("encoder {name}: must be one of {}", NAMES.join(", "));
-    }
-    for (key, one) in object.iter().filter(|(key, _)| *key != "name") {
-        let alone = serde_json::json!({ "name": name, key: one });
-        if let Err(error) = serde_json::from_value::<Encoder>(alone)
-            && !error.to_string().starts_with("missing field")
-        {
-            return if error.to_string().starts_with(&format!("unknown field `{key}`")) {
-                problem!("encoder {name}: {error}")
-            } else {
-                problem!("encoder {name}: {key}: {error}")
-            };
-        }
-    }
-    problem!("encoder {name}: {error}")
 }

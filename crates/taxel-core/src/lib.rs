@@ -14,6 +14,7 @@
 pub mod allowed;
 pub mod error;
 pub mod parameters;
+pub mod reading;
 pub mod vectors;
 
 pub mod array;

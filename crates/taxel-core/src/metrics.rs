@@ -13,6 +13,7 @@ mod patterns;
 mod stored;
 
 use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
 
 pub use pairwise::Work;
 pub use patterns::Patterns;
@@ -23,7 +24,8 @@ use law::{Law, Ready};
 use pairwise::Matrix;
 
 use crate::parameters::Described;
-use crate::{Result, Stop, problem};
+use crate::reading::{self, Unfit};
+use crate::{Error, Result, Stop, problem};
 
 /// The registry: a line a metric, `NAME: Kind`, whose file is `metrics/NAME.rs` and whose name in JSON is `NAME`.
 macro_rules! metrics {
@@ -44,6 +46,14 @@ macro_rules! metrics {
         impl Metric {
             fn law(&self) -> &dyn Law {
                 match self { $(Self::$Kind(metric) => metric,)* }
+            }
+
+            /// Reads the parameters of the metric of a name; none where there is none of that name.
+            fn read(name: &str, parameters: Value) -> Option<std::result::Result<Self, Unfit>> {
+                $(if name == stringify!($name) {
+                    return Some(reading::from_value(parameters).map(Self::$Kind));
+                })*
+                None
             }
 
             /// The parameters of a metric, by its name, with their defaults and ranges.
@@ -79,6 +89,30 @@ metrics! {
 }
 
 impl Metric {
+    /// Reads a metric from JSON: an object whose `name` says which.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter.
+    pub fn from_json(json: &str) -> Result<Self> {
+        let mut given: Map<String, Value> =
+            reading::from_text(json).map_err(|unfit| Error::Problem(unfit.of("metric")))?;
+        let name = given.remove("name").unwrap_or_default();
+        let name = name.as_str().unwrap_or_default();
+        let Some(Described { defaults, required, .. }) = Self::described(name) else {
+            let names: Vec<String> = NAMES.iter().map(|name| format!("'{name}'")).collect();
+            return Err(problem!("metric is '{name}': must be one of {}", names.join(", ")));
+        };
+        // A metric may hold another's parameters, whose reader would let unknown ones pass.
+        let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
+        if let Some(unknown) = given.keys().find(|key| !known.contains(&key.as_str())) {
+            return Err(problem!("{unknown}: {name} takes {}", known.join(", ")));
+        }
+        Self::read(name, given.into())
+            .ok_or_else(|| problem!("metric {name}: cannot be read"))?
+            .map_err(|unfit| Error::Problem(unfit.of(name)))
+    }
+
     /// Checks every parameter.
     ///
     /// # Errors

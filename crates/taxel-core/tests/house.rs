@@ -13,14 +13,15 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
     (
         "taxel-core",
         &[
-            &["error", "vectors"],
+            &["error", "reading", "vectors"],
             &["allowed"],
             &["parameters", "array"],
             &["events", "spikes"],
             &["wire", "contact", "neuron"],
             &["board"],
             &["encode"],
-            &["learn", "metrics"],
+            &["metrics"],
+            &["learn"],
             &["detect"],
         ],
     ),

@@ -4,17 +4,14 @@ use std::num::NonZero;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use serde_json::{Map, Value};
 use taxel_core::metrics::matching::matched;
 use taxel_core::metrics::{Metric, NAMES, Patterns, Work};
-use taxel_core::parameters::Described;
 use taxel_core::problem;
 use taxel_core::vectors::Instructions;
 
 use crate::convert::{array, slice};
 use crate::enter::{enter, enter_telling};
 use crate::errors::core;
-use crate::parameters::parsed;
 
 /// Patterns as Python hands them over: name, count, trains, times, offsets, window, listed.
 type PatternsIn<'py> =
@@ -47,17 +44,7 @@ impl<'py> Held<'py> {
 }
 
 fn to_metric(json: &str) -> PyResult<Metric> {
-    let given: Map<String, Value> = parsed("metric", json)?;
-    let name = given.get("name").and_then(Value::as_str).unwrap_or_default();
-    let Some(Described { defaults, required, .. }) = Metric::described(name) else {
-        let names: Vec<String> = NAMES.iter().map(|name| format!("'{name}'")).collect();
-        return Err(core(problem!("metric is '{name}': must be one of {}", names.join(", "))));
-    };
-    let known: Vec<&str> = required.iter().copied().chain(defaults.keys().map(String::as_str)).collect();
-    if let Some(unknown) = given.keys().find(|key| *key != "name" && !known.contains(&key.as_str())) {
-        return Err(core(problem!("{unknown}: {name} takes {}", known.join(", "))));
-    }
-    parsed(name, json)
+    Metric::from_json(json).map_err(core)
 }
 
 /// Which spikes and targets (ms) belong together, pattern by pattern: a pair of places each.

@@ -5,14 +5,13 @@ use pyo3::prelude::*;
 use taxel_core::board::{Board, session};
 use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor, Stage, Taxels};
 use taxel_core::wire::{Decoder, Registers};
-use taxel_core::{Array, Error, Events, Result};
+use taxel_core::{Array, Error, Events, Result, reading};
 use taxel_live::address::of_text;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Report};
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
 use crate::enter::{enter, enter_telling};
 use crate::errors::core;
-use crate::parameters::read;
 
 /// An act as Python hands it over: silence in ms, a scene as JSON, or pictures with their period in us.
 #[derive(FromPyObject)]
@@ -23,7 +22,7 @@ pub(crate) enum ActIn<'py> {
 }
 
 fn scene(json: &str) -> Result<Scene> {
-    read(json).map_err(|said| Error::Scene(format!("scene: {said}")))
+    reading::from_text(json).map_err(|unfit| Error::Scene(unfit.of("scene")))
 }
 
 fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
@@ -42,7 +41,7 @@ fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
 
 /// Acts and board, ready to be played.
 fn ready(array: &Array, registers: Registers, sensor: &str, seed: u64, acts: &[Act]) -> Result<Stage> {
-    let sensor: Sensor = read(sensor).map_err(|said| Error::Scene(format!("sensor: {said}")))?;
+    let sensor: Sensor = reading::from_text(sensor).map_err(|unfit| Error::Scene(unfit.of("sensor")))?;
     registers.check(array)?;
     Stage::new(array, Taxels::new(&sensor, array.len(), registers.ramp, seed)?, registers.frame_us(), acts)
 }

@@ -18,38 +18,6 @@ __all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "app"]
 WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
 
 
-def _wanted(said: str) -> str:
-    """Return what a parser expects, in words."""
-    said = said.strip().replace("`", "")
-    for kind, words in _KINDS.items():
-        if re.fullmatch(kind, said):
-            return words
-    return f"one of {said.removeprefix('one of ').replace(' or ', ', ')}"
-
-
-#: What parsers of parameters expect, and the same in words.
-_KINDS = {
-    r"f32|f64|a number": "a number",
-    r"[ui]\d+|usize|a whole number": "a whole number",
-    r"(a )?sequence": "a list",
-    r"an array of length \d+|a tuple of size \d+": "a list of so many",
-    r"(a )?map|struct .*": "values by name",
-    r"(a )?boolean": "true or false",
-    r"(a )?string|a name|string or map": "a name",
-}
-_IN_WORDS: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
-    (
-        r": invalid (?:type|value): (?:\w+ ){1,2}[`\"](.+?)[`\"], expected (.+)$",
-        lambda m: f" is {m[1]}: must be {_wanted(m[2])}",
-    ),
-    (r": invalid (?:type|value): (.+?), expected (.+)$", lambda m: f" is a {m[1]}: must be {_wanted(m[2])}"),
-    (r": invalid length (\d+), expected (.+)$", lambda m: f" has {m[1]} values: must be {_wanted(m[2])}"),
-    (r": unknown variant `(.*?)`, expected (.+)$", lambda m: f" is {m[1]}: must be {_wanted(m[2])}"),
-    (r"unknown field `(.*?)`, expected (.+)$", lambda m: f"no parameter {m[1]}: must be {_wanted(m[2])}"),
-    (r"missing field `(.*?)`", lambda m: f"{m[1]} is missing"),
-)
-
-
 class _Command(TyperCommand):
     """A command whose errors speak of what was typed, not of Python's arguments."""
 
@@ -82,8 +50,6 @@ class _Command(TyperCommand):
             text = options[first[1]] + text[first.end() :]
         if "tare" in options:
             text = re.sub(r"without a tare: .*", "without the taxels' rest: give --tare SECONDS or --tare FILE", text)
-        for theirs, ours in _IN_WORDS:
-            text = re.sub(theirs, ours, text)
         return text
 
 

@@ -9,7 +9,7 @@ use crate::allowed::above_0;
 use crate::detect::{Detection, FrameClock, ReadoutStream, TrainedNeuron};
 use crate::encode::{Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
-use crate::{Array, Error, Events, Result, Stop, problem};
+use crate::{Array, Error, Events, Result, Stop, problem, reading};
 
 /// What a readout's file says that it is.
 const FORMAT: &str = "taxel readout";
@@ -142,7 +142,7 @@ impl Readout {
     /// `Format` where the text is no readout, one of a version that is not known, or holds parts that make no sense.
     pub fn from_json(text: &str) -> Result<Self> {
         let format = |said: String| Error::Format(said);
-        let mut value: Value = serde_json::from_str(text).map_err(|e| format(format!("readout: not JSON: {e}")))?;
+        let mut value: Value = reading::from_text(text).map_err(|unfit| format(unfit.of("readout")))?;
         let Some(object) = value.as_object_mut() else {
             return Err(format("readout: not a JSON object".to_owned()));
         };
@@ -158,11 +158,11 @@ impl Readout {
             }
             None => return Err(format(format!("readout: says no version, must be {VERSION}"))),
         }
-        // The encoder names its own parameter that is wrong; serde would only say what.
+        // An encoder that is read as a part of another loses the names of its parameters.
         if let Some(encoder) = object.get("encoder") {
             Encoder::from_json(&encoder.to_string()).map_err(|e| format(format!("readout: {e}")))?;
         }
-        let readout: Self = serde_json::from_value(value).map_err(|e| format(format!("readout: {e}")))?;
+        let readout: Self = reading::from_value(value).map_err(|unfit| format(unfit.of("readout")))?;
         readout.check().map_err(|e| format(format!("readout: {e}")))?;
         Ok(readout)
     }
@@ -343,8 +343,8 @@ mod tests {
                 &good.replace("\"version\": 1,", "\"version\": 2,"),
                 "readout: version 2, this taxel reads version 1 only",
             ),
-            (&good.replace("\"run_threshold\"", "\"threshold\""), "readout: unknown field `threshold`"),
-            (&good.replace("\"neurons\"", "\"neuron\""), "readout: unknown field `neuron`"),
+            (&good.replace("\"run_threshold\"", "\"threshold\""), "readout: threshold is not known: there is"),
+            (&good.replace("\"neurons\"", "\"neuron\""), "readout: neuron is not known: there is"),
             (&good.replace("contact_area", "contact_are"), "readout: encoder contact_are: must be one of"),
             (&good.replace("\"noise_floor\": 3.0", "\"noise_floor\": -3.0"), "readout: noise_floor is -3"),
             (&good.replace("\"run_threshold\": 0.9", "\"run_threshold\": 0"), "readout: run_threshold is 0"),

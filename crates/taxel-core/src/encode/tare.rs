@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Array, Events, Result, problem};
+use crate::{Array, Events, Result, problem, reading};
 
 /// The rest of each taxel: the mean by time of its held values over a stretch at rest.
 ///
@@ -53,7 +53,7 @@ impl Tare {
     ///
     /// `Format` where it is no tare, `Problem` where its parts do not fit.
     pub fn from_json(json: &str) -> Result<Self> {
-        let tare: Self = serde_json::from_str(json).map_err(|e| crate::Error::Format(format!("tare: {e}")))?;
+        let tare: Self = reading::from_text(json).map_err(|unfit| crate::Error::Format(unfit.of("tare")))?;
         tare.check()?;
         Ok(tare)
     }

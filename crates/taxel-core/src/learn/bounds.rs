@@ -7,7 +7,7 @@ use crate::{Result, problem};
 
 /// A least or a largest weight, mV.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "a bound must be a number, or one a synapse, mV")]
+#[serde(untagged, expecting = "must be a number, or one a synapse, mV")]
 pub enum Bound {
     /// The same for all synapses.
     All(f64),

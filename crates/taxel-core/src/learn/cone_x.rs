@@ -76,7 +76,7 @@ pub struct ConeX {
 
 /// Where silence ends, ms.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(untagged, expecting = "a horizon must be a number, or one a pattern, ms")]
+#[serde(untagged, expecting = "must be a number, or one a pattern, ms")]
 pub enum Horizon {
     /// The same in all patterns.
     All(f64),

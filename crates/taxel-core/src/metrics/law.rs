@@ -59,13 +59,13 @@ pub(super) fn summed(
 /// Reads a cost that may be infinite, which JSON has no number for: a number, or its name as text.
 pub(super) fn number_or_name<'de, D: serde::Deserializer<'de>>(deserializer: D) -> std::result::Result<f64, D::Error> {
     #[derive(Deserialize)]
-    #[serde(untagged)]
+    #[serde(untagged, expecting = "must be a number")]
     enum Either {
         Number(f64),
         Name(String),
     }
     match Either::deserialize(deserializer)? {
         Either::Number(value) => Ok(value),
-        Either::Name(name) => name.parse().map_err(serde::de::Error::custom),
+        Either::Name(name) => name.parse().map_err(|_| serde::de::Error::custom("must be a number")),
     }
 }

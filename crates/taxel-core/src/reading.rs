@@ -1,0 +1,229 @@
+//! JSON read into what taxel holds; what does not fit is said as the rest of taxel says it, not in a parser's words.
+
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+use serde_json::error::Category;
+
+/// What of a JSON text does not fit: where, what is there, what would be right.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unfit {
+    /// From the outermost name to the innermost, as `neuron.lambdas[2]`; empty where it is the whole.
+    place: String,
+    /// Goes on from the place.
+    said: String,
+}
+
+impl Unfit {
+    /// The whole error, of what was read.
+    #[must_use]
+    pub fn of(&self, what: &str) -> String {
+        let colon = if self.said.starts_with(" is ") && self.place.is_empty() { "" } else { ": " };
+        format!("{what}{colon}{}{}", self.place, self.said)
+    }
+
+    /// The same for whoever wrote the parameter and knows its name alone, not the groups that it lies in.
+    #[must_use]
+    pub fn by_name(mut self) -> Self {
+        self.place = self.place.rsplit('.').next().unwrap_or_default().to_owned();
+        self
+    }
+}
+
+/// Reads a text.
+///
+/// # Errors
+///
+/// [`Unfit`] where it is no JSON, or not what is wanted.
+pub fn from_text<T: DeserializeOwned>(text: &str) -> Result<T, Unfit> {
+    let value = serde_json::from_str(text).map_err(|error| {
+        let said = match error.classify() {
+            Category::Eof => "not JSON: it ends too early".to_owned(),
+            // Serde names the sign that it waited for, which is seldom the one that is wrong.
+            _ => format!("not JSON: see line {}, column {}", error.line(), error.column()),
+        };
+        Unfit { place: String::new(), said }
+    })?;
+    from_value(value)
+}
+
+/// Reads a value.
+///
+/// # Errors
+///
+/// [`Unfit`] where it is not what is wanted.
+pub fn from_value<T: DeserializeOwned>(value: Value) -> Result<T, Unfit> {
+    serde_path_to_error::deserialize(&value).map_err(|error| {
+        let place = error.path().to_string();
+        let mut there = Some(&value);
+        for segment in error.path() {
+            there = match segment {
+                serde_path_to_error::Segment::Seq { index } => there.and_then(|value| value.get(*index)),
+                serde_path_to_error::Segment::Map { key } => there.and_then(|value| value.get(key)),
+                serde_path_to_error::Segment::Enum { variant } => there.and_then(|value| value.get(variant)).or(there),
+                serde_path_to_error::Segment::Unknown => None,
+            };
+        }
+        in_words(if place == "." { String::new() } else { place }, there, &error.inner().to_string())
+    })
+}
+
+/// Says in words what serde says; its texts are the only thing that an error of serde_json gives.
+fn in_words(place: String, there: Option<&Value>, said: &str) -> Unfit {
+    let quoted = |start: &str| said.strip_prefix(start).and_then(|rest| rest.split('`').nth(1));
+    let wanted = said.split_once(", expected ").map_or("", |(_, wanted)| wanted);
+    let is = |right: &str| there.map_or(format!(": {right}"), |value| format!(" is {}: {right}", shown(value)));
+    if let Some(name) = quoted("unknown field ") {
+        return Unfit { place: beside(&place, name), said: format!(" is not known: there is {}", choice(wanted)) };
+    }
+    if let Some(name) = quoted("missing field ") {
+        let dot = if place.is_empty() { "" } else { "." };
+        return Unfit { place: format!("{place}{dot}{name}"), said: " is missing".to_owned() };
+    }
+    let said = if said.starts_with("unknown variant ") {
+        is(&format!("must be {}", choice(wanted)))
+    } else if said.starts_with("invalid ") {
+        is(&format!("must be {}", kind(wanted, there)))
+    } else if said.starts_with("must be ") {
+        is(said)
+    } else {
+        format!(": {said}")
+    };
+    Unfit { place, said }
+}
+
+/// The place of a name that its group does not know; some groups end the place with it, some before it.
+fn beside(place: &str, name: &str) -> String {
+    match place.strip_suffix(name).unwrap_or(place).trim_end_matches('.') {
+        "" => name.to_owned(),
+        group => format!("{group}.{name}"),
+    }
+}
+
+/// A value as an error shows it: as JSON has it, not long, None for nothing.
+fn shown(value: &Value) -> String {
+    let said = match value {
+        Value::Null => "None".to_owned(),
+        other => other.to_string(),
+    };
+    if said.chars().count() <= 60 { said } else { said.chars().take(57).chain("...".chars()).collect() }
+}
+
+/// One of several names: `"a"`, `"b"` or `"c"`.
+fn choice(wanted: &str) -> String {
+    let names: Vec<String> = wanted.split('`').skip(1).step_by(2).map(|name| format!("\"{name}\"")).collect();
+    match names.split_last() {
+        None => "nothing".to_owned(),
+        Some((only, [])) => only.clone(),
+        Some((last, others)) => format!("{} or {last}", others.join(", ")),
+    }
+}
+
+/// What is wanted, without the names of Rust's types.
+fn kind(wanted: &str, there: Option<&Value>) -> String {
+    let most = match wanted {
+        "u8" => Some(u64::from(u8::MAX)),
+        "u16" => Some(u64::from(u16::MAX)),
+        "u32" => Some(u64::from(u32::MAX)),
+        "u64" | "usize" => Some(u64::MAX),
+        _ => None,
+    };
+    let too_many = there.and_then(Value::as_u64);
+    match (wanted, most, too_many) {
+        (_, Some(most), Some(_)) => format!("a whole number, at most {most}"),
+        (_, Some(_), None) => "a whole number, 0 or more".to_owned(),
+        ("f64" | "f32", ..) => "a number".to_owned(),
+        ("i8" | "i16" | "i32" | "i64" | "isize", ..) => "a whole number".to_owned(),
+        ("a boolean", ..) => "true or false".to_owned(),
+        ("a string" | "a borrowed string" | "string or map", ..) => "a name".to_owned(),
+        ("a sequence", ..) => "a list".to_owned(),
+        ("a map", ..) => "values by name".to_owned(),
+        _ if wanted.starts_with("struct ") => "values by name".to_owned(),
+        _ if wanted.contains("array of length") || wanted.contains("tuple") => {
+            format!("a list of {}", wanted.chars().filter(char::is_ascii_digit).collect::<String>())
+        }
+        _ => wanted.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde::Deserialize;
+
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    #[allow(dead_code)]
+    struct Whole {
+        tau: f64,
+        small: Option<u8>,
+        many: Option<usize>,
+        word: Option<Word>,
+        three: Option<[f64; 3]>,
+        pair: Option<(f64, String)>,
+        list: Option<Vec<f64>>,
+        yes: Option<bool>,
+        text: Option<String>,
+        inner: Option<Box<Whole>>,
+        each: Option<std::collections::BTreeMap<String, Whole>>,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    #[allow(dead_code)]
+    enum Word {
+        Keep,
+        Reset,
+        Later(Box<Whole>),
+    }
+
+    fn said(text: &str) -> String {
+        from_text::<Whole>(text).unwrap_err().of("whole")
+    }
+
+    #[test]
+    fn what_does_not_fit_is_said_by_place_value_and_remedy() {
+        for (parameter, words) in [
+            (r#""tau": "3""#, "tau is \"3\": must be a number"),
+            (r#""tau": null"#, "tau is None: must be a number"),
+            (r#""tau": {"ms": 3}"#, "tau is {\"ms\":3}: must be a number"),
+            (r#""tau": 1, "small": 300"#, "small is 300: must be a whole number, at most 255"),
+            (r#""tau": 1, "many": -1"#, "many is -1: must be a whole number, 0 or more"),
+            (r#""tau": 1, "many": 0.5"#, "many is 0.5: must be a whole number, 0 or more"),
+            (r#""tau": 1, "word": "x""#, "word is \"x\": must be \"keep\", \"reset\" or \"later\""),
+            (r#""tau": 1, "word": 2"#, "word is 2: must be a name"),
+            (r#""tau": 1, "word": {"later": {"tau": "x"}}"#, "word.later.tau is \"x\": must be a number"),
+            (r#""tau": 1, "three": [1, 2]"#, "three is [1,2]: must be a list of 3"),
+            (r#""tau": 1, "three": [1, 2, "3"]"#, "three[2] is \"3\": must be a number"),
+            (r#""tau": 1, "three": 3"#, "three is 3: must be a list of 3"),
+            (r#""tau": 1, "small": -1"#, "small is -1: must be a whole number, 0 or more"),
+            (r#""tau": 1, "pair": [1]"#, "pair is [1]: must be a list of 2"),
+            (r#""tau": 1, "list": 5"#, "list is 5: must be a list"),
+            (r#""tau": 1, "yes": 1"#, "yes is 1: must be true or false"),
+            (r#""tau": 1, "text": 1"#, "text is 1: must be a name"),
+            (r#""tau": 1, "inner": []"#, "inner is []: must be values by name"),
+            (r#""tau": 1, "inner": 7"#, "inner is 7: must be values by name"),
+            (r#""tau": 1, "each": {"a b": {}}"#, "each.a b.tau is missing"),
+            (r#""small": 1"#, "tau is missing"),
+            (r#""tau": 1, "inner": {"tau": 1, "wings": 2}"#, "inner.wings is not known: there is \"tau\""),
+            (r#""tau": 1, "wings": 2"#, "wings is not known: there is \"tau\""),
+        ] {
+            let text = format!("{{{parameter}}}");
+            assert!(said(&text).starts_with(&format!("whole: {words}")), "{}", said(&text));
+        }
+        assert_eq!(said("7"), "whole is 7: must be values by name");
+    }
+
+    #[test]
+    fn a_text_that_is_no_json_is_said_by_its_place() {
+        assert_eq!(said("{\n\"tau\": x"), "whole: not JSON: see line 2, column 8");
+        assert_eq!(said("{\"tau\": 1"), "whole: not JSON: it ends too early");
+        assert_eq!(said(&"[".repeat(200)), "whole: not JSON: see line 1, column 128");
+    }
+
+    #[test]
+    fn a_long_value_is_cut_and_a_name_can_stand_alone() {
+        let text = format!("{{\"tau\": 1, \"inner\": {{\"tau\": \"{}\"}}}}", "é".repeat(100));
+        let unfit = from_text::<Whole>(&text).unwrap_err().by_name();
+        assert_eq!(unfit.of("whole"), format!("whole: tau is \"{}...: must be a number", "é".repeat(56)));
+    }
+}
