@@ -1,4 +1,4 @@
-"""CONTRIBUTING is true: by its own pieces a copy gets a format and a study; without one of them a test says which."""
+"""CONTRIBUTING is true: by its own pieces a copy gets a format, study and learner; without one a test says which."""
 
 from __future__ import annotations
 
@@ -7,17 +7,19 @@ import re
 import shutil
 import subprocess
 import sys
+import zipfile
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-FORMAT, STUDY = "channel", "quiet"
-#: Where the laws and registries of formats and studies are tried.
+FORMAT, STUDY, LEARNER = "channel", "quiet", "echo"
+#: Where the laws and registries of formats, studies and learners are tried.
 TESTS = {
     FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py"],
     STUDY: ["tests/studies/test_registry.py", "tests/studies/test_quiet.py", "tests/studies/test_studies.py"],
+    LEARNER: ["tests/learn/test_manners.py", "tests/learn/test_echo.py"],
 }
 
 
@@ -32,13 +34,13 @@ class Piece(NamedTuple):
 def pieces() -> list[Piece]:
     said = (ROOT / "CONTRIBUTING.md").read_text()
     found = re.findall(
-        r"^```python\n# (\S+?)(?:, (at the end|after [^\n]+))?\n(.*?)^```", said, re.MULTILINE | re.DOTALL
+        r"^```(?:python\n#|rust\n//) (\S+?)(?:, (at the end|after [^\n]+))?\n(.*?)^```", said, re.MULTILINE | re.DOTALL
     )
     return [Piece(*piece) for piece in found]
 
 
 def of(name: str) -> list[Piece]:
-    """Return the pieces of a format or study: its files, and lines that name it."""
+    """Return the pieces of a format, study or learner: its files, and lines that name it."""
     return [p for p in pieces() if name in p.path or name in p.text]
 
 
@@ -50,7 +52,7 @@ def add(root: Path, piece: Piece) -> None:
         file.write_text(piece.text)
         return
     lines = file.read_text().splitlines(keepends=True)
-    anchor = piece.after.removeprefix("after ")
+    anchor = piece.after.removeprefix("after ").strip('"')
     at = len(lines) if piece.after == "at the end" else 1 + next(k for k, line in enumerate(lines) if anchor in line)
     gap = "\n\n" if piece.after == "at the end" else ""
     file.write_text("".join([*lines[:at], gap, piece.text, *lines[at:]]))
@@ -63,17 +65,18 @@ def copy(tmp_path: Path) -> Path:
     shutil.copytree(ROOT / "python", tmp_path / "python", ignore=unneeded)
     for compiled in (ROOT / "python" / "taxel").glob("_core*.so"):
         (tmp_path / "python" / "taxel" / compiled.name).symlink_to(compiled)
-    for room in ("formats", "studies"):
+    for room in ("formats", "learn", "studies"):
         shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     return tmp_path
 
 
 def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
-    """Run the tests that a new format or study has to pass, as far as they are about it or about the registry."""
+    """Run the tests that it has to pass, as far as they are about it or about the registry."""
     tests = [test for test in TESTS[name] if (root / test).exists()]
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *tests]
-    chosen = ["-k", f"{name} or registry or without_weight"] if name == STUDY else []
+    about = {STUDY: f"{name} or registry or without_weight", LEARNER: "echo or Echo or nothing_is_left_out"}
+    chosen = ["-k", about[name]] if name in about else []
     environment = os.environ | {"PYTHONPATH": str(root / "python")}
     return subprocess.run([*command, *chosen], cwd=root, env=environment, capture_output=True, text=True, check=False)
 
@@ -90,7 +93,14 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("python/taxel/studies/__init__.py", True),
         ("tests/studies/test_quiet.py", False),
     ]
-    assert sorted(pieces()) == sorted([*of(FORMAT), *of(STUDY)])
+    assert [(p.path, bool(p.after)) for p in of(LEARNER)] == [
+        ("crates/taxel-core/src/learn/rivals/echo.rs", False),
+        ("crates/taxel-core/src/learn/rivals.rs", True),
+        ("python/taxel/learn/echo.py", False),
+        ("python/taxel/learn/__init__.py", True),
+        ("tests/learn/test_echo.py", False),
+    ]
+    assert sorted(pieces()) == sorted([*of(FORMAT), *of(STUDY), *of(LEARNER)])
 
 
 @pytest.mark.parametrize("name", [FORMAT, STUDY])
@@ -122,3 +132,64 @@ def test_a_part_that_is_left_out_is_named(copy: Path, name: str, without: str, s
     done = tried(copy, name)
     assert done.returncode != 0
     assert said in done.stdout + done.stderr, done.stdout[-3000:] + done.stderr[-1000:]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A whole copy with the learner's pieces, and its compiled part built from them."""
+    root = tmp_path_factory.mktemp("built")
+    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
+    for name in tracked:
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, root / name)
+    for piece in of(LEARNER):
+        add(root, piece)
+    # What the checkout built of others' crates is built already.
+    made = ["build", "--release", "--quiet", "--target-dir", str(ROOT / "target"), "--out", str(root / "wheel")]
+    subprocess.run([Path(sys.executable).with_name("maturin"), *made], cwd=root, check=True, capture_output=True)
+    (wheel,) = (root / "wheel").glob("*.whl")
+    with zipfile.ZipFile(wheel) as inside:
+        (compiled,) = (name for name in inside.namelist() if name.startswith("taxel/_core") and name.endswith(".so"))
+        inside.extract(compiled, root / "python")
+    return root
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_what_contributing_says_of_a_learner_is_enough(built: Path) -> None:
+    done = tried(built, LEARNER)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+    assert re.search(r"\b[5-9] passed", done.stdout), done.stdout[-1000:]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize(
+    ("without", "said"),
+    [
+        ("python/taxel/learn/__init__.py", "a line in learn/__init__.py"),
+        ("tests/learn/test_echo.py", "tests/learn/test_echo.py"),
+        ("python/taxel/learn/echo.py", "No module named 'taxel.learn.echo'"),
+    ],
+)
+def test_a_part_of_a_learner_that_is_left_out_is_named(built: Path, without: str, said: str) -> None:
+    whole = (built / without).read_text()
+    try:
+        if without.endswith("__init__.py"):
+            shutil.copy(ROOT / without, built / without)
+        else:
+            (built / without).unlink()
+        done = tried(built, LEARNER)
+    finally:
+        (built / without).write_text(whole)
+    assert done.returncode != 0
+    assert said in done.stdout + done.stderr, done.stdout[-3000:] + done.stderr[-1000:]
+
+
+def test_a_learner_without_its_line_in_rust_is_named(copy: Path) -> None:
+    for piece in of(LEARNER):
+        if "crates" not in piece.path:
+            add(copy, piece)
+    done = tried(copy, LEARNER)
+    assert done.returncode != 0
+    assert "echo: nothing of that name has parameters" in done.stdout + done.stderr

@@ -4,7 +4,7 @@ use pyo3::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use taxel_core::encode::{Encoder, RunningRange};
-use taxel_core::learn::rivals::{Rival, Skim, Tempotron};
+use taxel_core::learn::rivals::{Batch, Rival, Tempotron};
 use taxel_core::learn::{ConeR, ConeX, OnlineConeR};
 use taxel_core::metrics::{Metric, matching};
 use taxel_core::neuron::Neuron;
@@ -30,9 +30,11 @@ fn described(of: &str) -> Option<Described> {
         "cone_r" => Some(ConeR::described()),
         "online_cone_r" => Some(OnlineConeR::described()),
         "tempotron" => Some(Tempotron::described()),
-        "skim" => Some(Skim::described()),
         "matching" => Some(matching::described()),
-        _ => Encoder::described(of).or_else(|| Rival::described(of)).or_else(|| Metric::described(of)),
+        _ => Encoder::described(of)
+            .or_else(|| Rival::described(of))
+            .or_else(|| Batch::described(of))
+            .or_else(|| Metric::described(of)),
     }
 }
 
@@ -50,8 +52,8 @@ fn check_parameters(of: &str, parameters: &str) -> PyResult<String> {
             written("OnlineConeR", &cone)
         }
         "tempotron" => checked("Tempotron", parameters, Tempotron::check),
-        "skim" => checked("SKIM", parameters, Skim::check),
         _ if Rival::described(of).is_some() => written(of, &to_rival(parameters)?),
+        _ if Batch::described(of).is_some() => written(of, &Batch::from_json(of, parameters).map_err(core)?),
         _ if Encoder::described(of).is_some() => Ok(Encoder::from_json(parameters).map_err(core)?.to_json()),
         _ => Err(unknown(of)),
     }

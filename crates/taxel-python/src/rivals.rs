@@ -1,9 +1,9 @@
-//! The rules that learn by epochs.
+//! The rules that others published.
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
-use taxel_core::learn::rivals::{Ended, Rival, Skim, Tempotron, Trained};
+use taxel_core::learn::rivals::{Batch, Ended, Learnt, Rival, Skim, Tempotron, Trained};
 use taxel_core::{Result as CoreResult, SpikeTrains, Stop, problem};
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
@@ -39,6 +39,10 @@ fn to_patterns(patterns: Vec<SpikesIn<'_>>) -> PyResult<Vec<SpikeTrains>> {
     patterns.into_iter().map(to_spikes).collect()
 }
 
+fn to_targets(targets: &[PyReadonlyArray1<'_, f64>]) -> PyResult<Vec<Vec<f64>>> {
+    targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect()
+}
+
 /// A rule with its neuron and its training, from its name and all parameters in one list.
 pub(crate) fn to_rival(json: &str) -> PyResult<Rival> {
     let mut given: Map<String, Value> = parsed("rule", json)?;
@@ -70,8 +74,7 @@ fn fit_rival<'py>(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<TrainedOut<'py>> {
     let rival = to_rival(parameters)?;
-    let patterns = to_patterns(patterns)?;
-    let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
+    let (patterns, targets) = (to_patterns(patterns)?, to_targets(&targets)?);
     let start = start.as_ref().map(|s| slice("start", s)).transpose()?;
     train(py, rival.training.max_seconds, progress, |report, stop| rival.fit(&patterns, &targets, start, report, stop))
 }
@@ -155,22 +158,42 @@ fn change_tempotron<'py>(
     Ok(array(py, change))
 }
 
-/// A least-squares problem as Python gets it: R row after row, z, the sum of squares out of reach, rows.
-type NormalOut<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>, f64, usize);
-
-/// Brings the least-squares problem of examples to triangular form.
+/// The names of all learners that take all examples at once.
 #[pyfunction]
-fn reduce_skim<'py>(
+fn batch_names() -> &'static [&'static str] {
+    Batch::NAMES
+}
+
+/// Learns from all examples at once; gives weights, and what else is said of them as JSON.
+#[pyfunction]
+fn fit_batch<'py>(
     py: Python<'py>,
+    name: &str,
     parameters: &str,
     patterns: Vec<SpikesIn<'py>>,
     targets: Vec<PyReadonlyArray1<'py, f64>>,
-) -> PyResult<NormalOut<'py>> {
-    let skim: Skim = parsed("SKIM", parameters)?;
-    let patterns = to_patterns(patterns)?;
-    let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
-    let normal = enter(py, |stop| skim.reduce(&patterns, &targets, stop))?;
-    Ok((array(py, normal.r()), array(py, normal.z()), normal.rest(), normal.rows))
+) -> PyResult<(Bound<'py, PyArray1<f64>>, String)> {
+    let batch = Batch::from_json(name, parameters).map_err(core)?;
+    let (patterns, targets) = (to_patterns(patterns)?, to_targets(&targets)?);
+    let learnt = enter(py, |stop| batch.fit(&patterns, &targets, stop))?;
+    Ok((array(py, learnt.weights), Value::Object(learnt.said).to_string()))
+}
+
+/// Output spikes of such a learner.
+#[pyfunction]
+fn run_batch<'py>(
+    py: Python<'py>,
+    name: &str,
+    parameters: &str,
+    weights: PyReadonlyArray1<'py, f64>,
+    said: &str,
+    pattern: SpikesIn<'py>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let batch = Batch::from_json(name, parameters).map_err(core)?;
+    let learnt = Learnt { weights: slice("weights", &weights)?.to_vec(), said: parsed(name, said)? };
+    let pattern = to_spikes(pattern)?;
+    let fired = enter(py, |stop| batch.run(&learnt, &pattern, stop))?;
+    Ok(array(py, fired))
 }
 
 /// The rows of one pattern, one after the other.
@@ -205,7 +228,9 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fit_tempotron, module)?)?;
     module.add_function(wrap_pyfunction!(peak_tempotron, module)?)?;
     module.add_function(wrap_pyfunction!(change_tempotron, module)?)?;
-    module.add_function(wrap_pyfunction!(reduce_skim, module)?)?;
+    module.add_function(wrap_pyfunction!(batch_names, module)?)?;
+    module.add_function(wrap_pyfunction!(fit_batch, module)?)?;
+    module.add_function(wrap_pyfunction!(run_batch, module)?)?;
     module.add_function(wrap_pyfunction!(rows_skim, module)?)?;
     module.add_function(wrap_pyfunction!(output_skim, module)?)
 }

@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import floats, instance, number, several
+from taxel._arguments import instance, number
 from taxel._parameters import defaults
-from taxel.learn._examples import examples
-from taxel.learn._learner import SpikeLearner
-from taxel.metrics import matching
+from taxel.learn._batch import BatchLearner
 from taxel.spikes import SpikeTrains
 
 __all__ = ["SKIM"]
@@ -24,7 +22,7 @@ _DEFAULT = defaults("skim")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class SKIM(SpikeLearner):
+class SKIM(BatchLearner):
     """Learn by SKIM: least squares from filtered inputs to a pulse at each target, then a threshold on the output.
 
     Parameters
@@ -81,8 +79,8 @@ class SKIM(SpikeLearner):
     were read in its Figure 3 and Table 1; its layer sizes, random weights and delays could not be read. An output
     spike is the first row at or above the threshold after one below it (a reading of ours: the thesis only says that
     SKIM's output needs such a step). Rows are brought to triangular form block by block, by reflections, so memory
-    does not grow with the recordings' length and no digits are lost to normal equations; the rest is
-    `numpy.linalg.lstsq`. Cost: O(rows * weights**2).
+    does not grow with the recordings' length and no digits are lost to normal equations; the rest is solved by
+    singular values. Cost: O(rows * weights**2).
 
     Examples
     --------
@@ -111,7 +109,6 @@ class SKIM(SpikeLearner):
     within_ms: float = _DEFAULT.within_ms
     seed: int = _DEFAULT.seed
 
-    weights_: NDArray[np.float64] = field(init=False)
     residual_: float = field(init=False)
     rows_: int = field(init=False)
     threshold_: float = field(init=False)
@@ -137,18 +134,8 @@ class SKIM(SpikeLearner):
         ProblemError : patterns or targets that make no sense (names pattern and target)
         KeyboardInterrupt : Ctrl-C, within a fraction of a second
         """
-        trains, times = examples(patterns, targets)
-        r, z, rest, self.rows_ = _core.reduce_skim(self._json(), trains, times)
-        r = r.reshape(len(z), len(z))
-        self.weights_ = np.asarray(np.linalg.lstsq(r, z, rcond=None)[0], dtype=np.float64)
-        self.residual_ = float(rest + np.sum((r @ self.weights_ - z) ** 2))
-        outputs = [_core.output_skim(self._json(), self.weights_, parts) for parts in trains]
-        self.scores_ = []
-        for level in map(float, self.thresholds):
-            fired = [self._crossings(output, s.start, level) for output, s in zip(outputs, patterns, strict=True)]
-            counts = matching(fired, times, window_ms=self.within_ms)
-            self.scores_.append((level, counts.found, counts.missed, counts.false))
-        self.threshold_ = min(self.scores_, key=lambda score: (score[2] + score[3], score[0]))[0]
+        super().fit(patterns, targets)
+        self.scores_ = [tuple(score) for score in self._said["scores"]]
         return self
 
     def rows(self, pattern: SpikeTrains) -> NDArray[np.float64]:
@@ -186,14 +173,4 @@ class SKIM(SpikeLearner):
         ProblemError : patterns that make no sense
         NotFittedError : before `fit`
         """
-        self._fitted()
-        level = self.threshold_ if threshold is None else number("threshold", threshold)
-        return [
-            self._crossings(self.output(s), s.start, level)
-            for s in (instance(f"pattern {p}", s, SpikeTrains) for p, s in enumerate(several("patterns", patterns)))
-        ]
-
-    def _crossings(self, output: NDArray[np.float64], start: float, level: float) -> NDArray[np.float64]:
-        above = output >= level
-        rows = np.flatnonzero(above & ~np.concatenate([[False], above[:-1]]))
-        return floats("crossings", start + rows * float(self.step_ms))
+        return self._fired(patterns, {} if threshold is None else {"threshold": number("threshold", threshold)})

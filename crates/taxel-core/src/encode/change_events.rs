@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
 use super::law::Law;
+use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
 use super::stream::Stream;
-use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 pub use crate::board::Previous;
 use crate::parameters::Described;
+use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
 /// Change events: U = value - previous value in units of the noise floor, saturating at +-(2^bits - 1).

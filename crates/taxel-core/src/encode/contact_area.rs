@@ -2,14 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::law::Law;
 use super::loaded::Loaded;
 use super::sampled::{BLOCK, Block, Channels, Source, blocks};
-use super::law::Law;
 use super::stream::Stream;
 use super::tare::Tare;
-use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
+use crate::spikes::ms;
 use crate::{Array, Events, Result, Spike, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.

@@ -10,13 +10,13 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::law::Law;
 use super::power::power;
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
-use super::law::Law;
 use super::stream::Stream;
-use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
+use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
 /// The FA-1 afferent exactly as equations 5.1 to 5.5, polarity kept.

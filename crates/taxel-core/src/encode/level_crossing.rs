@@ -5,14 +5,14 @@ use std::collections::VecDeque;
 use serde::{Deserialize, Serialize};
 
 use super::bracket::{Bracket, check_levels};
-use super::running_range::{RunningRange, Window};
-use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
 use super::law::Law;
 use super::periods::micros;
+use super::running_range::{RunningRange, Window};
+use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
 use super::stream::{Stream, sort_from};
-use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
+use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
 /// Crossings of levels: +1 where a taxel comes to a level, -1 where it falls below its release.

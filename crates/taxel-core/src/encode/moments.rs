@@ -5,15 +5,15 @@ use std::collections::VecDeque;
 
 use serde::{Deserialize, Serialize};
 
-use super::loaded::Loaded;
-use super::sampled::{BLOCK, Block, Rule, Sampled};
 use super::law::Law;
+use super::loaded::Loaded;
 use super::periods::micros;
+use super::sampled::{BLOCK, Block, Rule, Sampled};
 use super::stream::{Stream, sort_from};
 use super::tare::Tare;
-use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
+use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
 /// Moments of the held picture above rest, each through levels in equal ratios.

@@ -3,12 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::bracket::{Bracket, check_levels};
-use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
 use super::law::Law;
+use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
 use super::stream::{Stream, sort_from};
-use crate::spikes::ms;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
+use crate::spikes::ms;
 use crate::{Array, Result, Spike};
 
 /// A threshold and a pair of Izhikevich neurons: +1 about 16 or 20 ms after a taxel came to a level, -1 after it left.

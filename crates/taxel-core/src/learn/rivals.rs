@@ -1,23 +1,106 @@
 //! The rules that others published, for comparison: each with its own neuron, as its paper has it.
 
+mod batch;
 mod epochs;
 mod rival;
-mod skim;
 mod source;
 mod stepped;
 mod tempotron;
 
+pub use batch::Learnt;
 pub use epochs::{Ended, Trained, Training, Updates};
 pub use rival::Rival;
-pub use skim::{Nonlinearity, Normal, Skim};
 pub use stepped::{Current, Reset, SteppedNeuron};
 pub use tempotron::{Peak, Tempotron};
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Result, SpikeTrains, Stop};
+use crate::neuron::Neuron;
+use crate::parameters::Described;
+use crate::{Error, Result, SpikeTrains, Stop, problem, reading};
+use batch::BatchRule;
 use epochs::{Examples, change_of};
 use source::Source;
+
+/// The registry of learners of spike times that take all examples at once: a line each, its file
+/// `learn/rivals/NAME.rs`, which is also its name, and its kind.
+macro_rules! batches {
+    ($($module:ident: $Kind:ident;)*) => {
+        $(mod $module;)*
+        $(pub use $module::$Kind;)*
+
+        /// Any learner of spike times that takes all examples at once, with its parameters.
+        #[derive(Debug, Clone, PartialEq, Serialize)]
+        #[serde(untagged)]
+        pub enum Batch {
+            $(#[doc = concat!("[`", stringify!($Kind), "`].")] $Kind($Kind),)*
+        }
+
+        impl Batch {
+            /// The names of all of them.
+            pub const NAMES: &[&str] = &[$(stringify!($module)),*];
+
+            fn rule(&self) -> &dyn BatchRule {
+                match self { $(Self::$Kind(rule) => rule,)* }
+            }
+
+            /// The parameters of one, by its name, with their defaults and ranges.
+            #[must_use]
+            pub fn described(name: &str) -> Option<Described> {
+                $(if name == stringify!($module) {
+                    return Some(<$Kind as BatchRule>::described());
+                })*
+                None
+            }
+
+            /// Reads one, by its name, from the JSON of its parameters, and checks them.
+            ///
+            /// # Errors
+            ///
+            /// `Problem`, naming the parameter.
+            pub fn from_json(name: &str, json: &str) -> Result<Self> {
+                let read = |unfit: reading::Unfit| Error::Problem(unfit.of(name));
+                $(if name == stringify!($module) {
+                    let rule = reading::from_text::<$Kind>(json).map_err(read)?;
+                    BatchRule::check(&rule)?;
+                    return Ok(Self::$Kind(rule));
+                })*
+                Err(problem!("learner {name}: must be one of {}", Self::NAMES.join(", ")))
+            }
+        }
+    };
+}
+
+// Rustfmt finds no modules in a macro: the Makefile names their files to it.
+batches! {
+    skim: Skim;
+}
+
+pub use skim::{Nonlinearity, Normal};
+
+impl Batch {
+    /// Learns from patterns of the same trains with one list of targets (ms, ascending) a pattern.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for parameters, patterns or targets that make no sense; `Interrupted` where the caller stops it.
+    pub fn fit(&self, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Learnt> {
+        self.rule().check()?;
+        crate::learn::check_examples(&Neuron { refractory: 0.0, ..Neuron::default() }, patterns, targets)?;
+        crate::learn::check_some_target(targets)?;
+        self.rule().fit(patterns, targets, stop)
+    }
+
+    /// Output spikes in a pattern, ms, after what was learnt.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for a pattern, or for what was learnt, that makes no sense; `Interrupted` where the caller stops it.
+    pub fn run(&self, learnt: &Learnt, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
+        self.rule().check()?;
+        self.rule().run(learnt, pattern, stop)
+    }
+}
 
 /// The registry of rules by epochs: a line each, its file `learn/rivals/NAME.rs`, which is also its name in JSON, and the
 /// laws in it.

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::edges::{Window, begun, distinct, interval};
-use super::van_rossum_absolute::Exposure;
 use super::law::{Law, One, Ready, summed};
 use super::patterns::Patterns;
+use super::van_rossum_absolute::Exposure;
 use crate::parameters::Described;
 use crate::{Result, Stop};
 

@@ -4,9 +4,9 @@ mod matrix;
 
 use serde::{Deserialize, Serialize};
 
+use super::law::{Law, One, Ready, summed};
 use super::merged::merged;
 use super::pairwise::{Matrix, Work};
-use super::law::{Law, One, Ready, summed};
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::merged::merged;
 use super::law::{Law, One, Ready, summed};
+use super::merged::merged;
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;

@@ -4,10 +4,10 @@ mod matrix;
 
 use serde::{Deserialize, Serialize};
 
-use super::pairwise::{Matrix, Work};
-use super::van_rossum::Normalisation;
 use super::law::{Law, One, Ready};
+use super::pairwise::{Matrix, Work};
 use super::patterns::Patterns;
+use super::van_rossum::Normalisation;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result, Stop, problem};

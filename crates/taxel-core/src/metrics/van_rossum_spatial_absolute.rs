@@ -2,10 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::van_rossum_absolute::Exposure;
-use super::van_rossum_spatial::{Gauge, Kernel, Smoothing};
 use super::law::{Law, One, Ready};
 use super::patterns::Patterns;
+use super::van_rossum_absolute::Exposure;
+use super::van_rossum_spatial::{Gauge, Kernel, Smoothing};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop};

@@ -4,8 +4,8 @@ mod lanes;
 
 use serde::{Deserialize, Serialize};
 
-use super::pairwise::{Matrix, Work};
 use super::law::{Law, One, Ready, number_or_name, summed};
+use super::pairwise::{Matrix, Work};
 use super::patterns::Patterns;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;

@@ -1,12 +1,16 @@
 //! SKIM, the synaptic kernel inverse method (Tapson et al. 2013, Frontiers in Neuroscience 7:153): least squares from
 //! filtered inputs to a pulse at each target.
 
+use faer::{Mat, MatRef};
 use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 
+use super::batch::{BatchRule, Learnt};
 use crate::allowed::{Range, one_weight_a_train, ranges};
-use crate::neuron::{Kernel, Neuron, Shape, State};
+use crate::metrics::matching::matched;
+use crate::neuron::{Kernel, Shape, State};
 use crate::parameters::Described;
 use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
@@ -119,6 +123,26 @@ impl Normal {
         self.entries.last().map_or(0.0, |last| last * last)
     }
 
+    /// The shortest weights of the least sum of squares, and that sum.
+    ///
+    /// By singular values, as `numpy.linalg.lstsq` with `rcond=None`: those below rounding times the largest count as 0.
+    fn solve(&self) -> Result<(Vec<f64>, f64)> {
+        let (m, r, z) = (self.columns, self.r(), self.z());
+        let r = MatRef::from_row_major_slice(&r, m, m);
+        let z = Mat::from_fn(m, 1, |j, _| z[j]);
+        let svd = r.thin_svd().map_err(|_| problem!("the rows of these patterns have no singular values"))?;
+        let values = svd.S().column_vector();
+        let least = f64::EPSILON * m as f64 * values.iter().copied().fold(0.0, f64::max);
+        let mut along = svd.U().transpose() * &z;
+        for (k, &value) in values.iter().enumerate() {
+            along[(k, 0)] = if value > least { along[(k, 0)] / value } else { 0.0 };
+        }
+        let weights = svd.V() * &along;
+        let off = r * &weights - &z;
+        let rest = self.rest() + (0..m).map(|j| off[(j, 0)] * off[(j, 0)]).sum::<f64>();
+        Ok(((0..m).map(|j| weights[(j, 0)]).collect(), rest))
+    }
+
     /// Takes in rows, columns first, the wanted output as the last column; Householder's reflections of each column.
     ///
     /// Squares of the entries are never formed, so half of the digits that normal equations lose are kept.
@@ -170,33 +194,6 @@ impl Skim {
         delay_ms: "ms", Range::FROM_0;
         thresholds: "", Range::FINITE;
         within_ms: "ms", Range::ABOVE_0;
-    }
-
-    /// Its parameters, with their defaults and ranges.
-    #[must_use]
-    pub fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
-    }
-
-    /// Checks every parameter.
-    ///
-    /// # Errors
-    ///
-    /// `Problem`, naming the parameter, its value and what would be right.
-    pub fn check(&self) -> Result<()> {
-        self.check_ranges()?;
-        if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
-            return Err(problem!("tau_s is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
-        }
-        if self.thresholds.is_empty() {
-            return Err(problem!("thresholds: must hold at least one"));
-        }
-        for (name, value) in [("spread", self.spread), ("delay_ms", self.delay_ms)] {
-            if self.branches.is_some() && value.is_none() {
-                return Err(problem!("{name}: none was published for a layer of branches, give one"));
-            }
-        }
-        Ok(())
     }
 
     fn layer(&self) -> Option<Layer> {
@@ -271,14 +268,7 @@ impl Skim {
     }
 
     /// The least-squares problem of these examples, in triangular form; memory does not grow with the patterns' length.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` for parameters, patterns or targets that make no sense; `Interrupted` where the caller stops it.
-    pub fn reduce(&self, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Normal> {
-        self.check()?;
-        crate::learn::check_examples(&Neuron { refractory: 0.0, ..Neuron::default() }, patterns, targets)?;
-        crate::learn::check_some_target(targets)?;
+    fn reduce(&self, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Normal> {
         let columns = self.columns(patterns[0].len());
         let mut normal = Normal::new(columns);
         for (pattern, targets) in patterns.iter().zip(targets) {
@@ -344,5 +334,68 @@ impl Skim {
             }
         })?;
         Ok(out)
+    }
+}
+
+/// When the output comes up to a threshold, ms.
+fn crossings(output: &[f64], threshold: f64, start: f64, step_ms: f64) -> Vec<f64> {
+    let rises = |&row: &usize| output[row] >= threshold && (row == 0 || output[row - 1] < threshold);
+    (0..output.len()).filter(rises).map(|row| start + row as f64 * step_ms).collect()
+}
+
+impl BatchRule for Skim {
+    fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
+    fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        if self.kernel == Kernel::DoubleExponential && self.tau_s() >= self.tau {
+            return Err(problem!("tau_s is {} ms: must lie below tau, {} ms", self.tau_s(), self.tau));
+        }
+        if self.thresholds.is_empty() {
+            return Err(problem!("thresholds: must hold at least one"));
+        }
+        for (name, value) in [("spread", self.spread), ("delay_ms", self.delay_ms)] {
+            if self.branches.is_some() && value.is_none() {
+                return Err(problem!("{name}: none was published for a layer of branches, give one"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Weights, and of the thresholds the one with the fewest missed and false; the lowest of several.
+    fn fit(&self, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Learnt> {
+        let normal = self.reduce(patterns, targets, stop)?;
+        let (weights, residual) = normal.solve()?;
+        let mut counts = vec![(0, 0, 0); self.thresholds.len()];
+        for (p, (pattern, targets)) in patterns.iter().zip(targets).enumerate() {
+            let output = self.output(&weights, pattern, stop)?;
+            let (what, wanted) = (format!("output of pattern {p}"), format!("targets[{p}]"));
+            for (&threshold, (found, missed, too_many)) in self.thresholds.iter().zip(&mut counts) {
+                let fired = crossings(&output, threshold, pattern.start, self.step_ms);
+                let pairs = matched((&what, &fired), (&wanted, targets), self.within_ms, stop)?.len();
+                *found += pairs;
+                *missed += targets.len() - pairs;
+                *too_many += fired.len() - pairs;
+            }
+        }
+        let scored = || self.thresholds.iter().zip(&counts);
+        let best = scored().min_by(|a, b| (a.1.1 + a.1.2).cmp(&(b.1.1 + b.1.2)).then(a.0.total_cmp(b.0)));
+        let scores: Vec<Value> = scored().map(|(t, (f, m, x))| json!([t, f, m, x])).collect();
+        let said = json!({
+            "threshold": best.map(|(threshold, _)| threshold),
+            "scores": scores,
+            "residual": residual,
+            "rows": normal.rows,
+        });
+        Ok(Learnt { weights, said: said.as_object().cloned().unwrap_or_default() })
+    }
+
+    fn run(&self, learnt: &Learnt, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
+        let Some(threshold) = learnt.said.get("threshold").and_then(Value::as_f64) else {
+            return Err(problem!("threshold is missing"));
+        };
+        Ok(crossings(&self.output(&learnt.weights, pattern, stop)?, threshold, pattern.start, self.step_ms))
     }
 }

@@ -1,0 +1,32 @@
+//! Learners of spike times that take all examples at once.
+
+use serde_json::{Map, Value};
+
+use crate::parameters::Described;
+use crate::{Result, SpikeTrains, Stop};
+
+/// What was learnt.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Learnt {
+    /// One an input of the output neuron.
+    pub weights: Vec<f64>,
+    /// What else there is to know of it, by name, with what output spikes depend on.
+    pub said: Map<String, Value>,
+}
+
+/// What a learner's file says of it.
+pub(super) trait BatchRule {
+    /// Its parameters, with their defaults and ranges.
+    fn described() -> Described
+    where
+        Self: Sized;
+
+    /// Checks every parameter.
+    fn check(&self) -> Result<()>;
+
+    /// Learns from patterns of the same trains with one list of targets (ms, ascending) a pattern; asks `stop` often.
+    fn fit(&self, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Learnt>;
+
+    /// Output spikes in a pattern, ms.
+    fn run(&self, learnt: &Learnt, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>>;
+}

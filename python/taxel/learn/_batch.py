@@ -1,0 +1,73 @@
+"""What learners of spike times that take all examples at once share: fit, predict."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._arguments import instance, several
+from taxel.learn._examples import examples
+from taxel.learn._learner import SpikeLearner
+from taxel.spikes import SpikeTrains
+
+__all__ = ["BatchLearner"]
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class BatchLearner(SpikeLearner):
+    """Learn spike times from all examples at once; what the compiled part says of the fit ends in ``_``."""
+
+    weights_: NDArray[np.float64] = field(init=False)
+    #: What else was learnt, by name, as the compiled part reads it again.
+    _said: dict[str, Any] = field(init=False)
+
+    def fit(self, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> Self:
+        """Learn when to fire.
+
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains in each; signed ones split into ON and OFF. Of any length: a whole recording is a pattern.
+        targets : sequence of float sequences, ms
+            When the learner shall fire, one list a pattern, ascending; an empty one teaches silence.
+
+        Returns
+        -------
+        BatchLearner
+            Itself.
+
+        Raises
+        ------
+        ProblemError : patterns or targets that make no sense (names pattern and target)
+        KeyboardInterrupt : Ctrl-C, within a fraction of a second
+        """
+        self.weights_, said = _core.fit_batch(self._kind, self._json(), *examples(patterns, targets))
+        self._said = json.loads(said)
+        for name, value in self._said.items():
+            setattr(self, f"{name}_", value)
+        return self
+
+    def predict(self, patterns: Sequence[SpikeTrains]) -> list[NDArray[np.float64]]:
+        """Return when the learner fires, one array a pattern, ms.
+
+        Raises
+        ------
+        ProblemError : patterns that make no sense
+        NotFittedError : before `fit`
+        """
+        return self._fired(patterns, {})
+
+    def _fired(self, patterns: Sequence[SpikeTrains], instead: dict[str, Any]) -> list[NDArray[np.float64]]:
+        """Return the output spikes; `instead` replaces what was learnt, by name."""
+        weights = self._fitted()
+        said = json.dumps(self._said | instead)
+        trains = [
+            instance(f"pattern {p}", s, SpikeTrains)._parts() for p, s in enumerate(several("patterns", patterns))
+        ]
+        return [_core.run_batch(self._kind, self._json(), weights, said, parts) for parts in trains]
