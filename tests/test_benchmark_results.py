@@ -1,0 +1,75 @@
+"""Results of benchmarks and studies name a clean commit that exists; each benchmark has one."""
+
+import json
+import re
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+RESULTS = ROOT / "benchmarks" / "results"
+#: Commits by the results that name them: they went when history was written anew, or were not clean. To be rerun;
+#: none may be added.
+TO_BE_RERUN: dict[str, str] = {
+    "capture_udp.json": "723d39c",
+    "demo.json": "325fc11",
+    "metrics.json": "1878b2d",
+    "recording_write.json": "723d39c-dirty",
+    "wire_decode.json": "723d39c-dirty",
+}
+#: Benchmarks that have no result yet.
+NONE_YET = {
+    "encode_change_events",
+    "encode_contact_area",
+    "encode_fa1",
+    "encode_level_crossing",
+    "encode_moments",
+    "encode_threshold_izhikevich",
+}
+
+
+def stated(value: Any) -> Iterator[str]:
+    """Find every commit that a result states, at whatever depth."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            if key == "commit":
+                yield str(inner)
+            yield from stated(inner)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from stated(inner)
+
+
+def git(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(["git", *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+
+
+NAMED = sorted(
+    (str(path.relative_to(RESULTS)), commit)
+    for path in RESULTS.rglob("*.json")
+    for commit in stated(json.loads(path.read_text()))
+)
+
+
+def test_there_are_results_that_name_commits() -> None:
+    benchmarks = {path.stem for path in (ROOT / "benchmarks").glob("[!_]*.py")}
+    named = {file.removesuffix(".json") for file, _ in NAMED}
+    assert benchmarks - named == NONE_YET, "no result with a commit: run taxel bench NAME"
+
+
+@pytest.mark.parametrize(("file", "commit"), NAMED)
+def test_a_result_names_a_clean_commit_of_this_history(file: str, commit: str) -> None:
+    if TO_BE_RERUN.get(file) == commit:
+        pytest.skip("to be rerun")
+    assert re.fullmatch(r"[0-9a-f]{7,40}", commit), f"{file}: {commit}"
+    shallow = git("rev-parse", "--is-shallow-repository")
+    if shallow.stdout.strip() != "false":
+        pytest.skip("the history is not whole here")
+    assert git("merge-base", "--is-ancestor", commit, "HEAD").returncode == 0, f"{file}: {commit} is not in the history"
+
+
+def test_what_is_to_be_rerun_is_still_there() -> None:
+    assert set(TO_BE_RERUN.items()) <= set(NAMED), "rerun already: take it off"
