@@ -4,15 +4,14 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::contact::Sensor;
 use taxel_core::contact::sensor::ramp_ticks;
-use taxel_core::{Error, Result};
+use taxel_core::{Error, Result, reading};
 
 use crate::convert::{array, slice};
 use crate::enter::enter;
 use crate::errors::core;
-use crate::parameters::read;
 
 fn law(json: &str) -> Result<Sensor> {
-    let sensor: Sensor = read(json).map_err(|said| Error::Scene(format!("law: {said}")))?;
+    let sensor: Sensor = reading::from_text(json).map_err(|unfit| Error::Scene(unfit.of("law")))?;
     sensor.check()?;
     Ok(sensor)
 }
