@@ -27,7 +27,14 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
     ),
     (
         "taxel-live",
-        &[&["error", "clock", "latency"], &["address"], &["recording"], &["capture"], &["emulate", "pipeline"]],
+        &[
+            &["error", "clock", "latency"],
+            &["address"],
+            &["recording"],
+            &["capture"],
+            &["emulate", "pipeline"],
+            &["panel"],
+        ],
     ),
     (
         "taxel-python",
@@ -35,6 +42,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
             &["errors"],
             &["enter", "convert", "parameters"],
             &[
+                "calibration",
                 "cone_x",
                 "detect",
                 "encode",
@@ -44,6 +52,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "metrics",
                 "neuron",
                 "nouns",
+                "panel",
                 "recording",
                 "rivals",
                 "simulate",
