@@ -66,7 +66,7 @@ def calibrate(
     from taxel._files import try_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.calibration import Calibration  # noqa: PLC0415
 
-    for wrong, said in (
+    for wrong, why in (
         (load is None and (start is not None or stop is not None), "--from, --to: when --load lay there; give --load"),
         (
             load is None and loads is None and not law and table is None,
@@ -80,7 +80,7 @@ def calibrate(
         ),
     ):
         if wrong:
-            raise ProblemError(said)
+            raise ProblemError(why)
     opened = _opened(recording)
     place = recording.with_name(f"{recording.stem}.calibration.json") if out is None else out
     try_whole(place, overwrite=overwrite)
