@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -108,14 +109,25 @@ def test_the_page_holds_every_picture_and_names_what_was_not_run(report, tmp_pat
     load(MADE_HERE[0]).run(report, size="toy", quiet=True)
     page = Page()
     page.feed(write_page(report).read_text())
-    assert all(r.startswith(("data:image/svg+xml;base64,", "#")) for r in page.references)
-    picture = next(r for r in page.references if r.startswith("data:"))
-    assert base64.b64decode(picture.partition(",")[2]).startswith(b"<?xml")
+    assert all(r.startswith("#") for r in page.references)
+    assert '"axes":[' in page.text, "the study's figure, as a chart"
     assert "it shows that the study runs, not what it finds" in page.text
     empty = Page()
     empty.feed(write_page(tmp_path).read_text())
     assert [re.search(rf"taxel study {re.escape(name)}\b", empty.text) for name in STUDIES].count(None) == 0
-    assert "data:image" not in "".join(empty.references)
+    assert '"axes":[' not in empty.text
+
+
+def test_a_page_shows_the_kept_picture_of_numbers_that_the_code_cannot_draw_any_more(report, tmp_path):
+    name = MADE_HERE[0]
+    load(name).run(report, size="toy", quiet=True)
+    folder = shutil.copytree(report / name, tmp_path / name)
+    section = json.loads((folder / "summary.json").read_text())
+    (folder / "summary.json").write_text(json.dumps(section | {"said": {}}))
+    page = Page()
+    page.feed(write_page(tmp_path).read_text())
+    picture = next(r for r in page.references if r.startswith("data:"))
+    assert base64.b64decode(picture.partition(",")[2]).startswith(b"<?xml")
 
 
 def test_the_command_prints_the_statements_and_where_the_page_is(small, tmp_path, capsys):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,38 +14,17 @@ from numpy.typing import NDArray
 from taxel.demo.hearing import Hearing
 from taxel.demo.judging import LABELS, Judged
 from taxel.events import Events
+from taxel.report.charts import INK
 from taxel.simulate import Contact
 from taxel.wire import FRAME_US
 
-__all__ = ["STYLE", "close_up", "delay_split", "delays_by_class", "maps", "noise", "rates", "scene_picture", "svg"]
+__all__ = ["close_up", "delay_split", "delays_by_class", "maps", "noise", "rates", "scene_picture"]
 
 #: How many taxels of a side a map shows.
 _CROP = 28
 
 #: Truth, contact, lift, quiet.
 _TRUE, _SAID, _QUIET = "#e8b04b", {"contact": "#b5423c", "lift": "#2f6690"}, "#8a8a8a"
-
-#: The look of all pictures: draw inside ``matplotlib.rc_context(STYLE)``.
-STYLE: Any = {
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": "#555555",
-    "axes.labelcolor": "#333333",
-    "axes.titlesize": 10,
-    "axes.titlelocation": "left",
-    "font.size": 9,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "taxel",
-}
-
-
-def svg(figure: Figure) -> str:
-    """Return a figure as SVG that stands inside a page, and close it."""
-    text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    plt.close(figure)
-    said = text.getvalue()
-    return said[said.index("<svg") :]
 
 
 def _figure(rows: int, columns: int, size: tuple[float, float], **kwargs: Any) -> tuple[Figure, Any]:
@@ -61,25 +39,27 @@ def scene_picture(hearing: Hearing, start_us: float, stop_us: float) -> Figure:
     top = axes[0, 0]
     # Presses of half a newton and impacts of twenty in one picture.
     top.set_yscale("function", functions=(lambda v: np.sqrt(np.maximum(v, 0.0)), np.square))
-    top.plot(t, hearing.force_n[first:last], color="#333333", linewidth=1.2)
-    top.set(ylabel="force (N, root scale)", title="Force on the foam; shaded where it really touches")
-    for contact in hearing.contacts:
-        if contact.start_us < stop_us and contact.stop_us > start_us:
-            for axis in axes[:, 0]:
-                axis.axvspan(contact.start_us * 1e-6, contact.stop_us * 1e-6, color=_TRUE, alpha=0.3, linewidth=0)
+    top.plot(t, hearing.force_n[first:last], color=INK, linewidth=1.2, label="force on the foam")
+    top.set(ylabel="force (N, root scale)", title="Force on the foam")
+    shown = [c for c in hearing.contacts if c.start_us < stop_us and c.stop_us > start_us]
+    for axis in axes[:, 0]:
+        for contact in shown:
+            edges = contact.start_us * 1e-6, contact.stop_us * 1e-6
+            axis.axvspan(*edges, color=_TRUE, alpha=0.3, linewidth=0, label="really touches" * (contact is shown[0]))
     times = np.arange(start_us, stop_us, FRAME_US) / 1000.0
     for axis, label in zip(axes[1:, 0], LABELS, strict=True):
         colour = _SAID[label]
         threshold = hearing.readout.neurons[label].neuron.theta_0 * hearing.readout.run_threshold
-        axis.plot(times * 1e-3, hearing.potential(label, times), color=colour, linewidth=0.9)
-        axis.axhline(threshold, color=_QUIET, linewidth=0.8, linestyle="--")
+        axis.plot(times * 1e-3, hearing.potential(label, times), color=colour, linewidth=0.9, label="potential")
+        axis.axhline(threshold, color=_QUIET, linewidth=0.8, linestyle="--", label="its threshold")
         said = hearing.found[label].between(start_us, stop_us)
         for place in (axis, top):
-            for at in said.known:
-                place.axvline(at * 1e-6, color=colour, linewidth=0.9, alpha=0.9)
-        axis.set(
-            ylabel="mV", title=f"Potential of the neuron for {label}; line where it was said, dashed its threshold"
-        )
+            for k, at in enumerate(said.known):
+                name = f"{label} said" * (k == 0)
+                place.axvline(at * 1e-6, color=colour, linewidth=0.9, alpha=0.9, label=name)
+        axis.set(ylabel="potential (mV)", title=f"Potential of the neuron for {label}")
+        axis.legend()
+    top.legend()
     axes[2, 0].set(xlabel="board time (s)", xlim=(start_us * 1e-6, stop_us * 1e-6))
     return figure
 
@@ -91,7 +71,7 @@ def close_up(hearing: Hearing, contact: Contact, reach_us: float = 5_000.0) -> F
         begin, end = at - reach_us, at + reach_us
         frames = np.arange(max(0, int(begin / FRAME_US)), min(len(hearing.force_n), int(end / FRAME_US) + 1))
         force, raster, area = axes[:, column]
-        force.plot((frames * FRAME_US - at) / 1000.0, hearing.force_n[frames], color="#333333", linewidth=1.2)
+        force.plot((frames * FRAME_US - at) / 1000.0, hearing.force_n[frames], color=INK, linewidth=1.2)
         force.set(ylabel="force (N)", title=f"{label}, {contact.kind}, {contact.speed_m_s:.2f} m/s")
         near = hearing.events.between(begin, end)
         index = near.y.astype(int) * near.array.columns + near.x
@@ -99,20 +79,21 @@ def close_up(hearing: Hearing, contact: Contact, reach_us: float = 5_000.0) -> F
             mine = near.p == on
             name = f"{'more' if on else 'less'} pressure ({int(mine.sum())})"
             raster.plot((near.t[mine] - at) / 1000.0, index[mine], ".", color=colour, markersize=2.5, label=name)
-        raster.legend(loc="upper left", fontsize=7, frameon=False)
         raster.set(ylabel="taxel (row by row)")
         spikes = hearing.area.between(begin / 1000.0, end / 1000.0)
         for train in range(len(spikes)):
             colour = _SAID["contact"] if train < 5 else _SAID["lift"]
-            area.plot(spikes[train] - at / 1000.0, np.full(len(spikes[train]), train), "|", color=colour, markersize=9)
+            ms = spikes[train] - at / 1000.0
+            area.plot(ms, np.full(len(ms), train), "|", color=colour, markersize=9)
         names = [f"{sign} {n}" for sign in ("≥", "<") for n in (2, 4, 8, 16, 32)]
         area.set(yticks=range(10), yticklabels=names, ylim=(-0.7, 9.7), xlabel="from the true moment (ms)")
         area.set_ylabel("taxels loaded")
         for axis in (force, raster, area):
-            axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0)
-            for known in hearing.found[label].between(begin, end).known:
-                axis.axvline((known - at) / 1000.0, color=_SAID[label], linewidth=1.0)
-    figure.suptitle("yellow: the true moment; red and blue lines: when it was known", x=0.01, ha="left", fontsize=9)
+            axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0, label="true moment")
+            for k, known in enumerate(hearing.found[label].between(begin, end).known):
+                name = f"{label} known" * (k == 0)
+                axis.axvline((known - at) / 1000.0, color=_SAID[label], linewidth=1.0, label=name)
+            axis.legend()
     return figure
 
 
@@ -131,8 +112,7 @@ def maps(hearing: Hearing, contact: Contact) -> Figure:
     for axis, picture, after in zip(axes[0], seen, moments, strict=True):
         edges = (left - 0.5, left + _CROP - 0.5, top + _CROP - 0.5, top - 0.5)
         image = axis.imshow(picture, cmap="magma", vmin=0.0, vmax=most, interpolation="nearest", extent=edges)
-        axis.set_title(f"{after:+.1f} ms")
-        axis.tick_params(labelsize=6)
+        axis.set(title=f"{after:+.1f} ms", xlabel="column", ylabel="row")
     if image is not None:
         figure.colorbar(image, ax=list(axes[0]), label="ticks above rest", shrink=0.9)
     return figure
@@ -166,11 +146,11 @@ def rates(hearing: Hearing, bits: int = 9) -> Figure:
     for value, colour, name in (
         (whole * 80, "#4b8f4b", "the whole play on the wire"),
         (taxels * hz * 2, _QUIET, "frames, 2 bits a taxel"),
-        (taxels * hz * 10, "#333333", "frames, 10 bits a taxel"),
+        (taxels * hz * 10, INK, "frames, 10 bits a taxel"),
     ):
         axis.axvline(value, color=colour, linewidth=2.0, label=f"{name}: {_bits(value)}")
     axis.set(xscale="log", xlabel="bits a second (log scale)", ylabel="impacts", xlim=(1e4, 1e9))
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
+    axis.legend()
     return figure
 
 
@@ -188,14 +168,13 @@ def delays_by_class(judged: Judged, plain: Judged) -> Figure:
             for who, shift, colour in ((judged, 0.17, _SAID[label]), (plain, -0.17, _QUIET)):
                 delays = who.row(name, label).delays_ms
                 height = place + shift + jitter.uniform(-0.08, 0.08, len(delays))
-                axis.plot(delays, height, ".", color=colour, markersize=3.5)
-        axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0)
-        axis.set(
-            xscale="symlog", xlabel="known minus true (ms)", title=f"{label}: neuron in colour, plain rule in grey"
-        )
+                kind = ("neuron" if who is judged else "plain rule") * (place == 0)
+                axis.plot(delays, height, ".", color=colour, markersize=3.5, label=kind)
+        axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0, label="true moment")
+        axis.set(xscale="symlog", xlabel="known minus true (ms)", title=label)
+        axis.legend()
         axis.set_xticks([-30, -10, -3, -1, 0, 1, 3, 10, 30], ["-30", "-10", "-3", "-1", "0", "1", "3", "10", "30"])
         axis.minorticks_off()
-        axis.grid(axis="x", color="#eeeeee")
     axes[0, 0].set_yticks(range(len(names)), names)
     axes[0, 0].invert_yaxis()
     return figure
@@ -215,8 +194,8 @@ def delay_split(parts: Mapping[str, Mapping[str, float]]) -> Figure:
             left += value
     axis.set_yticks(range(len(parts)), list(parts))
     axis.invert_yaxis()
-    axis.set(xlabel="ms (medians)")
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8, frameon=False)
+    axis.set(xlabel="part of the delay (ms, medians)")
+    axis.legend()
     return figure
 
 
@@ -226,10 +205,11 @@ def noise(hearing: Hearing) -> Figure:
     axis: Axes = axes[0, 0]
     seconds = np.arange(0.0, (hearing.stop_us - hearing.start_us) * 1e-6, 1.0)
     each = np.histogram((hearing.events.t - hearing.start_us) * 1e-6, np.append(seconds, seconds[-1] + 1.0))[0]
-    axis.bar(seconds + 0.5, each, width=0.9, color=_QUIET)
+    axis.bar(seconds + 0.5, each, width=0.9, color=_QUIET, label="events")
     for label in LABELS:
-        for at in hearing.found[label].t:
-            axis.axvline((at - hearing.start_us) * 1e-6, color=_SAID[label])
+        for k, at in enumerate(hearing.found[label].t):
+            axis.axvline((at - hearing.start_us) * 1e-6, color=_SAID[label], label=f"{label} said" * (k == 0))
+    axis.legend()
     said: Sequence[str] = [f"{len(hearing.found[label])} times {label}" for label in LABELS]
     axis.set_xlim(0.0, seconds[-1] + 1.0)
     axis.set(xlabel="board time (s)", ylabel="events/s", title=f"Noise alone: said {' and '.join(said)}")

@@ -8,20 +8,20 @@ import platform
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-import jinja2
 import matplotlib as mpl
+import matplotlib.pyplot as plt
 import numpy as np
-from markupsafe import Markup
 
 import taxel
 from taxel.demo import pictures
 from taxel.demo.hearing import Hearing
 from taxel.demo.judging import GOALS, LABELS, Judged, Row
 from taxel.live import delays
+from taxel.report.charts import STYLE, chart
+from taxel.report.page import render
 from taxel.wire import FRAME_US
 
 __all__ = ["GUESSES", "Material", "figures", "write"]
@@ -131,15 +131,15 @@ def _new(path: Path, text: str) -> None:
 
 def _page(material: Material, values: Mapping[str, Any]) -> str:
     hearing = material.hearing
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    template = environment.from_string(files("taxel.demo").joinpath("report.html.j2").read_text(encoding="utf-8"))
-    with mpl.rc_context(pictures.STYLE):
-        drawn = {name: pictures.svg(figure) for name, figure in _figures(material, values).items()}
-    return template.render(
+    with mpl.rc_context(STYLE):
+        figures_of = _figures(material, values)
+        drawn = {name: chart(figure) for name, figure in figures_of.items()}
+        for figure in figures_of.values():
+            plt.close(figure)
+    return render(
+        "demo/report.html.j2",
         values=values,
-        pictures={name: Markup(text) for name, text in drawn.items()},
+        pictures=drawn,
         tables={
             "neuron": _table(hearing.judged),
             "plain": _table(hearing.judged_plain),
@@ -147,6 +147,9 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
         },
         dashpots=_dashpots({1.0: hearing, **material.dashpots}),
         goals=GOALS,
+        firsts={label: hearing.judged.row("first", label).touches for label in LABELS},
+        said=sum(len(hearing.found[label]) for label in LABELS),
+        rest_s=hearing.start_us * 1e-6,
         within={label: _share(hearing.judged.within_goal(label)) for label in LABELS},
         guesses=GUESSES,
         losses=_losses(material),

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jinja2
 import matplotlib as mpl
 import numpy as np
-from markupsafe import Markup
 
 from taxel._arguments import instance
 from taxel._files import write_whole
-from taxel.demo.pictures import STYLE, svg
 from taxel.information import Answer, Point
+from taxel.report.charts import STYLE, chart
+from taxel.report.page import render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -51,16 +49,15 @@ def write_information(path: str | os.PathLike[str], answer: Answer, *, overwrite
     OSError : the folder is missing, the disk is full ...
     """
     found = instance("answer", answer, Answer)
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    template = environment.from_string(
-        files("taxel.report").joinpath("information.html.j2").read_text(encoding="utf-8")
-    )
     with mpl.rc_context(STYLE):
-        drawn = {"curves": Markup(svg(_curves(found))), "confusion": Markup(svg(_confusion(found)))}
-    text = template.render(
-        answer=found, pictures=drawn, colours=_COLOURS, early=_early(found), labels=sum(found.labels.values())
+        drawn = {"curves": chart(_curves(found)), "confusion": chart(_confusion(found))}
+    text = render(
+        "report/information.html.j2",
+        answer=found,
+        pictures=drawn,
+        colours=_COLOURS,
+        early=_early(found),
+        labels=sum(found.labels.values()),
     )
     return write_whole(path, lambda file: file.write(text.encode()), overwrite=overwrite)
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import jinja2
 import matplotlib as mpl
 import numpy as np
 from markupsafe import Markup
@@ -21,11 +19,12 @@ from taxel._arguments import instance
 from taxel._core import ProblemError
 from taxel._files import write_whole
 from taxel.array import Array
-from taxel.demo.pictures import STYLE, svg
 from taxel.detect import Readout, Score
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.report.charts import INK, STYLE, chart
+from taxel.report.page import render
 from taxel.tare import Tare
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ __all__ = ["Listened", "write_listening"]
 _MOMENTS, _AROUND = 4, 6.0
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
-_SAID, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", "#2b2b2b"
+_SAID, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
 
 
 class Listened(NamedTuple):
@@ -96,10 +95,6 @@ def write_listening(
     place = Path(folder)
     place.mkdir(parents=True, exist_ok=True)
     moments = {label: _moments(listened, label) for label in readout.labels}
-    environment = jinja2.Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
-    )
-    template = environment.from_string(files("taxel.report").joinpath("listening.html.j2").read_text(encoding="utf-8"))
     with mpl.rc_context(STYLE):
         drawn = {
             label: {
@@ -109,7 +104,8 @@ def write_listening(
             }
             for label in readout.labels
         }
-    text = template.render(
+    text = render(
+        "report/listening.html.j2",
         title=title,
         judged=judged,
         readout=repr(readout),
@@ -123,7 +119,11 @@ def write_listening(
 
 
 def _drawn(figure: Figure | None) -> Markup | None:
-    return None if figure is None else Markup(svg(figure))
+    if figure is None:
+        return None
+    said = chart(figure)
+    plt.close(figure)
+    return said
 
 
 def _row(one: Listened, label: str) -> dict[str, Any]:
@@ -167,15 +167,17 @@ def _potential(readout: Readout, listened: list[Listened], label: str, moments: 
         times = np.linspace(at - reach, at + reach, 600)
         crossings = found + readout.encoder.latency_ms + one.delay_ms
         potential = one.neuron.potential(one.weights, trains, times, spikes=crossings)
-        axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1)
-        axis.axhline(readout.run_threshold * one.neuron.theta_0, color="#999999", linewidth=0.8, linestyle=":")
-        for t in found[np.abs(found - at) < reach]:
-            axis.axvline(t - at, color=_SAID, linewidth=1.2)
+        axis.plot(times - at, potential, color=_POTENTIAL, linewidth=1, label="potential")
+        threshold = readout.run_threshold * one.neuron.theta_0
+        axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
+        for k, t in enumerate(found[np.abs(found - at) < reach]):
+            axis.axvline(t - at, color=_SAID, linewidth=1.2, label="said" * (k == 0))
         true = np.asarray((heard.truth or {}).get(label, ()), np.float64) / 1000.0
-        for t in true[np.abs(true - at) < reach]:
-            axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--")
+        for k, t in enumerate(true[np.abs(true - at) < reach]):
+            axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--", label="true" * (k == 0))
         axis.set_title(f"{moment.what}, {at / 1000.0:.3f} s", fontsize=9)
-        axis.set_xlabel("ms")
+        axis.set_xlabel("ms from then")
+        axis.legend()
     axes[0][0].set_ylabel("potential, mV")
     return figure
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import jinja2
+from markupsafe import Markup
 
 from taxel._files import write_whole
-from taxel.studies import STUDIES
-from taxel.studies.study import read_section
+from taxel.report.page import render
+from taxel.studies import STUDIES, load
+from taxel.studies.study import Section, read_section
 
 __all__ = ["write_page"]
 
@@ -30,9 +31,19 @@ def write_page(report: Path) -> Path:
     ------
     FormatError : a summary in the folder that is none
     """
-    environment = jinja2.Environment(
-        loader=jinja2.PackageLoader("taxel.studies", "."), autoescape=True, undefined=jinja2.StrictUndefined
-    )
     sections = {name: read_section(report / name) for name in STUDIES}
-    text = environment.get_template("page.html.j2").render(titles=STUDIES, sections=sections)
+    charts = {name: _charts(name, section) for name, section in sections.items()}
+    text = render("studies/page.html.j2", titles=STUDIES, sections=sections, charts=charts)
     return write_whole(report / "index.html", lambda file: file.write(text.encode()), overwrite=True)
+
+
+def _charts(name: str, section: Section | None) -> Markup | None:
+    """Return a study's figures, drawn of its numbers; None where they are of an older code, whose pictures stay."""
+    if section is None:
+        return None
+    from taxel.report.charts import chart  # noqa: PLC0415  loads slowly
+
+    try:
+        return chart(load(name).draw(section["parameters"], section["said"]))
+    except (KeyError, TypeError, ValueError, IndexError):
+        return None

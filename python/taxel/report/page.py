@@ -1,0 +1,53 @@
+"""Pages of reports: one file that needs no other and no network, light and dark, on a desk and on a phone."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+from markupsafe import Markup
+
+from taxel import _core
+
+__all__ = ["render"]
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    return jinja2.Environment(
+        loader=jinja2.PackageLoader("taxel", "."),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+
+
+def render(template: str, **values: Any) -> str:
+    """Return a page.
+
+    Parameters
+    ----------
+    template : str
+        By package, such as "demo/report.html.j2"; it extends "report/page.html.j2".
+    values
+        What the template shows; figures as `taxel.report.charts.chart` makes them.
+    """
+    plot = _core.page_file("vendor/uPlot.js").decode()
+    # A module in a page exports nothing: the name is handed out, and all others stay within.
+    drawn, exported, _ = plot.rpartition("export {")
+    assert exported, "uPlot.js ends with what it exports"
+    own = files("taxel.report").joinpath("charts.js").read_text(encoding="utf-8")
+    licence = _core.page_file("vendor/uPlot.LICENSE").decode()
+    return (
+        _environment()
+        .get_template(template)
+        .render(
+            uplot_css=Markup(_core.page_file("vendor/uPlot.css").decode()),
+            uplot_js=Markup(f"/*\n{licence}*/\nconst uPlot = (() => {{\n{drawn}\nreturn uPlot;\n}})();"),
+            charts_js=Markup(own),
+            **values,
+        )
+    )

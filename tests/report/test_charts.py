@@ -1,0 +1,218 @@
+"""What a page's charts hold is what matplotlib was told to draw; what they cannot hold stays a picture."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import os
+import re
+import shutil
+import subprocess
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
+
+from taxel.report.charts import STYLE, chart, chart_data
+from taxel.report.page import render
+
+
+def axes_of(**how):
+    figure = Figure(**how)
+    return figure, figure.subplots()
+
+
+def held(html: str) -> dict:
+    """Return the JSON of a chart as a browser would read it."""
+    return json.loads(re.search(r'<script type="application/json">(.*?)</script>', html, re.S)[1])
+
+
+values = st.lists(st.floats(-1e6, 1e6) | st.just(float("nan")), min_size=1, max_size=20)
+
+
+@given(values)
+def test_a_line_keeps_its_numbers_and_gaps(y):
+    figure, axes = axes_of()
+    axes.plot(y, "--", color="#b5423c", label="a line")
+    (line,) = chart_data(figure)["axes"][0]["lines"]
+    kept = np.array([np.nan if v is None else v for v in line["y"]])
+    assert np.allclose(kept, y, rtol=1e-6, atol=0, equal_nan=True)
+    assert line["x"] == list(range(len(y)))
+    assert (line["color"], line["dash"], line["name"]) == ("#b5423c", [6, 4], "a line")
+
+
+def test_bars_bands_marks_segments_and_points_are_told_apart():
+    figure, axes = axes_of()
+    axes.bar([1, 2], [3, -4], width=0.5, label="bars")
+    axes.axvspan(1, 2, color="#e8b04b", alpha=0.5, label="band")
+    axes.axhline(7, linestyle=":", label="mark")
+    axes.errorbar([1, 2], [5, 6], [0.5, 1.0], fmt="o")
+    axes.scatter([1, 2, 3], [1, 1, 1], c=["#ff0000", "#00ff00", "#ff0000"])
+    axes.stairs([1, 2], [0, 1, 2], fill=True)
+    axes.text(1, 2, "here")
+    said = chart_data(figure)["axes"][0]
+    assert [(b["x0"], b["x1"], b["y0"], b["y1"], b["name"]) for b in said["bars"]] == [
+        (0.75, 1.25, 0, 3, "bars"),
+        (1.75, 2.25, 0, -4, "bars"),
+    ]
+    assert (said["bands"][0]["start"], said["bands"][0]["stop"], said["bands"][0]["color"]) == (1, 2, "#e8b04b80")
+    assert [(m["axis"], m["at"], m["dash"]) for m in said["marks"]] == [("y", 7, [2, 3])]
+    assert said["segments"][0]["at"] == [1, 4.5, 1, 5.5, 2, 5, 2, 7]
+    dots = [line for line in said["lines"] if line["width"] == 0]
+    assert sorted((d["color"], d["x"]) for d in dots if d["color"] in {"#ff0000", "#00ff00"}) == [
+        ("#00ff00", [2]),
+        ("#ff0000", [1, 3]),
+    ]
+    assert said["areas"][0]["y"] == [0, 1, 1, 2, 2, 0]
+    assert said["texts"][0]["text"] == "here"
+
+
+def test_axes_keep_limits_scales_names_and_what_they_share():
+    figure = Figure()
+    top, below = figure.subplots(2, 1, sharex=True)
+    top.plot([1, 10, 100], [1, 2, 3], label="a")
+    top.set(xscale="log", xlabel="Hz", title="how fast", xlim=(1, 100))
+    top.set_yticks([1, 3], ["one", "three"])
+    top.invert_yaxis()
+    top.legend(title="lines")
+    below.plot([1, 2], [-5, 5])
+    below.set_yscale("symlog", linthresh=0.5)
+    first, second = chart_data(figure)["axes"]
+    assert (first["x"]["scale"], first["x"]["min"], first["x"]["max"], first["x"]["label"]) == ("log", 1, 100, "Hz")
+    assert first["y"]["names"] == [[1, "one"], [3, "three"]]
+    assert first["y"]["reversed"] is True
+    assert (second["y"]["scale"], second["y"]["around"]) == ("asinh", 0.5)
+    assert first["group"] == second["group"] is not None
+    assert (first["legend_title"], [e["name"] for e in first["legend"]]) == ("lines", ["a"])
+    assert (first["title"], first["place"], second["place"]) == ("how fast", [1, 2, 1, 2], [2, 3, 1, 2])
+
+
+def test_names_along_an_axis_come_from_categories_too():
+    figure, axes = axes_of()
+    axes.barh(["before contact", "full"], [1.0, 2.0])
+    assert chart_data(figure)["axes"][0]["y"]["names"] == [[0, "before contact"], [1, "full"]]
+
+
+@pytest.mark.parametrize("origin", ["upper", "lower"])
+def test_a_map_keeps_its_values_and_its_colours(origin):
+    figure, axes = axes_of()
+    shown = axes.imshow([[0.0, 1.0, 2.0], [3.0, 4.0, np.nan]], cmap="magma", vmin=0, vmax=4, origin=origin)
+    figure.colorbar(shown, ax=axes, label="ticks")
+    said = chart_data(figure)
+    (image,) = said["axes"][0]["images"]
+    assert (image["rows"], image["columns"], image["values"]) == (2, 3, [0, 1, 2, 3, 4, None])
+    painted = mpl.image.imread(io.BytesIO(base64.b64decode(image["png"])))
+    assert painted.shape[:2] == (2, 3)
+    assert np.allclose(painted[1, 1], mpl.colormaps["magma"](1.0), atol=0.01)
+    # Row 0 lies between y0 and the first row's end, wherever 0 is on the screen.
+    assert (image["y0"], image["y1"]) == (-0.5, 1.5)
+    assert (said["scales"][0]["label"], said["scales"][0]["max"], len(said["axes"])) == ("ticks", 4, 1)
+
+
+def test_an_inset_that_only_looks_closer_is_left_to_the_reader():
+    figure, axes = axes_of()
+    axes.plot([1, 2, 3], [1, 4, 9])
+    axes.inset_axes((0.1, 0.5, 0.3, 0.3)).plot([1, 2, 3], [1, 4, 9])
+    assert len(chart_data(figure)["axes"]) == 1
+
+
+def three_dimensions(figure):
+    figure.add_subplot(projection="3d").plot([1, 2], [1, 2], [1, 2])
+
+
+def twins(figure):
+    axes = figure.subplots()
+    axes.plot([1, 2])
+    axes.twinx().plot([3, 1])
+
+
+def arrows(figure):
+    figure.subplots().annotate("look", (0, 0), (1, 1), arrowprops={})
+
+
+def another_inset(figure):
+    axes = figure.subplots()
+    axes.plot([1, 2])
+    axes.inset_axes((0.1, 0.5, 0.3, 0.3)).plot([7, 8, 9])
+
+
+@pytest.mark.parametrize("draw", [three_dimensions, twins, arrows, another_inset])
+def test_what_a_chart_cannot_hold_is_a_picture_in_the_pages_ink(draw):
+    with mpl.rc_context(STYLE):
+        figure = Figure()
+        draw(figure)
+        html = chart(figure)
+    assert "<svg" in html
+    assert "application/json" not in html
+    assert "var(--ink)" in html
+
+
+def test_text_of_a_figure_cannot_end_the_script():
+    figure, axes = axes_of()
+    axes.plot([1, 2], label="x")
+    axes.set_title("</script><script>alert(1)</script>")
+    html = str(chart(figure))
+    assert html.count("</script>") == 1
+    assert held(html.replace("<\\/", "</", 0))["axes"][0]["title"] == "</script><script>alert(1)</script>"
+
+
+def page(*figures):
+    class Row:
+        score = None
+
+    charts = {"contact": {"potential": chart(list(figures)), "weights": "", "errors": None}}
+    return render(
+        "report/listening.html.j2",
+        title="a page",
+        judged="",
+        readout="none",
+        labels=["contact"],
+        drawn=charts,
+        rows=[],
+        worst=[],
+        scored=False,
+    )
+
+
+def some():
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    left.plot([1, 2, 3], [3, 1, 2], label="a line")
+    left.legend()
+    right.imshow(np.eye(4))
+    figure.subplots_adjust()
+    other, axes = axes_of()
+    axes.bar([1, 2], [3, 4])
+    axes.set(yscale="log", ylim=(0.1, 10))
+    return figure, other
+
+
+def test_a_page_needs_nothing_but_itself():
+    text = page(*some())
+    assert not re.search(r"""(?:src|href)\s*=\s*["'](?!data:|#)""", text)
+    assert not re.search(r"@import|url\((?!data:)", text)
+    assert "Leon Sorokin" in text, "uPlot's licence goes with it"
+    assert "export {" not in text
+    assert "prefers-color-scheme: dark" in text
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
+def test_a_browser_draws_every_chart(tmp_path):
+    place = tmp_path / "page.html"
+    place.write_text(page(*some()), encoding="utf-8")
+    asked = ["--headless", "--disable-gpu", "--virtual-time-budget=4000", f"--user-data-dir={tmp_path / 'profile'}"]
+    asked += ["--no-sandbox"] * (os.geteuid() == 0)
+    seen = subprocess.run(
+        [shutil.which("chromium"), *asked, "--dump-dom", place.as_uri()],
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    ).stdout
+    assert re.findall(r'class="charts" data-drawn="(\d+)"', seen) == ["2", "1"]
+    assert seen.count("<canvas") == 3
+    assert "a line" in seen
