@@ -1,131 +1,15 @@
 //! Weights from examples: patterns of input spikes, and the times at which the neuron shall fire.
+//!
+//! `statement` says once what the thesis' equations 6.9 to 6.14 ask of the weights; `engines` minimise over rows that they are
+//! handed; `cone` holds the learners CONE-X and CONE-R, `online` the window that slides; `rivals` the rules of others.
 
-mod augmented;
-mod bounds;
-pub mod certificate;
-mod cone_program;
-mod cone_r;
-pub mod cone_x;
-mod dual_active_set;
-mod minimise;
-mod mixed;
-mod nearest;
-mod online_cone_r;
-mod point;
+pub mod cone;
+mod engines;
+mod online;
 pub mod rivals;
-mod rounds;
-mod rows;
-mod silence;
 pub mod statement;
-mod touched;
 
-pub use bounds::Bound;
-pub use cone_r::{ConeR, Divisor, Engine, Fit, Norm, Parts, Problem, Round, Shares, Status};
-pub use cone_x::ConeX;
-pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
-pub use online_cone_r::OnlineConeR;
-
-use crate::neuron::Neuron;
-use crate::{Result, SpikeTrains, problem};
-
-/// Checks what every learner is given: one list of targets (ms, ascending) a pattern, the same trains in each pattern.
-///
-/// # Errors
-///
-/// `Problem`, naming pattern and target.
-fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>]) -> Result<()> {
-    if patterns.is_empty() {
-        return Err(problem!("patterns: there is none, at least one is needed"));
-    }
-    if patterns.len() != targets.len() {
-        return Err(problem!(
-            "targets: {} lists for {} patterns, must be one a pattern (an empty one teaches silence)",
-            targets.len(),
-            patterns.len()
-        ));
-    }
-    for (p, (pattern, targets)) in patterns.iter().zip(targets).enumerate() {
-        check_example(neuron, p, pattern, targets)?;
-        check_trains(p, pattern, patterns[0].len())?;
-    }
-    Ok(())
-}
-
-/// Checks that there is a target in some pattern, for learners that learn nothing from silence alone.
-fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
-    if targets.iter().all(Vec::is_empty) {
-        return Err(problem!("targets: no pattern has one, so nothing is to be learnt"));
-    }
-    Ok(())
-}
-
-/// Checks one pattern, number `p`, and its targets.
-fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<()> {
-    check_pattern(p, pattern)?;
-    if pattern.times.is_empty() && !targets.is_empty() {
-        return Err(problem!("pattern {p}: has no spike, so no weight can matter at its target"));
-    }
-    for (k, &t) in targets.iter().enumerate() {
-        if !t.is_finite() {
-            return Err(problem!("pattern {p}, target {k}: time is {t}, must be finite"));
-        }
-        if t < pattern.start || t > pattern.stop {
-            return Err(problem!(
-                "pattern {p}, target {k}: {t} ms lies outside the pattern's window {} to {} ms",
-                pattern.start,
-                pattern.stop
-            ));
-        }
-        if k == 0 {
-            continue;
-        }
-        let since = t - targets[k - 1];
-        if since <= 0.0 {
-            return Err(problem!(
-                "pattern {p}, target {k}: {t} ms comes after {} ms, targets must ascend",
-                targets[k - 1]
-            ));
-        }
-        if since <= neuron.refractory {
-            return Err(problem!(
-                "pattern {p}, target {k} ({t} ms): {since} ms after target {}, inside the refractory {} ms",
-                k - 1,
-                neuron.refractory
-            ));
-        }
-    }
-    Ok(())
-}
-
-/// Checks one pattern to learn from, number `p`.
-fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
-    pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
-    if pattern.is_empty() {
-        return Err(problem!("pattern {p}: has no train"));
-    }
-    if pattern.values.is_some() {
-        return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
-    }
-    Ok(())
-}
-
-/// Checks a pattern that is only heard.
-fn check_heard(pattern: &SpikeTrains) -> Result<()> {
-    pattern.check()?;
-    if pattern.values.is_some() {
-        return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
-    }
-    if pattern.is_empty() {
-        return Err(problem!("pattern: has no train"));
-    }
-    Ok(())
-}
-
-/// Checks that a pattern has the trains that pattern 0 has.
-fn check_trains(p: usize, pattern: &SpikeTrains, trains: usize) -> Result<()> {
-    if pattern.len() == trains {
-        Ok(())
-    } else {
-        Err(problem!("pattern {p}: {} trains, pattern 0 has {trains}", pattern.len()))
-    }
-}
+pub use cone::{ConeR, ConeX};
+pub use engines::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
+pub use online::OnlineConeR;
+pub use statement::Bound;

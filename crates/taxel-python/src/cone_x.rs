@@ -3,7 +3,7 @@
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use taxel_core::learn::ConeX;
-use taxel_core::learn::cone_x::{Engine, Fit, Problem, Round, Status};
+use taxel_core::learn::cone::cone_x::{Engine, Fit, Problem, Round, Status};
 use taxel_core::learn::statement::{Margin, Row, Stated};
 use taxel_core::problem;
 

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 use taxel_core::learn as core_learn;
-use taxel_core::learn::{ConeR, Engine, Fit, Problem, Round, Shares, Status};
+use taxel_core::learn::cone::cone_r::{ConeR, Engine, Fit, Problem, Round, Shares, Status};
 use taxel_core::problem;
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};

@@ -86,8 +86,8 @@ impl Batch {
     /// `Problem` for parameters, patterns or targets that make no sense; `Interrupted` where the caller stops it.
     pub fn fit(&self, patterns: &[SpikeTrains], targets: &[Vec<f64>], stop: Stop<'_>) -> Result<Learnt> {
         self.rule().check()?;
-        crate::learn::check_examples(&Neuron { refractory: 0.0, ..Neuron::default() }, patterns, targets)?;
-        crate::learn::check_some_target(targets)?;
+        crate::learn::statement::check_examples(&Neuron { refractory: 0.0, ..Neuron::default() }, patterns, targets)?;
+        crate::learn::statement::check_some_target(targets)?;
         self.rule().fit(patterns, targets, stop)
     }
 

@@ -130,12 +130,12 @@ impl Rival {
         stop: Stop<'_>,
     ) -> Result<Trained> {
         self.check()?;
-        crate::learn::check_examples(
+        crate::learn::statement::check_examples(
             &Neuron { refractory: self.neuron.refractory, ..Neuron::default() },
             patterns,
             targets,
         )?;
-        crate::learn::check_some_target(targets)?;
+        crate::learn::statement::check_some_target(targets)?;
         self.law.train(&self.neuron, &self.training, Examples { patterns, targets, start }, report, stop)
     }
 
@@ -150,7 +150,7 @@ impl Rival {
             pattern.check()?;
         } else {
             let neuron = Neuron { refractory: self.neuron.refractory, ..Neuron::default() };
-            crate::learn::check_examples(&neuron, std::slice::from_ref(pattern), &[targets.to_vec()])?;
+            crate::learn::statement::check_examples(&neuron, std::slice::from_ref(pattern), &[targets.to_vec()])?;
         }
         one_weight_a_train(weights, pattern.len())?;
         self.law.change(&self.neuron, weights, pattern, targets)
@@ -165,7 +165,7 @@ impl SteppedNeuron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn run(&self, weights: &[f64], pattern: &SpikeTrains) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::check_heard(pattern)?;
+        crate::learn::statement::check_heard(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
         let mut fired = Vec::new();
         self.fire(weights, &self.lay_out(pattern), &mut fired);

@@ -304,7 +304,7 @@ impl Skim {
     /// `Problem` for parameters or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn rows(&self, pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::check_heard(pattern)?;
+        crate::learn::statement::check_heard(pattern)?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {
             for row in 0..block[0].len() {
@@ -321,7 +321,7 @@ impl Skim {
     /// `Problem` for parameters, weights or a pattern that make no sense; `Interrupted` where the caller stops it.
     pub fn output(&self, weights: &[f64], pattern: &SpikeTrains, stop: Stop<'_>) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::check_heard(pattern)?;
+        crate::learn::statement::check_heard(pattern)?;
         one_weight_a_train(weights, self.columns(pattern.len()))?;
         let mut out = Vec::new();
         self.walk(pattern, stop, |_, block| {

@@ -176,7 +176,7 @@ impl Tempotron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn peak(&self, weights: &[f64], pattern: &SpikeTrains) -> Result<Peak> {
         self.check()?;
-        crate::learn::check_heard(pattern)?;
+        crate::learn::statement::check_heard(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
         Ok(self.reach(&self.shape(), weights, &self.lay_out(pattern)).peak)
     }
@@ -189,7 +189,7 @@ impl Tempotron {
     /// `Problem` for parameters, weights or a pattern that make no sense.
     pub fn change(&self, weights: &[f64], pattern: &SpikeTrains, label: bool) -> Result<Vec<f64>> {
         self.check()?;
-        crate::learn::check_heard(pattern)?;
+        crate::learn::statement::check_heard(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
         let (shape, events) = (self.shape(), self.lay_out(pattern));
         let mut change = vec![0.0; weights.len()];
@@ -318,11 +318,11 @@ fn check_labelled(patterns: &[SpikeTrains], labels: &[bool]) -> Result<()> {
         return Err(problem!("labels: {} for {} patterns, must be one a pattern", labels.len(), patterns.len()));
     }
     for (p, pattern) in patterns.iter().enumerate() {
-        crate::learn::check_pattern(p, pattern)?;
+        crate::learn::statement::check_pattern(p, pattern)?;
         if labels[p] && pattern.times.is_empty() {
             return Err(problem!("pattern {p}: has no spike, so no weight can make the neuron fire in it"));
         }
-        crate::learn::check_trains(p, pattern, patterns[0].len())?;
+        crate::learn::statement::check_trains(p, pattern, patterns[0].len())?;
     }
     Ok(())
 }

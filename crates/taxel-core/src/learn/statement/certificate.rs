@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::statement::{Margin, Row, Statement};
+use super::rows::{Margin, Row, Statement};
 use crate::Result;
 
 /// Multipliers that prove a problem infeasible, and what they say in words.
@@ -44,7 +44,7 @@ const NAMED: usize = 12;
 
 impl Certificate {
     /// Checks multipliers of rows (those of other rows than targets must be 0 or more); gives nothing if they prove nothing.
-    pub(super) fn check(statement: &Statement, bounds: &Bounds, rows: Vec<(Row, f64)>) -> Result<Option<Self>> {
+    pub(crate) fn check(statement: &Statement, bounds: &Bounds, rows: Vec<(Row, f64)>) -> Result<Option<Self>> {
         let Some(proven) = gap(statement, bounds, &rows, false)? else { return Ok(None) };
         let at_all = gap(statement, bounds, &rows, true)?.is_some();
         let text = read(statement, bounds, &rows, at_all)?;
@@ -52,7 +52,7 @@ impl Certificate {
     }
 
     /// Looks for a target that no weights reach, or that all exceed: a proof of one row.
-    pub(super) fn of_one_target(statement: &Statement, bounds: &Bounds) -> Result<Option<Self>> {
+    pub(crate) fn of_one_target(statement: &Statement, bounds: &Bounds) -> Result<Option<Self>> {
         for (pattern, target) in statement.targets() {
             let row = Row::Target { pattern, target };
             for multiplier in [-1.0, 1.0] {

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::augmented::Start;
-use super::bounds::{Bound, bounds_of, check_bounds};
-use super::rounds::START_NEAR_MS;
-use super::rows::{Layout, SilentRows, TargetRow, target_rows};
-use super::{check_examples, check_trains};
 use crate::allowed::{Range, ranges};
+use crate::learn::engines::START_NEAR_MS;
+use crate::learn::engines::Start;
+use crate::learn::statement::{Bound, bounds_of, check_bounds};
+use crate::learn::statement::{Layout, SilentRows, TargetRow, target_rows};
+use crate::learn::statement::{check_examples, check_trains};
 use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
 use crate::vectors::{add, dot};
@@ -148,7 +148,7 @@ impl ConeR {
     }
 
     /// Checks that the horizon lies behind the last target of pattern `p`.
-    pub(super) fn check_horizon(&self, p: usize, targets: &[f64]) -> Result<()> {
+    pub(crate) fn check_horizon(&self, p: usize, targets: &[f64]) -> Result<()> {
         match (self.horizon, targets.last()) {
             (Some(horizon), Some(&last)) if last > horizon => {
                 Err(problem!("pattern {p}: last target at {last} ms, the horizon is {horizon} ms"))
@@ -158,12 +158,12 @@ impl ConeR {
     }
 
     /// How many grid points a pattern has: to its stop, or one `tau` past its last target, or the horizon.
-    pub(super) fn points(&self, pattern: &SpikeTrains, targets: &[f64]) -> f64 {
+    pub(crate) fn points(&self, pattern: &SpikeTrains, targets: &[f64]) -> f64 {
         let last = targets.last().map_or(pattern.stop, |t| pattern.stop.max(t + self.neuron.tau));
         self.neuron.points(pattern.start, self.horizon.unwrap_or(last))
     }
 
-    pub(super) fn layout(&self) -> Layout<'_> {
+    pub(crate) fn layout(&self) -> Layout<'_> {
         Layout { neuron: &self.neuron, horizon: self.horizon, margin: self.margin, near_ms: START_NEAR_MS }
     }
 
@@ -207,7 +207,7 @@ pub struct Parts {
 }
 
 impl Parts {
-    pub(super) fn sum(&self) -> f64 {
+    pub(crate) fn sum(&self) -> f64 {
         self.l1 + self.l2 + self.B + self.C + self.D
     }
 }
@@ -268,41 +268,41 @@ pub struct Fit {
 /// Inside, potentials are in units of `unit` mV, a power of 2 near theta_0 over 0.3.
 #[derive(Debug, Clone)]
 pub struct Problem {
-    pub(super) base: ConeR,
+    pub(crate) base: ConeR,
     unit: f64,
     patterns: Vec<SpikeTrains>,
-    pub(super) trains: usize,
-    pub(super) targets: Arc<Vec<TargetRow>>,
-    pub(super) silent: SilentRows,
+    pub(crate) trains: usize,
+    pub(crate) targets: Arc<Vec<TargetRow>>,
+    pub(crate) silent: SilentRows,
     /// Rows behind the targets, one after the other, and their `B'B` by columns.
-    pub(super) behind: Arc<Vec<f64>>,
-    pub(super) gram: Arc<Vec<f64>>,
+    pub(crate) behind: Arc<Vec<f64>>,
+    pub(crate) gram: Arc<Vec<f64>>,
 }
 
 /// Everything that turns potentials into 6.14: the parameters with their normalisers.
 #[derive(Debug, Clone)]
-pub(super) struct Objective {
-    pub(super) l1: f64,
-    pub(super) l2: f64,
-    pub(super) b: f64,
-    pub(super) c: f64,
-    pub(super) d: f64,
-    pub(super) kappa: f64,
-    pub(super) norm: Norm,
+pub(crate) struct Objective {
+    pub(crate) l1: f64,
+    pub(crate) l2: f64,
+    pub(crate) b: f64,
+    pub(crate) c: f64,
+    pub(crate) d: f64,
+    pub(crate) kappa: f64,
+    pub(crate) norm: Norm,
     /// Least and largest weights, one a synapse, mV.
-    pub(super) lower: Vec<f64>,
-    pub(super) upper: Vec<f64>,
+    pub(crate) lower: Vec<f64>,
+    pub(crate) upper: Vec<f64>,
 }
 
 impl Objective {
     /// The same, every term times `scale`.
-    pub(super) fn scaled(&self, scale: f64) -> Self {
+    pub(crate) fn scaled(&self, scale: f64) -> Self {
         let (l1, l2, b, c, d) = (self.l1 * scale, self.l2 * scale, self.b * scale, self.c * scale, self.d * scale);
         Self { l1, l2, b, c, d, ..self.clone() }
     }
 
     /// No weights whose 6.14 is `most` or less hold one larger than this: l1 and l2 alone would come to more.
-    pub(super) fn reach(&self, most: f64) -> f64 {
+    pub(crate) fn reach(&self, most: f64) -> f64 {
         let reach = match self.norm {
             Norm::Norm => most / (self.l1 + self.l2),
             Norm::Square => (most / self.l1).min((most / self.l2).sqrt()),
@@ -312,7 +312,7 @@ impl Objective {
     }
 
     /// The same within bounds as narrow as that: the least lies within them too.
-    pub(super) fn within_reach(&self, most: f64) -> Self {
+    pub(crate) fn within_reach(&self, most: f64) -> Self {
         let reach = self.reach(most);
         let lower = self.lower.iter().map(|l| l.max(-reach)).collect();
         let upper = self.upper.iter().map(|u| u.min(reach)).collect();
@@ -338,7 +338,7 @@ impl Problem {
     }
 
     /// Lays out one pattern, which may be without targets: others will follow.
-    pub(super) fn of_one(parameters: &ConeR, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<Self> {
+    pub(crate) fn of_one(parameters: &ConeR, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<Self> {
         Self::laid_out(parameters, std::slice::from_ref(pattern), &[targets.to_vec()], stop)
     }
 
@@ -379,7 +379,7 @@ impl Problem {
     }
 
     /// Adds one more pattern; gives how many silent and free rows it has.
-    pub(super) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<usize> {
+    pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<usize> {
         let before = self.silent.len();
         self.silent.push(self.base.layout(), pattern, targets, stop)?;
         let (neuron, delta_t) = (&self.base.neuron, self.base.delta_t());
@@ -394,7 +394,7 @@ impl Problem {
     }
 
     /// Takes the first pattern away; gives how many silent and free rows, and how many targets, went with it.
-    pub(super) fn drop_first(&mut self) -> (usize, usize) {
+    pub(crate) fn drop_first(&mut self) -> (usize, usize) {
         let before = self.silent.len();
         self.silent.drop_first();
         self.patterns.remove(0);
@@ -410,7 +410,7 @@ impl Problem {
     }
 
     /// The same, but of the silent rows the named ones alone, written out; for solving, not for judging.
-    pub(super) fn of_rows(&self, rows: &[usize]) -> Self {
+    pub(crate) fn of_rows(&self, rows: &[usize]) -> Self {
         Self {
             base: self.base.clone(),
             unit: self.unit,
@@ -423,15 +423,15 @@ impl Problem {
         }
     }
 
-    pub(super) fn check_trains(&self, p: usize, pattern: &SpikeTrains) -> Result<()> {
+    pub(crate) fn check_trains(&self, p: usize, pattern: &SpikeTrains) -> Result<()> {
         check_trains(p, pattern, self.trains)
     }
 
-    pub(super) fn patterns(&self) -> usize {
+    pub(crate) fn patterns(&self) -> usize {
         self.patterns.len()
     }
 
-    pub(super) fn silent_and_free_rows(&self) -> usize {
+    pub(crate) fn silent_and_free_rows(&self) -> usize {
         self.silent.len()
     }
 
@@ -448,7 +448,7 @@ impl Problem {
     }
 
     /// How large weights must be for targets to be met, mV.
-    pub(super) fn needed(&self) -> f64 {
+    pub(crate) fn needed(&self) -> f64 {
         let length = |row: &TargetRow| dot(&row.at, &row.at).sqrt();
         let (thresholds, lengths) =
             self.targets.iter().fold((0.0, 0.0), |sum, row| (sum.0 + row.threshold, sum.1 + length(row)));
@@ -515,7 +515,7 @@ impl Problem {
     }
 
     /// As `fit`; counts refiring on one pattern alone where one is named.
-    pub(super) fn fit_counting(
+    pub(crate) fn fit_counting(
         &self,
         parameters: &ConeR,
         start: Option<(&[f64], Option<&Shares>)>,

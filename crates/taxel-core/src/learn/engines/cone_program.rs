@@ -13,55 +13,55 @@ use clarabel::solver::{
     ZeroConeT,
 };
 
-use super::cone_r::Norm;
+use crate::learn::cone::cone_r::Norm;
 use crate::{Error, Result, Stop};
 
 /// A sum of hinges, `weight_i max(r_i.w - limit_i, 0)`, with rows one after the other.
 #[derive(Debug, Default)]
-pub(super) struct Hinges {
-    pub(super) rows: Vec<f64>,
-    pub(super) limit: Vec<f64>,
-    pub(super) weight: Vec<f64>,
+pub(crate) struct Hinges {
+    pub(crate) rows: Vec<f64>,
+    pub(crate) limit: Vec<f64>,
+    pub(crate) weight: Vec<f64>,
 }
 
 /// Rows that must be met, one after the other: `equal.w = equal_to`, `below.w <= limit`.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct HardRows<'a> {
-    pub(super) equal: &'a [f64],
-    pub(super) equal_to: &'a [f64],
-    pub(super) below: &'a [f64],
-    pub(super) limit: &'a [f64],
+pub(crate) struct HardRows<'a> {
+    pub(crate) equal: &'a [f64],
+    pub(crate) equal_to: &'a [f64],
+    pub(crate) below: &'a [f64],
+    pub(crate) limit: &'a [f64],
 }
 
 /// The whole program.
 #[derive(Debug)]
-pub(super) struct ConeProgram<'a> {
-    pub(super) linear: &'a [f64],
-    pub(super) l1: f64,
-    pub(super) l2: f64,
-    pub(super) norm: Norm,
+pub(crate) struct ConeProgram<'a> {
+    pub(crate) linear: &'a [f64],
+    pub(crate) l1: f64,
+    pub(crate) l2: f64,
+    pub(crate) norm: Norm,
     /// Half the curvature of `B`, and its rows, one after the other.
-    pub(super) quadratic: f64,
-    pub(super) behind: &'a [f64],
+    pub(crate) quadratic: f64,
+    pub(crate) behind: &'a [f64],
     /// `B'B`, column by column.
-    pub(super) gram: &'a [f64],
+    pub(crate) gram: &'a [f64],
     /// Least and largest value of each weight.
-    pub(super) bounds: Vec<[f64; 2]>,
-    pub(super) hinges: &'a Hinges,
-    pub(super) hard: HardRows<'a>,
+    pub(crate) bounds: Vec<[f64; 2]>,
+    pub(crate) hinges: &'a Hinges,
+    pub(crate) hard: HardRows<'a>,
 }
 
 /// What the solver found; whether it is the optimum, the caller finds out.
 #[derive(Debug)]
-pub(super) struct Answer {
-    pub(super) weights: Vec<f64>,
+pub(crate) struct Answer {
+    pub(crate) weights: Vec<f64>,
     /// One multiplier a hinge, between 0 and its weight.
-    pub(super) multipliers: Vec<f64>,
+    pub(crate) multipliers: Vec<f64>,
     /// One multiplier a hard row; those of inequalities at least 0.
-    pub(super) equality: Vec<f64>,
-    pub(super) inequality: Vec<f64>,
+    pub(crate) equality: Vec<f64>,
+    pub(crate) inequality: Vec<f64>,
     /// The slope that stands for `l2 |w|_2` in the dual, no longer than `l2`; zeros without that term.
-    pub(super) pull: Vec<f64>,
+    pub(crate) pull: Vec<f64>,
 }
 
 /// Coefficients below this do not move a potential by more than its rounding.
@@ -97,7 +97,7 @@ impl Columns {
 
 impl ConeProgram<'_> {
     /// Solves the program to a relative gap of about `tolerance`, all costs times `scale` (so that they are about 1).
-    pub(super) fn solve(&self, scale: f64, tolerance: f64, stop: Stop<'_>) -> Result<Answer> {
+    pub(crate) fn solve(&self, scale: f64, tolerance: f64, stop: Stop<'_>) -> Result<Answer> {
         let n = self.linear.len();
         let (m, k) = (self.hinges.limit.len(), self.behind.len() / n.max(1));
         let quadratic = self.quadratic * scale;

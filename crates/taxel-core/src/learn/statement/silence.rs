@@ -4,7 +4,7 @@
 //! recovering threshold is found exactly; intervals are split at inputs, targets, edges of refractory times and where a taper
 //! begins. A bound that costs no exponential passes over nearly all of them. On the grid it is a comparison a point.
 
-use super::statement::{AT_TARGET, Row, Sheet, Statement};
+use super::rows::{AT_TARGET, Row, Sheet, Statement};
 use crate::neuron::{AfterSpike, FirstThreshold, Neuron, Shape, State, Step, Time, peak};
 
 /// How long before a rise of the threshold silence is asked for at the lower one, ms: the simulator's edge has some width.
@@ -12,16 +12,16 @@ const BEFORE_RISE: f64 = 2e-9;
 
 /// The worst instant of a stretch in which silence is broken.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Peak {
-    pub(super) pattern: usize,
+pub(crate) struct Peak {
+    pub(crate) pattern: usize,
     /// ms.
-    pub(super) t: f64,
+    pub(crate) t: f64,
     /// Potential less threshold plus the share of the margin, mV.
-    pub(super) excess: f64,
+    pub(crate) excess: f64,
 }
 
 impl Peak {
-    pub(super) fn row(&self) -> Row {
+    pub(crate) fn row(&self) -> Row {
         Row::Silence { pattern: self.pattern, t: self.t }
     }
 }
@@ -65,7 +65,7 @@ struct Strip {
 
 /// All silent times of a problem, laid out for sweeping.
 #[derive(Debug, Clone)]
-pub(super) struct Silence {
+pub(crate) struct Silence {
     shape: Shape,
     tau_rec: f64,
     grid: bool,
@@ -73,7 +73,7 @@ pub(super) struct Silence {
 }
 
 impl Silence {
-    pub(super) fn new(statement: &Statement) -> Self {
+    pub(crate) fn new(statement: &Statement) -> Self {
         let grid = statement.neuron.time == Time::Grid;
         let strips = statement.sheets.iter().map(|sheet| strip(statement, sheet)).collect();
         Self { shape: statement.shape, tau_rec: statement.neuron.tau_rec(), grid, strips }
@@ -81,7 +81,7 @@ impl Silence {
 
     /// Finds the worst instant of each stretch in which potential, with this share of the margin, exceeds the threshold by
     /// more than `tolerance`.
-    pub(super) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
+    pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
         let mut found = Vec::new();
         let one = self.shape.input();
         for (pattern, strip) in self.strips.iter().enumerate() {

@@ -3,9 +3,9 @@
 //! The thesis names as CONE's limit that it cannot learn on line, and suggests such a window. Rows of a pattern are laid out
 //! once, when it comes; the objective is that of a fit to the whole window from nothing, to the same proven gap.
 
-use super::check_example;
-use super::cone_r::{ConeR, Fit, Problem, Round, Shares};
 use crate::allowed::{Parameter, Range};
+use crate::learn::cone::cone_r::{ConeR, Fit, Problem, Round, Shares};
+use crate::learn::statement::check_example;
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 

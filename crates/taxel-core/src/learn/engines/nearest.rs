@@ -6,7 +6,7 @@ use crate::vectors::dot;
 use crate::{Result, Stop};
 
 /// The weights within the bounds that meet all rows and lie nearest to these; none where there are none, or on a stop.
-pub(super) fn nearest(
+pub(crate) fn nearest(
     weights: &[f64],
     rows: &HardRows<'_>,
     lower: &[f64],

@@ -14,17 +14,17 @@ const EDGE: f64 = 1e-9;
 
 /// A row that is kept whole: a target's, or the one behind it that B lifts.
 #[derive(Debug, Clone)]
-pub(super) struct TargetRow {
-    pub(super) pattern: usize,
-    pub(super) target: usize,
+pub(crate) struct TargetRow {
+    pub(crate) pattern: usize,
+    pub(crate) target: usize,
     /// When, ms.
-    pub(super) t: f64,
+    pub(crate) t: f64,
     /// The threshold at the target, mV.
-    pub(super) threshold: f64,
+    pub(crate) threshold: f64,
     /// Coefficients at the target, by train.
-    pub(super) at: Vec<f64>,
+    pub(crate) at: Vec<f64>,
     /// Coefficients `delta_t` later, as though the neuron had not fired at the target.
-    pub(super) behind: Vec<f64>,
+    pub(crate) behind: Vec<f64>,
 }
 
 /// An input as the grid sees it: what it adds to the state at the first grid point not before it.
@@ -61,7 +61,7 @@ struct Sheet {
 
 /// All silent rows: one a grid point that lies neither at a target nor in the refractory time behind it.
 #[derive(Debug, Clone)]
-pub(super) struct SilentRows {
+pub(crate) struct SilentRows {
     sheets: Vec<Sheet>,
     trains: usize,
     shape: Shape,
@@ -71,9 +71,9 @@ pub(super) struct SilentRows {
     /// Some rows of a grid written out, one after the other, in place of sheets.
     written: Option<Vec<f64>>,
     /// What the potential must not exceed, mV; infinite where nothing is asked.
-    pub(super) limit: Vec<f64>,
+    pub(crate) limit: Vec<f64>,
     /// The rows (by number) of each target's pattern that lie in the `near_ms` before it.
-    pub(super) before_targets: Vec<std::ops::Range<usize>>,
+    pub(crate) before_targets: Vec<std::ops::Range<usize>>,
 }
 
 /// The entries of `Step` for so many grid steps.
@@ -104,11 +104,11 @@ impl Steps {
 
 /// What a pattern's silent rows are laid out with.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Layout<'a> {
-    pub(super) neuron: &'a Neuron,
-    pub(super) horizon: Option<f64>,
-    pub(super) margin: f64,
-    pub(super) near_ms: f64,
+pub(crate) struct Layout<'a> {
+    pub(crate) neuron: &'a Neuron,
+    pub(crate) horizon: Option<f64>,
+    pub(crate) margin: f64,
+    pub(crate) near_ms: f64,
 }
 
 /// The last target before `t`, or none.
@@ -123,7 +123,7 @@ fn threshold(neuron: &Neuron, start: f64, targets: &[f64], t: f64) -> f64 {
     neuron.threshold(last_before(targets, t).or(printed).map(|spike| t - spike))
 }
 
-pub(super) fn target_rows(
+pub(crate) fn target_rows(
     neuron: &Neuron,
     delta_t: f64,
     patterns: &[SpikeTrains],
@@ -172,7 +172,7 @@ fn lost(neuron: &Neuron, targets: &[f64], s: f64, t: f64) -> bool {
 
 impl SilentRows {
     /// Lays the grid over each pattern, from its start to its stop, or one `tau` past its last target, or `horizon`.
-    pub(super) fn new(
+    pub(crate) fn new(
         layout: Layout<'_>,
         patterns: &[SpikeTrains],
         targets: &[Vec<f64>],
@@ -197,7 +197,7 @@ impl SilentRows {
     }
 
     /// Adds the rows of one more pattern; where the caller stops it, they are as before.
-    pub(super) fn push(
+    pub(crate) fn push(
         &mut self,
         layout: Layout<'_>,
         pattern: &SpikeTrains,
@@ -258,7 +258,7 @@ impl SilentRows {
     }
 
     /// Takes the rows of the first pattern away; the others are numbered anew from 0.
-    pub(super) fn drop_first(&mut self) {
+    pub(crate) fn drop_first(&mut self) {
         let gone = self.sheets.remove(0);
         self.limit.drain(..gone.points);
         self.before_targets.drain(..gone.targets);
@@ -269,7 +269,7 @@ impl SilentRows {
     }
 
     /// The named rows (ascending) alone, written out.
-    pub(super) fn written_out(&self, rows: &[usize]) -> Self {
+    pub(crate) fn written_out(&self, rows: &[usize]) -> Self {
         Self {
             sheets: vec![],
             steps: self.steps.clone(),
@@ -281,7 +281,7 @@ impl SilentRows {
     }
 
     /// How many rows, those at which nothing is asked included.
-    pub(super) fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.limit.len()
     }
 
@@ -295,7 +295,7 @@ impl SilentRows {
     }
 
     /// The potential on every row, mV.
-    pub(super) fn potential(&self, weights: &[f64], out: &mut Vec<f64>) {
+    pub(crate) fn potential(&self, weights: &[f64], out: &mut Vec<f64>) {
         out.clear();
         out.resize(self.len(), 0.0);
         if weights.iter().all(|&w| w == 0.0) {
@@ -334,7 +334,7 @@ impl SilentRows {
     }
 
     /// Adds the sum of all rows, each times its factor, to `sum` (one entry a train): the adjoint of `potential`.
-    pub(super) fn add_sum(&self, factors: &[f64], sum: &mut [f64]) {
+    pub(crate) fn add_sum(&self, factors: &[f64], sum: &mut [f64]) {
         if let Some(written) = &self.written {
             let rows = factors.iter().zip(written.chunks_exact(self.trains));
             return rows.for_each(|(&factor, row)| add(sum, factor, row));
@@ -374,7 +374,7 @@ impl SilentRows {
     }
 
     /// The coefficients of the named rows (ascending), row after row.
-    pub(super) fn coefficients(&self, rows: &[usize]) -> Vec<f64> {
+    pub(crate) fn coefficients(&self, rows: &[usize]) -> Vec<f64> {
         let n = self.trains;
         if let Some(written) = &self.written {
             return rows.iter().flat_map(|row| &written[row * n..(row + 1) * n]).copied().collect();

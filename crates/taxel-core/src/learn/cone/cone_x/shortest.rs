@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 
 use super::{Certificate, MOST_ROUNDS, Problem, Round, Slopes};
-use crate::learn::dual_active_set::{DualActiveSet, Multipliers, RowId, Verdict};
-use crate::learn::silence::Peak;
+use crate::learn::engines::{DualActiveSet, Multipliers, RowId, Verdict};
+use crate::learn::statement::Peak;
 use crate::learn::statement::{Row, Statement};
 use crate::{Result, Stop, problem};
 

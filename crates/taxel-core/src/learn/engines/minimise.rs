@@ -1,20 +1,20 @@
 //! The least 6.14: by the engine of this house, and by the cone solver where that one's check fails.
 
 use super::augmented::{Start, relative};
-use super::cone_r::{Engine, Objective, Parts, Problem, Round};
 use super::rounds::Rounds;
+use crate::learn::cone::cone_r::{Engine, Objective, Parts, Problem, Round};
 use crate::{Result, Stop};
 
 /// What was found, and who proved it.
-pub(super) struct Found {
-    pub(super) weights: Vec<f64>,
-    pub(super) objective: f64,
-    pub(super) parts: Parts,
-    pub(super) gap: f64,
-    pub(super) rounds: usize,
-    pub(super) rows: usize,
-    pub(super) engine: Engine,
-    pub(super) shares: Vec<f64>,
+pub(crate) struct Found {
+    pub(crate) weights: Vec<f64>,
+    pub(crate) objective: f64,
+    pub(crate) parts: Parts,
+    pub(crate) gap: f64,
+    pub(crate) rounds: usize,
+    pub(crate) rows: usize,
+    pub(crate) engine: Engine,
+    pub(crate) shares: Vec<f64>,
 }
 
 impl Problem {
@@ -25,7 +25,7 @@ impl Problem {
     /// # Errors
     ///
     /// `Problem` where the cone solver finds no answer.
-    pub(super) fn minimise(
+    pub(crate) fn minimise(
         &self,
         objective: &Objective,
         tolerance: f64,

@@ -1,9 +1,9 @@
 //! The last step of CONE-R: onto the targets that the optimum meets, off the silent rows that it touches.
 
 use super::cone_program::HardRows;
-use super::cone_r::{Objective, Problem};
 use super::minimise::Found;
 use super::nearest::nearest;
+use crate::learn::cone::cone_r::{Objective, Problem};
 use crate::{Result, Stop};
 
 /// A row counts as met by the optimum where its multiplier lies so far within its range (of 1) and it is missed by no more
@@ -22,7 +22,7 @@ impl Problem {
     ///
     /// At the optimum a target whose multiplier lies within its range is met exactly, and so is a silent row; a silent row
     /// is kept a hair below its limit. Taken back where the objective would leave the tolerance.
-    pub(super) fn meet(&self, objective: &Objective, tolerance: f64, found: &mut Found, stop: Stop<'_>) -> Result<()> {
+    pub(crate) fn meet(&self, objective: &Objective, tolerance: f64, found: &mut Found, stop: Stop<'_>) -> Result<()> {
         let (silent, theta) = (self.silent.len(), self.base.neuron.theta_0);
         if found.gap > tolerance || found.shares.len() != silent + self.targets.len() {
             return Ok(());

@@ -13,11 +13,11 @@ mod tests;
 
 use dense::{add_sum, times};
 
-use super::certificate::Bounds;
 use super::cone_program::{ConeProgram, HardRows, Hinges};
-use super::cone_r::Norm;
-use super::cone_x::NOTHING;
 use super::nearest::nearest;
+use crate::learn::cone::cone_r::Norm;
+use crate::learn::cone::cone_x::NOTHING;
+use crate::learn::statement::Bounds;
 use crate::vectors::dot;
 use crate::{Error, Result, Stop};
 use interior::{Interior, State};
@@ -30,19 +30,19 @@ const TRIES: [f64; 3] = [1e-6, 1e-9, 1e-12];
 
 /// The terms of the objective, weighted and normalised.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Terms<'a> {
-    pub(super) l1: f64,
-    pub(super) l2: f64,
-    pub(super) norm: Norm,
+pub(crate) struct Terms<'a> {
+    pub(crate) l1: f64,
+    pub(crate) l2: f64,
+    pub(crate) norm: Norm,
     /// The factor of B, its rows one after the other, and what they should reach.
-    pub(super) lift: f64,
-    pub(super) behind: &'a [f64],
-    pub(super) wanted: &'a [f64],
+    pub(crate) lift: f64,
+    pub(crate) behind: &'a [f64],
+    pub(crate) wanted: &'a [f64],
 }
 
 /// What solved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Engine {
+pub(crate) enum Engine {
     /// The interior point of this module.
     Native,
     /// Clarabel, as that one did not close the gap.
@@ -51,7 +51,7 @@ pub(super) enum Engine {
 
 /// Where a later call with more rows can go on.
 #[derive(Debug, Clone)]
-pub(super) struct Start {
+pub(crate) struct Start {
     state: State,
     /// The last polished point, in the program's units, and what binds there.
     exact: Option<(Point, Guess)>,
@@ -59,7 +59,7 @@ pub(super) struct Start {
 
 impl Start {
     /// Forgets inequality rows, as the caller does; those added later than the call come last.
-    pub(super) fn retain(&mut self, keep: &[bool]) {
+    pub(crate) fn retain(&mut self, keep: &[bool]) {
         self.state.retain(keep);
         if let Some((point, guess)) = &mut self.exact {
             retain(&mut point.inequality, keep);
@@ -70,24 +70,24 @@ impl Start {
 
 /// What was found.
 #[derive(Debug, Clone)]
-pub(super) struct Found {
-    pub(super) weights: Vec<f64>,
+pub(crate) struct Found {
+    pub(crate) weights: Vec<f64>,
     /// Multipliers of the inequality rows, at least 0.
-    pub(super) inequality: Vec<f64>,
+    pub(crate) inequality: Vec<f64>,
     /// The least objective over these rows is no lower, hence over these and more.
-    pub(super) bound: f64,
-    pub(super) engine: Engine,
-    pub(super) stopped: bool,
-    pub(super) start: Start,
+    pub(crate) bound: f64,
+    pub(crate) engine: Engine,
+    pub(crate) stopped: bool,
+    pub(crate) start: Start,
 }
 
 /// Weights and multipliers; `pull` stands for the slope of `l2 |w|_2`, no longer than `l2`.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Point {
-    pub(super) weights: Vec<f64>,
-    pub(super) equality: Vec<f64>,
-    pub(super) inequality: Vec<f64>,
-    pub(super) pull: Vec<f64>,
+pub(crate) struct Point {
+    pub(crate) weights: Vec<f64>,
+    pub(crate) equality: Vec<f64>,
+    pub(crate) inequality: Vec<f64>,
+    pub(crate) pull: Vec<f64>,
 }
 
 /// Minimises the objective over these rows and bounds.
@@ -100,7 +100,7 @@ pub(super) struct Point {
 /// # Errors
 ///
 /// `Problem` where Clarabel, asked as a last resort, refuses the problem.
-pub(super) fn minimise(
+pub(crate) fn minimise(
     terms: &Terms<'_>,
     rows: &HardRows<'_>,
     bounds: &Bounds,

@@ -1,22 +1,22 @@
 //! 6.14 at given weights, and a bound from below on the least it can be.
 
-use super::cone_r::{Norm, Objective, Parts, Problem};
+use crate::learn::cone::cone_r::{Norm, Objective, Parts, Problem};
 use crate::vectors::{add, dot};
 
 /// Weights, and where they bring the potential.
 #[derive(Debug, Clone)]
-pub(super) struct Point {
-    pub(super) weights: Vec<f64>,
+pub(crate) struct Point {
+    pub(crate) weights: Vec<f64>,
     /// Potential less limit on the silent rows, then potential less threshold at the targets, mV.
-    pub(super) excess: Vec<f64>,
+    pub(crate) excess: Vec<f64>,
     /// Potential less `kappa` thresholds behind the targets, mV.
-    pub(super) behind: Vec<f64>,
-    pub(super) parts: Parts,
+    pub(crate) behind: Vec<f64>,
+    pub(crate) parts: Parts,
 }
 
 impl Problem {
     /// 6.14 at these weights.
-    pub(super) fn point(&self, objective: &Objective, weights: Vec<f64>) -> Point {
+    pub(crate) fn point(&self, objective: &Objective, weights: Vec<f64>) -> Point {
         let mut excess = Vec::with_capacity(self.silent.len() + self.targets.len());
         self.silent.potential(&weights, &mut excess);
         excess.iter_mut().zip(&self.silent.limit).for_each(|(u, limit)| *u -= limit);
@@ -41,7 +41,7 @@ impl Problem {
     /// multipliers between 0 and D's weight, targets by multipliers between minus and plus C's, the norm by a `pull` no
     /// longer than its factor, a square by its slope. What is left is linear and l1 over the box, and has its least value
     /// synapse by synapse. So the bound holds whoever found the multipliers, and however.
-    pub(super) fn bound(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> f64 {
+    pub(crate) fn bound(&self, objective: &Objective, at: &Tangents<'_>, most: f64) -> f64 {
         let reach = objective.reach(most);
         let silent = self.silent.len();
         let mut gradient = vec![0.0; self.trains];
@@ -78,10 +78,10 @@ impl Problem {
 }
 
 /// Where 6.14 is touched from below: weights, what they do to the rows, a multiplier a row, and the pull of the norm.
-pub(super) struct Tangents<'a> {
-    pub(super) weights: &'a [f64],
-    pub(super) excess: &'a [f64],
-    pub(super) behind: &'a [f64],
-    pub(super) multipliers: &'a [f64],
-    pub(super) pull: &'a [f64],
+pub(crate) struct Tangents<'a> {
+    pub(crate) weights: &'a [f64],
+    pub(crate) excess: &'a [f64],
+    pub(crate) behind: &'a [f64],
+    pub(crate) multipliers: &'a [f64],
+    pub(crate) pull: &'a [f64],
 }

@@ -6,7 +6,7 @@
 //! c moves there, and as c comes to rest the multipliers become those of B alone (Rockafellar 1976, SIAM J. Control 14:877).
 
 use super::{Best, Point, Program, dot, power_of_2};
-use crate::learn::dual_active_set::{DualActiveSet, Verdict};
+use crate::learn::engines::{DualActiveSet, Verdict};
 use crate::{Result, Stop};
 
 const MOST_STEPS: usize = 30;

@@ -11,10 +11,10 @@ use faer::linalg::cholesky::llt::solve::solve_in_place;
 use faer::linalg::matmul::triangular::{BlockStructure, matmul};
 use faer::{Accum, MatMut, MatRef, Par};
 
-use super::cone_r::{Norm, Objective, Problem};
-use super::point::{Point, Tangents};
 use super::rounds::Rounds;
 use crate::Stop;
+use crate::learn::cone::cone_r::{Norm, Objective, Problem};
+use crate::learn::statement::{Point, Tangents};
 use crate::vectors::{add, dot};
 
 /// At first a target's kink is rounded over so many thresholds (all of them, seen from no weights), one of silence over so many.
@@ -38,9 +38,9 @@ const EXACT: f64 = 1e-3;
 
 /// Where to begin: weights of a similar fit, and its multipliers as shares of their range.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Start {
-    pub(super) weights: Option<Vec<f64>>,
-    pub(super) shares: Option<Vec<f64>>,
+pub(crate) struct Start {
+    pub(crate) weights: Option<Vec<f64>>,
+    pub(crate) shares: Option<Vec<f64>>,
 }
 
 struct Engine<'a> {
@@ -85,7 +85,7 @@ struct Passing {
 
 impl Problem {
     /// Minimises 6.14 (scaled so that it is about 1) until its relative gap is `tolerance`, or no further progress is made.
-    pub(super) fn augmented(
+    pub(crate) fn augmented(
         &self,
         objective: &Objective,
         tolerance: f64,
@@ -147,7 +147,7 @@ impl Problem {
 }
 
 /// The share of the objective that is not proven; none where everything is met, all where it is no number.
-pub(super) fn relative(best: &Point, bound: f64) -> f64 {
+pub(crate) fn relative(best: &Point, bound: f64) -> f64 {
     match best.parts.sum() {
         least if least <= NOTHING => 0.0,
         least if least.is_finite() => (least - bound).max(0.0) / least,
@@ -156,7 +156,7 @@ pub(super) fn relative(best: &Point, bound: f64) -> f64 {
 }
 
 /// An objective below this share of that of no weights at all is 0: everything is met.
-pub(super) const NOTHING: f64 = 1e-10;
+pub(crate) const NOTHING: f64 = 1e-10;
 
 impl<'a> Engine<'a> {
     fn new(problem: &'a Problem, objective: &'a Objective, start: Start, zero: &Point) -> Self {

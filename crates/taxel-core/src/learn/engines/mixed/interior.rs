@@ -9,7 +9,7 @@ use super::dense::{Cholesky, add_gram, add_sum, outer, times};
 use super::polish::Guess;
 use super::{Place, Point, Program, retain};
 use crate::Stop;
-use crate::learn::cone_r::Norm;
+use crate::learn::cone::cone_r::Norm;
 use crate::vectors::dot;
 use faer::Mat;
 

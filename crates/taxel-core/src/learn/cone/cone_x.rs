@@ -10,13 +10,13 @@ mod shortest;
 
 use serde::{Deserialize, Serialize};
 
-use super::bounds::{Bound, bounds_of, check_bounds};
-use super::certificate::{Bounds, Certificate};
 use super::cone_r::{Divisor, Norm};
-use super::silence::{Peak, Silence};
-use super::statement::{Margin, Row, Stated, Statement};
-use super::{check_examples, check_some_target};
 use crate::allowed::{Numbers, Range, ranges};
+use crate::learn::statement::{Bound, bounds_of, check_bounds};
+use crate::learn::statement::{Bounds, Certificate};
+use crate::learn::statement::{Margin, Row, Stated, Statement};
+use crate::learn::statement::{Peak, Silence};
+use crate::learn::statement::{check_examples, check_some_target};
 use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
 use crate::vectors::dot;
@@ -37,7 +37,7 @@ const SMALLER: f64 = 0.1;
 const LEAST_SHARE: f64 = 1e-3;
 const LEAST_MARGIN: f64 = 0.99e-6;
 /// An objective that is known to this share of what B is of no weights at all is known: every lift may be reached.
-pub(super) const NOTHING: f64 = 1e-10;
+pub(crate) const NOTHING: f64 = 1e-10;
 /// Rounds end without a verdict after so many.
 const MOST_ROUNDS: usize = 1000;
 

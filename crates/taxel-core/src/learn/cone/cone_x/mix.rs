@@ -3,11 +3,11 @@
 use std::collections::HashSet;
 
 use super::{Best, Engine, MET, MOST_ROUNDS, Problem, Round, Slopes};
-use crate::learn::certificate::Bounds;
-use crate::learn::cone_program::HardRows;
-use crate::learn::mixed::{self, Terms};
-use crate::learn::nearest::nearest;
-use crate::learn::silence::Peak;
+use crate::learn::engines::HardRows;
+use crate::learn::engines::mixed::{self, Terms};
+use crate::learn::engines::nearest;
+use crate::learn::statement::Bounds;
+use crate::learn::statement::Peak;
 use crate::learn::statement::Row;
 use crate::vectors::dot;
 use crate::{Result, Stop};

@@ -8,7 +8,7 @@ use faer::Mat;
 use super::dense::{Lu, add_gram, add_sum, times};
 use super::{Place, Point, Program};
 use crate::Stop;
-use crate::learn::cone_r::Norm;
+use crate::learn::cone::cone_r::Norm;
 use crate::vectors::dot;
 
 const MOST_GUESSES: usize = 12;

@@ -8,13 +8,13 @@
 
 use super::augmented::relative;
 use super::cone_program::{ConeProgram, HardRows, Hinges};
-use super::cone_r::{Norm, Objective, Problem};
-use super::point::{Point, Tangents};
+use crate::learn::cone::cone_r::{Norm, Objective, Problem};
+use crate::learn::statement::{Point, Tangents};
 use crate::vectors::add;
 use crate::{Error, Result, Stop};
 
 /// Rows of the first program: targets and every 4th ms of the 60 ms before them, of so many targets that it stays small.
-pub(super) const START_NEAR_MS: f64 = 60.0;
+pub(crate) const START_NEAR_MS: f64 = 60.0;
 const START_STRIDE_MS: f64 = 4.0;
 const START_ROWS: usize = 500;
 /// Rows of any later one.
@@ -28,14 +28,14 @@ const STALLED: f64 = 1e-10;
 const MOST_ROUNDS: usize = 500;
 
 /// What the rounds came to, whether proven or not.
-pub(super) struct Rounds {
-    pub(super) best: Point,
-    pub(super) bound: f64,
-    pub(super) rounds: usize,
-    pub(super) rows: usize,
+pub(crate) struct Rounds {
+    pub(crate) best: Point,
+    pub(crate) bound: f64,
+    pub(crate) rounds: usize,
+    pub(crate) rows: usize,
     /// A multiplier a row, as shares: of D's weight from 0 to 1, of twice C's from -1/2 to 1/2.
-    pub(super) shares: Vec<f64>,
-    pub(super) stopped: bool,
+    pub(crate) shares: Vec<f64>,
+    pub(crate) stopped: bool,
 }
 
 /// The state of a hinge.
@@ -61,7 +61,7 @@ impl Problem {
     /// # Errors
     ///
     /// `Problem` where the cone solver finds no answer.
-    pub(super) fn by_rounds(
+    pub(crate) fn by_rounds(
         &self,
         objective: &Objective,
         tolerance: f64,

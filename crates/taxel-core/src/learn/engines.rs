@@ -1,0 +1,16 @@
+//! What minimises over rows that it is handed, whatever they mean.
+
+mod augmented;
+mod cone_program;
+mod dual_active_set;
+mod minimise;
+pub(crate) mod mixed;
+mod nearest;
+mod rounds;
+mod touched;
+
+pub(crate) use augmented::Start;
+pub(crate) use cone_program::HardRows;
+pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
+pub(crate) use nearest::nearest;
+pub(crate) use rounds::START_NEAR_MS;

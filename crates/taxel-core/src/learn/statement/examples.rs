@@ -1,0 +1,106 @@
+//! Checks of what learners are given.
+
+use crate::neuron::Neuron;
+use crate::{Result, SpikeTrains, problem};
+
+/// Checks what every learner is given: one list of targets (ms, ascending) a pattern, the same trains in each pattern.
+///
+/// # Errors
+///
+/// `Problem`, naming pattern and target.
+pub(crate) fn check_examples(neuron: &Neuron, patterns: &[SpikeTrains], targets: &[Vec<f64>]) -> Result<()> {
+    if patterns.is_empty() {
+        return Err(problem!("patterns: there is none, at least one is needed"));
+    }
+    if patterns.len() != targets.len() {
+        return Err(problem!(
+            "targets: {} lists for {} patterns, must be one a pattern (an empty one teaches silence)",
+            targets.len(),
+            patterns.len()
+        ));
+    }
+    for (p, (pattern, targets)) in patterns.iter().zip(targets).enumerate() {
+        check_example(neuron, p, pattern, targets)?;
+        check_trains(p, pattern, patterns[0].len())?;
+    }
+    Ok(())
+}
+
+/// Checks that there is a target in some pattern, for learners that learn nothing from silence alone.
+pub(crate) fn check_some_target(targets: &[Vec<f64>]) -> Result<()> {
+    if targets.iter().all(Vec::is_empty) {
+        return Err(problem!("targets: no pattern has one, so nothing is to be learnt"));
+    }
+    Ok(())
+}
+
+/// Checks one pattern, number `p`, and its targets.
+pub(crate) fn check_example(neuron: &Neuron, p: usize, pattern: &SpikeTrains, targets: &[f64]) -> Result<()> {
+    check_pattern(p, pattern)?;
+    if pattern.times.is_empty() && !targets.is_empty() {
+        return Err(problem!("pattern {p}: has no spike, so no weight can matter at its target"));
+    }
+    for (k, &t) in targets.iter().enumerate() {
+        if !t.is_finite() {
+            return Err(problem!("pattern {p}, target {k}: time is {t}, must be finite"));
+        }
+        if t < pattern.start || t > pattern.stop {
+            return Err(problem!(
+                "pattern {p}, target {k}: {t} ms lies outside the pattern's window {} to {} ms",
+                pattern.start,
+                pattern.stop
+            ));
+        }
+        if k == 0 {
+            continue;
+        }
+        let since = t - targets[k - 1];
+        if since <= 0.0 {
+            return Err(problem!(
+                "pattern {p}, target {k}: {t} ms comes after {} ms, targets must ascend",
+                targets[k - 1]
+            ));
+        }
+        if since <= neuron.refractory {
+            return Err(problem!(
+                "pattern {p}, target {k} ({t} ms): {since} ms after target {}, inside the refractory {} ms",
+                k - 1,
+                neuron.refractory
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// Checks one pattern to learn from, number `p`.
+pub(crate) fn check_pattern(p: usize, pattern: &SpikeTrains) -> Result<()> {
+    pattern.check().map_err(|e| problem!("pattern {p}: {e}"))?;
+    if pattern.is_empty() {
+        return Err(problem!("pattern {p}: has no train"));
+    }
+    if pattern.values.is_some() {
+        return Err(problem!("pattern {p}: spikes are signed, split them into ON and OFF trains first"));
+    }
+    Ok(())
+}
+
+/// Checks a pattern that is only heard.
+pub(crate) fn check_heard(pattern: &SpikeTrains) -> Result<()> {
+    pattern.check()?;
+    if pattern.values.is_some() {
+        return Err(problem!("pattern: spikes are signed, split them into ON and OFF trains first"));
+    }
+    if pattern.is_empty() {
+        return Err(problem!("pattern: has no train"));
+    }
+    Ok(())
+}
+
+/// Checks that a pattern has the trains that pattern 0 has.
+pub(crate) fn check_trains(p: usize, pattern: &SpikeTrains, trains: usize) -> Result<()> {
+    if pattern.len() == trains {
+        Ok(())
+    } else {
+        Err(problem!("pattern {p}: {} trains, pattern 0 has {trains}", pattern.len()))
+    }
+}

@@ -1,0 +1,378 @@
+//! The stated problem 6.9: what each row of it asks of the weights, named by pattern and time, written out when asked.
+//!
+//! A *row* holds the coefficients of the weights in one linear function of them (the potential at a time, or its slope), and
+//! what it must equal or not exceed. After a spike some inputs are lost (`after_spike`); as the spikes of a learning problem
+//! are its targets, everything stays linear. No table of all rows exists (7.7 GB at 4000 inputs): a row is summed up from the
+//! inputs before it.
+//!
+//! In continuous time silence keeps a *tapered margin* below the threshold: `height` mV, and from some time before a target on
+//! less and less, as the potential has to come up to the threshold there; behind it the neuron is free until the end of its
+//! refractory time, where silence begins at once. On the grid it is the printed set of points (6.9b), with one margin for all.
+
+use serde::{Deserialize, Serialize};
+
+use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Neuron, Shape, State, Time};
+use crate::{Result, SpikeTrains, problem};
+
+/// Rounding of a grid point on the very edge of a refractory time, ms.
+const EDGE: f64 = 1e-9;
+
+/// From so near a target on the target's row and its slope row stand for silence, ms; an input so near before it is at it and
+/// adds nothing there. A hair less than in the neuron, so that a crossing that is met to rounding falls on the same side.
+pub(crate) const AT_TARGET: f64 = 0.99 * AT_EDGE;
+
+/// The name of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Row {
+    /// The potential at a target equals the threshold (6.9a).
+    Target {
+        /// Which pattern.
+        pattern: usize,
+        /// Which of its targets.
+        target: usize,
+    },
+    /// The potential at a time stays below the threshold, less the margin (6.9b).
+    Silence {
+        /// Which pattern.
+        pattern: usize,
+        /// When, ms.
+        t: f64,
+    },
+    /// The potential comes up to a target from below: its slope exceeds the threshold's by that of the margin.
+    Slope {
+        /// Which pattern.
+        pattern: usize,
+        /// Which of its targets.
+        target: usize,
+    },
+}
+
+/// What a row says: `coefficients.w = limit` at a target, `<= limit` else.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Stated {
+    /// One a train: at a target and in silence those of the potential, in a slope row those of its slope, negated.
+    pub coefficients: Vec<f64>,
+    /// mV; mV/ms in a slope row.
+    pub limit: f64,
+}
+
+/// How far below the threshold silence stays.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Margin {
+    /// Away from targets, mV.
+    pub height: f64,
+    /// How steeply it falls to 0 at a target, hence how much more steeply than the threshold the potential rises there, mV/ms;
+    /// 0 on the grid, where nothing tapers.
+    pub slope: f64,
+}
+
+impl Margin {
+    /// This margin, times a factor.
+    #[must_use]
+    pub fn times(self, factor: f64) -> Self {
+        Self { height: factor * self.height, slope: factor * self.slope }
+    }
+}
+
+/// The taper: in the kernel's own family, so that potential and margin together are one state.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Taper {
+    shape: Shape,
+    /// The state at the target, which is 0 there and falls with `slope`.
+    end: State,
+    /// Where it reaches `height`, ms before the target.
+    pub(crate) length: f64,
+}
+
+impl Taper {
+    fn new(shape: Shape, margin: Margin) -> Self {
+        if margin.slope == 0.0 {
+            return Self { shape, end: State::default(), length: 0.0 };
+        }
+        let end = State { a: -margin.slope / shape.slope(State { a: 1.0, b: 0.0 }), b: 0.0 };
+        // The family lies above its tangent, so its height is reached within height/slope.
+        let (mut low, mut high) = (0.0, margin.height / margin.slope);
+        loop {
+            let middle = f64::midpoint(low, high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            if shape.after(end, -middle).b < margin.height {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Self { shape, end, length: high }
+    }
+
+    /// The state `x` ms before the target; its potential is the margin there.
+    pub(crate) fn before(&self, x: f64) -> State {
+        self.shape.after(self.end, -x)
+    }
+}
+
+/// One pattern with its targets.
+#[derive(Debug, Clone)]
+pub(crate) struct Sheet {
+    pub(crate) start: f64,
+    /// Where silence is asked for to.
+    pub(crate) end: f64,
+    pub(crate) targets: Vec<f64>,
+    /// Time (ms) and train, by time.
+    pub(crate) inputs: Vec<(f64, u32)>,
+}
+
+impl Sheet {
+    /// The inputs before `t`, by time.
+    fn before(&self, t: f64) -> &[(f64, u32)] {
+        &self.inputs[..self.inputs.partition_point(|i| i.0 < t)]
+    }
+
+    /// The last target before `t`.
+    pub(crate) fn fired(&self, t: f64) -> Option<f64> {
+        last_before(&self.targets, t)
+    }
+
+    /// The first target at `t` or later.
+    pub(crate) fn next(&self, t: f64) -> Option<f64> {
+        self.targets.get(self.targets.partition_point(|&target| target < t)).copied()
+    }
+}
+
+fn last_before(targets: &[f64], t: f64) -> Option<f64> {
+    targets.partition_point(|&target| target < t).checked_sub(1).map(|k| targets[k])
+}
+
+/// The problem, ready to state any row.
+#[derive(Debug, Clone)]
+pub struct Statement {
+    pub(crate) neuron: Neuron,
+    pub(crate) shape: Shape,
+    pub(crate) margin: Margin,
+    /// What a potential of 1 in here is, mV.
+    pub(crate) unit: f64,
+    pub(crate) taper: Taper,
+    pub(crate) trains: usize,
+    pub(crate) sheets: Vec<Sheet>,
+}
+
+impl Statement {
+    /// Takes examples that have been checked, and where silence ends in each pattern, ms.
+    pub(crate) fn new(
+        neuron: &Neuron,
+        margin: Margin,
+        unit: f64,
+        patterns: &[SpikeTrains],
+        targets: &[Vec<f64>],
+        ends: &[f64],
+    ) -> Self {
+        let shape = neuron.shape();
+        let sheet = |((pattern, targets), &end): ((&SpikeTrains, &Vec<f64>), &f64)| Sheet {
+            start: pattern.start,
+            end,
+            targets: targets.clone(),
+            inputs: pattern.by_time().iter().map(|s| (s.t, s.train)).collect(),
+        };
+        Self {
+            neuron: neuron.clone(),
+            shape,
+            margin,
+            unit,
+            taper: Taper::new(shape, margin),
+            trains: patterns[0].len(),
+            sheets: patterns.iter().zip(targets).zip(ends).map(sheet).collect(),
+        }
+    }
+
+    /// The same with another margin.
+    pub(crate) fn with_margin(&self, margin: Margin) -> Self {
+        Self { margin, taper: Taper::new(self.shape, margin), ..self.clone() }
+    }
+
+    /// What the margin takes off a row's limit, mV (mV/ms in a slope row).
+    #[must_use]
+    pub fn margin_of(&self, row: Row) -> f64 {
+        match row {
+            Row::Target { .. } => 0.0,
+            Row::Slope { .. } => self.margin.slope,
+            Row::Silence { pattern, t } => self.sheets.get(pattern).map_or(0.0, |sheet| self.margin_at(sheet, t)),
+        }
+    }
+
+    /// All targets, as (pattern, target).
+    pub fn targets(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        self.sheets.iter().enumerate().flat_map(|(p, sheet)| (0..sheet.targets.len()).map(move |k| (p, k)))
+    }
+
+    /// When a row's time is, ms.
+    #[must_use]
+    pub fn time(&self, row: Row) -> f64 {
+        match row {
+            Row::Silence { t, .. } => t,
+            Row::Target { pattern, target } | Row::Slope { pattern, target } => self.sheets[pattern].targets[target],
+        }
+    }
+
+    /// Writes a row out.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the problem has no such row.
+    pub fn state(&self, row: Row) -> Result<Stated> {
+        let mut coefficients = vec![0.0; self.trains];
+        let limit = self.state_into(row, &mut coefficients)?;
+        Ok(Stated { coefficients, limit })
+    }
+
+    /// Writes a row out into `coefficients`, one a train; gives its limit.
+    pub(crate) fn state_into(&self, row: Row, coefficients: &mut [f64]) -> Result<f64> {
+        match row {
+            Row::Target { pattern, target } => {
+                let (sheet, t) = self.target(pattern, target)?;
+                let heard = self.heard_at(sheet, t);
+                self.sum(heard, t, &sheet.targets[..target], |state| state.b, coefficients);
+                Ok(self.threshold(sheet, t))
+            }
+            Row::Slope { pattern, target } => {
+                if self.neuron.time == Time::Grid {
+                    return Err(problem!(
+                        "pattern {pattern}, target {target}: a slope is asked for in continuous time only"
+                    ));
+                }
+                let (sheet, t) = self.target(pattern, target)?;
+                let (heard, slope) = (self.heard_at(sheet, t), |state| -self.shape.slope(state));
+                self.sum(heard, t, &sheet.targets[..target], slope, coefficients);
+                let falls = (self.threshold(sheet, t) - self.neuron.theta_0) / self.neuron.tau_rec();
+                Ok(falls - self.margin.slope)
+            }
+            Row::Silence { pattern, t } => {
+                let sheet = self.sheet(pattern)?;
+                self.check_silent(pattern, t)?;
+                let fired = sheet.targets.partition_point(|&target| target < t);
+                self.sum(sheet.before(t), t, &sheet.targets[..fired], |state| state.b, coefficients);
+                Ok(self.threshold(sheet, t) - self.margin_at(sheet, t))
+            }
+        }
+    }
+
+    /// What B(w) looks at (6.10): the coefficients `delta_t` ms behind a target, and the threshold at the target, mV.
+    ///
+    /// Inputs behind the target count: B asks where the potential would have come to, had the neuron not fired there.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the problem has no such target.
+    pub fn behind(&self, pattern: usize, target: usize, delta_t: f64) -> Result<Stated> {
+        let (sheet, t) = self.target(pattern, target)?;
+        let mut coefficients = vec![0.0; self.trains];
+        let t_behind = t + delta_t;
+        let earlier = &sheet.targets[..target];
+        self.sum(sheet.before(t_behind), t_behind, earlier, |state| state.b, &mut coefficients);
+        Ok(Stated { coefficients, limit: self.threshold(sheet, t) })
+    }
+
+    fn sheet(&self, pattern: usize) -> Result<&Sheet> {
+        let there = self.sheets.len();
+        self.sheets.get(pattern).ok_or_else(|| problem!("pattern {pattern}: there are {there}"))
+    }
+
+    fn target(&self, pattern: usize, target: usize) -> Result<(&Sheet, f64)> {
+        let sheet = self.sheet(pattern)?;
+        let there = sheet.targets.len();
+        match sheet.targets.get(target) {
+            Some(&t) => Ok((sheet, t)),
+            None => Err(problem!("pattern {pattern}, target {target}: the pattern has {there} targets")),
+        }
+    }
+
+    /// Checks that silence is asked for at this time.
+    fn check_silent(&self, pattern: usize, t: f64) -> Result<()> {
+        let sheet = self.sheet(pattern)?;
+        let Sheet { start, end, .. } = sheet;
+        if !(*start <= t && t <= *end) {
+            return Err(problem!("pattern {pattern}: {t} ms lies outside of what is asked for, {start} to {end} ms"));
+        }
+        if self.neuron.time == Time::Grid && !self.is_point(sheet, t) {
+            return Err(problem!(
+                "pattern {pattern}: {t} ms is no point of the grid, {start} + k {} ms",
+                self.neuron.step_ms
+            ));
+        }
+        if !self.is_silent(sheet, t) {
+            return Err(problem!(
+                "pattern {pattern}: {t} ms lies at a target or in its refractory time, nothing is asked there"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Whether silence is asked for at this time.
+    pub(crate) fn is_asked(&self, pattern: usize, t: f64) -> bool {
+        self.check_silent(pattern, t).is_ok()
+    }
+
+    /// Whether `t` is a point of the grid.
+    pub(crate) fn is_point(&self, sheet: &Sheet, t: f64) -> bool {
+        let step = self.neuron.step_ms;
+        t == sheet.start + ((t - sheet.start) / step).round() * step
+    }
+
+    /// Whether `t` lies neither at a target nor in the refractory time behind it.
+    pub(crate) fn is_silent(&self, sheet: &Sheet, t: f64) -> bool {
+        let free = sheet.fired(t).is_some_and(|target| match self.neuron.time {
+            Time::Grid => t <= target + self.neuron.refractory + EDGE,
+            Time::Continuous => t < target + self.neuron.refractory,
+        });
+        !free && sheet.next(t).is_none_or(|target| t <= target - AT_TARGET)
+    }
+
+    /// The threshold at `t`, the neuron having fired at the targets before, mV.
+    pub(crate) fn threshold(&self, sheet: &Sheet, t: f64) -> f64 {
+        self.neuron.theta_0 + self.rise(sheet, t, t)
+    }
+
+    /// What is left at `t` of the threshold's rise, the neuron having fired at the targets before `to`, mV.
+    pub(crate) fn rise(&self, sheet: &Sheet, t: f64, to: f64) -> f64 {
+        let printed = (self.neuron.first_threshold == FirstThreshold::Printed).then_some(sheet.start);
+        self.neuron.rise(sheet.fired(to).or(printed).map(|spike| t - spike))
+    }
+
+    /// The margin at `t`, mV.
+    pub(crate) fn margin_at(&self, sheet: &Sheet, t: f64) -> f64 {
+        match sheet.next(t) {
+            Some(target) if target - t <= self.taper.length => self.taper.before(target - t).b,
+            _ => self.margin.height,
+        }
+    }
+
+    /// The inputs that count at a target, by time.
+    fn heard_at<'a>(&self, sheet: &'a Sheet, target: f64) -> &'a [(f64, u32)] {
+        match self.neuron.time {
+            Time::Grid => sheet.before(target),
+            Time::Continuous => sheet.before(target - AT_TARGET),
+        }
+    }
+
+    /// Adds up, by train, what `part` sees at `t` of inputs before, the neuron having fired at `earlier` targets only.
+    fn sum(&self, inputs: &[(f64, u32)], t: f64, earlier: &[f64], part: impl Fn(State) -> f64, out: &mut [f64]) {
+        out.fill(0.0);
+        let neuron = &self.neuron;
+        let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
+        let last = last_before(earlier, t);
+        let (mut at, mut one) = (f64::NAN, 0.0);
+        for &(s, train) in &inputs[from..] {
+            // Many inputs share a time where times are whole ms: an exponential a time, not an input.
+            if s != at {
+                at = s;
+                let lost = match neuron.after_spike {
+                    AfterSpike::Keep => false,
+                    AfterSpike::Ignore => neuron.loses(s, last_before(earlier, s)),
+                    AfterSpike::Reset => neuron.loses(s, last),
+                };
+                one = if lost { 0.0 } else { part(self.shape.after(self.shape.input(), t - s)) };
+            }
+            out[train as usize] += one;
+        }
+    }
+}
