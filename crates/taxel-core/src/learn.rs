@@ -3,13 +3,15 @@
 //! `statement` says once what the thesis' equations 6.9 to 6.14 ask of the weights; `engines` minimise over rows that they are
 //! handed; `cone` holds the learners CONE-X and CONE-R, `online` the window that slides; `rivals` the rules of others.
 
-pub mod cone;
+mod cone;
 mod engines;
+mod fit;
 mod online;
 pub mod rivals;
-pub mod statement;
+mod statement;
 
-pub use cone::{ConeR, ConeX};
+pub use cone::{ConeR, ConeRFit, ConeRProblem, ConeX, ConeXFit, ConeXProblem, Horizon, Shares};
 pub use engines::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
+pub use fit::{Engine, Fit, Left, Round, Status};
 pub use online::OnlineConeR;
-pub use statement::Bound;
+pub use statement::{Bound, Bounds, Certificate, Divisor, Margin, Norm, Parts, Row, Stated};

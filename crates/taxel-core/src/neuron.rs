@@ -15,7 +15,7 @@ mod threshold;
 
 pub(crate) use crossing::peak;
 pub use kernel::{Kernel, Shape, State, Step};
-pub(crate) use model::AT_EDGE;
+pub(crate) use model::{AT_EDGE, ROUNDING_MS};
 pub use model::{AfterSpike, FirstThreshold, Neuron, Time};
 pub use population::Weight;
 pub use streaming::NeuronStream;

@@ -2,9 +2,7 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::learn::ConeX;
-use taxel_core::learn::cone::cone_x::{Engine, Fit, Problem, Round, Status};
-use taxel_core::learn::statement::{Margin, Row, Stated};
+use taxel_core::learn::{self as core_learn, ConeX, ConeXFit, Fit, Left, Margin, Round, Row, Stated};
 use taxel_core::problem;
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
@@ -71,7 +69,7 @@ type RowOut<'py> = (Bound<'py, PyArray1<f64>>, f64);
 /// A stated problem.
 #[pyclass(frozen)]
 struct ConeXProblem {
-    problem: Problem,
+    problem: core_learn::ConeXProblem,
     max_seconds: Option<f64>,
 }
 
@@ -87,7 +85,7 @@ impl ConeXProblem {
         let parameters = to_cone_x(parameters)?;
         let patterns = patterns.into_iter().map(to_spikes).collect::<PyResult<Vec<_>>>()?;
         let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
-        let problem = enter(py, |stop| Problem::new(&parameters, &patterns, &targets, stop))?;
+        let problem = enter(py, |stop| core_learn::ConeXProblem::new(&parameters, &patterns, &targets, stop))?;
         Ok(Self { problem, max_seconds: parameters.max_seconds })
     }
 
@@ -99,7 +97,7 @@ impl ConeXProblem {
 
     fn with_margin(&self, py: Python<'_>, height: f64, slope: f64) -> PyResult<Self> {
         let margin = Margin { height, slope };
-        let problem = enter(py, |_| Ok::<_, taxel_core::Error>(self.problem.with_margin(margin)))?;
+        let problem = enter(py, |stop| self.problem.with_margin(margin, stop))?;
         Ok(Self { problem, max_seconds: self.max_seconds })
     }
 
@@ -132,29 +130,21 @@ impl ConeXProblem {
         let multipliers = slice("multipliers", &multipliers)?;
         let rows = start.iter().map(to_row).collect::<PyResult<Vec<_>>>()?;
         let start: Vec<(Row, f64)> = rows.into_iter().zip(multipliers.iter().copied()).collect();
-        let (fit, signal) = enter_keeping(py, self.max_seconds, |stop, teller| {
-            let mut report = |r: Round| {
-                teller.tell(progress.as_ref(), |py, told| told.call1(py, (r.round, r.rows, r.broken, r.objective)));
+        let (found, signal) = enter_keeping(py, self.max_seconds, |stop, teller| {
+            let mut report = |round: Round| {
+                let Round { round, rows, objective, left: Left::Broken(broken) } = round else { return };
+                teller.tell(progress.as_ref(), |py, told| told.call1(py, (round, rows, broken, objective)));
             };
             self.problem.fit(&start, &mut report, stop)
         })?;
-        let Fit {
-            status, weights, objective, parts, gap, violation, engine, rounds, held, certificate, reason, ..
-        } = fit;
-        let status = match status {
-            Status::Solved => "solved",
-            Status::Infeasible => "infeasible",
-            Status::Stopped => "stopped",
-        };
-        let engine = match engine {
-            Engine::Native => "native",
-            Engine::ConeSolver => "cone solver",
-        };
+        let ConeXFit { fit, violation, margin, asked, reason, held, certificate } = found;
+        let Fit { status, weights, objective, parts, gap, rounds, engine } = fit;
+        let parts = [parts.l1, parts.l2, parts.B];
         let certificate = certificate.map(|c| (weighed(py, &c.rows), c.gap, c.at_all, c.text));
         let held = weighed(py, &held);
         Ok((
-            (status, array(py, weights), objective, parts, gap, violation),
-            ([fit.margin, fit.asked].map(|m| (m.height, m.slope)), engine, rounds, held, certificate, reason),
+            (status.name(), array(py, weights), objective, parts, gap, violation),
+            ([margin, asked].map(|m| (m.height, m.slope)), engine.name(), rounds, held, certificate, reason),
             signal,
         ))
     }

@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 use taxel_core::learn as core_learn;
-use taxel_core::learn::cone::cone_r::{ConeR, Engine, Fit, Problem, Round, Shares, Status};
+use taxel_core::learn::{ConeR, ConeRFit, Engine, Fit, Left, Round, Shares, Status};
 use taxel_core::problem;
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
@@ -44,7 +44,7 @@ type FitOut<'py> = (
 
 /// The rows of one set of examples.
 #[pyclass(frozen)]
-struct ConeRProblem(Problem);
+struct ConeRProblem(core_learn::ConeRProblem);
 
 #[pymethods]
 impl ConeRProblem {
@@ -58,7 +58,7 @@ impl ConeRProblem {
         let parameters = to_cone_r(parameters)?;
         let patterns = patterns.into_iter().map(to_spikes).collect::<PyResult<Vec<_>>>()?;
         let targets = targets.iter().map(|t| slice("targets", t).map(<[f64]>::to_vec)).collect::<PyResult<Vec<_>>>()?;
-        enter(py, |stop| Problem::new(&parameters, &patterns, &targets, stop)).map(Self)
+        enter(py, |stop| core_learn::ConeRProblem::new(&parameters, &patterns, &targets, stop)).map(Self)
     }
 
     /// How many rows demand silence.
@@ -86,8 +86,9 @@ impl ConeRProblem {
         let start = start.as_ref().map(to_start).transpose()?;
         let start = start.as_ref().map(|(weights, multipliers)| (*weights, multipliers.as_ref()));
         let (fit, raised) = enter_keeping(py, parameters.max_seconds, |stop, teller| {
-            let mut report = |r: Round| {
-                teller.tell(progress.as_ref(), |py, told| told.call1(py, (r.round, r.rows, r.objective, r.gap)));
+            let mut report = |round: Round| {
+                let Round { round, rows, objective, left: Left::Gap(gap) } = round else { return };
+                teller.tell(progress.as_ref(), |py, told| told.call1(py, (round, rows, objective, gap)));
             };
             self.0.fit(&parameters, start, &mut report, stop)
         })?;
@@ -147,12 +148,14 @@ fn to_start<'a>((weights, multipliers): &'a StartIn<'_>) -> PyResult<(&'a [f64],
     Ok((slice("start", weights)?, multipliers))
 }
 
-fn fit_out(py: Python<'_>, fit: Fit) -> FitOut<'_> {
-    let parts = [fit.parts.l1, fit.parts.l2, fit.parts.B, fit.parts.C, fit.parts.D];
-    let how = (fit.rounds, fit.rows, fit.status == Status::Solved, fit.engine == Engine::Native);
-    let rows = fit.multipliers.rows.iter().map(|&row| row as i64).collect();
-    let multipliers = (array(py, rows), array(py, fit.multipliers.values));
-    (array(py, fit.weights), fit.objective, parts, fit.gap, how, (fit.unreachable, fit.refires), multipliers)
+fn fit_out(py: Python<'_>, found: ConeRFit) -> FitOut<'_> {
+    let ConeRFit { fit, rows, multipliers, unreachable, refires } = found;
+    let Fit { status, weights, objective, parts, gap, rounds, engine } = fit;
+    let parts = [parts.l1, parts.l2, parts.B, parts.C, parts.D];
+    let how = (rounds, rows, status == Status::Solved, engine == Engine::Native);
+    let numbers = multipliers.rows.iter().map(|&row| row as i64).collect();
+    let multipliers = (array(py, numbers), array(py, multipliers.values));
+    (array(py, weights), objective, parts, gap, how, (unreachable, refires), multipliers)
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {

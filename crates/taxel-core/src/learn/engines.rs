@@ -10,7 +10,6 @@ mod rounds;
 mod touched;
 
 pub(crate) use augmented::Start;
-pub(crate) use cone_program::HardRows;
+pub(crate) use cone_program::{ConeProgram, HardRows, Hinges};
 pub use dual_active_set::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
 pub(crate) use nearest::nearest;
-pub(crate) use rounds::START_NEAR_MS;

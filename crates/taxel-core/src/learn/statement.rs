@@ -1,17 +1,29 @@
-//! The stated problem, equations 6.9 to 6.14: what each row asks of the weights, and what the objective is made of.
+//! The stated problem, equations 6.9 to 6.14, once for all learners: what is asked at which time, and what it counts.
+//!
+//! `rows` names and states any row (6.9, 6.10), `targets` writes out those at the targets, `silence` sweeps over all others,
+//! `objective` is 6.14 (6.11 is a part of it), `relaxed` its value, `certificate` the proof that nothing meets the rows.
 
 mod bounds;
 mod certificate;
+mod continuous;
 mod examples;
 mod grid;
+mod objective;
+mod peak;
 mod relaxed;
 mod rows;
 mod silence;
+mod targets;
 
-pub use bounds::{Bound, bounds_of, check_bounds};
-pub use certificate::{Bounds, Certificate};
+pub use bounds::{Bound, Bounds};
+pub(crate) use bounds::{bounds_of, check_bounds};
+pub use certificate::Certificate;
 pub(crate) use examples::{check_example, check_examples, check_heard, check_pattern, check_some_target, check_trains};
-pub(crate) use grid::{Layout, SilentRows, TargetRow, target_rows};
-pub(crate) use relaxed::{Point, Tangents};
+pub(crate) use objective::{Choice, NOTHING, Objective, relative_gap};
+pub use objective::{Divisor, Norm, Parts};
+pub(crate) use peak::{Peak, largest};
+pub(crate) use relaxed::{Point, Relaxed, Tangents};
+pub(crate) use rows::end_of;
 pub use rows::{Margin, Row, Stated, Statement};
-pub(crate) use silence::{Peak, Silence};
+pub(crate) use silence::Silence;
+pub(crate) use targets::Targets;

@@ -80,6 +80,8 @@ pub struct Neuron {
 /// An input so near an end of a refractory time counts as at it, and one so short a time before the neuron's own spike as at
 /// the spike, ms: trained neurons fire within 1e-6 ms of their targets, and inputs at whole ms often lie just there.
 pub(crate) const AT_EDGE: f64 = 1e-6;
+/// Rounding of a time that is the sum of others, on the very edge of a refractory time, ms.
+pub(crate) const ROUNDING_MS: f64 = 1e-9;
 /// How far below the threshold a potential may end and still count as reaching it, mV where `theta_0` is 0.3 mV and in
 /// proportion elsewhere: rounding of a potential that was trained to touch the threshold.
 const TOUCH: f64 = 1e-12;
@@ -189,7 +191,7 @@ impl Neuron {
         since.map_or(0.0, |s| {
             let recovering = s - self.refractory;
             // A rise that rounding puts a hair before its time must still be there (an input can lie just on the edge).
-            if recovering < -1e-9 { 0.0 } else { self.theta_plus * (-recovering / self.tau_rec()).exp() }
+            if recovering < -ROUNDING_MS { 0.0 } else { self.theta_plus * (-recovering / self.tau_rec()).exp() }
         })
     }
 

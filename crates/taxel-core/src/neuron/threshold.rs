@@ -1,6 +1,6 @@
 //! The threshold after a spike, and the spike that crossed it.
 
-use super::model::{FirstThreshold, Neuron};
+use super::model::{FirstThreshold, Neuron, ROUNDING_MS};
 
 /// A spike of the neuron.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,9 +27,6 @@ pub(super) struct Threshold {
     pub(super) fired: Option<f64>,
 }
 
-/// Rounding of a grid point or an input on the very edge of the refractory time, ms.
-pub(super) const EDGE: f64 = 1e-9;
-
 impl Threshold {
     pub(super) fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
         Self {
@@ -55,13 +52,13 @@ impl Threshold {
         }
         self.since.map_or(0.0, |since| {
             let recovering = t - since - self.refractory;
-            if recovering < -EDGE { 0.0 } else { self.plus * (-recovering / self.tau_rec).exp() }
+            if recovering < -ROUNDING_MS { 0.0 } else { self.plus * (-recovering / self.tau_rec).exp() }
         })
     }
 
     /// Whether the neuron cannot fire at `t`: `0 < t - spike <= refractory` (6.6).
     pub(super) fn silent_at(&self, t: f64) -> bool {
-        self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + EDGE)
+        self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + ROUNDING_MS)
     }
 
     /// Whether a potential on a grid has reached the threshold at `t`, and the neuron may fire.

@@ -13,8 +13,7 @@ use faer::{Accum, MatMut, MatRef, Par};
 
 use super::rounds::Rounds;
 use crate::Stop;
-use crate::learn::cone::cone_r::{Norm, Objective, Problem};
-use crate::learn::statement::{Point, Tangents};
+use crate::learn::statement::{Norm, Objective, Point, Relaxed, Tangents};
 use crate::vectors::{add, dot};
 
 /// At first a target's kink is rounded over so many thresholds (all of them, seen from no weights), one of silence over so many.
@@ -46,7 +45,7 @@ pub(crate) struct Start {
 struct Engine<'a> {
     /// Whether weights were given to start from.
     started: bool,
-    problem: &'a Problem,
+    problem: &'a Relaxed,
     objective: &'a Objective,
     weights: Vec<f64>,
     excess: Vec<f64>,
@@ -83,7 +82,7 @@ struct Passing {
     low: f64,
 }
 
-impl Problem {
+impl Relaxed {
     /// Minimises 6.14 (scaled so that it is about 1) until its relative gap is `tolerance`, or no further progress is made.
     pub(crate) fn augmented(
         &self,
@@ -93,8 +92,13 @@ impl Problem {
         progress: &mut dyn FnMut(usize, usize, f64, f64),
         stop: Stop<'_>,
     ) -> Rounds {
-        let zero: Vec<f64> =
-            objective.lower.iter().zip(&objective.upper).map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
+        let zero: Vec<f64> = objective
+            .bounds
+            .lower
+            .iter()
+            .zip(&objective.bounds.upper)
+            .map(|(&low, &high)| 0.0_f64.clamp(low, high))
+            .collect();
         let mut best = self.point(objective, zero);
         let mut engine = Engine::new(self, objective, start, &best);
         let mut bound = engine.bound_at_zero(&best).max(0.0);
@@ -108,7 +112,7 @@ impl Problem {
             engine.most = best.parts.sum();
         }
         let (mut rounds, mut rows, mut stalled) = (0, 0, 0);
-        let mut gap = relative(&best, bound);
+        let mut gap = best.gap(bound);
         let mut stopped = false;
         while gap > tolerance && rounds < ROUNDS && stalled < 12 {
             rounds += 1;
@@ -134,7 +138,7 @@ impl Problem {
                 best = candidate;
             }
             engine.most = best.parts.sum();
-            gap = relative(&best, bound);
+            gap = best.gap(bound);
             stalled = if gap > 0.9 * before.0 && engine.most > 0.99 * before.1 { stalled + 1 } else { 0 };
             progress(rounds, rows, best.parts.sum(), gap);
             engine.sharpen(reached);
@@ -146,24 +150,12 @@ impl Problem {
     }
 }
 
-/// The share of the objective that is not proven; none where everything is met, all where it is no number.
-pub(crate) fn relative(best: &Point, bound: f64) -> f64 {
-    match best.parts.sum() {
-        least if least <= NOTHING => 0.0,
-        least if least.is_finite() => (least - bound).max(0.0) / least,
-        _ => f64::INFINITY,
-    }
-}
-
-/// An objective below this share of that of no weights at all is 0: everything is met.
-pub(crate) const NOTHING: f64 = 1e-10;
-
 impl<'a> Engine<'a> {
-    fn new(problem: &'a Problem, objective: &'a Objective, start: Start, zero: &Point) -> Self {
+    fn new(problem: &'a Relaxed, objective: &'a Objective, start: Start, zero: &Point) -> Self {
         let n = problem.trains;
         let silent = problem.silent.len();
         let total = silent + problem.targets.len();
-        let theta = problem.base.neuron.theta_0;
+        let theta = problem.theta_0;
         let started = start.weights.is_some();
         let (weights, excess, behind) = match start.weights {
             None => (zero.weights.clone(), zero.excess.clone(), zero.behind.clone()),
@@ -177,7 +169,8 @@ impl<'a> Engine<'a> {
         let warm = start.shares.is_some();
         let mut shares = start.shares.unwrap_or_default();
         shares.resize(total, 0.0);
-        let widest = objective.upper.iter().zip(&objective.lower).fold(0.0_f64, |m, (u, l)| m.max(u.max(-l)));
+        let widest =
+            objective.bounds.upper.iter().zip(&objective.bounds.lower).fold(0.0_f64, |m, (u, l)| m.max(u.max(-l)));
         let width = widest.min(FAR * problem.needed()).max(zero.weights.iter().fold(0.0, |m, w| w.abs().max(m)));
         let scratch = cholesky_in_place_scratch::<f64>(n, Par::Seq, faer::Spec::default());
         let mut engine = Self {
@@ -205,8 +198,8 @@ impl<'a> Engine<'a> {
         engine.multipliers();
         let mut pull = vec![0.0; n];
         for (k, target) in problem.targets.iter().enumerate() {
-            add(&mut pull, engine.factors[silent + k].abs().max(objective.c), &target.at);
-            add(&mut pull, 2.0 * objective.b * objective.kappa * target.threshold, &target.behind);
+            add(&mut pull, engine.factors[silent + k].abs().max(objective.c), target.at);
+            add(&mut pull, 2.0 * objective.b * objective.kappa * target.threshold, target.behind);
         }
         let most = (dot(&pull, &pull) / n as f64).sqrt();
         let size = (objective.l1 + objective.l2 / (n as f64).sqrt()).max(1e-3 * most).max(1e-12);
@@ -251,8 +244,8 @@ impl<'a> Engine<'a> {
             problem.silent.add_sum(&self.factors[..silent], &mut self.gradient);
         }
         for ((target, &factor), &behind) in problem.targets.iter().zip(&self.factors[silent..]).zip(&self.behind) {
-            add(&mut self.gradient, factor, &target.at);
-            add(&mut self.gradient, 2.0 * o.b * behind, &target.behind);
+            add(&mut self.gradient, factor, target.at);
+            add(&mut self.gradient, 2.0 * o.b * behind, target.behind);
         }
         match o.norm {
             Norm::Square => add(&mut self.gradient, 2.0 * o.l2, &self.weights),
@@ -265,7 +258,7 @@ impl<'a> Engine<'a> {
         for n in 0..self.weights.len() {
             let w = self.weights[n];
             self.gradient[n] += self.rho * (w - self.centre[n]) + self.hold(n, w).0;
-            let apart = o.upper[n] - o.lower[n];
+            let apart = o.bounds.upper[n] - o.bounds.lower[n];
             near += self.gradient[n].abs() * apart.min(2.0 * self.width);
             anywhere += self.gradient[n].abs() * apart;
         }
@@ -291,7 +284,7 @@ impl<'a> Engine<'a> {
         } else {
             0.0
         };
-        let at = soft.clamp(o.lower[n], o.upper[n]);
+        let at = soft.clamp(o.bounds.lower[n], o.bounds.upper[n]);
         let held = at != soft || (soft == 0.0 && shift > 0.0);
         // Not sigma (z - at): z, at and w may be close, and sigma large.
         let slope = if held { self.held[n] + self.sigma * (w - at) } else { o.l1.copysign(z) };
@@ -304,7 +297,7 @@ impl<'a> Engine<'a> {
         for n in 0..self.weights.len() {
             let (w, o) = (self.weights[n], self.objective);
             let against = self.hold(n, w).0 - self.gradient[n];
-            self.held[n] = if w <= o.lower[n] || w >= o.upper[n] {
+            self.held[n] = if w <= o.bounds.lower[n] || w >= o.bounds.upper[n] {
                 against
             } else if w == 0.0 {
                 against.clamp(-o.l1, o.l1)
@@ -330,7 +323,7 @@ impl<'a> Engine<'a> {
         rows.iter_mut().for_each(|v| *v *= root);
         let root = (2.0 * o.c / self.delta[1]).sqrt();
         for &k in &self.inside[kept..] {
-            rows.extend(problem.targets[k - silent].at.iter().map(|v| root * v));
+            rows.extend(problem.targets.row(k - silent).at.iter().map(|v| root * v));
         }
         let count = self.inside.len();
         let length = dot(&self.weights, &self.weights).sqrt();
@@ -387,8 +380,8 @@ impl<'a> Engine<'a> {
         } else {
             rise.resize(silent, 0.0);
         }
-        rise.extend(problem.targets.iter().map(|row| dot(&row.at, direction)));
-        let lift: Vec<f64> = problem.targets.iter().map(|row| dot(&row.behind, direction)).collect();
+        rise.extend(problem.targets.iter().map(|row| dot(row.at, direction)));
+        let lift: Vec<f64> = problem.targets.iter().map(|row| dot(row.behind, direction)).collect();
         let smooth = {
             let against: f64 =
                 self.weights.iter().zip(&self.centre).zip(direction).map(|((w, c), d)| (w - c) * d).sum();
@@ -522,8 +515,8 @@ impl<'a> Engine<'a> {
             problem.silent.add_sum(&multipliers[..silent], &mut pull);
             for ((target, &multiplier), &behind) in problem.targets.iter().zip(&multipliers[silent..]).zip(&zero.behind)
             {
-                add(&mut pull, multiplier, &target.at);
-                add(&mut pull, 2.0 * o.b * behind, &target.behind);
+                add(&mut pull, multiplier, target.at);
+                add(&mut pull, 2.0 * o.b * behind, target.behind);
             }
             for (n, p) in pull.iter_mut().enumerate() {
                 let soft = if *p > o.l1 {
@@ -533,7 +526,7 @@ impl<'a> Engine<'a> {
                 } else {
                     0.0
                 };
-                let free = if soft > 0.0 { o.lower[n] < 0.0 } else { o.upper[n] > 0.0 };
+                let free = if soft > 0.0 { o.bounds.lower[n] < 0.0 } else { o.bounds.upper[n] > 0.0 };
                 *p = if free { -soft } else { 0.0 };
             }
             let length = dot(&pull, &pull).sqrt();
@@ -564,7 +557,7 @@ impl<'a> Engine<'a> {
             self.held[n] = self.hold(n, self.weights[n]).0;
         }
         self.centre.copy_from_slice(&self.weights);
-        let theta = self.problem.base.neuron.theta_0;
+        let theta = self.problem.theta_0;
         if reached {
             self.delta = self.delta.map(|delta| (delta * SHRINK).max(SHARPEST * theta));
             self.sigma /= SHRINK;

@@ -13,7 +13,8 @@ use clarabel::solver::{
     ZeroConeT,
 };
 
-use crate::learn::cone::cone_r::Norm;
+use crate::learn::statement::Norm;
+use crate::vectors::dot;
 use crate::{Error, Result, Stop};
 
 /// A sum of hinges, `weight_i max(r_i.w - limit_i, 0)`, with rows one after the other.
@@ -248,7 +249,7 @@ impl ConeProgram<'_> {
         let mut pull = vec![0.0; n];
         if normed {
             let dual = &z[cone + 1..];
-            let length = dual.iter().map(|z| z * z).sum::<f64>().sqrt();
+            let length = dot(dual, dual).sqrt();
             let shrink = (self.l2 / length.max(f64::MIN_POSITIVE)).min(1.0 / scale);
             pull.iter_mut().zip(dual).for_each(|(p, z)| *p = -z * shrink);
         }

@@ -385,7 +385,7 @@ impl DualActiveSet {
         if !(limit.is_finite() && coefficients.iter().all(|a| a.is_finite())) {
             return Err(problem!("row: holds a coefficient or limit that is not finite"));
         }
-        let length = coefficients.iter().map(|a| a * a).sum::<f64>().sqrt();
+        let length = dot(coefficients, coefficients).sqrt();
         let length = if length > 0.0 { length } else { 1.0 };
         let slot = self.slot(Row { kind, length, limit: limit / length });
         for (to, a) in self.coefficients[slot * self.stride..].iter_mut().zip(coefficients) {

@@ -1,8 +1,9 @@
 //! The least 6.14: by the engine of this house, and by the cone solver where that one's check fails.
 
-use super::augmented::{Start, relative};
+use super::augmented::Start;
 use super::rounds::Rounds;
-use crate::learn::cone::cone_r::{Engine, Objective, Parts, Problem, Round};
+use crate::learn::fit::{Engine, Left, Round};
+use crate::learn::statement::{Objective, Parts, Point, Relaxed};
 use crate::{Result, Stop};
 
 /// What was found, and who proved it.
@@ -17,7 +18,7 @@ pub(crate) struct Found {
     pub(crate) shares: Vec<f64>,
 }
 
-impl Problem {
+impl Relaxed {
     /// Finds the least objective; the bound that proves it counts all rows, whichever engine ran.
     ///
     /// Where `stop` asks for an end, the best so far comes back, with what is proven of it.
@@ -34,14 +35,14 @@ impl Problem {
         progress: &mut dyn FnMut(Round),
         stop: Stop<'_>,
     ) -> Result<Found> {
-        let limits = objective.lower.iter().zip(&objective.upper);
+        let limits = objective.bounds.lower.iter().zip(&objective.bounds.upper);
         let zero: Vec<f64> = limits.map(|(&low, &high)| 0.0_f64.clamp(low, high)).collect();
         let at_zero = self.point(objective, zero.clone()).parts.sum();
         let scale = if at_zero > 0.0 { 1.0 / at_zero } else { 1.0 };
         let objective = &objective.scaled(scale).within_reach(at_zero * scale);
         let mut before = 0;
         let mut told = |round: usize, rows, least: f64, gap| {
-            progress(Round { round, rows, objective: least / scale, gap });
+            progress(Round { round, rows, objective: least / scale, left: Left::Gap(gap) });
         };
         let weights = start.weights.clone();
         let mut by = engine;
@@ -55,7 +56,7 @@ impl Problem {
             let from = self.point(objective, weights.unwrap_or(zero));
             self.by_rounds(objective, tolerance, (from, 0.0, near), &mut told, stop)?
         };
-        let open = |best, bound| relative(best, bound) > tolerance;
+        let open = |best: &Point, bound| best.gap(bound) > tolerance;
         if by == Engine::Native && !found.stopped && open(&found.best, found.bound) {
             by = Engine::ConeSolver;
             before = found.rounds;
@@ -69,7 +70,7 @@ impl Problem {
             *part /= scale;
         }
         Ok(Found {
-            gap: relative(&found.best, found.bound),
+            gap: found.best.gap(found.bound),
             weights: found.best.weights,
             objective: least,
             parts,
@@ -96,7 +97,7 @@ impl Problem {
             return Err(start);
         };
         let silent = self.silent.len();
-        let near = NEAR * self.base.neuron.theta_0;
+        let near = NEAR * self.theta_0;
         let mut best = self.point(objective, weights);
         let mut at = best.excess.clone();
         let (mut bound, mut rounds) = (0.0_f64, 0);
@@ -108,7 +109,7 @@ impl Problem {
             let small = self.of_rows(&live);
             let begin = live.iter().map(|&row| shares[row]).chain(shares[silent..].iter().copied());
             let from = Start { weights: Some(best.weights.clone()), shares: Some(begin.collect()) };
-            let mut told = |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), relative(&best, bound));
+            let mut told = |round, rows, _, _| progress(rounds + round, rows, best.parts.sum(), best.gap(bound));
             let found = small.augmented(objective, 0.3 * tolerance, from, &mut told, stop);
             rounds += found.rounds;
             bound = bound.max(found.bound);
@@ -120,7 +121,7 @@ impl Problem {
             if point.parts.sum() < best.parts.sum() {
                 best = point;
             }
-            let gap = relative(&best, bound);
+            let gap = best.gap(bound);
             progress(rounds, found.rows, best.parts.sum(), gap);
             if gap <= tolerance || found.stopped {
                 return Ok(Rounds { best, bound, rounds, rows: found.rows, shares, stopped: found.stopped });

@@ -6,15 +6,13 @@
 //! minimises lies below 6.14 and touches it at those weights: its minimum is a lower bound, and the way there goes down. An
 //! exact line search on 6.14 keeps the next round from overshooting where hinges change state on the way.
 
-use super::augmented::relative;
 use super::cone_program::{ConeProgram, HardRows, Hinges};
-use crate::learn::cone::cone_r::{Norm, Objective, Problem};
-use crate::learn::statement::{Point, Tangents};
+use crate::learn::statement::{Norm, Objective, Point, Relaxed, Tangents};
 use crate::vectors::add;
 use crate::{Error, Result, Stop};
 
 /// Rows of the first program: targets and every 4th ms of the 60 ms before them, of so many targets that it stays small.
-pub(crate) const START_NEAR_MS: f64 = 60.0;
+const START_NEAR_MS: f64 = 60.0;
 const START_STRIDE_MS: f64 = 4.0;
 const START_ROWS: usize = 500;
 /// Rows of any later one.
@@ -55,7 +53,7 @@ struct Kept {
     linear: Vec<f64>,
 }
 
-impl Problem {
+impl Relaxed {
     /// Minimises 6.14 (scaled so that it is about 1) from a point of which `bound` is known, or from a small program of its own.
     ///
     /// # Errors
@@ -72,7 +70,7 @@ impl Problem {
         let mut accuracy = (0.001 * tolerance).min(1e-7);
         let (mut best, mut bound, near_best) = start;
         let objective = &objective.within_reach(best.parts.sum());
-        let (mut rounds, mut rows, near) = (0, 0, NEAR * self.base.neuron.theta_0);
+        let (mut rounds, mut rows, near) = (0, 0, NEAR * self.theta_0);
         let mut shares = vec![0.0; best.excess.len()];
         let solve = |kept: &Kept, accuracy| match self.program(objective, kept).solve(1.0, accuracy, stop) {
             Err(Error::Interrupted) => Ok(None),
@@ -112,7 +110,7 @@ impl Problem {
             }
             let before = best.parts.sum();
             best = self.better(objective, best, answer.weights);
-            let (least, gap) = (best.parts.sum(), relative(&best, bound));
+            let (least, gap) = (best.parts.sum(), best.gap(bound));
             progress(rounds, rows, least, gap);
             let stalled = before - least <= STALLED * least;
             if gap <= tolerance || (stalled && accuracy < FINEST) || rounds == MOST_ROUNDS {
@@ -212,8 +210,8 @@ impl Problem {
         let mut linear = vec![0.0; self.trains];
         self.silent.add_sum(&slopes[..self.silent.len()], &mut linear);
         for (target, slope) in self.targets.iter().zip(&slopes[self.silent.len()..]) {
-            add(&mut linear, slope - objective.c, &target.at);
-            add(&mut linear, -2.0 * objective.b * objective.kappa * target.threshold, &target.behind);
+            add(&mut linear, slope - objective.c, target.at);
+            add(&mut linear, -2.0 * objective.b * objective.kappa * target.threshold, target.behind);
         }
         let weight = rows.iter().map(|&row| self.hinge_weight(objective, row)).collect();
         Kept { hinges: self.hinges(&rows, weight), rows, linear }
@@ -221,20 +219,22 @@ impl Problem {
 
     fn hinges(&self, rows: &[usize], weight: Vec<f64>) -> Hinges {
         let (silent, targets) = rows.split_at(rows.partition_point(|&row| row < self.silent.len()));
-        let targets = || targets.iter().map(|row| &self.targets[row - self.silent.len()]);
+        let targets = || targets.iter().map(|row| self.targets.row(row - self.silent.len()));
         let mut coefficients = self.silent.coefficients(silent);
-        targets().for_each(|target| coefficients.extend_from_slice(&target.at));
+        targets().for_each(|target| coefficients.extend_from_slice(target.at));
         let limit = silent.iter().map(|&row| self.silent.limit[row]).chain(targets().map(|t| t.threshold)).collect();
         Hinges { rows: coefficients, limit, weight }
     }
 
     /// The first program: some targets, evenly chosen, and every 4th ms before them, each standing for those left out.
     fn start(&self, objective: &Objective) -> Kept {
-        let stride = (START_STRIDE_MS / self.base.neuron.step_ms).round().max(1.0) as usize;
-        let of_a_target = self.silent.before_targets.iter().map(|r| r.len().div_ceil(stride)).max().unwrap_or(0) + 1;
+        let stride = (START_STRIDE_MS / self.silent.step_ms).round().max(1.0) as usize;
+        let targets = self.targets.names.iter().zip(&self.targets.times);
+        let near: Vec<_> = targets.map(|(name, &t)| self.silent.before(name.0, t, START_NEAR_MS)).collect();
+        let of_a_target = near.iter().map(|rows| rows.len().div_ceil(stride)).max().unwrap_or(0) + 1;
         let every = (self.targets.len() * of_a_target).div_ceil(START_ROWS).max(1);
         let mut rows = Vec::new();
-        for before in self.silent.before_targets.iter().step_by(every) {
+        for before in near.iter().step_by(every) {
             rows.extend(before.clone().rev().step_by(stride).filter(|&row| self.silent.limit[row].is_finite()));
         }
         rows.sort_unstable();
@@ -245,9 +245,9 @@ impl Problem {
             if k % every == 0 {
                 rows.push(self.silent.len() + k);
                 weight.push(2.0 * objective.c * every as f64);
-                add(&mut linear, -objective.c * every as f64, &target.at);
+                add(&mut linear, -objective.c * every as f64, target.at);
             }
-            add(&mut linear, -2.0 * objective.b * objective.kappa * target.threshold, &target.behind);
+            add(&mut linear, -2.0 * objective.b * objective.kappa * target.threshold, target.behind);
         }
         Kept { hinges: self.hinges(&rows, weight), rows, linear }
     }
@@ -259,9 +259,9 @@ impl Problem {
             l2: objective.l2,
             norm: objective.norm,
             quadratic: objective.b,
-            behind: &self.behind,
+            behind: &self.targets.behind,
             gram: &self.gram,
-            bounds: objective.lower.iter().zip(&objective.upper).map(|(l, u)| [*l, *u]).collect(),
+            bounds: objective.bounds.lower.iter().zip(&objective.bounds.upper).map(|(l, u)| [*l, *u]).collect(),
             hinges: &kept.hinges,
             hard: HardRows::default(),
         }

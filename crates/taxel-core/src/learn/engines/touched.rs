@@ -3,7 +3,7 @@
 use super::cone_program::HardRows;
 use super::minimise::Found;
 use super::nearest::nearest;
-use crate::learn::cone::cone_r::{Objective, Problem};
+use crate::learn::statement::{Objective, Relaxed, relative_gap};
 use crate::{Result, Stop};
 
 /// A row counts as met by the optimum where its multiplier lies so far within its range (of 1) and it is missed by no more
@@ -17,13 +17,13 @@ const SPARED: f64 = 0.3;
 /// Rows a synapse, of those that are touched, beyond which they are left as they are.
 const MOST_TOUCHED: usize = 4;
 
-impl Problem {
+impl Relaxed {
     /// Moves the weights onto what they miss by no more than the solver's rounding: a neuron fires where it is touched.
     ///
     /// At the optimum a target whose multiplier lies within its range is met exactly, and so is a silent row; a silent row
     /// is kept a hair below its limit. Taken back where the objective would leave the tolerance.
     pub(crate) fn meet(&self, objective: &Objective, tolerance: f64, found: &mut Found, stop: Stop<'_>) -> Result<()> {
-        let (silent, theta) = (self.silent.len(), self.base.neuron.theta_0);
+        let (silent, theta) = (self.silent.len(), self.theta_0);
         if found.gap > tolerance || found.shares.len() != silent + self.targets.len() {
             return Ok(());
         }
@@ -35,23 +35,24 @@ impl Problem {
         let targets: Vec<usize> = (0..self.targets.len()).filter(|k| within(silent + k, -0.5)).collect();
         let touched = |row: &usize| within(*row, 0.0) || (-BELOW..WITHIN).contains(&(excess[*row] / theta));
         let rows: Vec<usize> = (0..silent).filter(touched).collect();
-        let met = targets.iter().all(|k| excess[silent + k].abs() <= 0.1 * self.base.neuron.touch());
+        let met = targets.iter().all(|k| excess[silent + k].abs() <= 0.1 * self.touch);
         if (met && rows.is_empty()) || targets.len() + rows.len() > MOST_TOUCHED * self.trains {
             return Ok(());
         }
-        let equal: Vec<f64> = targets.iter().flat_map(|k| self.targets[*k].at.iter().copied()).collect();
-        let equal_to: Vec<f64> = targets.iter().map(|k| self.targets[*k].threshold).collect();
+        let equal: Vec<f64> = targets.iter().flat_map(|k| self.targets.row(*k).at.iter().copied()).collect();
+        let equal_to: Vec<f64> = targets.iter().map(|k| self.targets.thresholds[*k]).collect();
         let below = self.silent.coefficients(&rows);
         let limit: Vec<f64> = rows.iter().map(|row| self.silent.limit[*row] - BELOW * theta).collect();
         let all = HardRows { equal: &equal, equal_to: &equal_to, below: &below, limit: &limit };
         let least = found.objective * (1.0 - found.gap);
         for rows in [all, HardRows { below: &[], limit: &[], ..all }] {
-            let Some(weights) = nearest(&found.weights, &rows, &objective.lower, &objective.upper, stop)? else {
+            let Some(weights) = nearest(&found.weights, &rows, &objective.bounds.lower, &objective.bounds.upper, stop)?
+            else {
                 continue;
             };
             let point = self.point(objective, weights);
             let sum = point.parts.sum();
-            let gap = if sum > least { (sum - least) / sum } else { 0.0 };
+            let gap = relative_gap(sum, least);
             if gap <= SPARED * tolerance {
                 (found.weights, found.parts, found.objective, found.gap) = (point.weights, point.parts, sum, gap);
                 break;

@@ -4,7 +4,8 @@
 //! once, when it comes; the objective is that of a fit to the whole window from nothing, to the same proven gap.
 
 use crate::allowed::{Parameter, Range};
-use crate::learn::cone::cone_r::{ConeR, Fit, Problem, Round, Shares};
+use crate::learn::cone::{ConeR, ConeRFit, ConeRProblem, Shares};
+use crate::learn::fit::Round;
 use crate::learn::statement::check_example;
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
@@ -14,7 +15,7 @@ use crate::{Result, SpikeTrains, Stop, problem};
 pub struct OnlineConeR {
     parameters: ConeR,
     window: usize,
-    problem: Option<Problem>,
+    problem: Option<ConeRProblem>,
     /// How many patterns came so far.
     seen: usize,
     last: Option<(Vec<f64>, Shares)>,
@@ -50,7 +51,7 @@ impl OnlineConeR {
     /// How many rows they have that demand silence.
     #[must_use]
     pub fn silent_rows(&self) -> usize {
-        self.problem.as_ref().map_or(0, Problem::silent_rows)
+        self.problem.as_ref().map_or(0, ConeRProblem::silent_rows)
     }
 
     /// Takes a pattern with its targets (ms) into the window; the oldest leaves where it is full.
@@ -61,13 +62,14 @@ impl OnlineConeR {
     pub fn add(&mut self, pattern: &SpikeTrains, targets: &[f64], stop: Stop<'_>) -> Result<()> {
         let parameters = &self.parameters;
         check_example(&parameters.neuron, self.seen, pattern, targets)?;
-        parameters.check_horizon(self.seen, targets)?;
-        let rows = self.problem.as_ref().map_or(0, Problem::silent_and_free_rows);
-        parameters.neuron.check_rows(rows as f64 + parameters.points(pattern, targets))?;
+        let (end, points) = parameters.end_of(self.seen, pattern, targets)?;
+        let rows = self.problem.as_ref().map_or(0, ConeRProblem::silent_and_free_rows);
+        parameters.neuron.check_rows(rows as f64 + points)?;
         if let Some(problem) = &mut self.problem {
             problem.check_trains(self.seen, pattern)?;
             let silent = problem.silent_and_free_rows();
-            let rows = problem.push(pattern, targets, stop)?;
+            problem.push(pattern, targets, end, stop)?;
+            let rows = problem.silent_and_free_rows() - silent;
             if let Some((_, shares)) = &mut self.last {
                 shares.make_room(silent, rows);
             }
@@ -78,7 +80,7 @@ impl OnlineConeR {
                 }
             }
         } else {
-            self.problem = Some(Problem::of_one(parameters, pattern, targets, stop)?);
+            self.problem = Some(ConeRProblem::of_one(parameters, pattern, targets, end, stop)?);
         }
         self.seen += 1;
         Ok(())
@@ -89,13 +91,13 @@ impl OnlineConeR {
     /// # Errors
     ///
     /// `Problem` for a window without a pattern.
-    pub fn fit(&mut self, progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<Fit> {
+    pub fn fit(&mut self, progress: &mut dyn FnMut(Round), stop: Stop<'_>) -> Result<ConeRFit> {
         let Some(problem) = &self.problem else {
             return Err(problem!("the window is empty: add a pattern first"));
         };
         let start = self.last.as_ref().map(|(weights, shares)| (weights.as_slice(), Some(shares)));
         let fit = problem.fit_counting(&self.parameters, start, Some(problem.patterns() - 1), progress, stop)?;
-        self.last = Some((fit.weights.clone(), fit.multipliers.clone()));
+        self.last = Some((fit.fit.weights.clone(), fit.multipliers.clone()));
         Ok(fit)
     }
 }

@@ -51,12 +51,29 @@ impl Bound {
     }
 }
 
+/// The weights that are allowed, mV.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bounds {
+    /// One a train.
+    pub lower: Vec<f64>,
+    /// One a train.
+    pub upper: Vec<f64>,
+}
+
+impl Bounds {
+    /// The least and the largest that a row can come to.
+    pub(crate) fn range(&self, row: &[f64]) -> (f64, f64) {
+        let ends = row.iter().zip(&self.lower).zip(&self.upper).map(|((a, l), u)| (a * l, a * u));
+        ends.fold((0.0, 0.0), |sum, (l, u)| (sum.0 + l.min(u), sum.1 + l.max(u)))
+    }
+}
+
 /// Checks that `lb` does not lie above `ub`, both finite, at every synapse; where they are equal the synapse is frozen.
 ///
 /// # Errors
 ///
 /// `Problem`, naming the synapse.
-pub fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
+pub(crate) fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
     if let (Some(a), Some(b)) = (lb.len(), ub.len())
         && a != b
     {
@@ -81,12 +98,12 @@ pub fn check_bounds(lb: &Bound, ub: &Bound) -> Result<()> {
 /// # Errors
 ///
 /// `Problem` where their number is another.
-pub fn bounds_of(lb: &Bound, ub: &Bound, trains: usize) -> Result<(Vec<f64>, Vec<f64>)> {
+pub(crate) fn bounds_of(lb: &Bound, ub: &Bound, trains: usize) -> Result<Bounds> {
     check_bounds(lb, ub)?;
     for (name, bound) in [("lb", lb), ("ub", ub)] {
         if let Some(count) = bound.len().filter(|&count| count != trains) {
             return Err(problem!("{name}: {count} bounds for {trains} trains, must be one a train, or one for all"));
         }
     }
-    Ok(((0..trains).map(|n| lb.at(n)).collect(), (0..trains).map(|n| ub.at(n)).collect()))
+    Ok(Bounds { lower: (0..trains).map(|n| lb.at(n)).collect(), upper: (0..trains).map(|n| ub.at(n)).collect() })
 }

@@ -6,8 +6,10 @@
 
 use std::collections::BTreeMap;
 
+use super::bounds::Bounds;
 use super::rows::{Margin, Row, Statement};
 use crate::Result;
+use crate::vectors::dot;
 
 /// Multipliers that prove a problem infeasible, and what they say in words.
 #[derive(Debug, Clone, PartialEq)]
@@ -20,23 +22,6 @@ pub struct Certificate {
     pub at_all: bool,
     /// Which patterns, targets and silences conflict.
     pub text: String,
-}
-
-/// The weights that are allowed, mV.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Bounds {
-    /// One a train.
-    pub lower: Vec<f64>,
-    /// One a train.
-    pub upper: Vec<f64>,
-}
-
-impl Bounds {
-    /// The least and the largest that a row can come to.
-    fn range(&self, row: &[f64]) -> (f64, f64) {
-        let ends = row.iter().zip(&self.lower).zip(&self.upper).map(|((a, l), u)| (a * l, a * u));
-        ends.fold((0.0, 0.0), |sum, (l, u)| (sum.0 + l.min(u), sum.1 + l.max(u)))
-    }
 }
 
 /// Rows named in a reading, those of most weight first.
@@ -128,7 +113,7 @@ fn list(statement: &Statement, rows: &[(Row, f64)]) -> Result<String> {
     let mut weighed = Vec::with_capacity(rows.len());
     for &(row, multiplier) in rows {
         let stated = statement.state(row)?;
-        let length = stated.coefficients.iter().map(|a| a * a).sum::<f64>().sqrt();
+        let length = dot(&stated.coefficients, &stated.coefficients).sqrt();
         weighed.push((multiplier.abs() * length.max(stated.limit.abs()), row));
     }
     weighed.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -1,31 +1,14 @@
-//! The rows of a learning problem: what the potential is made of at the targets and at every silent grid point.
+//! Silence on the grid (6.9b): what the potential is on every grid point, and what the threshold leaves it there.
 //!
-//! A *row* holds the coefficients of the weights in `U(w, t)` at one time of one pattern. After a spike some inputs are
-//! lost (`after_spike`); as the spikes of a learning problem are its targets, the potential stays linear in the weights.
 //! Silent rows are never stored: one sweep over the grid gives the potential on all of them (the kernel needs two numbers
-//! a pattern), one sweep backwards gives a weighted sum of all of them.
+//! a pattern), one sweep backwards gives a weighted sum of all of them. CONE-X looks for points at which silence is broken,
+//! CONE-R sums up by how much.
 
-use crate::neuron::{AfterSpike, FirstThreshold, Neuron, Shape, State, Step};
+use super::peak::{Peak, exceeds};
+use super::rows::{Sheet, Statement, lost};
+use crate::neuron::{AfterSpike, Shape, State, Step};
 use crate::vectors::{add, dot};
-use crate::{Result, SpikeTrains, Stop};
-
-/// Rounding of a grid point on the very edge of a refractory time, ms.
-const EDGE: f64 = 1e-9;
-
-/// A row that is kept whole: a target's, or the one behind it that B lifts.
-#[derive(Debug, Clone)]
-pub(crate) struct TargetRow {
-    pub(crate) pattern: usize,
-    pub(crate) target: usize,
-    /// When, ms.
-    pub(crate) t: f64,
-    /// The threshold at the target, mV.
-    pub(crate) threshold: f64,
-    /// Coefficients at the target, by train.
-    pub(crate) at: Vec<f64>,
-    /// Coefficients `delta_t` later, as though the neuron had not fired at the target.
-    pub(crate) behind: Vec<f64>,
-}
+use crate::{Result, Stop};
 
 /// An input as the grid sees it: what it adds to the state at the first grid point not before it.
 #[derive(Debug, Clone, Copy)]
@@ -42,38 +25,36 @@ struct Station {
     point: u32,
     /// Everything before is lost here (`Reset`), ahead of the inputs.
     reset: bool,
-    /// Where the inputs that come here end among all of the sheet; they begin where those of the station before end.
+    /// Where the inputs that come here end among all of the pattern; they begin where those of the station before end.
     inputs: u32,
 }
 
-/// The silent rows of one pattern.
+/// The grid points of one pattern.
 #[derive(Debug, Clone)]
-struct Sheet {
+struct Lane {
     inputs: Vec<GridInput>,
     /// Ascending by point.
     stations: Vec<Station>,
     /// The number of its first row among all.
     first: usize,
     points: usize,
-    /// How many targets its pattern has.
-    targets: usize,
+    /// When its first point is, ms.
+    start: f64,
 }
 
 /// All silent rows: one a grid point that lies neither at a target nor in the refractory time behind it.
 #[derive(Debug, Clone)]
 pub(crate) struct SilentRows {
-    sheets: Vec<Sheet>,
+    lanes: Vec<Lane>,
     trains: usize,
     shape: Shape,
-    step_ms: f64,
+    pub(crate) step_ms: f64,
     /// What 0, 1, 2 ... grid steps do: so a run of points without an input needs no recursion.
     steps: Steps,
-    /// Some rows of a grid written out, one after the other, in place of sheets.
+    /// Some rows of a grid written out, one after the other, in place of lanes.
     written: Option<Vec<f64>>,
     /// What the potential must not exceed, mV; infinite where nothing is asked.
     pub(crate) limit: Vec<f64>,
-    /// The rows (by number) of each target's pattern that lie in the `near_ms` before it.
-    pub(crate) before_targets: Vec<std::ops::Range<usize>>,
 }
 
 /// The entries of `Step` for so many grid steps.
@@ -102,180 +83,109 @@ impl Steps {
     }
 }
 
-/// What a pattern's silent rows are laid out with.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Layout<'a> {
-    pub(crate) neuron: &'a Neuron,
-    pub(crate) horizon: Option<f64>,
-    pub(crate) margin: f64,
-    pub(crate) near_ms: f64,
-}
-
-/// The last target before `t`, or none.
-fn last_before(targets: &[f64], t: f64) -> Option<f64> {
-    let n = targets.partition_point(|&target| target < t);
-    n.checked_sub(1).map(|k| targets[k])
-}
-
-/// The threshold at `t` when the neuron has fired at the targets before.
-fn threshold(neuron: &Neuron, start: f64, targets: &[f64], t: f64) -> f64 {
-    let printed = (neuron.first_threshold == FirstThreshold::Printed).then_some(start);
-    neuron.threshold(last_before(targets, t).or(printed).map(|spike| t - spike))
-}
-
-pub(crate) fn target_rows(
-    neuron: &Neuron,
-    delta_t: f64,
-    patterns: &[SpikeTrains],
-    targets: &[Vec<f64>],
-) -> Vec<TargetRow> {
-    let mut rows = Vec::new();
-    for (p, (pattern, targets)) in patterns.iter().zip(targets).enumerate() {
-        for (k, &t) in targets.iter().enumerate() {
-            let earlier = &targets[..k];
-            rows.push(TargetRow {
-                pattern: p,
-                target: k,
-                t,
-                threshold: threshold(neuron, pattern.start, targets, t),
-                at: coefficients(neuron, pattern, earlier, t),
-                behind: coefficients(neuron, pattern, earlier, t + delta_t),
-            });
-        }
-    }
-    rows
-}
-
-/// The coefficients of the weights at `t`, the neuron having fired at `earlier` targets only.
-fn coefficients(neuron: &Neuron, pattern: &SpikeTrains, earlier: &[f64], t: f64) -> Vec<f64> {
-    let shape = neuron.shape();
-    let oldest = t - shape.forgotten();
-    (0..pattern.len())
-        .map(|n| {
-            let train = pattern.train(n);
-            let from = train.partition_point(|&s| s < oldest);
-            let heard = train[from..].iter().take_while(|&&s| s < t);
-            let kept = heard.filter(|&&s| !lost(neuron, earlier, s, t));
-            kept.map(|&s| shape.value(t - s)).sum()
-        })
-        .collect()
-}
-
-/// Whether an input at `s` no longer counts at `t`, the neuron having fired at these targets.
-fn lost(neuron: &Neuron, targets: &[f64], s: f64, t: f64) -> bool {
-    match neuron.after_spike {
-        AfterSpike::Keep => false,
-        AfterSpike::Ignore => neuron.loses(s, last_before(targets, s)),
-        AfterSpike::Reset => neuron.loses(s, last_before(targets, t)),
-    }
-}
-
 impl SilentRows {
-    /// Lays the grid over each pattern, from its start to its stop, or one `tau` past its last target, or `horizon`.
-    pub(crate) fn new(
-        layout: Layout<'_>,
-        patterns: &[SpikeTrains],
-        targets: &[Vec<f64>],
-        stop: Stop<'_>,
-    ) -> Result<Self> {
-        let (shape, step_ms) = (layout.neuron.shape(), layout.neuron.step_ms);
+    /// Lays the grid over each pattern of a statement, from its start to the end of its silence.
+    pub(crate) fn new(statement: &Statement, stop: Stop<'_>) -> Result<Self> {
+        let (shape, step_ms) = (statement.shape, statement.neuron.step_ms);
         let mut rows = Self {
-            sheets: vec![],
-            trains: patterns[0].len(),
+            lanes: vec![],
+            trains: statement.trains,
             shape,
             step_ms,
             steps: Steps::new(shape, step_ms),
             written: None,
             limit: vec![],
-            before_targets: vec![],
         };
-        for (pattern, targets) in patterns.iter().zip(targets) {
+        for pattern in 0..statement.sheets.len() {
             stop.check()?;
-            rows.push(layout, pattern, targets, stop)?;
+            rows.push(statement, pattern, stop)?;
         }
         Ok(rows)
     }
 
     /// Adds the rows of one more pattern; where the caller stops it, they are as before.
-    pub(crate) fn push(
-        &mut self,
-        layout: Layout<'_>,
-        pattern: &SpikeTrains,
-        targets: &[f64],
-        stop: Stop<'_>,
-    ) -> Result<()> {
-        let Layout { neuron, horizon, margin, near_ms } = layout;
-        let step = self.step_ms;
-        let time = |point: f64| pattern.start + point * step;
-        let last = targets.last().map_or(pattern.stop, |t| pattern.stop.max(t + neuron.tau));
-        let end = horizon.unwrap_or(last);
-        let points = (((end - pattern.start) / step + EDGE).floor() + 1.0).max(0.0) as usize;
-        let first = self.limit.len();
-        let (mut next, mut limit) = (0, vec![]);
+    pub(crate) fn push(&mut self, statement: &Statement, pattern: usize, stop: Stop<'_>) -> Result<()> {
+        let (neuron, sheet, step) = (&statement.neuron, &statement.sheets[pattern], self.step_ms);
+        let Sheet { start, end, targets, .. } = sheet;
+        let time = |point: f64| start + point * step;
+        let points = neuron.points(*start, *end) as usize;
+        let (mut next, mut limit) = (0, Vec::with_capacity(points));
         for k in 0..points {
             if k % 4096 == 0 {
                 stop.check()?;
             }
             let t = time(k as f64);
-            while next < targets.len() && targets[next] + neuron.refractory + EDGE < t {
+            while targets.get(next).is_some_and(|&target| target < t) {
                 next += 1;
             }
-            let free = next < targets.len() && targets[next] - EDGE <= t;
-            limit.push(if free { f64::INFINITY } else { threshold(neuron, pattern.start, targets, t) - margin });
+            let fired = next.checked_sub(1).map(|k| targets[k]);
+            limit.push(if statement.is_silent_between(fired, t, targets.get(next).copied()) {
+                neuron.theta_0 + statement.rise(sheet, fired, t) - statement.margin.height
+            } else {
+                f64::INFINITY
+            });
         }
-        let point_after = |t: f64| {
-            let k = ((t - pattern.start) / step).floor() as u32;
-            if time(f64::from(k)) > t { k } else { k + 1 }
-        };
-        let mut inputs = Vec::with_capacity(pattern.times.len());
-        for (k, spike) in pattern.by_time().iter().enumerate() {
+        let mut inputs = Vec::with_capacity(sheet.inputs.len());
+        for (k, &(t, train)) in sheet.inputs.iter().enumerate() {
             if k % 4096 == 0 {
                 stop.check()?;
             }
-            let point = ((spike.t - pattern.start) / step).ceil();
+            let point = ((t - start) / step).ceil();
             // An input on a point itself is felt behind it; where its kernel begins above 0, from the next point on.
-            let late = time(point) - spike.t <= 0.0 && self.shape.input().b != 0.0;
+            let late = time(point) - t <= 0.0 && self.shape.input().b != 0.0;
             let felt = if late { point + 1.0 } else { point };
-            if felt < points as f64 && !lost(neuron, targets, spike.t, time(felt)) {
-                let State { a, b } = self.shape.after(self.shape.input(), (time(felt) - spike.t).max(0.0));
-                inputs.push(GridInput { point: felt as u32, train: spike.train, a, b });
+            if felt < points as f64 && !lost(neuron, targets, t, time(felt)) {
+                let State { a, b } = self.shape.after(self.shape.input(), (time(felt) - t).max(0.0));
+                inputs.push(GridInput { point: felt as u32, train, a, b });
             }
         }
         inputs.sort_by_key(|i| i.point);
         let resets = match neuron.after_spike {
-            AfterSpike::Reset => targets.iter().map(|&t| point_after(t)).filter(|&r| (r as usize) < points).collect(),
+            AfterSpike::Reset => {
+                let after = targets.iter().map(|&t| self.point_after(*start, t));
+                after.filter(|&r| r < points).map(|r| r as u32).collect()
+            }
             AfterSpike::Keep | AfterSpike::Ignore => vec![],
         };
         let stations = stations(&inputs, &resets);
-        for &t in targets {
-            let after = (point_after(t) as usize).min(points);
-            let near = (near_ms / step).ceil() as usize;
-            self.before_targets.push(first + after.saturating_sub(near + 1)..first + after);
-        }
+        self.lanes.push(Lane { inputs, stations, first: self.limit.len(), points, start: *start });
         self.limit.append(&mut limit);
-        self.sheets.push(Sheet { inputs, stations, first, points, targets: targets.len() });
         Ok(())
+    }
+
+    /// The first grid point behind `t`, of a pattern that begins at `start`.
+    fn point_after(&self, start: f64, t: f64) -> usize {
+        let k = ((t - start) / self.step_ms).floor() as usize;
+        if start + k as f64 * self.step_ms > t { k } else { k + 1 }
+    }
+
+    /// The numbers of the rows that lie in the `near_ms` before `t`, or at it.
+    pub(crate) fn before(&self, pattern: usize, t: f64, near_ms: f64) -> std::ops::Range<usize> {
+        let Lane { first, points, start, .. } = self.lanes[pattern];
+        let after = self.point_after(start, t).min(points);
+        let near = (near_ms / self.step_ms).ceil() as usize;
+        first + after.saturating_sub(near + 1)..first + after
+    }
+
+    /// How many rows the first pattern has, those at which nothing is asked included.
+    pub(crate) fn of_first(&self) -> usize {
+        self.lanes.first().map_or(0, |lane| lane.points)
     }
 
     /// Takes the rows of the first pattern away; the others are numbered anew from 0.
     pub(crate) fn drop_first(&mut self) {
-        let gone = self.sheets.remove(0);
-        self.limit.drain(..gone.points);
-        self.before_targets.drain(..gone.targets);
-        self.sheets.iter_mut().for_each(|sheet| sheet.first -= gone.points);
-        for rows in &mut self.before_targets {
-            *rows = rows.start - gone.points..rows.end - gone.points;
-        }
+        let gone = self.lanes.remove(0).points;
+        self.limit.drain(..gone);
+        self.lanes.iter_mut().for_each(|lane| lane.first -= gone);
     }
 
     /// The named rows (ascending) alone, written out.
     pub(crate) fn written_out(&self, rows: &[usize]) -> Self {
         Self {
-            sheets: vec![],
+            lanes: vec![],
             steps: self.steps.clone(),
             written: Some(self.coefficients(rows)),
             limit: rows.iter().map(|&row| self.limit[row]).collect(),
-            before_targets: vec![],
             ..*self
         }
     }
@@ -305,23 +215,52 @@ impl SilentRows {
             let rows = out.iter_mut().zip(written.chunks_exact(self.trains));
             return rows.for_each(|(out, row)| *out = dot(row, weights));
         }
-        for sheet in &self.sheets {
-            let rows = &mut out[sheet.first..sheet.first + sheet.points];
-            let mut state = State::default();
-            let (mut input, mut at) = (0, 0);
-            for (k, station) in sheet.stations.iter().enumerate() {
-                state = if station.reset { State::default() } else { self.step(station.point - at).apply(state) };
-                at = station.point;
-                for i in &sheet.inputs[input..station.inputs as usize] {
-                    let w = weights[i.train as usize];
-                    state.a += w * i.a;
-                    state.b += w * i.b;
-                }
-                input = station.inputs as usize;
-                let end = sheet.stations.get(k + 1).map_or(sheet.points, |next| next.point as usize);
-                self.run(state, &mut rows[at as usize..end]);
+        for lane in &self.lanes {
+            self.potential_of(lane, weights, &mut out[lane.first..lane.first + lane.points]);
+        }
+    }
+
+    /// The potential on the rows of one pattern.
+    fn potential_of(&self, lane: &Lane, weights: &[f64], rows: &mut [f64]) {
+        let mut state = State::default();
+        let (mut input, mut at) = (0, 0);
+        for (k, station) in lane.stations.iter().enumerate() {
+            state = if station.reset { State::default() } else { self.step(station.point - at).apply(state) };
+            at = station.point;
+            for i in &lane.inputs[input..station.inputs as usize] {
+                let w = weights[i.train as usize];
+                state.a += w * i.a;
+                state.b += w * i.b;
+            }
+            input = station.inputs as usize;
+            let end = lane.stations.get(k + 1).map_or(lane.points, |next| next.point as usize);
+            match &mut rows[at as usize..end] {
+                [row] => *row = state.b,
+                rows => self.run(state, rows),
             }
         }
+    }
+
+    /// Finds the worst point of each stretch in which the potential exceeds what it must not by more than `tolerance`.
+    pub(crate) fn broken(&self, weights: &[f64], tolerance: f64) -> Vec<Peak> {
+        let (mut found, mut potential) = (vec![], vec![]);
+        for (pattern, lane) in self.lanes.iter().enumerate() {
+            potential.clear();
+            potential.resize(lane.points, 0.0);
+            self.potential_of(lane, weights, &mut potential);
+            let limits = &self.limit[lane.first..lane.first + lane.points];
+            let mut worst: Option<Peak> = None;
+            for (k, (u, limit)) in potential.iter().zip(limits).enumerate() {
+                let excess = u - limit;
+                if excess <= tolerance {
+                    found.extend(worst.take());
+                } else if worst.is_none_or(|w| exceeds(excess, w.excess)) {
+                    worst = Some(Peak { pattern, t: lane.start + k as f64 * self.step_ms, excess });
+                }
+            }
+            found.extend(worst);
+        }
+        found
     }
 
     /// The potential on a run of rows without an input, from the state at the first of them.
@@ -339,16 +278,16 @@ impl SilentRows {
             let rows = factors.iter().zip(written.chunks_exact(self.trains));
             return rows.for_each(|(&factor, row)| add(sum, factor, row));
         }
-        for sheet in &self.sheets {
-            let factors = &factors[sheet.first..sheet.first + sheet.points];
+        for lane in &self.lanes {
+            let factors = &factors[lane.first..lane.first + lane.points];
             // How much the rows from here on hear of the state here.
             let mut heard = State::default();
-            let mut end = sheet.points;
-            for (k, station) in sheet.stations.iter().enumerate().rev() {
+            let mut end = lane.points;
+            for (k, station) in lane.stations.iter().enumerate().rev() {
                 let at = station.point as usize;
                 heard = self.run_back(heard, &factors[at..end]);
-                let from = if k == 0 { 0 } else { sheet.stations[k - 1].inputs as usize };
-                for i in &sheet.inputs[from..station.inputs as usize] {
+                let from = if k == 0 { 0 } else { lane.stations[k - 1].inputs as usize };
+                for i in &lane.inputs[from..station.inputs as usize] {
                     sum[i.train as usize] += heard.a * i.a + heard.b * i.b;
                 }
                 if station.reset {
@@ -381,21 +320,21 @@ impl SilentRows {
         }
         let mut out = vec![0.0; rows.len() * n];
         let mut place = 0;
-        for sheet in &self.sheets {
-            if place == rows.len() || rows[place] >= sheet.first + sheet.points {
+        for lane in &self.lanes {
+            if place == rows.len() || rows[place] >= lane.first + lane.points {
                 continue;
             }
             let (mut a, mut b) = (vec![0.0; n], vec![0.0; n]);
             let (mut station, mut input, mut at) = (0, 0, 0_u32);
-            while place < rows.len() && rows[place] < sheet.first + sheet.points {
-                let point = (rows[place] - sheet.first) as u32;
-                let next = station + sheet.stations[station..].partition_point(|s| s.point <= point);
-                let passed = &sheet.stations[station..next];
+            while place < rows.len() && rows[place] < lane.first + lane.points {
+                let point = (rows[place] - lane.first) as u32;
+                let next = station + lane.stations[station..].partition_point(|s| s.point <= point);
+                let passed = &lane.stations[station..next];
                 if let Some(reset) = passed.iter().rposition(|s| s.reset) {
                     a.fill(0.0);
                     b.fill(0.0);
                     let before = station + reset;
-                    input = if before == 0 { 0 } else { sheet.stations[before - 1].inputs as usize };
+                    input = if before == 0 { 0 } else { lane.stations[before - 1].inputs as usize };
                 } else if point > at {
                     let step = self.step(point - at);
                     for (a, b) in a.iter_mut().zip(&mut b) {
@@ -404,7 +343,7 @@ impl SilentRows {
                     }
                 }
                 let end = passed.last().map_or(input, |s| s.inputs as usize);
-                for i in &sheet.inputs[input..end] {
+                for i in &lane.inputs[input..end] {
                     let now = self.step(point - i.point).apply(State { a: i.a, b: i.b });
                     a[i.train as usize] += now.a;
                     b[i.train as usize] += now.b;

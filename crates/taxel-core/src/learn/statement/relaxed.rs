@@ -1,7 +1,105 @@
-//! 6.14 at given weights, and a bound from below on the least it can be.
+//! The relaxed problem (6.12 to 6.14): all that is asked may be missed, at a price. Its value at given weights, and a bound from
+//! below on the least it can be.
 
-use crate::learn::cone::cone_r::{Norm, Objective, Parts, Problem};
+use std::sync::Arc;
+
+use super::grid::SilentRows;
+use super::objective::{NOTHING, Norm, Objective, Parts, relative_gap};
+use super::rows::Statement;
+use super::targets::Targets;
 use crate::vectors::{add, dot};
+use crate::{Result, Stop};
+
+/// The rows of some examples, on the grid, as 6.14 reads them.
+///
+/// Rows are numbered: those of the grid, then the targets.
+#[derive(Debug, Clone)]
+pub(crate) struct Relaxed {
+    pub(crate) theta_0: f64,
+    /// How far below the threshold a potential may end and still count as reaching it, mV.
+    pub(crate) touch: f64,
+    pub(crate) trains: usize,
+    pub(crate) targets: Arc<Targets>,
+    pub(crate) silent: SilentRows,
+    /// `B'B` of the rows behind the targets, by columns.
+    pub(crate) gram: Arc<Vec<f64>>,
+}
+
+impl Relaxed {
+    /// Lays out the rows of a statement; B looks `delta_t` ms behind the targets.
+    pub(crate) fn new(statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<Self> {
+        let (neuron, trains) = (&statement.neuron, statement.trains);
+        let mut rows = Self {
+            theta_0: neuron.theta_0,
+            touch: neuron.touch(),
+            trains,
+            targets: Arc::new(Targets::new(statement, delta_t, stop)?),
+            silent: SilentRows::new(statement, stop)?,
+            gram: Arc::new(vec![0.0; trains * trains]),
+        };
+        for k in 0..rows.targets.len() {
+            stop.check()?;
+            rows.lift(k, 1.0);
+        }
+        Ok(rows)
+    }
+
+    /// Counts the row behind target `k` into B's matrix, or, with -1, out of it.
+    fn lift(&mut self, k: usize, sign: f64) {
+        let row = self.targets.row(k).behind;
+        for (column, &v) in Arc::make_mut(&mut self.gram).chunks_exact_mut(self.trains).zip(row) {
+            add(column, sign * v, row);
+        }
+    }
+
+    /// Adds the rows of the statement's last pattern; where the caller stops it, they are as before.
+    pub(crate) fn push(&mut self, statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<()> {
+        let (pattern, before) = (statement.sheets.len() - 1, self.targets.len());
+        let mut targets = Targets::clone(&self.targets);
+        targets.push(statement, pattern, delta_t, stop)?;
+        self.silent.push(statement, pattern, stop)?;
+        self.targets = Arc::new(targets);
+        for k in before..self.targets.len() {
+            self.lift(k, 1.0);
+        }
+        Ok(())
+    }
+
+    /// Takes the rows of the first pattern away.
+    pub(crate) fn drop_first(&mut self) {
+        for k in 0..self.targets.of_first() {
+            self.lift(k, -1.0);
+        }
+        Arc::make_mut(&mut self.targets).drop_first();
+        self.silent.drop_first();
+    }
+
+    /// The same, but of the silent rows the named ones alone, written out; for solving, not for judging.
+    pub(crate) fn of_rows(&self, rows: &[usize]) -> Self {
+        Self {
+            targets: Arc::clone(&self.targets),
+            silent: self.silent.written_out(rows),
+            gram: Arc::clone(&self.gram),
+            ..*self
+        }
+    }
+
+    /// How large weights must be for targets to be met, mV.
+    pub(crate) fn needed(&self) -> f64 {
+        let (thresholds, lengths) = self
+            .targets
+            .iter()
+            .fold((0.0, 0.0), |sum, row| (sum.0 + row.threshold, sum.1 + dot(row.at, row.at).sqrt()));
+        if lengths > 0.0 { thresholds / lengths } else { f64::INFINITY }
+    }
+
+    /// What D comes to at these weights, without its factor.
+    pub(crate) fn broken_silence(&self, weights: &[f64]) -> f64 {
+        let mut potential = Vec::new();
+        self.silent.potential(weights, &mut potential);
+        potential.iter().zip(&self.silent.limit).map(|(u, limit)| (u - limit).max(0.0)).sum()
+    }
+}
 
 /// Weights, and where they bring the potential.
 #[derive(Debug, Clone)]
@@ -14,21 +112,20 @@ pub(crate) struct Point {
     pub(crate) parts: Parts,
 }
 
-impl Problem {
+impl Relaxed {
     /// 6.14 at these weights.
     pub(crate) fn point(&self, objective: &Objective, weights: Vec<f64>) -> Point {
         let mut excess = Vec::with_capacity(self.silent.len() + self.targets.len());
         self.silent.potential(&weights, &mut excess);
         excess.iter_mut().zip(&self.silent.limit).for_each(|(u, limit)| *u -= limit);
-        excess.extend(self.targets.iter().map(|row| dot(&row.at, &weights) - row.threshold));
-        let behind: Vec<f64> =
-            self.targets.iter().map(|r| dot(&r.behind, &weights) - objective.kappa * r.threshold).collect();
+        excess.extend(self.targets.iter().map(|row| dot(row.at, &weights) - row.threshold));
+        let behind = objective.unlifted(&self.targets, &weights);
         let (silent, targets) = excess.split_at(self.silent.len());
-        let square: f64 = weights.iter().map(|w| w * w).sum();
+        let (l1, l2) = objective.norms(&weights);
         let parts = Parts {
-            l1: objective.l1 * weights.iter().map(|w| w.abs()).sum::<f64>(),
-            l2: objective.l2 * if objective.norm == Norm::Norm { square.sqrt() } else { square },
-            B: objective.b * behind.iter().map(|x| x * x).sum::<f64>(),
+            l1,
+            l2,
+            B: objective.b * dot(&behind, &behind),
             C: objective.c * targets.iter().map(|x| x.abs()).sum::<f64>(),
             D: objective.d * silent.iter().map(|x| x.max(0.0)).sum::<f64>(),
         };
@@ -48,8 +145,8 @@ impl Problem {
         self.silent.add_sum(&at.multipliers[..silent], &mut gradient);
         let mut bound = 0.0;
         for ((target, multiplier), behind) in self.targets.iter().zip(&at.multipliers[silent..]).zip(at.behind) {
-            add(&mut gradient, *multiplier, &target.at);
-            add(&mut gradient, 2.0 * objective.b * behind, &target.behind);
+            add(&mut gradient, *multiplier, target.at);
+            add(&mut gradient, 2.0 * objective.b * behind, target.behind);
             bound += objective.b * behind * behind;
         }
         match objective.norm {
@@ -69,11 +166,21 @@ impl Problem {
         }
         for (n, (&g, &w)) in gradient.iter().zip(at.weights).enumerate() {
             let cost = |v: f64| g * (v - w) + objective.l1 * v.abs();
-            let (lower, upper) = (objective.lower[n].max(-reach), objective.upper[n].min(reach));
+            let (lower, upper) = (objective.bounds.lower[n].max(-reach), objective.bounds.upper[n].min(reach));
             let ends = cost(lower).min(cost(upper));
             bound += if lower < 0.0 && upper > 0.0 { ends.min(cost(0.0)) } else { ends };
         }
         bound
+    }
+}
+
+impl Point {
+    /// The share of the objective that a bound leaves open; none where everything is met.
+    pub(crate) fn gap(&self, bound: f64) -> f64 {
+        match self.parts.sum() {
+            least if least <= NOTHING => 0.0,
+            least => relative_gap(least, bound),
+        }
     }
 }
 

@@ -1,4 +1,4 @@
-//! The stated problem 6.9: what each row of it asks of the weights, named by pattern and time, written out when asked.
+//! The rows of the stated problem (6.9, 6.10): what each asks of the weights, named by pattern and time, written out when asked.
 //!
 //! A *row* holds the coefficients of the weights in one linear function of them (the potential at a time, or its slope), and
 //! what it must equal or not exceed. After a spike some inputs are lost (`after_spike`); as the spikes of a learning problem
@@ -11,11 +11,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Neuron, Shape, State, Time};
+use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Neuron, ROUNDING_MS, Shape, State, Time};
 use crate::{Result, SpikeTrains, problem};
-
-/// Rounding of a grid point on the very edge of a refractory time, ms.
-const EDGE: f64 = 1e-9;
 
 /// From so near a target on the target's row and its slope row stand for silence, ms; an input so near before it is at it and
 /// adds nothing there. A hair less than in the neuron, so that a crossing that is met to rounding falls on the same side.
@@ -123,6 +120,29 @@ pub(crate) struct Sheet {
     pub(crate) inputs: Vec<(f64, u32)>,
 }
 
+/// Where silence ends in pattern `p`, ms: at the horizon, or at the later of its stop and its last target + `tau`.
+///
+/// # Errors
+///
+/// `Problem` where a target, or the pattern's start, lies behind the horizon.
+pub(crate) fn end_of(
+    neuron: &Neuron,
+    horizon: Option<f64>,
+    p: usize,
+    pattern: &SpikeTrains,
+    targets: &[f64],
+) -> Result<f64> {
+    let last = targets.last();
+    let Some(end) = horizon else { return Ok(last.map_or(pattern.stop, |last| pattern.stop.max(last + neuron.tau))) };
+    if let Some(last) = last.filter(|last| **last > end) {
+        return Err(problem!("pattern {p}: last target at {last} ms, the horizon is {end} ms"));
+    }
+    if end < pattern.start {
+        return Err(problem!("pattern {p}: starts at {} ms, the horizon is {end} ms", pattern.start));
+    }
+    Ok(end)
+}
+
 impl Sheet {
     /// The inputs before `t`, by time.
     fn before(&self, t: f64) -> &[(f64, u32)] {
@@ -140,8 +160,18 @@ impl Sheet {
     }
 }
 
+/// The last target before `t`.
 fn last_before(targets: &[f64], t: f64) -> Option<f64> {
     targets.partition_point(|&target| target < t).checked_sub(1).map(|k| targets[k])
+}
+
+/// Whether an input at `s` no longer counts at `t`, the neuron having fired at these targets.
+pub(crate) fn lost(neuron: &Neuron, targets: &[f64], s: f64, t: f64) -> bool {
+    match neuron.after_spike {
+        AfterSpike::Keep => false,
+        AfterSpike::Ignore => neuron.loses(s, last_before(targets, s)),
+        AfterSpike::Reset => neuron.loses(s, last_before(targets, t)),
+    }
 }
 
 /// The problem, ready to state any row.
@@ -158,31 +188,31 @@ pub struct Statement {
 }
 
 impl Statement {
-    /// Takes examples that have been checked, and where silence ends in each pattern, ms.
-    pub(crate) fn new(
-        neuron: &Neuron,
-        margin: Margin,
-        unit: f64,
-        patterns: &[SpikeTrains],
-        targets: &[Vec<f64>],
-        ends: &[f64],
-    ) -> Self {
+    /// Of no pattern yet, for so many trains; what a potential of 1 in here is, is `unit` mV.
+    pub(crate) fn new(neuron: &Neuron, margin: Margin, unit: f64, trains: usize) -> Self {
         let shape = neuron.shape();
-        let sheet = |((pattern, targets), &end): ((&SpikeTrains, &Vec<f64>), &f64)| Sheet {
+        let (neuron, taper) = (neuron.clone(), Taper::new(shape, margin));
+        Self { neuron, shape, margin, unit, taper, trains, sheets: vec![] }
+    }
+
+    /// Takes one more pattern, which has been checked, and where silence ends in it, ms.
+    pub(crate) fn push(&mut self, pattern: &SpikeTrains, targets: &[f64], end: f64) {
+        self.sheets.push(Sheet {
             start: pattern.start,
             end,
-            targets: targets.clone(),
+            targets: targets.to_vec(),
             inputs: pattern.by_time().iter().map(|s| (s.t, s.train)).collect(),
-        };
-        Self {
-            neuron: neuron.clone(),
-            shape,
-            margin,
-            unit,
-            taper: Taper::new(shape, margin),
-            trains: patterns[0].len(),
-            sheets: patterns.iter().zip(targets).zip(ends).map(sheet).collect(),
-        }
+        });
+    }
+
+    /// Takes the first pattern away; the others are numbered anew from 0.
+    pub(crate) fn drop_first(&mut self) {
+        self.sheets.remove(0);
+    }
+
+    /// Takes the last pattern away.
+    pub(crate) fn drop_last(&mut self) {
+        self.sheets.pop();
     }
 
     /// The same with another margin.
@@ -264,12 +294,24 @@ impl Statement {
     ///
     /// `Problem` where the problem has no such target.
     pub fn behind(&self, pattern: usize, target: usize, delta_t: f64) -> Result<Stated> {
-        let (sheet, t) = self.target(pattern, target)?;
         let mut coefficients = vec![0.0; self.trains];
+        let limit = self.behind_into(pattern, target, delta_t, &mut coefficients)?;
+        Ok(Stated { coefficients, limit })
+    }
+
+    /// Writes that out into `coefficients`, one a train; gives the threshold.
+    pub(crate) fn behind_into(
+        &self,
+        pattern: usize,
+        target: usize,
+        delta_t: f64,
+        coefficients: &mut [f64],
+    ) -> Result<f64> {
+        let (sheet, t) = self.target(pattern, target)?;
         let t_behind = t + delta_t;
         let earlier = &sheet.targets[..target];
-        self.sum(sheet.before(t_behind), t_behind, earlier, |state| state.b, &mut coefficients);
-        Ok(Stated { coefficients, limit: self.threshold(sheet, t) })
+        self.sum(sheet.before(t_behind), t_behind, earlier, |state| state.b, coefficients);
+        Ok(self.threshold(sheet, t))
     }
 
     fn sheet(&self, pattern: usize) -> Result<&Sheet> {
@@ -320,22 +362,27 @@ impl Statement {
 
     /// Whether `t` lies neither at a target nor in the refractory time behind it.
     pub(crate) fn is_silent(&self, sheet: &Sheet, t: f64) -> bool {
-        let free = sheet.fired(t).is_some_and(|target| match self.neuron.time {
-            Time::Grid => t <= target + self.neuron.refractory + EDGE,
+        self.is_silent_between(sheet.fired(t), t, sheet.next(t))
+    }
+
+    /// The same of a time between the last target before it and the first one not before it.
+    pub(crate) fn is_silent_between(&self, fired: Option<f64>, t: f64, next: Option<f64>) -> bool {
+        let free = fired.is_some_and(|target| match self.neuron.time {
+            Time::Grid => t <= target + self.neuron.refractory + ROUNDING_MS,
             Time::Continuous => t < target + self.neuron.refractory,
         });
-        !free && sheet.next(t).is_none_or(|target| t <= target - AT_TARGET)
+        !free && next.is_none_or(|target| t <= target - AT_TARGET)
     }
 
     /// The threshold at `t`, the neuron having fired at the targets before, mV.
     pub(crate) fn threshold(&self, sheet: &Sheet, t: f64) -> f64 {
-        self.neuron.theta_0 + self.rise(sheet, t, t)
+        self.neuron.theta_0 + self.rise(sheet, sheet.fired(t), t)
     }
 
-    /// What is left at `t` of the threshold's rise, the neuron having fired at the targets before `to`, mV.
-    pub(crate) fn rise(&self, sheet: &Sheet, t: f64, to: f64) -> f64 {
+    /// What is left at `t` of the threshold's rise, the neuron having last fired at `fired`, mV.
+    pub(crate) fn rise(&self, sheet: &Sheet, fired: Option<f64>, t: f64) -> f64 {
         let printed = (self.neuron.first_threshold == FirstThreshold::Printed).then_some(sheet.start);
-        self.neuron.rise(sheet.fired(to).or(printed).map(|spike| t - spike))
+        self.neuron.rise(fired.or(printed).map(|spike| t - spike))
     }
 
     /// The margin at `t`, mV.
@@ -357,20 +404,17 @@ impl Statement {
     /// Adds up, by train, what `part` sees at `t` of inputs before, the neuron having fired at `earlier` targets only.
     fn sum(&self, inputs: &[(f64, u32)], t: f64, earlier: &[f64], part: impl Fn(State) -> f64, out: &mut [f64]) {
         out.fill(0.0);
-        let neuron = &self.neuron;
         let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
-        let last = last_before(earlier, t);
         let (mut at, mut one) = (f64::NAN, 0.0);
         for &(s, train) in &inputs[from..] {
             // Many inputs share a time where times are whole ms: an exponential a time, not an input.
             if s != at {
                 at = s;
-                let lost = match neuron.after_spike {
-                    AfterSpike::Keep => false,
-                    AfterSpike::Ignore => neuron.loses(s, last_before(earlier, s)),
-                    AfterSpike::Reset => neuron.loses(s, last),
+                one = if lost(&self.neuron, earlier, s, t) {
+                    0.0
+                } else {
+                    part(self.shape.after(self.shape.input(), t - s))
                 };
-                one = if lost { 0.0 } else { part(self.shape.after(self.shape.input(), t - s)) };
             }
             out[train as usize] += one;
         }

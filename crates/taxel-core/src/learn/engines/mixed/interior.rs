@@ -6,10 +6,9 @@
 //! iteration takes the Cholesky factors of one matrix of synapses and one of equality rows.
 
 use super::dense::{Cholesky, add_gram, add_sum, outer, times};
-use super::polish::Guess;
-use super::{Place, Point, Program, retain};
+use super::program::{Guess, Place, Point, Program, retain};
 use crate::Stop;
-use crate::learn::cone::cone_r::Norm;
+use crate::learn::statement::Norm;
 use crate::vectors::dot;
 use faer::Mat;
 

@@ -6,9 +6,9 @@
 use faer::Mat;
 
 use super::dense::{Lu, add_gram, add_sum, times};
-use super::{Place, Point, Program};
+use super::program::{Guess, MET, Place, Point, Program};
 use crate::Stop;
-use crate::learn::cone::cone_r::Norm;
+use crate::learn::statement::Norm;
 use crate::vectors::dot;
 
 const MOST_GUESSES: usize = 12;
@@ -18,19 +18,10 @@ const MOST_REFINEMENTS: usize = 12;
 const SOFT: [f64; 2] = [1e-11, 1e-15];
 /// What is off of the conditions of a guess in units of about 1 where that is solved.
 const SOLVED: f64 = 1e-13;
-/// Rows and bounds count as met within this, in units of rows of length 1.
-pub(super) const MET: f64 = 2e-14;
 /// The share of the tolerance at which the gap is small enough.
 const ENOUGH: f64 = 0.01;
 /// Multipliers and slopes of the wrong sign count from here.
 const WRONG: f64 = 1e-11;
-
-/// A guess of what binds.
-#[derive(Debug, Clone)]
-pub(super) struct Guess {
-    pub(super) places: Vec<Place>,
-    pub(super) binding: Vec<bool>,
-}
 
 /// Solves for the guess, mends it, and so on; gives the best point that meets all rows and bounds, with its guess.
 pub(super) fn polish(

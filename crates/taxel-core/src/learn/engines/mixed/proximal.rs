@@ -5,8 +5,10 @@
 //! `u = w - c` and `y = sqrt(2 lift/rho) (B w - m)` it is the least `|u|^2 + |y|^2`, which is what the dual active set finds;
 //! c moves there, and as c comes to rest the multipliers become those of B alone (Rockafellar 1976, SIAM J. Control 14:877).
 
-use super::{Best, Point, Program, dot, power_of_2};
+use super::best::Best;
+use super::program::{Point, Program, power_of_2};
 use crate::learn::engines::{DualActiveSet, Verdict};
+use crate::vectors::dot;
 use crate::{Result, Stop};
 
 const MOST_STEPS: usize = 30;

@@ -1,4 +1,8 @@
+use super::program::Point;
 use super::*;
+use crate::learn::engines::nearest;
+use crate::learn::statement::{Norm, relative_gap};
+use crate::vectors::dot;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 /// Of the largest weight, about.
@@ -86,7 +90,7 @@ impl Problem {
     }
 
     fn gap(&self, found: &Found) -> f64 {
-        relative(self.objective(&found.weights), found.bound)
+        relative_gap(self.objective(&found.weights), found.bound)
     }
 
     /// Clarabel on the same rows, unscaled by us.

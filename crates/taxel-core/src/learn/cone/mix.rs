@@ -1,14 +1,13 @@
 //! Objectives of more than the shortest weights: l1, B and sums of terms, by rounds around the solver for few rows.
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
-use super::{Best, Engine, MET, MOST_ROUNDS, Problem, Round, Slopes};
-use crate::learn::engines::HardRows;
+use super::exact::{Best, Exact, MET, MOST_ROUNDS, Slopes};
 use crate::learn::engines::mixed::{self, Terms};
-use crate::learn::engines::nearest;
-use crate::learn::statement::Bounds;
-use crate::learn::statement::Peak;
-use crate::learn::statement::Row;
+use crate::learn::engines::{HardRows, nearest};
+use crate::learn::fit::{Left, Round};
+use crate::learn::statement::{Bounds, Peak, Row, Targets, largest};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -22,7 +21,7 @@ const SLACK_SHARE: f64 = 0.05;
 /// Rounds in which rows go: later ones only add, so that they end.
 const DROPPING: usize = 10;
 
-impl Problem {
+impl Exact {
     /// Goes on from weights that meet every row.
     pub(super) fn mix(
         &self,
@@ -32,22 +31,24 @@ impl Problem {
         stop: Stop<'_>,
     ) -> Result<Best> {
         let objective = &self.objective;
+        let wanted: Vec<f64> = self.targets.thresholds.iter().map(|threshold| objective.kappa * threshold).collect();
         let terms = Terms {
             l1: objective.l1,
             l2: objective.l2,
             norm: objective.norm,
             lift: objective.b,
-            behind: &objective.behind,
-            wanted: &objective.wanted,
+            behind: &self.targets.behind,
+            wanted: &wanted,
         };
-        let Bounds { lower, upper } = &self.bounds;
+        let Bounds { lower, upper } = &objective.bounds;
         let size = best.weights.iter().fold(0.0_f64, |most, w| most.max(w.abs()));
         let mut rows = Dense::new(self, best.held.iter().chain(start).map(|r| r.0))?;
         let (mut going, mut near, begun) = (None, true, best.rounds);
         loop {
             best.rounds += 1;
-            let tolerance = if near { NEAR } else { self.parameters.tolerance };
-            let found = mixed::minimise(&terms, &rows.hard(), &self.bounds, size, going.as_ref(), tolerance, stop)?;
+            let tolerance = if near { NEAR } else { self.tolerance };
+            let found =
+                mixed::minimise(&terms, &rows.hard(), &objective.bounds, size, going.as_ref(), tolerance, stop)?;
             best.least = best.least.max(found.bound);
             if found.stopped || best.rounds >= MOST_ROUNDS {
                 return Ok(best);
@@ -60,11 +61,12 @@ impl Problem {
             {
                 weights = meets;
             }
-            let theta = self.parameters.neuron.theta_0;
+            let theta = self.statement.neuron.theta_0;
             let broken =
                 self.broken(&weights, ASKED_SHARE, if near { NEAR_SHARE * theta } else { self.rounding(&weights) });
-            let value: f64 = objective.parts(&weights).iter().sum();
-            progress(Round { round: best.rounds, rows: rows.names.len(), broken: broken.len(), objective: value });
+            let value: f64 = self.parts(&weights).sum();
+            let (count, left) = (rows.names.len(), Left::Broken(broken.len()));
+            progress(Round { round: best.rounds, rows: count, objective: value, left });
             let mut goes_on = found.start;
             if near && best.rounds < begun + DROPPING {
                 goes_on.retain(&rows.drop_slack(&weights, &found.inequality, SLACK_SHARE * theta));
@@ -77,19 +79,16 @@ impl Problem {
                 (near, going) = (false, Some(goes_on));
                 continue;
             }
-            best.engine = match found.engine {
-                mixed::Engine::Native => Engine::Native,
-                mixed::Engine::Clarabel => Engine::ConeSolver,
-            };
+            best.engine = found.engine;
             // Rows that bind here help the next fit, although the shortest weights do not need them.
             for (&name, &multiplier) in rows.names.iter().zip(&found.inequality) {
                 if multiplier > 0.0 && !best.held.iter().any(|(held, _)| *held == name) {
                     best.held.push((name, 0.0));
                 }
             }
-            if self.missed(&weights)? <= MET
+            if self.missed(&weights) <= MET
                 && self.worst(&weights) <= self.rounding(&weights)
-                && value < objective.parts(&best.weights).iter().sum()
+                && value < self.parts(&best.weights).sum()
             {
                 best.weights = weights;
             }
@@ -100,8 +99,7 @@ impl Problem {
 
 /// The working set, written out.
 struct Dense {
-    equal: Vec<f64>,
-    equal_to: Vec<f64>,
+    targets: Arc<Targets>,
     below: Vec<f64>,
     limit: Vec<f64>,
     /// Of the rows below.
@@ -112,23 +110,17 @@ struct Dense {
 
 impl Dense {
     /// All targets, and those of these rows that the problem has.
-    fn new(problem: &Problem, rows: impl Iterator<Item = Row>) -> Result<Self> {
+    fn new(problem: &Exact, rows: impl Iterator<Item = Row>) -> Result<Self> {
         let statement = &problem.statement;
         let slopes = Slopes::new(statement)?;
         let mut dense = Self {
-            equal: vec![],
-            equal_to: vec![],
+            targets: Arc::clone(&problem.targets),
             below: vec![],
             limit: vec![],
             names: vec![],
             there: HashSet::new(),
             slopes,
         };
-        for (pattern, target) in statement.targets() {
-            let stated = statement.state(Row::Target { pattern, target })?;
-            dense.equal.extend(stated.coefficients);
-            dense.equal_to.push(stated.limit);
-        }
         for row in rows {
             match row {
                 Row::Silence { pattern, t } if statement.is_asked(pattern, t) => {
@@ -146,10 +138,10 @@ impl Dense {
     }
 
     fn hard(&self) -> HardRows<'_> {
-        HardRows { equal: &self.equal, equal_to: &self.equal_to, below: &self.below, limit: &self.limit }
+        HardRows { equal: &self.targets.at, equal_to: &self.targets.thresholds, below: &self.below, limit: &self.limit }
     }
 
-    fn add_silence(&mut self, problem: &Problem, pattern: usize, t: f64) -> Result<()> {
+    fn add_silence(&mut self, problem: &Exact, pattern: usize, t: f64) -> Result<()> {
         if self.there.insert((pattern, t.to_bits())) {
             let row = Row::Silence { pattern, t };
             let stated = problem.statement.state(row)?;
@@ -172,7 +164,7 @@ impl Dense {
     }
 
     /// Adds what is broken; says whether anything is new.
-    fn add(&mut self, problem: &Problem, weights: &[f64], broken: &[Peak]) -> Result<bool> {
+    fn add(&mut self, problem: &Exact, weights: &[f64], broken: &[Peak]) -> Result<bool> {
         let before = self.names.len();
         for peak in broken {
             self.add_silence(problem, peak.pattern, peak.t)?;
@@ -203,8 +195,8 @@ impl Dense {
     /// How far the worst row is missed.
     fn missed(&self, weights: &[f64]) -> f64 {
         let n = weights.len();
-        let equal = self.equal.chunks_exact(n).zip(&self.equal_to).map(|(row, to)| (dot(row, weights) - to).abs());
+        let equal = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
         let below = self.below.chunks_exact(n).zip(&self.limit).map(|(row, limit)| dot(row, weights) - limit);
-        super::largest(equal.chain(below).chain([0.0]))
+        largest(equal.chain(below).chain([0.0]))
     }
 }

@@ -2,10 +2,10 @@
 
 use std::collections::HashSet;
 
-use super::{Certificate, MOST_ROUNDS, Problem, Round, Slopes};
+use super::exact::{Exact, MOST_ROUNDS, Slopes};
 use crate::learn::engines::{DualActiveSet, Multipliers, RowId, Verdict};
-use crate::learn::statement::Peak;
-use crate::learn::statement::{Row, Statement};
+use crate::learn::fit::{Left, Round};
+use crate::learn::statement::{Certificate, Peak, Row, Statement};
 use crate::{Result, Stop, problem};
 
 /// Cuts have the full margin, but this share of it is asked for: each cut has room around it, so rounds end.
@@ -28,7 +28,7 @@ pub(super) struct Shortest {
     pub(super) end: End,
 }
 
-impl Problem {
+impl Exact {
     /// Row generation around the dual active set.
     pub(super) fn shortest(
         &self,
@@ -50,8 +50,8 @@ impl Problem {
                 Verdict::Optimal => {
                     let broken = self.broken(&weights, ASKED_SHARE, self.rounding(&weights));
                     let rows = working.rows();
-                    let objective = self.objective.parts(&weights).iter().sum();
-                    progress(Round { round: rounds, rows, broken: broken.len(), objective });
+                    let objective = self.parts(&weights).sum();
+                    progress(Round { round: rounds, rows, objective, left: Left::Broken(broken.len()) });
                     let flat = working.flat(&weights, (1.0 - ASKED_SHARE) * self.statement.margin.slope);
                     let ended = rounds == MOST_ROUNDS || stop.asked();
                     if !ended && weights != before && working.cut(&self.statement, &broken, &flat)? {
@@ -68,7 +68,9 @@ impl Problem {
 
     /// The proof, of as few rows as can be found quickly.
     fn refutation(&self, rows: Vec<(Row, f64)>, stop: Stop<'_>) -> Result<Option<Certificate>> {
-        let Some(proof) = Certificate::check(&self.statement, &self.bounds, rows.clone())? else { return Ok(None) };
+        let Some(proof) = Certificate::check(&self.statement, &self.objective.bounds, rows.clone())? else {
+            return Ok(None);
+        };
         if rows.len() > FEW {
             return Ok(Some(proof));
         }
@@ -98,7 +100,7 @@ impl Problem {
 
     /// A proof that these rows cannot be met together.
     fn conflict(&self, rows: &[Row], stop: Stop<'_>) -> Result<Option<Certificate>> {
-        let mut engine = DualActiveSet::new(&self.bounds.lower, &self.bounds.upper)?;
+        let mut engine = DualActiveSet::new(&self.objective.bounds.lower, &self.objective.bounds.upper)?;
         let (mut targets, mut others) = (vec![], vec![]);
         for &row in rows {
             let stated = self.statement.state(row)?;
@@ -111,7 +113,7 @@ impl Problem {
             }
         }
         let Verdict::Infeasible(ray) = engine.solve(stop)? else { return Ok(None) };
-        Certificate::check(&self.statement, &self.bounds, named(&targets, &others, &ray.multipliers))
+        Certificate::check(&self.statement, &self.objective.bounds, named(&targets, &others, &ray.multipliers))
     }
 
     /// A bound on `|w|^2` below, from any multipliers: what the Lagrangian comes to at least within the bounds.
@@ -123,7 +125,7 @@ impl Problem {
             sum.iter_mut().zip(&row).for_each(|(g, a)| *g += multiplier * a);
             allowed += multiplier * limit;
         }
-        let least: f64 = (sum.iter().zip(&self.bounds.lower).zip(&self.bounds.upper))
+        let least: f64 = (sum.iter().zip(&self.objective.bounds.lower).zip(&self.objective.bounds.upper))
             .map(|((&g, &l), &u)| {
                 let w = (-g).clamp(l, u);
                 0.5 * w * w + g * w
@@ -148,8 +150,9 @@ struct Working {
 }
 
 impl Working {
-    fn new(problem: &Problem, start: &[(Row, f64)]) -> Result<Self> {
-        let Problem { statement, bounds, .. } = problem;
+    fn new(problem: &Exact, start: &[(Row, f64)]) -> Result<Self> {
+        let Exact { statement, targets, .. } = problem;
+        let bounds = &problem.objective.bounds;
         let mut working = Self {
             engine: DualActiveSet::new(&bounds.lower, &bounds.upper)?,
             targets: statement.targets().map(|(pattern, target)| Row::Target { pattern, target }).collect(),
@@ -159,9 +162,8 @@ impl Working {
             ids: vec![],
             row: vec![0.0; statement.trains],
         };
-        for &target in &working.targets {
-            let limit = statement.state_into(target, &mut working.row)?;
-            working.engine.equality(&working.row, limit)?;
+        for target in targets.iter() {
+            working.engine.equality(target.at, target.threshold)?;
         }
         for (name, stated) in &working.slopes.0 {
             working.ids.push(Some(working.engine.inequality(&stated.coefficients, stated.limit)?));

@@ -1,0 +1,138 @@
+//! The problem of 6.11 at one margin: what must be met, what is minimised, and how far weights are from meeting it.
+
+use std::sync::Arc;
+
+use crate::learn::fit::Engine;
+use crate::learn::statement::{Margin, Objective, Parts, Peak, Row, Silence, Stated, Statement, Targets, largest};
+use crate::neuron::Time;
+use crate::vectors::dot;
+use crate::{Result, Stop};
+
+/// How far a target may be missed, mV.
+pub(super) const MET: f64 = 1e-12;
+/// Silence counts as broken from this on, mV, and by this share of the sum of absolute weights: rounding of the sweep.
+const BROKEN: f64 = 1e-13;
+const BROKEN_SHARE: f64 = 2e-16;
+/// The share of the margin that weights must keep to count as a solution.
+const KEPT_SHARE: f64 = 0.5;
+/// Rounds end without a verdict after so many.
+pub(super) const MOST_ROUNDS: usize = 1000;
+
+/// A stated problem whose targets and silence must be met.
+#[derive(Debug, Clone)]
+pub(super) struct Exact {
+    pub(super) statement: Statement,
+    pub(super) targets: Arc<Targets>,
+    silence: Silence,
+    pub(super) objective: Objective,
+    /// The relative gap at which the objective counts as least.
+    pub(super) tolerance: f64,
+}
+
+/// The best weights so far, and what is known of them.
+pub(super) struct Best {
+    pub(super) weights: Vec<f64>,
+    /// No weights have a smaller objective.
+    pub(super) least: f64,
+    pub(super) held: Vec<(Row, f64)>,
+    pub(super) engine: Engine,
+    pub(super) rounds: usize,
+}
+
+impl Exact {
+    /// Writes out the targets of a statement, lays out its silence, and normalises what is minimised.
+    pub(super) fn new(
+        statement: Statement,
+        delta_t: f64,
+        objective: impl FnOnce(&Targets) -> Objective,
+        tolerance: f64,
+        stop: Stop<'_>,
+    ) -> Result<Self> {
+        let targets = Targets::new(&statement, delta_t, stop)?;
+        let objective = objective(&targets);
+        let silence = Silence::new(&statement, stop)?;
+        Ok(Self { statement, targets: Arc::new(targets), silence, objective, tolerance })
+    }
+
+    /// The same problem with another margin.
+    pub(super) fn with_margin(&self, margin: Margin, stop: Stop<'_>) -> Result<Self> {
+        let statement = self.statement.with_margin(margin);
+        let silence = Silence::new(&statement, stop)?;
+        let (targets, objective) = (Arc::clone(&self.targets), self.objective.clone());
+        Ok(Self { statement, targets, silence, objective, tolerance: self.tolerance })
+    }
+
+    /// 6.11 at these weights, by its terms.
+    pub(super) fn parts(&self, weights: &[f64]) -> Parts {
+        self.objective.exact_parts(&self.targets, weights)
+    }
+
+    /// How far the worst target is missed, mV.
+    pub(super) fn missed(&self, weights: &[f64]) -> f64 {
+        let missed = self.targets.iter().map(|row| (dot(row.at, weights) - row.threshold).abs());
+        largest(missed.chain([0.0]))
+    }
+
+    /// Where silence is broken with this share of the margin, by more than `tolerance`.
+    pub(super) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
+        self.silence.broken(weights, share, tolerance)
+    }
+
+    /// By how much silence is broken at worst where it keeps what it must of the margin, mV; below 0 where it is kept.
+    pub(super) fn worst(&self, weights: &[f64]) -> f64 {
+        self.silence.worst(weights, KEPT_SHARE)
+    }
+
+    /// How far silence may seem broken by rounding alone, mV.
+    pub(super) fn rounding(&self, weights: &[f64]) -> f64 {
+        let least = if self.is_grid() { MET } else { BROKEN };
+        least.max(BROKEN_SHARE * weights.iter().map(|w| w.abs()).sum::<f64>())
+    }
+
+    fn is_grid(&self) -> bool {
+        self.statement.neuron.time == Time::Grid
+    }
+
+    /// The largest share of the margin that holds, 0 where silence is broken; on the grid the least threshold - potential.
+    pub(super) fn kept_margin(&self, weights: &[f64]) -> Margin {
+        let margin = self.statement.margin;
+        if self.is_grid() {
+            return Margin { height: margin.height - self.silence.worst(weights, 1.0), slope: 0.0 };
+        }
+        // At the worst instants potential + share margin = threshold gives the next share; the shares only fall.
+        let mut share = 1.0;
+        loop {
+            let broken = self.broken(weights, share, self.rounding(weights));
+            let less = broken.iter().map(|peak| peak.excess / self.statement.margin_of(peak.row()));
+            let next = share - largest(less.chain([0.0]));
+            // Weights of a fit that was stopped may keep none at all.
+            if next.is_nan() || next <= 0.0 {
+                return margin.times(0.0);
+            }
+            if next >= share {
+                return margin.times(share);
+            }
+            share = next;
+        }
+    }
+}
+
+/// Slope rows, which no sweep prices.
+#[derive(Debug)]
+pub(super) struct Slopes(pub(super) Vec<(Row, Stated)>);
+
+impl Slopes {
+    pub(super) fn new(statement: &Statement) -> Result<Self> {
+        if statement.neuron.time == Time::Grid {
+            return Ok(Self(vec![]));
+        }
+        let rows = statement.targets().map(|(pattern, target)| Row::Slope { pattern, target });
+        Ok(Self(rows.map(|row| Ok((row, statement.state(row)?))).collect::<Result<_>>()?))
+    }
+
+    /// Those that are broken even with so much less slope.
+    pub(super) fn broken(&self, weights: &[f64], left_out: f64) -> Vec<usize> {
+        let kept = |row: &Stated| dot(&row.coefficients, weights) <= row.limit + left_out;
+        (0..self.0.len()).filter(|&k| !kept(&self.0[k].1)).collect()
+    }
+}

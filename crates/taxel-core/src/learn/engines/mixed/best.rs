@@ -1,0 +1,128 @@
+//! The best weights and the best bound so far, from whatever solver.
+
+use super::dense::times;
+use super::interior::State;
+use super::polish::polish;
+use super::program::{Guess, Point, Program, retain};
+use crate::learn::engines::nearest;
+use crate::learn::fit::Engine;
+use crate::learn::statement::{NOTHING, relative_gap};
+use crate::{Result, Stop};
+
+/// Where a later call with more rows can go on.
+#[derive(Debug, Clone)]
+pub(crate) struct Start {
+    pub(super) state: State,
+    /// The last polished point, in the program's units, and what binds there.
+    pub(super) exact: Option<(Point, Guess)>,
+}
+
+impl Start {
+    /// Forgets inequality rows, as the caller does; those added later than the call come last.
+    pub(crate) fn retain(&mut self, keep: &[bool]) {
+        self.state.retain(keep);
+        if let Some((point, guess)) = &mut self.exact {
+            retain(&mut point.inequality, keep);
+            retain(&mut guess.binding, keep);
+        }
+    }
+}
+
+/// What was found.
+#[derive(Debug, Clone)]
+pub(crate) struct Found {
+    pub(crate) weights: Vec<f64>,
+    /// Multipliers of the inequality rows, at least 0.
+    pub(crate) inequality: Vec<f64>,
+    /// The least objective over these rows is no lower, hence over these and more.
+    pub(crate) bound: f64,
+    pub(crate) engine: Engine,
+    pub(crate) stopped: bool,
+    pub(crate) start: Start,
+}
+
+/// The best point so far and the best bound.
+pub(super) struct Best<'a> {
+    pub(super) program: &'a Program,
+    pub(super) point: Point,
+    pub(super) guess: Option<Guess>,
+    pub(super) met: bool,
+    pub(super) objective: f64,
+    pub(super) bound: f64,
+}
+
+impl<'a> Best<'a> {
+    pub(super) fn new(program: &'a Program) -> Self {
+        let weights = program.lower.iter().zip(&program.upper).map(|(l, u)| 0.0_f64.clamp(*l, *u)).collect();
+        let point = Point {
+            weights,
+            equality: vec![0.0; program.equal_to.len()],
+            inequality: vec![0.0; program.limit.len()],
+            pull: vec![0.0; program.width()],
+        };
+        // No term is below 0.
+        Self { program, point, guess: None, met: false, objective: f64::INFINITY, bound: 0.0 }
+    }
+
+    pub(super) fn offer(&mut self, point: Point, guess: Option<Guess>) {
+        let objective = self.program.objective(&point.weights);
+        let met = self.program.met(&point.weights);
+        self.bound = self.bound.max(self.program.bound(&point));
+        if self.objective.is_infinite() || (met && !self.met) || (met == self.met && objective < self.objective) {
+            (self.point, self.guess, self.met, self.objective) = (point, guess, met, objective);
+        }
+    }
+
+    pub(super) fn improve(&mut self, near: &Point, guess: Guess, tolerance: f64, stop: Stop<'_>) -> Result<()> {
+        let program = self.program;
+        if let Some((point, guess)) = polish(program, near, guess, tolerance, stop) {
+            self.offer(point, Some(guess));
+        }
+        if self.gap() <= tolerance {
+            return Ok(());
+        }
+        // Where what binds cannot be told, good multipliers and the nearest weights that meet the rows will do.
+        self.offer(near.clone(), None);
+        if program.gap(near) <= tolerance
+            && let Some(weights) = nearest(&near.weights, &program.hard(), &program.lower, &program.upper, stop)?
+        {
+            self.offer(Point { weights, ..near.clone() }, None);
+        }
+        Ok(())
+    }
+
+    /// Goes on from a polished point with rows added since.
+    pub(super) fn exchange(&mut self, point: &Point, guess: &Guess, tolerance: f64, stop: Stop<'_>) {
+        let (mut point, mut guess) = (point.clone(), guess.clone());
+        let below = times(&self.program.below, &point.weights);
+        let added = below.iter().zip(&self.program.limit).skip(guess.binding.len());
+        guess.binding.extend(added.map(|(u, limit)| u > limit));
+        point.inequality.resize(guess.binding.len(), 0.0);
+        if let Some((point, guess)) = polish(self.program, &point, guess, tolerance, stop) {
+            self.offer(point, Some(guess));
+        }
+    }
+
+    pub(super) fn gap(&self) -> f64 {
+        if !self.met {
+            f64::INFINITY
+        } else if self.objective - self.bound <= NOTHING * self.program.at_zero() {
+            0.0
+        } else {
+            relative_gap(self.objective, self.bound)
+        }
+    }
+
+    pub(super) fn found(self, engine: Engine, stopped: bool, state: State) -> Found {
+        let program = self.program;
+        let multipliers = self.point.inequality.iter().zip(&program.of_below);
+        Found {
+            weights: self.point.weights.iter().map(|w| w * program.weight).collect(),
+            inequality: multipliers.map(|(z, scale)| z * program.cost / scale).collect(),
+            bound: self.bound * program.cost,
+            engine,
+            stopped,
+            start: Start { state, exact: self.guess.map(|guess| (self.point, guess)) },
+        }
+    }
+}

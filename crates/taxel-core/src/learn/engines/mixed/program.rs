@@ -1,0 +1,331 @@
+//! The program in its own units: terms, rows, bounds, and what they come to at any weights and multipliers.
+
+use super::dense::{add_sum, times};
+use crate::learn::engines::{ConeProgram, HardRows, Hinges};
+use crate::learn::statement::{Bounds, Norm, relative_gap};
+use crate::vectors::dot;
+use crate::{Result, Stop};
+
+/// Rows and bounds count as met within this, in units of rows of length 1.
+pub(super) const MET: f64 = 2e-14;
+
+/// The terms of the objective, weighted and normalised.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Terms<'a> {
+    pub(crate) l1: f64,
+    pub(crate) l2: f64,
+    pub(crate) norm: Norm,
+    /// The factor of B, its rows one after the other, and what they should reach.
+    pub(crate) lift: f64,
+    pub(crate) behind: &'a [f64],
+    pub(crate) wanted: &'a [f64],
+}
+
+/// Weights and multipliers; `pull` stands for the slope of `l2 |w|_2`, no longer than `l2`.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Point {
+    pub(crate) weights: Vec<f64>,
+    pub(crate) equality: Vec<f64>,
+    pub(crate) inequality: Vec<f64>,
+    pub(crate) pull: Vec<f64>,
+}
+
+/// Where a weight stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    Free,
+    Zero,
+    Lower,
+    Upper,
+}
+
+/// A guess of what binds.
+#[derive(Debug, Clone)]
+pub(super) struct Guess {
+    pub(super) places: Vec<Place>,
+    pub(super) binding: Vec<bool>,
+}
+
+/// The problem in units in which weights, rows and costs are about 1. All scales are powers of 2, so nothing is rounded.
+pub(super) struct Program {
+    pub(super) l1: f64,
+    pub(super) l2: f64,
+    pub(super) norm: Norm,
+    pub(super) lift: f64,
+    pub(super) behind: Vec<f64>,
+    pub(super) wanted: Vec<f64>,
+    pub(super) equal: Vec<f64>,
+    pub(super) equal_to: Vec<f64>,
+    pub(super) below: Vec<f64>,
+    pub(super) limit: Vec<f64>,
+    pub(super) lower: Vec<f64>,
+    pub(super) upper: Vec<f64>,
+    /// What a weight, the objective and each inequality row were divided by.
+    pub(super) weight: f64,
+    pub(super) cost: f64,
+    pub(super) of_below: Vec<f64>,
+}
+
+/// Keeps what is kept, and all behind.
+pub(super) fn retain<T>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut keep = keep.iter();
+    values.retain(|_| keep.next().copied().unwrap_or(true));
+}
+
+/// The power of 2 next to a positive number; 1 for any other.
+pub(super) fn power_of_2(x: f64) -> f64 {
+    if x > 0.0 && x.is_finite() { x.log2().round().clamp(-1000.0, 1000.0).exp2() } else { 1.0 }
+}
+
+impl Program {
+    pub(super) fn new(terms: &Terms<'_>, rows: &HardRows<'_>, bounds: &Bounds, size: f64) -> Self {
+        let Bounds { lower, upper } = bounds;
+        let n = lower.len();
+        let weight = power_of_2(size);
+        let scaled = |rows: &[f64], limits: &[f64]| {
+            let (mut rows, mut limits) = (rows.to_vec(), limits.to_vec());
+            let mut scales = Vec::with_capacity(limits.len());
+            for (row, limit) in rows.chunks_exact_mut(n.max(1)).zip(&mut limits) {
+                let scale = power_of_2(dot(row, row).sqrt() * weight);
+                row.iter_mut().for_each(|v| *v *= weight / scale);
+                *limit /= scale;
+                scales.push(scale);
+            }
+            (rows, limits, scales)
+        };
+        let (equal, equal_to, _) = scaled(rows.equal, rows.equal_to);
+        let (below, limit, of_below) = scaled(rows.below, rows.limit);
+        let behind: Vec<f64> = terms.behind.iter().map(|v| v * weight).collect();
+        let square = terms.norm == Norm::Square;
+        let l2 = terms.l2 * if square { weight * weight } else { weight };
+        let mut pulled = vec![0.0; n];
+        if terms.lift > 0.0 {
+            add_sum(&behind, terms.wanted, &mut pulled);
+        }
+        let lifted = 2.0 * terms.lift * pulled.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let cost = power_of_2(terms.l1 * weight + if square { 2.0 * l2 } else { l2 / (n as f64).sqrt() } + lifted);
+        Self {
+            l1: terms.l1 * weight / cost,
+            l2: l2 / cost,
+            norm: terms.norm,
+            lift: terms.lift / cost,
+            behind,
+            wanted: terms.wanted.to_vec(),
+            equal,
+            equal_to,
+            below,
+            limit,
+            lower: lower.iter().map(|w| w / weight).collect(),
+            upper: upper.iter().map(|w| w / weight).collect(),
+            weight,
+            cost,
+            of_below,
+        }
+    }
+
+    pub(super) fn width(&self) -> usize {
+        self.lower.len()
+    }
+
+    pub(super) fn hard(&self) -> HardRows<'_> {
+        HardRows { equal: &self.equal, equal_to: &self.equal_to, below: &self.below, limit: &self.limit }
+    }
+
+    pub(super) fn missed(&self, w: &[f64]) -> Vec<f64> {
+        if self.lift > 0.0 {
+            times(&self.behind, w).iter().zip(&self.wanted).map(|(u, m)| u - m).collect()
+        } else {
+            vec![]
+        }
+    }
+
+    pub(super) fn objective(&self, w: &[f64]) -> f64 {
+        let square = dot(w, w);
+        let missed = self.missed(w);
+        self.l1 * w.iter().map(|w| w.abs()).sum::<f64>()
+            + self.l2 * if self.norm == Norm::Square { square } else { square.sqrt() }
+            + self.lift * dot(&missed, &missed)
+    }
+
+    /// The slope of the smooth terms: B, and the square.
+    pub(super) fn slope(&self, w: &[f64]) -> Vec<f64> {
+        let mut slope = vec![0.0; w.len()];
+        if self.lift > 0.0 {
+            let mut missed = self.missed(w);
+            missed.iter_mut().for_each(|m| *m *= 2.0 * self.lift);
+            add_sum(&self.behind, &missed, &mut slope);
+        }
+        if self.norm == Norm::Square {
+            slope.iter_mut().zip(w).for_each(|(s, w)| *s += 2.0 * self.l2 * w);
+        }
+        slope
+    }
+
+    /// How far the tangent of the smooth terms at `w` lies below 0 at weights of 0.
+    pub(super) fn tangent(&self, w: &[f64]) -> f64 {
+        let missed = self.missed(w);
+        let lift: f64 = missed.iter().zip(&self.wanted).map(|(x, m)| x * (2.0 * m + x)).sum();
+        let square = if self.norm == Norm::Square { self.l2 * dot(w, w) } else { 0.0 };
+        self.lift * lift + square
+    }
+
+    /// The least value of `slope v + l1 |v|` between the bounds of weight `j`.
+    pub(super) fn least(&self, j: usize, slope: f64) -> f64 {
+        let cost = |v: f64| slope * v + self.l1 * v.abs();
+        let (lower, upper) = (self.lower[j], self.upper[j]);
+        let ends = cost(lower).min(cost(upper));
+        if lower < 0.0 && upper > 0.0 { ends.min(0.0) } else { ends }
+    }
+
+    /// The slope of `l2 |w|_2`.
+    pub(super) fn pull(&self, w: &[f64]) -> Vec<f64> {
+        let length = dot(w, w).sqrt();
+        if self.norm == Norm::Norm && self.l2 > 0.0 && length > 0.0 {
+            w.iter().map(|w| self.l2 * w / length).collect()
+        } else {
+            vec![0.0; w.len()]
+        }
+    }
+
+    /// How far rows and bounds are missed at most.
+    pub(super) fn missing(&self, w: &[f64]) -> f64 {
+        let equal = times(&self.equal, w);
+        let equal = equal.iter().zip(&self.equal_to).map(|(u, e)| (u - e).abs());
+        let below = times(&self.below, w);
+        let below = below.iter().zip(&self.limit).map(|(u, limit)| u - limit);
+        let bounds = w.iter().zip(self.lower.iter().zip(&self.upper)).map(|(w, (l, u))| (l - w).max(w - u));
+        equal.chain(below).chain(bounds).fold(0.0, f64::max)
+    }
+
+    pub(super) fn met(&self, w: &[f64]) -> bool {
+        w.iter().all(|w| w.is_finite()) && self.missing(w) <= MET * (self.width() as f64).sqrt().max(10.0)
+    }
+
+    pub(super) fn is_lift_alone(&self) -> bool {
+        self.l1 == 0.0 && self.l2 == 0.0 && self.lift > 0.0
+    }
+
+    pub(super) fn at_zero(&self) -> f64 {
+        self.lift * dot(&self.wanted, &self.wanted)
+    }
+
+    /// Solves the same program with Clarabel, as far as it goes.
+    pub(super) fn clarabel(&self, stop: Stop<'_>) -> Result<Point> {
+        let n = self.width();
+        let mut gram = vec![0.0; n * n];
+        let mut linear = vec![0.0; n];
+        if self.lift > 0.0 {
+            for row in self.behind.chunks_exact(n) {
+                for (column, v) in gram.chunks_exact_mut(n).zip(row) {
+                    column.iter_mut().zip(row).for_each(|(g, r)| *g += v * r);
+                }
+            }
+            let factors: Vec<f64> = self.wanted.iter().map(|m| -2.0 * self.lift * m).collect();
+            add_sum(&self.behind, &factors, &mut linear);
+        }
+        let program = ConeProgram {
+            linear: &linear,
+            l1: self.l1,
+            l2: self.l2,
+            norm: self.norm,
+            quadratic: self.lift,
+            behind: &self.behind,
+            gram: &gram,
+            bounds: self.lower.iter().zip(&self.upper).map(|(l, u)| [*l, *u]).collect(),
+            hinges: &Hinges::default(),
+            hard: self.hard(),
+        };
+        let answer = program.solve(1.0, 1e-11, stop)?;
+        Ok(Point {
+            weights: answer.weights,
+            equality: answer.equality,
+            inequality: answer.inequality,
+            pull: answer.pull,
+        })
+    }
+
+    /// What seems to bind at weights and multipliers of any solver.
+    pub(super) fn guess(&self, point: &Point) -> Guess {
+        const NEAR: f64 = 1e-7;
+        let place = |(w, (l, u)): (&f64, (&f64, &f64))| match *w {
+            w if w - l <= NEAR => Place::Lower,
+            w if u - w <= NEAR => Place::Upper,
+            w if self.l1 > 0.0 && w.abs() <= NEAR => Place::Zero,
+            _ => Place::Free,
+        };
+        let below = times(&self.below, &point.weights);
+        let rows = below.iter().zip(&self.limit).zip(&point.inequality);
+        Guess {
+            places: point.weights.iter().zip(self.lower.iter().zip(&self.upper)).map(place).collect(),
+            binding: rows.map(|((u, limit), z)| limit - u < *z).collect(),
+        }
+    }
+
+    /// Relative distance between the objective and the bound of these multipliers.
+    pub(super) fn gap(&self, point: &Point) -> f64 {
+        relative_gap(self.objective(&point.weights), self.bound(point))
+    }
+
+    /// A bound below the least objective, whatever the multipliers (those of inequalities at least 0) and the point are.
+    ///
+    /// Every term is replaced by a tangent below it: the norm by a `pull` no longer than its factor, a square by its slope
+    /// at the weights; rows by their multipliers. What is left is linear and l1 over the box, and has its least value synapse by
+    /// synapse. What rounding can add to any of these sums is taken off.
+    pub(super) fn bound(&self, point: &Point) -> f64 {
+        let n = self.width();
+        let w = &point.weights;
+        let mut slope = vec![0.0; n];
+        let mut sizes = vec![0.0; n];
+        let mut terms = 4.0;
+        let mut value = 0.0;
+        let mut size = 0.0;
+        let mut add = |rows: &[f64], factors: &[f64], values: &[f64]| {
+            add_sum(rows, factors, &mut slope);
+            for (row, factor) in rows.chunks_exact(n.max(1)).zip(factors) {
+                if *factor != 0.0 {
+                    terms += 1.0;
+                    sizes.iter_mut().zip(row).for_each(|(s, r)| *s += (factor * r).abs());
+                }
+            }
+            for (f, v) in factors.iter().zip(values) {
+                value -= f * v;
+                size += (f * v).abs();
+            }
+        };
+        let inequality: Vec<f64> = point.inequality.iter().map(|z| z.max(0.0)).collect();
+        add(&self.equal, &point.equality, &self.equal_to);
+        add(&self.below, &inequality, &self.limit);
+        if self.lift > 0.0 {
+            // x^2 >= 2 m x - m^2 for any m, with x = behind.w - wanted.
+            let missed = self.missed(w);
+            let factors: Vec<f64> = missed.iter().map(|m| 2.0 * self.lift * m).collect();
+            let values: Vec<f64> = missed.iter().zip(&self.wanted).map(|(m, wanted)| wanted + 0.5 * m).collect();
+            add(&self.behind, &factors, &values);
+        }
+        if self.norm == Norm::Square {
+            for (k, w) in w.iter().enumerate() {
+                slope[k] += 2.0 * self.l2 * w;
+                sizes[k] += (2.0 * self.l2 * w).abs();
+            }
+            value -= self.l2 * dot(w, w);
+            size += self.l2 * dot(w, w);
+        } else if self.l2 > 0.0 {
+            let length = dot(&point.pull, &point.pull).sqrt();
+            let shrink = (self.l2 / length.max(f64::MIN_POSITIVE)).min(1.0) * (1.0 - n as f64 * f64::EPSILON);
+            for (k, p) in point.pull.iter().enumerate() {
+                slope[k] += shrink * p;
+                sizes[k] += p.abs();
+            }
+        }
+        let mut rounding = 0.0;
+        for k in 0..n {
+            let least = self.least(k, slope[k]);
+            let most = self.lower[k].abs().max(self.upper[k].abs());
+            value += least;
+            size += least.abs();
+            rounding += sizes[k] * most;
+        }
+        // Half an epsilon for each of so many additions and products, whatever their order.
+        value - 0.5 * f64::EPSILON * (terms * rounding + (terms + n as f64) * size)
+    }
+}

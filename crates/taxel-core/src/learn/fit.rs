@@ -1,0 +1,93 @@
+//! What a fit says, and what is known on the way, whichever the learner.
+
+use serde::{Deserialize, Serialize};
+
+use super::statement::Parts;
+
+/// How a fit ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// The objective is proven to lie within `tolerance` of its least value; what must be met is met.
+    Solved,
+    /// No weights meet what must be met; a certificate proves it. (In 6.14 nothing must be.)
+    Infeasible,
+    /// Neither is known: the weights are the best so far.
+    Stopped,
+}
+
+impl Status {
+    /// The word for it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Solved => "solved",
+            Self::Infeasible => "infeasible",
+            Self::Stopped => "stopped",
+        }
+    }
+}
+
+/// Who found the least objective.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Engine {
+    /// taxel's own; where its result cannot be proven, the cone solver goes on from it.
+    #[default]
+    #[serde(rename = "native")]
+    Native,
+    /// Clarabel, over the rows that matter.
+    #[serde(rename = "cone solver")]
+    ConeSolver,
+}
+
+impl Engine {
+    /// The words for it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Native => "native",
+            Self::ConeSolver => "cone solver",
+        }
+    }
+}
+
+/// What is known after a round of row generation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Round {
+    /// Counted from 1.
+    pub round: usize,
+    /// Rows that are looked at.
+    pub rows: usize,
+    /// The objective: where silence must be kept that of this round, else the best so far.
+    pub objective: f64,
+    /// What is left to do.
+    pub left: Left,
+}
+
+/// What is left to do after a round.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Left {
+    /// Silence must be kept, and is broken in so many stretches of time.
+    Broken(usize),
+    /// The best objective's relative distance to the best bound so far.
+    Gap(f64),
+}
+
+/// A fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fit {
+    /// How it ended.
+    pub status: Status,
+    /// mV, one a train; NaN where there are none.
+    pub weights: Vec<f64>,
+    /// 6.14 (6.11 where targets and silence must be met) at these weights; infinite where there are none.
+    pub objective: f64,
+    /// Its terms.
+    pub parts: Parts,
+    /// Proven relative distance to the least objective.
+    pub gap: f64,
+    /// Rounds of row generation.
+    pub rounds: usize,
+    /// Who found it.
+    pub engine: Engine,
+}

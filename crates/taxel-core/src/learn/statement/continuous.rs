@@ -1,0 +1,184 @@
+//! Silence in continuous time: where do these weights break it? One sweep over all patterns, two numbers a pattern, no row
+//! written out.
+//!
+//! Between two input spikes potential and tapered margin are one state of the kernel's family, so their maximum above the
+//! recovering threshold is found exactly; intervals are split at inputs, targets, edges of refractory times and where a taper
+//! begins. A bound that costs no exponential passes over nearly all of them.
+
+use super::peak::{Peak, exceeds};
+use super::rows::{AT_TARGET, Sheet, Statement, lost};
+use crate::neuron::{AfterSpike, FirstThreshold, Shape, State, Step, peak};
+
+/// How long before a rise of the threshold silence is asked for at the lower one, ms: the simulator's edge has some width.
+const BEFORE_RISE: f64 = 2e-9;
+
+/// A time at which something happens, with what the sweep needs at each.
+#[derive(Debug, Clone, Copy)]
+struct Node {
+    /// From the node before to here.
+    step: Step,
+    /// The largest that an input of weight 1 at this node comes to before the next one.
+    reach: f64,
+    /// The least limit up to the next node, mV; infinite where nothing is asked.
+    least: f64,
+    /// Where the inputs at this node end.
+    inputs: u32,
+    /// Everything before is lost from here on.
+    reset: bool,
+}
+
+/// What silence asks from a node to the next.
+#[derive(Debug, Clone, Copy)]
+struct Asked {
+    t: f64,
+    /// The next node.
+    to: f64,
+    theta: f64,
+    /// What is left of the threshold's rise at the node, mV.
+    rise: f64,
+    /// The margin at the node: in a taper as a state of the kernel's family, else constant.
+    taper: State,
+    height: f64,
+}
+
+#[derive(Debug, Clone)]
+struct Strip {
+    nodes: Vec<Node>,
+    asked: Vec<Asked>,
+    /// Trains of the inputs that count, by time.
+    trains: Vec<u32>,
+}
+
+/// All silent times of a problem, laid out for sweeping.
+#[derive(Debug, Clone)]
+pub(crate) struct SilentTimes {
+    shape: Shape,
+    tau_rec: f64,
+    strips: Vec<Strip>,
+}
+
+impl SilentTimes {
+    pub(crate) fn new(statement: &Statement) -> Self {
+        let strips = statement.sheets.iter().map(|sheet| strip(statement, sheet)).collect();
+        Self { shape: statement.shape, tau_rec: statement.neuron.tau_rec(), strips }
+    }
+
+    /// Finds the worst instant of each stretch in which potential, with this share of the margin, exceeds the threshold by
+    /// more than `tolerance`.
+    pub(crate) fn broken(&self, weights: &[f64], share: f64, tolerance: f64) -> Vec<Peak> {
+        let mut found = Vec::new();
+        let one = self.shape.input();
+        for (pattern, strip) in self.strips.iter().enumerate() {
+            let (mut state, mut next) = (State::default(), 0);
+            let mut worst: Option<Peak> = None;
+            for (node, asked) in strip.nodes.iter().zip(&strip.asked) {
+                state = if node.reset { State::default() } else { node.step.apply(state) };
+                let inputs = &strip.trains[next..node.inputs as usize];
+                next = node.inputs as usize;
+                if !inputs.is_empty() {
+                    let sum: f64 = inputs.iter().map(|&train| weights[train as usize]).sum();
+                    state.a += sum * one.a;
+                    state.b += sum * one.b;
+                }
+                let bound = positive(state.b) + positive(state.a) * node.reach;
+                if bound - node.least <= tolerance {
+                    found.extend(worst.take());
+                    continue;
+                }
+                let (t, excess, last) = self.largest(asked, state, share);
+                if exceeds(excess, tolerance) && worst.is_none_or(|w| exceeds(excess, w.excess)) {
+                    worst = Some(Peak { pattern, t, excess });
+                }
+                if last <= tolerance {
+                    found.extend(worst.take());
+                }
+            }
+            found.extend(worst);
+        }
+        found
+    }
+
+    /// The largest excess from a node to the next, when it is, and the excess at the end.
+    fn largest(&self, asked: &Asked, state: State, share: f64) -> (f64, f64, f64) {
+        let State { a, b } = asked.taper;
+        let state = State { a: state.a + share * a, b: state.b + share * b };
+        let limit = asked.theta - share * asked.height;
+        let excess = |s: f64| self.shape.after(state, s).b - limit - asked.rise * (-s / self.tau_rec).exp();
+        let length = asked.to - asked.t;
+        let last = excess(length);
+        let mut worst = (asked.t, state.b - limit - asked.rise);
+        if exceeds(last, worst.1) {
+            worst = (asked.to, last);
+        }
+        if let Some(top) = peak(&self.shape, state, asked.rise, self.tau_rec).filter(|p| p.at < length) {
+            let excess = excess(top.at);
+            if exceeds(excess, worst.1) {
+                worst = (asked.t + top.at, excess);
+            }
+        }
+        (worst.0, worst.1, last)
+    }
+}
+
+/// What lies above 0, and what is no number.
+fn positive(x: f64) -> f64 {
+    if x <= 0.0 { 0.0 } else { x }
+}
+
+fn strip(statement: &Statement, sheet: &Sheet) -> Strip {
+    let Statement { neuron, shape, taper, .. } = statement;
+    // Inputs that are lost just behind themselves never count: no spike but a target is between.
+    let counts = |&(t, _): &(f64, u32)| t <= sheet.end && !lost(neuron, &sheet.targets, t, t.next_up());
+    let heard: Vec<(f64, u32)> = sheet.inputs.iter().copied().filter(counts).collect();
+
+    let mut times = vec![sheet.start, sheet.end];
+    times.extend(heard.iter().map(|i| i.0));
+    for &target in &sheet.targets {
+        times.extend([target, target - taper.length, target - AT_TARGET, target + neuron.refractory]);
+    }
+    if neuron.first_threshold == FirstThreshold::Printed {
+        let rise = sheet.start + neuron.refractory;
+        times.extend([rise - BEFORE_RISE, rise]);
+    }
+    times.retain(|&t| sheet.start <= t && t <= sheet.end);
+    times.sort_unstable_by(f64::total_cmp);
+    times.dedup();
+
+    let (mut nodes, mut asked) = (Vec::with_capacity(times.len()), Vec::with_capacity(times.len()));
+    let (mut next, mut step, mut length) = (0, shape.step(0.0), 0.0);
+    for (k, &t) in times.iter().enumerate() {
+        if k > 0 && t - times[k - 1] != length {
+            length = t - times[k - 1];
+            step = shape.step(length);
+        }
+        next += heard[next..].iter().take_while(|i| i.0 <= t).count();
+        let reset = neuron.after_spike == AfterSpike::Reset && sheet.next(t) == Some(t);
+        let mut here = Asked { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: State::default(), height: 0.0 };
+        let (mut reach, mut least) = (0.0, f64::INFINITY);
+        if let Some(to) = times.get(k + 1).copied().filter(|&to| asks(statement, sheet, t, to)) {
+            here.to = to;
+            // Just behind the node: a target at the node itself has fired.
+            here.rise = statement.rise(sheet, sheet.fired(to), t);
+            reach = shape.value((to - t).min(shape.peak()));
+            match sheet.next(to).filter(|target| target - f64::midpoint(t, to) < taper.length) {
+                Some(target) => here.taper = taper.before(target - t),
+                None => here.height = statement.margin.height,
+            }
+            least = here.theta + here.rise * (-(to - t) / neuron.tau_rec()).exp() - here.height - here.taper.b;
+        }
+        nodes.push(Node { step, reach, least, inputs: next as u32, reset });
+        asked.push(here);
+    }
+    Strip { nodes, asked, trains: heard.iter().map(|i| i.1).collect() }
+}
+
+/// Whether silence is asked for from `t` to `to`, neighbouring nodes.
+fn asks(statement: &Statement, sheet: &Sheet, t: f64, to: f64) -> bool {
+    let neuron = &statement.neuron;
+    let fired = sheet.fired(to);
+    let rises =
+        neuron.first_threshold == FirstThreshold::Printed && fired.is_none() && to == sheet.start + neuron.refractory;
+    !rises
+        && fired.is_none_or(|target| target + neuron.refractory <= t)
+        && sheet.next(to).is_none_or(|target| to <= target - AT_TARGET)
+}

@@ -1,0 +1,96 @@
+//! The rows that are read whole, whatever the learner: those at the targets (6.9a), and those behind them that B lifts (6.10).
+
+use super::rows::{Row, Statement};
+use crate::{Result, Stop};
+
+/// The rows at all targets, written out one after the other.
+#[derive(Debug, Clone)]
+pub(crate) struct Targets {
+    trains: usize,
+    /// Pattern, and which of its targets.
+    pub(crate) names: Vec<(usize, usize)>,
+    /// ms, one a target.
+    pub(crate) times: Vec<f64>,
+    /// mV.
+    pub(crate) thresholds: Vec<f64>,
+    /// Coefficients at the targets.
+    pub(crate) at: Vec<f64>,
+    /// Coefficients `delta_t` later, as though the neuron had not fired at the target.
+    pub(crate) behind: Vec<f64>,
+}
+
+/// What is asked at one target.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct TargetRow<'a> {
+    pub(crate) threshold: f64,
+    pub(crate) at: &'a [f64],
+    pub(crate) behind: &'a [f64],
+}
+
+impl Targets {
+    /// Those of all patterns of a statement, and the rows `delta_t` ms behind them.
+    pub(crate) fn new(statement: &Statement, delta_t: f64, stop: Stop<'_>) -> Result<Self> {
+        let mut targets = Self {
+            trains: statement.trains,
+            names: vec![],
+            times: vec![],
+            thresholds: vec![],
+            at: vec![],
+            behind: vec![],
+        };
+        for pattern in 0..statement.sheets.len() {
+            targets.push(statement, pattern, delta_t, stop)?;
+        }
+        Ok(targets)
+    }
+
+    /// Adds those of one more pattern.
+    pub(crate) fn push(&mut self, statement: &Statement, pattern: usize, delta_t: f64, stop: Stop<'_>) -> Result<()> {
+        let mut row = vec![0.0; self.trains];
+        let mut new = Self { names: vec![], times: vec![], thresholds: vec![], at: vec![], behind: vec![], ..*self };
+        for target in 0..statement.sheets[pattern].targets.len() {
+            stop.check()?;
+            new.names.push((pattern, target));
+            new.times.push(statement.sheets[pattern].targets[target]);
+            new.thresholds.push(statement.state_into(Row::Target { pattern, target }, &mut row)?);
+            new.at.extend_from_slice(&row);
+            statement.behind_into(pattern, target, delta_t, &mut row)?;
+            new.behind.extend_from_slice(&row);
+        }
+        self.names.append(&mut new.names);
+        self.times.append(&mut new.times);
+        self.thresholds.append(&mut new.thresholds);
+        self.at.append(&mut new.at);
+        self.behind.append(&mut new.behind);
+        Ok(())
+    }
+
+    /// Takes those of the first pattern away; the others are numbered anew from 0.
+    pub(crate) fn drop_first(&mut self) {
+        let gone = self.of_first();
+        self.names.drain(..gone);
+        self.names.iter_mut().for_each(|(pattern, _)| *pattern -= 1);
+        self.times.drain(..gone);
+        self.thresholds.drain(..gone);
+        self.at.drain(..gone * self.trains);
+        self.behind.drain(..gone * self.trains);
+    }
+
+    /// How many targets the first pattern has.
+    pub(crate) fn of_first(&self) -> usize {
+        self.names.partition_point(|name| name.0 == 0)
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.names.len()
+    }
+
+    pub(crate) fn row(&self, k: usize) -> TargetRow<'_> {
+        let columns = k * self.trains..(k + 1) * self.trains;
+        TargetRow { threshold: self.thresholds[k], at: &self.at[columns.clone()], behind: &self.behind[columns] }
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = TargetRow<'_>> + Clone {
+        (0..self.len()).map(|k| self.row(k))
+    }
+}
