@@ -1,5 +1,6 @@
 """The one door between Rust and Python: errors, panics, Ctrl-C, the GIL."""
 
+import json
 import os
 import signal
 import subprocess
@@ -114,6 +115,59 @@ def test_a_board_may_be_used_from_several_threads():
 
     together(scan)
     assert board.time_us > 0
+
+
+def test_a_decoder_of_version_2_may_be_used_from_several_threads():
+    board, ticks = taxel.device.Board(taxel.wire.Registers(wire_version=2)), np.zeros(4096, np.uint16)
+    datagrams = []
+    for value in range(40, 60):
+        ticks[:] = value
+        datagrams += board.frame(ticks)
+    decoder = taxel.wire_v2.Decoder()
+
+    def push(number):
+        for datagram in datagrams[number::6]:
+            decoder.push(datagram)
+            assert decoder.counts.missing >= 0
+            assert decoder.held.shape == (64, 64)
+            assert decoder.status is None or decoder.status.frames
+
+    together(push)
+    assert (decoder.counts.intact, decoder.counts.missing) == (len(datagrams), 0)
+
+
+def test_a_stream_of_version_2_may_be_used_from_several_threads():
+    board = taxel.device.Board(taxel.wire.Registers(wire_version=2))
+    sent = board.frame(np.full(4096, 40, np.uint16))
+    data = b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent)
+    reader, found = taxel.wire_v2.StreamReader(), []
+
+    def push(_):
+        for _ in range(20):
+            found.extend(reader.push(data))
+            assert reader.skipped == 0
+
+    together(push)
+    assert len(found) == 6 * 20 * len(sent)
+
+
+def test_a_recording_may_be_written_from_several_threads(tmp_path):
+    header = {"array": taxel.Array.thesis()._geometry(), "source": "test"}
+    writer = _core.RecordingWriter(tmp_path / "many.mcap", json.dumps(header), "none", False)
+    payload = bytes.fromhex("c000050304")
+
+    def write(number):
+        for k in range(200):
+            writer.datagram(1000 * k, 6 * k + number, payload)
+            writer.note(1000 * k, None, f"thread {number}, note {k}")
+
+    together(write)
+    writer.finish(json.dumps({"received": 1200, "recorded": 1200}))
+    with pytest.raises(taxel.ProblemError, match="is finished"):
+        writer.datagram(0, 0, payload)
+    recording = taxel.open(tmp_path / "many.mcap")
+    assert len(recording.notes) == 1200
+    assert len(recording.events) == 1200
 
 
 def test_a_window_may_be_used_from_several_threads():

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._arguments import shown
+from taxel._columns import frozen
 from taxel._core import FormatError, ProblemError
 from taxel._limits import COLUMNS, DESCRIPTION, TAXELS, UNPACKED, VALUE, unpacked
 from taxel._limits import table as limited
@@ -64,7 +65,8 @@ def read_npz(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]
 
 
 def table_of(path: Path, columns: dict[str, NDArray[Any]], array: Array | None) -> tuple[Events | Frames, Remarks]:
-    """Make a table of the columns of a file, with the remarks that stand beside them."""
+    """Make a table of the columns of a file, which become its own, with the remarks that stand beside them."""
+    columns = {name: frozen(values) for name, values in columns.items()}
     remarks = Remarks.from_json(f"{path}, array about", str(columns.get("about", "{}")))
     sensor = array or remarks.array
     try:
@@ -226,7 +228,7 @@ def _csv_frames(path: Path, names: list[str], body: bytes, array: Array | None) 
     values = np.zeros((len(table), *array.shape), np.float32)
     values[:, y, x] = table[:, 1:]
     try:
-        return Frames(values, table[:, 0], array=array)
+        return Frames(frozen(values), table[:, 0], array=array)
     except ProblemError as error:
         raise FormatError(f"{path}: {error}") from None
 

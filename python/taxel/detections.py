@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import column, fields, floats, nth, shown, window
+from taxel._arguments import fields, nth, shown, window
 from taxel._arguments import path as checked_path
+from taxel._columns import Columns, frozen, kept, own
 from taxel._core import FormatError, ProblemError
 from taxel._files import write_whole
 
@@ -50,7 +51,7 @@ class Detection(NamedTuple):
     said: int | None
 
 
-class Detections:
+class Detections(Columns):
     """Hold what a readout said: label, time of the event, time at which it could be said, and how surely.
 
     All times are us of the board's clock.
@@ -101,11 +102,12 @@ class Detections:
             raise ProblemError(f"label: {error}") from None
         if labels.ndim != 1 or labels.dtype.kind != "U":
             raise ProblemError(f"label is {shown(label)}: must be a list of texts")
-        self.label: NDArray[np.str_] = labels
-        self.t: NDArray[np.int64] = column("t", t, np.int64, "us")
-        self.known: NDArray[np.int64] = column("known", known, np.int64, "us")
-        self.slope: NDArray[np.float64] = floats("slope", np.full(len(labels), np.nan) if slope is None else slope)
-        self.said: NDArray[np.int64] | None = None if said is None else column("said", said, np.int64, "us")
+        self.label: NDArray[np.str_] = own(labels, label)
+        self.t: NDArray[np.int64] = kept("t", t, np.int64, "us")
+        self.known: NDArray[np.int64] = kept("known", known, np.int64, "us")
+        slopes = frozen(np.full(len(labels), np.nan)) if slope is None else slope
+        self.slope: NDArray[np.float64] = kept("slope", slopes, np.float64)
+        self.said: NDArray[np.int64] | None = None if said is None else kept("said", said, np.int64, "us")
         if self.said is not None and len(self.said) != len(labels):
             raise ProblemError(f"said has {len(self.said)} entries: must be {len(labels)}, one a detection")
         _core.check_detections(self._parts())
@@ -291,7 +293,8 @@ class Detections:
 
     @classmethod
     def _from_parts(cls, parts: tuple[Any, ...]) -> Detections:
-        return cls(*parts)
+        label, *columns = parts
+        return cls(label, *map(frozen, columns))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Detections):

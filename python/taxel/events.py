@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._arguments import column, fields, instance, nth, rows, shown, window
+from taxel._columns import Columns, frozen, kept
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -40,7 +41,7 @@ class Event(NamedTuple):
     intensity: int | None
 
 
-class Events:
+class Events(Columns):
     """Hold changes at taxels, in the order in which they came.
 
     Parameters
@@ -63,6 +64,11 @@ class Events:
     Raises
     ------
     ProblemError : columns of unequal length, or an event outside the array (names the event)
+
+    Notes
+    -----
+    Columns are read-only: arrays of the caller's are copied once, unless they are read-only themselves. So whatever
+    reads them, reads them where they lie.
 
     Examples
     --------
@@ -88,19 +94,19 @@ class Events:
         markers: Sequence[tuple[int, bool]] = (),
     ) -> None:
         self.array = instance("array", array, Array)
-        self.t: NDArray[np.int64] = column("t", t, np.int64, "us")
-        self.x: NDArray[np.uint16] = column("x", x, np.uint16)
-        self.y: NDArray[np.uint16] = column("y", y, np.uint16)
-        self.p: NDArray[np.bool_] = column("p", p, np.bool_)
+        self.t: NDArray[np.int64] = kept("t", t, np.int64, "us")
+        self.x: NDArray[np.uint16] = kept("x", x, np.uint16)
+        self.y: NDArray[np.uint16] = kept("y", y, np.uint16)
+        self.p: NDArray[np.bool_] = kept("p", p, np.bool_)
         self.intensity: NDArray[np.uint16] | None = None
         self.present: NDArray[np.bool_] | None = None
         if intensity is not None:
-            self.intensity = column("intensity", intensity, np.uint16)
+            self.intensity = kept("intensity", intensity, np.uint16)
             all_of_them = np.ones(len(self.intensity), np.bool_)
-            self.present = all_of_them if present is None else column("present", present, np.bool_)
-            if len(self.present) == len(self.intensity) and not self.present.all():
+            self.present = frozen(all_of_them) if present is None else kept("present", present, np.bool_)
+            if len(self.present) == len(self.intensity) and self.intensity[~self.present].any():
                 # What did not come has no value, so equal events have equal columns.
-                self.intensity = np.where(self.present, self.intensity, np.uint16(0))
+                self.intensity = frozen(np.where(self.present, self.intensity, np.uint16(0)))
         elif present is not None:
             raise ProblemError("present without intensity: give both or neither")
         self.markers = _markers(markers)
@@ -312,10 +318,12 @@ class Events:
         present: NDArray[np.bool_] | None,
         markers: tuple[tuple[int, bool], ...],
     ) -> Events:
-        """Build events from columns that the compiled part or another `Events` has checked already."""
+        """Build events from columns of our own that the compiled part or another `Events` has checked already."""
         events = cls.__new__(cls)
-        events.array, events.t, events.x, events.y, events.p = array, t, x, y, p
-        events.intensity, events.present, events.markers = intensity, present, markers
+        events.array, events.markers = array, markers
+        events.t, events.x, events.y, events.p = frozen(t), frozen(x), frozen(y), frozen(p)
+        events.intensity = None if intensity is None else frozen(intensity)
+        events.present = None if present is None else frozen(present)
         return events
 
     def _parts(self) -> tuple[Any, ...]:

@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import column, instance, number, numbers, shown, text, whole, window
+from taxel import _core
+from taxel._arguments import instance, number, shown, text, whole, window
+from taxel._columns import Columns, frozen, kept, kept_numbers
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -21,7 +23,7 @@ __all__ = ["Frames"]
 MOST_VALUES = 2**30
 
 
-class Frames:
+class Frames(Columns):
     """Hold pictures of the whole array over time.
 
     Parameters
@@ -38,6 +40,10 @@ class Frames:
     ------
     ProblemError : shapes that do not fit, or times that do not ascend (names the picture)
 
+    Notes
+    -----
+    `values` and `t` are read-only: arrays of the caller's are copied once, unless they are read-only themselves.
+
     Examples
     --------
     >>> frames = Frames(np.zeros((3, 8, 8)), [0, 192, 384], unit="ticks")
@@ -46,8 +52,8 @@ class Frames:
     """
 
     def __init__(self, values: ArrayLike, t: ArrayLike, *, unit: str = "counts", array: Array | None = None) -> None:
-        self.values: NDArray[np.float32] = numbers("values", values, np.float32)
-        self.t: NDArray[np.int64] = column("t", t, np.int64, "us")
+        self.values: NDArray[np.float32] = kept_numbers("values", values, np.float32)
+        self.t: NDArray[np.int64] = kept("t", t, np.int64, "us")
         if self.values.ndim != 3:
             raise ProblemError(f"values have {self.values.ndim} dimensions: must have three (n, rows, columns)")
         if len(self.t) != len(self.values):
@@ -107,7 +113,8 @@ class Frames:
             new = slice(bounds[k], bounds[k + 1])
             held[index[new]] = events.intensity[order[new]]
             values[k] = held
-        return cls(values.reshape(len(t), array.rows, array.columns), t, unit="ticks", array=array)
+        pictures_of = frozen(values).reshape(len(t), array.rows, array.columns)
+        return cls(pictures_of, frozen(t), unit="ticks", array=array)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -216,6 +223,10 @@ class Frames:
         from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
 
         return html(self)
+
+    def _parts(self) -> _core._Frames:
+        """Return what the compiled part reads in place."""
+        return self.array._parts(), self.t, self.values.reshape(-1)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Frames):

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._arguments import bare, column, floats, nth, number, shown, text, window
 from taxel._arguments import path as checked_path
+from taxel._columns import Columns, frozen, kept
 from taxel._core import FormatError, ProblemError
 from taxel._files import whole_file, write_whole
 
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["SpikeTrains"]
 
 
-class SpikeTrains:
+class SpikeTrains(Columns):
     """Hold spike times by train, with the window that was listened to.
 
     Parameters
@@ -44,6 +45,11 @@ class SpikeTrains:
     Raises
     ------
     ProblemError : times not finite, not ascending or outside the window (names train and spike)
+
+    Notes
+    -----
+    `times`, `offsets` and `values` are read-only: arrays of the caller's are copied once, unless they are read-only
+    themselves.
 
     Examples
     --------
@@ -62,9 +68,9 @@ class SpikeTrains:
         stop: float,
         values: ArrayLike | None = None,
     ) -> None:
-        self.times: NDArray[np.float64] = floats("times", times, "ms")
-        self.offsets: NDArray[np.int64] = column("offsets", offsets, np.int64)
-        self.values: NDArray[np.float32] | None = None if values is None else column("values", values, np.float32)
+        self.times: NDArray[np.float64] = kept("times", times, np.float64, "ms")
+        self.offsets: NDArray[np.int64] = kept("offsets", offsets, np.int64)
+        self.values: NDArray[np.float32] | None = None if values is None else kept("values", values, np.float32)
         self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
         _core.check_spikes(self._parts())
 
@@ -106,7 +112,7 @@ class SpikeTrains:
         if stop is None:
             # What is not finite is refused below, by its place.
             stop = float(max(number("start", start, "ms"), np.max(flat[np.isfinite(flat)], initial=-np.inf)))
-        return cls(flat, offsets, start, stop, signed)
+        return cls._of_own(flat, offsets, start, stop, signed)
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -143,7 +149,7 @@ class SpikeTrains:
         if self.values is not None and other.values is not None:
             values = np.concatenate([self.values, other.values])[order]
         offsets = self.offsets + other.offsets
-        return SpikeTrains(times[order], offsets, min(self.start, other.start), max(self.stop, other.stop), values)
+        return self._of_own(times[order], offsets, min(self.start, other.start), max(self.stop, other.stop), values)
 
     @property
     def counts(self) -> NDArray[np.int64]:
@@ -226,12 +232,13 @@ class SpikeTrains:
         times = np.add.outer(delays, self.times).reshape(-1)
         offsets = np.add.outer(np.arange(len(delays)) * len(self.times), self.offsets[:-1]).reshape(-1)
         values = None if self.values is None else np.tile(self.values, len(delays))
-        return SpikeTrains(times, [*offsets, len(times)], self.start, self.stop + delays[-1], values)
+        ends = np.append(offsets, len(times))
+        return self._of_own(times, ends, self.start, self.stop + delays[-1], values)
 
     def _where(self, keep: NDArray[np.bool_], start: float, stop: float) -> SpikeTrains:
         offsets = np.concatenate([[0], np.cumsum(keep)])[self.offsets]
         values = None if self.values is None else self.values[keep]
-        return SpikeTrains(self.times[keep], offsets, start, stop, values)
+        return self._of_own(self.times[keep], offsets, start, stop, values)
 
     def to_numpy(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return times (ms) and train numbers of all spikes, by train."""
@@ -437,7 +444,19 @@ class SpikeTrains:
     @classmethod
     def _from_parts(cls, parts: tuple[Any, ...]) -> SpikeTrains:
         times, offsets, values, start, stop = parts
-        return cls(times, offsets, start, stop, values)
+        return cls._of_own(times, offsets, start, stop, values)
+
+    @classmethod
+    def _of_own(
+        cls,
+        times: NDArray[np.float64],
+        offsets: NDArray[np.int64],
+        start: float,
+        stop: float,
+        values: NDArray[np.float32] | None,
+    ) -> SpikeTrains:
+        """Build spike trains from new arrays of our own."""
+        return cls(frozen(times), frozen(offsets), start, stop, None if values is None else frozen(values))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, SpikeTrains):

@@ -89,8 +89,7 @@ class Tare:
         if isinstance(x, Events):
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
         if isinstance(x, Frames):
-            parts = x.array._parts(), x.t, x.values.reshape(-1)
-            return cls.from_json(_core.tare_of_frames(*parts, *window, note))
+            return cls.from_json(_core.tare_of_frames(x._parts(), *window, note))
         raise ProblemError(f"{type(x).__name__}: a tare is taken from taxel.Events or taxel.Frames")
 
     def off(self, frames: Frames) -> Frames:

@@ -191,7 +191,9 @@ def test_events_read_as_held_values_are_frames_of_these(encoder):
     spikes = encoder.encode(events)
     period = round(encoder.period_ms * 1000)
     frames = Frames.from_events(events, period, stop=int(spikes.stop * 1000 - 1000 * encoder.latency_ms) + 1)
-    frames.values[0] = Frames.from_events(events[events.t == events.t[0]], 1).values[0]
+    values = frames.values.copy()
+    values[0] = Frames.from_events(events[events.t == events.t[0]], 1).values[0]
+    frames = Frames(values, frames.t, unit=frames.unit, array=frames.array)
     assert spikes_of(encoder.encode(frames)) == [
         s for s in spikes_of(spikes) if s[0] <= frames.t[-1] + 1000 * encoder.latency_ms
     ]

@@ -295,8 +295,9 @@ def test_neurons_name_touches_too():
     ],
 )
 def test_what_cannot_be_answered_is_one_clear_error(change, text):
-    frames = taxel.Frames(np.zeros((50, 1, 2)), np.arange(50) * 1000)
-    frames.values[5::10] = 100
+    values = np.zeros((50, 1, 2))
+    values[5::10] = 100
+    frames = taxel.Frames(values, np.arange(50) * 1000)
     events = trials_of(20)
     if "periods_ms" in change:
         events = [LabelledTrial(frames, "ab"[k % 2], 1000 * k, 1000 * k + 40_000) for k in range(20)]

@@ -6,6 +6,7 @@
 mod afferents;
 mod counts;
 mod outbox;
+mod play;
 mod scan;
 mod session;
 
@@ -15,6 +16,7 @@ use scan::Lfsr;
 use serde::{Deserialize, Serialize};
 
 pub use counts::BoardCounts;
+pub use play::{Armed, Play, Played};
 pub use session::session;
 
 use crate::wire::registers::Registers;

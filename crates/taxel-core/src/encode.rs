@@ -4,6 +4,7 @@ mod bracket;
 mod law;
 mod loaded;
 mod periods;
+mod pieces;
 mod power;
 mod running_range;
 mod sampled;
@@ -13,6 +14,7 @@ mod tare;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+pub use pieces::Pieces;
 pub use running_range::{FirstWindow, RunningRange};
 pub use stream::Stream;
 pub use tare::{Tare, TareBuilder};
@@ -22,7 +24,7 @@ use law::Law;
 use crate::parameters::Described;
 use crate::reading::{self, Unfit};
 use crate::spikes::ms;
-use crate::{Array, Error, Events, Result, Spike, SpikeTrains, Stop, problem};
+use crate::{Array, Error, EventsView, FramesView, Result, Spike, SpikeTrains, Stop, problem};
 
 /// The registry: a line an encoder, `NAME: Kind`, whose file is `encode/NAME.rs` and whose name in JSON is `NAME`.
 macro_rules! encoders {
@@ -167,39 +169,37 @@ impl Encoder {
     /// # Errors
     ///
     /// As [`Encoder::stream`] and [`Stream::push_events`]; `Problem` too where an event lies too far behind one before
-    /// it ([`Events::check_order`]); `Interrupted` where asked to stop.
-    pub fn encode_events(&self, events: &Events, stop: Stop<'_>) -> Result<SpikeTrains> {
+    /// it ([`EventsView::check_order`]); `Interrupted` where asked to stop.
+    pub fn encode_events(&self, events: EventsView<'_>, stop: Stop<'_>) -> Result<SpikeTrains> {
         /// Events between two looks at `stop`.
         const PIECE: usize = 65_536;
-        let mut stream = self.stream(&events.array)?;
+        let mut stream = self.stream(events.array)?;
+        events.check()?;
         events.check_order()?;
         let mut out = vec![];
-        if events.len() <= PIECE {
-            stream.push_events(events, &mut out)?;
-        } else {
-            for begin in (0..events.len()).step_by(PIECE) {
-                stop.check()?;
-                stream.push_events(&events.piece(begin..events.len().min(begin + PIECE)), &mut out)?;
-            }
+        for piece in events.pieces(PIECE) {
+            stop.check()?;
+            stream.push_events(piece, &mut out)?;
         }
         collect(stream, out, events.t.first().copied())
     }
 
-    /// Encodes pictures, row by row and one after the other, at `t` us.
+    /// Encodes a whole recording of pictures.
     ///
     /// # Errors
     ///
-    /// As [`Encoder::stream`] and [`Stream::push_frame`]; `Interrupted` where asked to stop.
-    pub fn encode_pictures(&self, array: &Array, t: &[i64], values: &[f32], stop: Stop<'_>) -> Result<SpikeTrains> {
-        let mut stream = self.stream(array)?;
+    /// As [`Encoder::stream`], [`FramesView::check`] and [`Stream::push_frame`]; `Interrupted` where asked to stop.
+    pub fn encode_frames(&self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<SpikeTrains> {
+        let mut stream = self.stream(frames.array)?;
+        frames.check()?;
         let mut out = vec![];
-        for (k, (&t, picture)) in t.iter().zip(values.chunks_exact(array.len())).enumerate() {
+        for (k, (t, picture)) in frames.iter().enumerate() {
             if k % 64 == 0 {
                 stop.check()?;
             }
             stream.push_frame(t, picture, &mut out)?;
         }
-        collect(stream, out, t.first().copied())
+        collect(stream, out, frames.t.first().copied())
     }
 }
 

@@ -61,21 +61,96 @@ impl Events {
         self.t.is_empty()
     }
 
+    /// The columns where they lie.
+    #[must_use]
+    pub fn view(&self) -> EventsView<'_> {
+        EventsView {
+            array: &self.array,
+            t: &self.t,
+            x: &self.x,
+            y: &self.y,
+            p: &self.p,
+            intensity: self.intensity.as_ref().map(|i| IntensitiesView { ticks: &i.ticks, present: &i.present }),
+            markers: &self.markers,
+        }
+    }
+
+    /// Forgets all events and markers but keeps the columns' memory, to be filled again.
+    pub fn clear(&mut self) {
+        self.t.clear();
+        self.x.clear();
+        self.y.clear();
+        self.p.clear();
+        self.markers.clear();
+        if let Some(intensity) = &mut self.intensity {
+            intensity.ticks.clear();
+            intensity.present.clear();
+        }
+    }
+}
+
+/// The intensity words of an [`EventsView`].
+#[derive(Debug, Clone, Copy)]
+pub struct IntensitiesView<'a> {
+    /// As [`Intensities::ticks`].
+    pub ticks: &'a [u16],
+    /// As [`Intensities::present`].
+    pub present: &'a [bool],
+}
+
+/// Events wherever their columns lie: in an [`Events`], or in the memory of a caller, who may not change them meanwhile.
+#[derive(Debug, Clone, Copy)]
+pub struct EventsView<'a> {
+    /// The sensor.
+    pub array: &'a Array,
+    /// us, unwrapped.
+    pub t: &'a [i64],
+    /// Column.
+    pub x: &'a [u16],
+    /// Row.
+    pub y: &'a [u16],
+    /// More pressure (true) or less.
+    pub p: &'a [bool],
+    /// The held values that came with the changes, or none at all.
+    pub intensity: Option<IntensitiesView<'a>>,
+    /// Starts and stops, by time.
+    pub markers: &'a [Marker],
+}
+
+impl<'a> EventsView<'a> {
+    /// How many events.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Whether there is no event.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.t.is_empty()
+    }
+
     /// The events of a range of places, without markers.
     #[must_use]
     pub fn piece(&self, range: std::ops::Range<usize>) -> Self {
+        let part = |i: IntensitiesView<'a>| IntensitiesView {
+            ticks: &i.ticks[range.clone()],
+            present: &i.present[range.clone()],
+        };
         Self {
-            array: self.array.clone(),
-            t: self.t[range.clone()].to_vec(),
-            x: self.x[range.clone()].to_vec(),
-            y: self.y[range.clone()].to_vec(),
-            p: self.p[range.clone()].to_vec(),
-            intensity: self
-                .intensity
-                .as_ref()
-                .map(|i| Intensities { ticks: i.ticks[range.clone()].to_vec(), present: i.present[range].to_vec() }),
-            markers: vec![],
+            array: self.array,
+            t: &self.t[range.clone()],
+            x: &self.x[range.clone()],
+            y: &self.y[range.clone()],
+            p: &self.p[range.clone()],
+            intensity: self.intensity.map(part),
+            markers: &[],
         }
+    }
+
+    /// The same events `count` at a time, without markers.
+    pub fn pieces(self, count: usize) -> impl Iterator<Item = Self> {
+        (0..self.len()).step_by(count).map(move |begin| self.piece(begin..self.len().min(begin + count)))
     }
 
     /// Checks that the events of a whole recording came in order, but for what [`FARTHEST_BACK_US`] allows.
@@ -98,51 +173,30 @@ impl Events {
         Ok(())
     }
 
-    /// Forgets all events and markers but keeps the columns' memory, to be filled again.
-    pub fn clear(&mut self) {
-        self.t.clear();
-        self.x.clear();
-        self.y.clear();
-        self.p.clear();
-        self.markers.clear();
-        if let Some(intensity) = &mut self.intensity {
-            intensity.ticks.clear();
-            intensity.present.clear();
-        }
-    }
-
     /// Checks that columns are equally long and that every event lies on the array.
     ///
     /// # Errors
     ///
     /// `Problem`, naming the column or the event.
     pub fn check(&self) -> Result<()> {
-        let pairs = self.intensity.as_ref().map(|i| (i.ticks.len(), i.present.len()));
-        check(&self.array, self.t.len(), &self.x, &self.y, self.p.len(), pairs)
-    }
-}
-
-/// [`Events::check`] for columns wherever they lie; of t, p and a pair of ticks and present their lengths matter.
-///
-/// # Errors
-///
-/// `Problem`, naming the column or the event.
-pub fn check(array: &Array, t: usize, x: &[u16], y: &[u16], p: usize, intensity: Option<(usize, usize)>) -> Result<()> {
-    for (name, len) in [("x", x.len()), ("y", y.len()), ("p", p)] {
-        if len != t {
-            return Err(problem!("events: {name} has {len} entries, t has {t}: they must be equal"));
+        let t = self.len();
+        for (name, len) in [("x", self.x.len()), ("y", self.y.len()), ("p", self.p.len())] {
+            if len != t {
+                return Err(problem!("events: {name} has {len} entries, t has {t}: they must be equal"));
+            }
         }
-    }
-    if let Some((ticks, present)) = intensity
-        && (ticks != t || present != t)
-    {
-        return Err(problem!("events: intensity has {ticks} entries, t has {t}: they must be equal"));
-    }
-    let (columns, rows) = (array.columns, array.rows);
-    for (k, (&x, &y)) in x.iter().zip(y).enumerate() {
-        if x >= columns || y >= rows {
-            return Err(problem!("event {k}: taxel x={x}, y={y} lies outside {rows} rows x {columns} columns"));
+        if let Some(IntensitiesView { ticks, present }) = self.intensity
+            && (ticks.len() != t || present.len() != t)
+        {
+            let ticks = ticks.len();
+            return Err(problem!("events: intensity has {ticks} entries, t has {t}: they must be equal"));
         }
+        let (columns, rows) = (self.array.columns, self.array.rows);
+        for (k, (&x, &y)) in self.x.iter().zip(self.y).enumerate() {
+            if x >= columns || y >= rows {
+                return Err(problem!("event {k}: taxel x={x}, y={y} lies outside {rows} rows x {columns} columns"));
+            }
+        }
+        Ok(())
     }
-    Ok(())
 }

@@ -3,8 +3,8 @@
 //! The modules stand in the order that data takes them. Nothing here opens a socket or a file, looks at a clock or
 //! knows of Python, so the same bytes give the same result on a machine, however often and in however many threads.
 //!
-//! Of the nouns only `Frames` is not here: pictures are pushed one by one from where they lie (a file, NumPy), so nothing
-//! here ever holds many.
+//! Of the nouns only `Frames` is not here but as a view: pictures are read one by one where they lie (a file, NumPy), so
+//! nothing here ever holds many.
 //!
 //! On another machine, decoding, the board and whatever adds and multiplies by [`vectors`]' plain loops give the same
 //! bits too. What takes an exponential from the platform's library (neurons, smoothed metrics, scenes), and learners,
@@ -19,6 +19,7 @@ pub mod vectors;
 
 pub mod array;
 pub mod events;
+pub mod frames;
 pub mod spikes;
 
 pub mod board;
@@ -34,5 +35,6 @@ pub mod metrics;
 
 pub use array::Array;
 pub use error::{Error, Result, Stop};
-pub use events::{Events, Intensities, Marker};
+pub use events::{Events, EventsView, Intensities, IntensitiesView, Marker};
+pub use frames::FramesView;
 pub use spikes::{Spike, SpikeTrains};

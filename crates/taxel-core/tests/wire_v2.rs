@@ -364,7 +364,7 @@ fn unknown_kinds_and_flags_are_counted_and_anything_is_survived() {
         header.write(&body, &mut bytes);
         decoder.push(&bytes, Some(random.random_range(i64::MIN / 4..i64::MAX / 4)), &mut events, &mut repaired);
         assert_eq!(repaired.len(), events.len());
-        events.check().unwrap();
+        events.view().check().unwrap();
         events.clear();
         repaired.clear();
     }

@@ -57,6 +57,16 @@ pub struct BoardClock {
 }
 
 impl BoardClock {
+    /// The line through many datagrams: their board times, us, and when they arrived, ns.
+    #[must_use]
+    pub fn offset_of(board_us: &[i64], arrived_ns: &[i64]) -> Option<Offset> {
+        let mut clock = Self::default();
+        for (&board, &arrived) in board_us.iter().zip(arrived_ns) {
+            clock.note(board, arrived);
+        }
+        clock.offset()
+    }
+
     /// Notes that something which could leave the board at `board_us` at the earliest arrived at `arrived_ns`.
     pub fn note(&mut self, board_us: i64, arrived_ns: i64) {
         let point = (board_us, arrived_ns - board_us * 1000);

@@ -22,9 +22,9 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
-use taxel_core::Marker;
 use taxel_core::encode::Tare;
 use taxel_core::wire::{self, Decoder};
+use taxel_core::{Marker, Stop};
 
 use crate::capture::Receiver;
 use crate::{Error, Result};
@@ -35,6 +35,9 @@ pub use read::Ear;
 use recorder::Recorder;
 pub use said::{Lines, Said, Sink};
 use shared::{Shared, Shown};
+
+/// How long a wait lasts before it is asked whether to stop.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// How many detections wait for [`Live::next`]; more are counted and lost to it, not to the sinks.
 const SAID_WAITING: usize = 1 << 14;
@@ -124,6 +127,24 @@ impl Live {
                     std::thread::sleep(timeout);
                 }
                 Ok(None)
+            }
+        }
+    }
+
+    /// As [`Live::next`], but looks now and then whether to stop waiting; `None` then.
+    ///
+    /// # Errors
+    ///
+    /// As [`Live::next`].
+    pub fn wait(&self, timeout: Duration, stop: Stop<'_>) -> Result<Option<Said>> {
+        let until = Instant::now().checked_add(timeout);
+        loop {
+            let left = until.map_or(LOOK_EVERY, |t| t.saturating_duration_since(Instant::now()));
+            // Asked before: what ended it was then noted before, and `next` gives it.
+            let over = self.is_over();
+            let said = self.next(left.min(LOOK_EVERY))?;
+            if said.is_some() || over || left.is_zero() || stop.asked() {
+                return Ok(said);
             }
         }
     }

@@ -22,8 +22,8 @@ use serde::{Deserialize, Serialize};
 use taxel_core::wire::{self, Registers};
 use taxel_core::{Array, problem};
 
-pub use lsa::{LsaWriter, numbered, read_lsa};
-pub use mcap_reader::{Decoded, Ending, Message, Reader, Rebuilt, Remarks};
+pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
+pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Reader, Rebuilt, Remarks};
 pub use mcap_writer::Writer;
 pub use topic::Topic;
 

@@ -5,7 +5,7 @@
 
 use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::{Array, Events, Intensities, Marker, SpikeTrains};
+use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeTrains};
 
 use crate::errors::ProblemError;
 
@@ -49,24 +49,61 @@ pub(crate) type EventsIn<'py> = (
     Vec<(i64, bool)>,
 );
 
-pub(crate) fn to_events((parts, t, x, y, p, intensity, markers): EventsIn<'_>) -> PyResult<Events> {
-    let events = Events {
-        array: to_array(parts)?,
-        t: slice("t", &t)?.to_vec(),
-        x: slice("x", &x)?.to_vec(),
-        y: slice("y", &y)?.to_vec(),
-        p: slice("p", &p)?.to_vec(),
-        intensity: match intensity {
-            None => None,
-            Some((ticks, present)) => Some(Intensities {
-                ticks: slice("intensity", &ticks)?.to_vec(),
-                present: slice("present", &present)?.to_vec(),
-            }),
-        },
-        markers: markers.into_iter().map(|(t, start)| Marker { t, start }).collect(),
-    };
-    events.check().map_err(crate::errors::core)?;
-    Ok(events)
+/// Events whose columns stay where Python has them.
+pub(crate) struct EventsHeld<'py> {
+    array: Array,
+    t: PyReadonlyArray1<'py, i64>,
+    x: PyReadonlyArray1<'py, u16>,
+    y: PyReadonlyArray1<'py, u16>,
+    p: PyReadonlyArray1<'py, bool>,
+    intensity: Option<(PyReadonlyArray1<'py, u16>, PyReadonlyArray1<'py, bool>)>,
+    markers: Vec<Marker>,
+}
+
+pub(crate) fn to_events((parts, t, x, y, p, intensity, markers): EventsIn<'_>) -> PyResult<EventsHeld<'_>> {
+    let markers = markers.into_iter().map(|(t, start)| Marker { t, start }).collect();
+    Ok(EventsHeld { array: to_array(parts)?, t, x, y, p, intensity, markers })
+}
+
+impl EventsHeld<'_> {
+    /// The columns in place, to be read without the GIL; who reads them checks them.
+    pub(crate) fn view(&self) -> PyResult<EventsView<'_>> {
+        Ok(EventsView {
+            array: &self.array,
+            t: slice("t", &self.t)?,
+            x: slice("x", &self.x)?,
+            y: slice("y", &self.y)?,
+            p: slice("p", &self.p)?,
+            intensity: match &self.intensity {
+                None => None,
+                Some((ticks, present)) => {
+                    Some(IntensitiesView { ticks: slice("intensity", ticks)?, present: slice("present", present)? })
+                }
+            },
+            markers: &self.markers,
+        })
+    }
+}
+
+/// Pictures as Python hands them over: array, t, and values one after the other.
+pub(crate) type FramesIn<'py> = (ArrayParts, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>);
+
+/// Pictures whose values stay where Python has them.
+pub(crate) struct FramesHeld<'py> {
+    array: Array,
+    t: PyReadonlyArray1<'py, i64>,
+    values: PyReadonlyArray1<'py, f32>,
+}
+
+pub(crate) fn to_frames((parts, t, values): FramesIn<'_>) -> PyResult<FramesHeld<'_>> {
+    Ok(FramesHeld { array: to_array(parts)?, t, values })
+}
+
+impl FramesHeld<'_> {
+    /// As [`EventsHeld::view`].
+    pub(crate) fn view(&self) -> PyResult<FramesView<'_>> {
+        Ok(FramesView { array: &self.array, t: slice("t", &self.t)?, values: slice("values", &self.values)? })
+    }
 }
 
 /// Events as Python gets them: the same parts, as new arrays.

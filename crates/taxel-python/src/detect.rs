@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use taxel_core::detect::{Detection, Readout, ReadoutStream as CoreStream, Reference, Spread, score as score_core};
 use taxel_core::encode::Tare;
 
-use crate::convert::{ArrayParts, EventsIn, array, slice, to_array, to_events};
+use crate::convert::{ArrayParts, EventsIn, FramesIn, array, slice, to_array, to_events, to_frames};
 use crate::enter::{Shared, enter};
 use crate::errors::{ProblemError, core};
 use crate::parameters::parsed;
@@ -132,24 +132,23 @@ fn readout_run_events<'py>(
     tare: Option<&str>,
 ) -> PyResult<DetectionsOut<'py>> {
     let ((readout, tare), events) = (parse(readout, tare)?, to_events(events)?);
-    let found = enter(py, |stop| readout.run_events(&events, frame_us, tare.as_ref(), stop))?;
+    let events = events.view()?;
+    let found = enter(py, |stop| readout.run_events(events, frame_us, tare.as_ref(), stop))?;
     Ok(from_detections(py, found))
 }
 
-/// What a readout says of pictures, one after the other in `values`, at `t` us.
+/// What a readout says of a whole recording of pictures.
 #[pyfunction]
 fn readout_run_frames<'py>(
     py: Python<'py>,
     readout: &str,
-    array: ArrayParts,
-    t: PyReadonlyArray1<'py, i64>,
-    values: PyReadonlyArray1<'py, f32>,
+    frames: FramesIn<'py>,
     frame_us: Option<f64>,
     tare: Option<&str>,
 ) -> PyResult<DetectionsOut<'py>> {
-    let ((readout, tare), array) = (parse(readout, tare)?, to_array(array)?);
-    let (t, values) = (slice("t", &t)?, slice("values", &values)?);
-    let found = enter(py, |stop| readout.run_pictures(&array, t, values, frame_us, tare.as_ref(), stop))?;
+    let ((readout, tare), frames) = (parse(readout, tare)?, to_frames(frames)?);
+    let frames = frames.view()?;
+    let found = enter(py, |stop| readout.run_frames(frames, frame_us, tare.as_ref(), stop))?;
     Ok(from_detections(py, found))
 }
 
@@ -167,21 +166,15 @@ impl ReadoutStream {
 
     fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<DetectionsOut<'py>> {
         let events = to_events(events)?;
-        let mut found = vec![];
-        self.0.enter(py, |readout, _| readout.push_events(&events, &mut found))?;
+        let (events, mut found) = (events.view()?, vec![]);
+        self.0.enter(py, |readout, _| readout.push_events(events, &mut found))?;
         Ok(from_detections(py, found))
     }
 
-    fn push_frames<'py>(
-        &self,
-        py: Python<'py>,
-        array: ArrayParts,
-        t: PyReadonlyArray1<'py, i64>,
-        values: PyReadonlyArray1<'py, f32>,
-    ) -> PyResult<DetectionsOut<'py>> {
-        let array = to_array(array)?;
-        let (t, values) = (slice("t", &t)?, slice("values", &values)?);
-        let found = self.0.enter(py, |readout, stop| readout.push_pictures(&array, t, values, stop))?;
+    fn push_frames<'py>(&self, py: Python<'py>, frames: FramesIn<'py>) -> PyResult<DetectionsOut<'py>> {
+        let frames = to_frames(frames)?;
+        let frames = frames.view()?;
+        let found = self.0.enter(py, |readout, stop| readout.push_frames(frames, stop))?;
         Ok(from_detections(py, found))
     }
 

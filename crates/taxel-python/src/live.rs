@@ -1,8 +1,8 @@
 //! The pipeline from datagrams to detections, and the sender of the benchmarks.
 
 use std::path::PathBuf;
-use std::sync::{PoisonError, RwLock};
-use std::time::{Duration, Instant};
+use std::sync::{PoisonError, RwLock, RwLockReadGuard};
+use std::time::Duration;
 
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -13,16 +13,13 @@ use taxel_core::encode::Tare;
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
-use taxel_live::capture::{self, SendCounts, Sender};
+use taxel_live::capture::{self, Sender};
 use taxel_live::pipeline::{Ear, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink};
 
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core};
 use crate::parameters::parsed;
-
-/// How long a wait lasts before Ctrl-C is looked for.
-const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// What Python may choose; everything else is as Rust has it.
 #[derive(Deserialize)]
@@ -41,12 +38,7 @@ struct Chosen {
 impl Chosen {
     fn registers(&self, array: &Array) -> PyResult<Registers> {
         match &self.registers {
-            Value::String(name) => {
-                let preset = Registers::preset(name).map_err(core)?;
-                // A smaller array has fewer lines to drive.
-                let lines = preset.lines.min(array.columns);
-                Ok(Registers { lines, ..preset })
-            }
+            Value::String(name) => Registers::preset_on(name, array).map_err(core),
             held => Registers::deserialize(held).map_err(|e| ProblemError::new_err(format!("registers: {e}"))),
         }
     }
@@ -68,12 +60,16 @@ struct Live {
 }
 
 impl Live {
+    fn held(&self) -> RwLockReadGuard<'_, Option<Pipeline>> {
+        self.pipeline.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
     fn with<T: Send>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&Pipeline) -> taxel_live::Result<T> + Send,
     ) -> PyResult<T> {
-        enter(py, |_| match self.pipeline.read().unwrap_or_else(PoisonError::into_inner).as_ref() {
+        enter(py, |_| match self.held().as_ref() {
             Some(pipeline) => work(pipeline),
             None => Err(problem!("live: has been stopped; begin a new one").into()),
         })
@@ -133,14 +129,7 @@ impl Live {
         }
         let readout = readout.map(Readout::from_json).transpose().map_err(core)?;
         let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
-        let ear = match (readout, tare_us) {
-            (None, _) => Ear::Deaf,
-            (Some(readout), Some(us)) => Ear::Taring(us, Box::new(readout)),
-            (Some(readout), None) => {
-                let frame_us = options.registers.frame_us();
-                Ear::Reading(Box::new(readout.stream(&options.array, frame_us, tare.as_ref()).map_err(core)?))
-            }
-        };
+        let ear = Ear::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
         let pipeline = enter(py, |_| Pipeline::start(of_host(host, port)?, options, ear, sinks))?;
         Ok(Self { pipeline: RwLock::new(Some(pipeline)) })
     }
@@ -155,23 +144,11 @@ impl Live {
     fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<SaidParts>> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
-        let until = Instant::now().checked_add(timeout);
-        loop {
-            let left = until.map_or(LOOK_EVERY, |t| t.saturating_duration_since(Instant::now()));
-            let (said, over) =
-                enter(py, |_| match self.pipeline.read().unwrap_or_else(PoisonError::into_inner).as_ref() {
-                    Some(pipeline) => {
-                        // Asked before: what ended it was then noted before, and `next` gives it.
-                        let over = pipeline.is_over();
-                        Ok::<_, taxel_live::Error>((pipeline.next(left.min(LOOK_EVERY))?, over))
-                    }
-                    None => Ok((None, true)),
-                })?;
-            py.check_signals()?;
-            if said.is_some() || over || left.is_zero() {
-                return Ok(said.map(said_parts));
-            }
-        }
+        let said = enter(py, |stop| match self.held().as_ref() {
+            Some(pipeline) => pipeline.wait(timeout, stop),
+            None => Ok(None),
+        })?;
+        Ok(said.map(said_parts))
     }
 
     /// Whether the way has ended.
@@ -207,6 +184,8 @@ impl Live {
     /// Ends; gives counters, verdict and path as JSON, or None where it had ended before.
     fn stop(&self, py: Python<'_>) -> PyResult<Option<String>> {
         enter(py, |_| {
+            // Whoever waits for a detection ends then, and lets go.
+            self.held().iter().for_each(Pipeline::end);
             let pipeline = self.pipeline.write().unwrap_or_else(PoisonError::into_inner).take();
             pipeline.map(|pipeline| Ok::<_, taxel_live::Error>(json!(pipeline.stop()?).to_string())).transpose()
         })
@@ -234,29 +213,9 @@ fn send(
     seconds: f64,
     segment: bool,
 ) -> PyResult<String> {
-    if datagrams.is_empty() || each == 0 {
-        return Err(ProblemError::new_err("send: needs one datagram or more, and one or more at a time"));
-    }
-    for (name, value) in [("period_us", period_us), ("seconds", seconds)] {
-        if !(0.0..=1e9).contains(&value) {
-            return Err(ProblemError::new_err(format!("{name} is {value}: must lie between 0 and 1e9")));
-        }
-    }
-    let counts: SendCounts = enter(py, |stop| {
+    let counts = enter(py, |stop| {
         let mut sender = Sender::open(of_host(host, port)?, segment)?;
-        let begun = Instant::now();
-        let mut next = datagrams.iter().cycle();
-        for period in 0_u32.. {
-            let due = Duration::from_secs_f64(f64::from(period) * period_us * 1e-6);
-            if due.as_secs_f64() >= seconds || begun.elapsed().as_secs_f64() >= seconds || stop.asked() {
-                break;
-            }
-            std::thread::sleep(due.saturating_sub(begun.elapsed()));
-            for datagram in next.by_ref().take(each) {
-                sender.push(datagram)?;
-            }
-            sender.flush()?;
-        }
+        sender.repeat(&datagrams, each, period_us, seconds, stop)?;
         Ok::<_, taxel_live::Error>(sender.counts())
     })?;
     Ok(json!(counts).to_string())

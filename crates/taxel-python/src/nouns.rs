@@ -2,9 +2,9 @@
 
 use pyo3::prelude::*;
 
-use taxel_core::{events, spikes};
+use taxel_core::spikes;
 
-use crate::convert::{EventsIn, SpikesIn, SpikesOut, from_spikes, slice, to_array, to_offsets, to_spikes};
+use crate::convert::{EventsIn, SpikesIn, SpikesOut, from_spikes, slice, to_events, to_offsets, to_spikes};
 use crate::enter::enter;
 
 /// Checks spike trains; raises where train or spike make no sense.
@@ -19,14 +19,9 @@ fn check_spikes(py: Python<'_>, trains: SpikesIn<'_>) -> PyResult<()> {
 /// Checks events; raises where a column is short or an event lies outside its array.
 #[pyfunction]
 fn check_events(py: Python<'_>, events: EventsIn<'_>) -> PyResult<()> {
-    let (array, t, x, y, p, intensity, _) = events;
-    let array = to_array(array)?;
-    let (t, x, y, p) = (slice("t", &t)?.len(), slice("x", &x)?, slice("y", &y)?, slice("p", &p)?.len());
-    let pairs = match &intensity {
-        None => None,
-        Some((ticks, present)) => Some((slice("intensity", ticks)?.len(), slice("present", present)?.len())),
-    };
-    enter(py, |_| events::check(&array, t, x, y, p, pairs))
+    let events = to_events(events)?;
+    let events = events.view()?;
+    enter(py, |_| events.check())
 }
 
 /// Splits signed trains into all ON trains, then all OFF trains.

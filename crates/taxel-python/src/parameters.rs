@@ -1,6 +1,7 @@
 //! Parameter objects from the JSON in which Python hands them over.
 
 use pyo3::prelude::*;
+use serde::Serialize;
 use serde::de::DeserializeOwned;
 use taxel_core::{Error, reading};
 
@@ -10,4 +11,9 @@ use crate::errors::core;
 pub(crate) fn parsed<T: DeserializeOwned>(what: &str, json: &str) -> PyResult<T> {
     // Groups of parameters are ours; whoever wrote the parameter knows its name alone.
     reading::from_text(json).map_err(|unfit| core(Error::Problem(unfit.by_name().of(what))))
+}
+
+/// What is handed to Python, as JSON.
+pub(crate) fn to_json<T: Serialize>(value: &T) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|error| core(problem!("{error}")))
 }

@@ -1,20 +1,19 @@
 //! Recordings: the live format's reader and writer, and the manual's raw files.
 
 use std::path::PathBuf;
-use std::sync::Mutex;
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde_json::json;
 use taxel_core::detect::Detection;
-use taxel_core::{Marker, Stop, wire};
+use taxel_core::{Marker, problem, wire};
 use taxel_live::clock::BoardClock;
-use taxel_live::recording::{Counts, Header, LsaWriter, Reader, Topic, Writer, WriterOptions, numbered};
+use taxel_live::recording::{Counts, Header, LsaWriter, Reader, Writer, WriterOptions, decode_lsa, numbered};
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
-use crate::enter::enter;
-use crate::errors::{ProblemError, core};
+use crate::enter::{Shared, enter};
+use crate::errors::core;
 use crate::parameters::parsed;
 
 /// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram.
@@ -73,38 +72,23 @@ impl RecordingReader {
 
     /// All datagrams as they came.
     fn datagrams<'py>(&self, py: Python<'py>) -> PyResult<DatagramsOut<'py>> {
-        let (mut arrived, mut number, mut offsets, mut bytes) = (vec![], vec![], vec![0_i64], vec![]);
-        enter(py, |stop: Stop<'_>| {
-            self.reader.messages(stop, |message| {
-                if message.topic == Topic::Datagrams {
-                    arrived.push(message.at_ns);
-                    number.push(message.number);
-                    bytes.extend_from_slice(message.data);
-                    offsets.push(i64::try_from(bytes.len()).unwrap_or(i64::MAX));
-                }
-                Ok(())
-            })
-        })?;
-        Ok((array(py, arrived), array(py, number), array(py, offsets), array(py, bytes)))
+        let all = enter(py, |stop| self.reader.datagrams(stop))?;
+        Ok((array(py, all.arrived_ns), array(py, all.number), array(py, all.offsets), array(py, all.bytes)))
     }
 }
 
 /// A recording of the live format, being written.
 #[pyclass(frozen)]
-struct RecordingWriter {
-    writer: Mutex<Option<Writer>>,
-}
+struct RecordingWriter(Shared<Option<Writer>>);
 
 impl RecordingWriter {
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Writer) -> taxel_live::Result<T> + Send) -> PyResult<T> {
-        enter(py, |_| {
-            let writer = self.writer.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
-            match writer.as_ref() {
-                Some(writer) => work(writer),
-                None => Err(taxel_core::problem!("the recording is finished: begin a new one").into()),
-            }
-        })
+        self.0.enter(py, |writer, _| work(writer.as_ref().ok_or_else(finished)?))
     }
+}
+
+fn finished() -> taxel_live::Error {
+    problem!("the recording is finished: begin a new one").into()
 }
 
 #[pymethods]
@@ -115,7 +99,7 @@ impl RecordingWriter {
         let header: Header = parsed("header", header)?;
         let options = WriterOptions { compression: compression.parse().map_err(core)?, overwrite };
         let writer = enter(py, |_| Writer::create(&path, &header, options))?;
-        Ok(Self { writer: Mutex::new(Some(writer)) })
+        Ok(Self(Shared::new(Some(writer))))
     }
 
     /// Keeps datagrams: arrival ns, number, where each begins in `payload` (and where the last ends), bytes.
@@ -129,22 +113,7 @@ impl RecordingWriter {
     ) -> PyResult<()> {
         let (arrived_ns, number) = (slice("arrived_ns", &arrived_ns)?, slice("number", &number)?);
         let (offsets, bytes) = (slice("offsets", &offsets)?, slice("payload", &payload)?);
-        if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
-            let n = arrived_ns.len();
-            return Err(ProblemError::new_err(format!("{n} arrivals: need {n} numbers and {} offsets", n + 1)));
-        }
-        self.with(py, |writer| {
-            for (k, two) in offsets.windows(2).enumerate() {
-                let range = usize::try_from(two[0]).ok().zip(usize::try_from(two[1]).ok());
-                let Some(datagram) = range.and_then(|(from, to)| bytes.get(from..to)) else {
-                    return Err(
-                        taxel_core::problem!("datagram {k}: bytes {} to {} are not there", two[0], two[1]).into()
-                    );
-                };
-                writer.datagram(arrived_ns[k], number[k], datagram)?;
-            }
-            Ok(())
-        })
+        self.with(py, |writer| writer.datagrams(arrived_ns, number, offsets, bytes))
     }
 
     /// Keeps one datagram.
@@ -204,11 +173,8 @@ impl RecordingWriter {
     /// Ends the recording; counts in and out as JSON.
     fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<String> {
         let counts: Counts = parsed("counts", counts)?;
-        let writer = self.writer.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
-        let Some(writer) = writer else {
-            return Err(ProblemError::new_err("the recording is finished: begin a new one"));
-        };
-        Ok(json!(enter(py, |_| writer.finish(counts))?).to_string())
+        let counts = self.0.enter(py, |writer, _| writer.take().ok_or_else(finished)?.finish(counts))?;
+        Ok(json!(counts).to_string())
     }
 }
 
@@ -249,22 +215,9 @@ fn read_lsa<'py>(
 ) -> PyResult<LsaOut<'py>> {
     let sensor = to_array(sensor)?;
     let pairing: wire::Pairing = parsed("pairing", &json!(pairing).to_string())?;
-    let (bytes, events, counts, complete) = enter(py, |stop| -> taxel_live::Result<_> {
-        let (bytes, complete) = taxel_live::recording::read_lsa(&path)?;
-        let mut decoder = wire::Decoder::new(sensor.clone()).pairing(pairing).differences(differences);
-        let mut events = taxel_core::Events::empty(sensor);
-        for piece in bytes.chunks(PIECE) {
-            stop.check()?;
-            decoder.push_into(piece, None, &mut events);
-        }
-        decoder.finish_into(&mut events);
-        Ok((bytes, events, *decoder.counts(), complete))
-    })?;
-    Ok((array(py, bytes), from_events(py, events), json!(counts).to_string(), complete))
+    let read = enter(py, |stop| decode_lsa(&path, sensor, pairing, differences, stop))?;
+    Ok((array(py, read.bytes), from_events(py, read.events), json!(read.counts).to_string(), read.complete))
 }
-
-/// Between two looks at Ctrl-C.
-const PIECE: usize = 1 << 22;
 
 /// The line between the board's clock and the host's: a board time (us), the host's then (ns), drift (ppm).
 #[pyfunction]
@@ -274,14 +227,8 @@ fn board_clock(
     arrived_ns: PyReadonlyArray1<'_, i64>,
 ) -> PyResult<Option<(i64, i64, f64)>> {
     let (board_us, arrived_ns) = (slice("board_us", &board_us)?, slice("arrived_ns", &arrived_ns)?);
-    let mut clock = BoardClock::default();
-    enter(py, |_| {
-        for (&board, &arrived) in board_us.iter().zip(arrived_ns) {
-            clock.note(board, arrived);
-        }
-        Ok::<_, taxel_core::Error>(())
-    })?;
-    Ok(clock.offset().map(|o| (o.board_us, o.host_ns, o.drift_ppm)))
+    let offset = enter(py, |_| Ok::<_, taxel_core::Error>(BoardClock::offset_of(board_us, arrived_ns)))?;
+    Ok(offset.map(|o| (o.board_us, o.host_ns, o.drift_ppm)))
 }
 
 /// The name of a recording in automatic mode: the index appended to the name.

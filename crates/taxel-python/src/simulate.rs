@@ -2,10 +2,10 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::board::{Board, session};
-use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor, Stage, Taxels};
-use taxel_core::wire::{Decoder, Registers};
-use taxel_core::{Array, Error, Events, Result, reading};
+use taxel_core::board::{Armed, Play, Played};
+use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor};
+use taxel_core::wire::Registers;
+use taxel_core::{Error, Result, reading};
 use taxel_live::address::of_text;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Report};
 
@@ -39,11 +39,8 @@ fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
         .collect()
 }
 
-/// Acts and board, ready to be played.
-fn ready(array: &Array, registers: Registers, sensor: &str, seed: u64, acts: &[Act]) -> Result<Stage> {
-    let sensor: Sensor = reading::from_text(sensor).map_err(|unfit| Error::Scene(unfit.of("sensor")))?;
-    registers.check(array)?;
-    Stage::new(array, Taxels::new(&sensor, array.len(), registers.ramp, seed)?, registers.frame_us(), acts)
+fn to_sensor(json: &str) -> PyResult<Sensor> {
+    reading::from_text(json).map_err(|unfit| core(Error::Scene(unfit.of("sensor"))))
 }
 
 /// Touches as Python gets them: kind, start and stop in us, speed in m/s, peak force in N.
@@ -79,8 +76,10 @@ fn truth<'py>(
     preset: &str,
     acts: Vec<ActIn<'py>>,
 ) -> PyResult<(ContactsOut, Bound<'py, PyArray1<f32>>)> {
-    let (sensor_array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
-    let stage = enter(py, |_| ready(&sensor_array, registers, "{}", 0, &acts))?;
+    let registers = Registers::preset(preset).map_err(core)?;
+    let (array_felt, sensor) = (to_array(parts)?, Sensor::default());
+    let play = Play { array: array_felt, registers, sensor, seed: 0, acts: to_acts(acts)?, tare_ms: 0.0 };
+    let stage = enter(py, |_| play.stage())?;
     Ok((from_contacts(stage.contacts()), array(py, stage.force_n())))
 }
 
@@ -100,35 +99,10 @@ fn play<'py>(
     tare_ms: f64,
     watch: Py<PyAny>,
 ) -> PyResult<(EventsOut<'py>, u64, u64)> {
-    let (array, acts, registers) = (to_array(parts)?, to_acts(acts)?, Registers::preset(preset).map_err(core)?);
-    let (events, datagrams, words) = enter_telling(py, |stop, teller| {
-        let mut stage = ready(&array, registers, sensor, seed, &acts)?;
-        let commands = session(&registers, tare_ms, stage.frames() as u64)?;
-        let mut board = Board::new(registers, &array)?;
-        let mut decoder = Decoder::new(array.clone());
-        let mut events = Events::empty(array.clone());
-        let (mut datagrams, mut words) = (0_u64, 0_u64);
-        let hear = |datagram: &[u8]| {
-            decoder.push_into(datagram, None, &mut events);
-            decoder.end_of_datagram_into(&mut events);
-            datagrams += 1;
-            words += datagram.len() as u64 / 5;
-            true
-        };
-        let mut first = vec![0; array.len()];
-        stage.frame(&mut first)?;
-        board.arm(&first)?;
-        let (frames, second) = (stage.frames(), (1e6 / registers.frame_us()) as usize);
-        let mut done = 0_usize;
-        let touch = |ticks: &mut [u16]| {
-            done += 1;
-            if done.is_multiple_of(second) {
-                teller.tell(Some(&watch), |py, told| told.call1(py, (done as f64 / frames as f64,)));
-            }
-            stage.frame(ticks)
-        };
-        board.play(touch, &commands, hear, stop)?;
-        Ok::<_, Error>((events, datagrams, words))
+    let (array, registers) = (to_array(parts)?, Registers::preset(preset).map_err(core)?);
+    let play = Play { array, registers, sensor: to_sensor(sensor)?, seed, acts: to_acts(acts)?, tare_ms };
+    let Played { events, datagrams, words } = enter_telling(py, |stop, teller| {
+        play.hear(|share| teller.tell(Some(&watch), |py, told| told.call1(py, (share,))), stop)
     })?;
     Ok((from_events(py, events), datagrams, words))
 }
@@ -153,16 +127,12 @@ fn emulate(
     begun: Py<PyAny>,
     watch: Py<PyAny>,
 ) -> PyResult<String> {
-    let (array, acts) = (to_array(parts)?, to_acts(acts)?);
+    let (array, acts, sensor) = (to_array(parts)?, to_acts(acts)?, to_sensor(sensor)?);
     let registers = Registers { wire_version: wire, ..Registers::preset(preset).map_err(core)? };
     let (to, control) = enter(py, |_| Ok::<_, taxel_live::Error>((of_text(to)?, control.map(of_text).transpose()?)))?;
     enter_telling(py, |stop, teller| {
-        let mut stage = ready(&array, registers, sensor, seed, &acts)?;
-        let commands = session(&registers, tare_ms, stage.frames() as u64)?;
-        let mut board = Board::new(registers, &array)?;
-        let mut first = vec![0; array.len()];
-        stage.frame(&mut first)?;
-        board.arm(&first)?;
+        let Armed { board, mut stage, commands } =
+            Play { array: array.clone(), registers, sensor, seed, acts, tare_ms }.arm()?;
         let options = EmulatorOptions { control, commands, ..EmulatorOptions::to(to) };
         let mut emulator = Emulator::open(board, &array, options)?;
         let control = emulator.control_address().map(|a| a.to_string());

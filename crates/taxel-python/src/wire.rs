@@ -10,14 +10,10 @@ use taxel_core::{Error, Marker, problem};
 use crate::convert::{ArrayParts, EventsIn, EventsOut, from_events, slice, to_array, to_events};
 use crate::enter::{Shared, enter};
 use crate::errors::{ProblemError, core};
-use crate::parameters::parsed;
+use crate::parameters::{parsed, to_json};
 
 /// Bytes between two looks at Ctrl-C: some milliseconds of work.
 const PIECE: usize = 16 << 20;
-
-fn to_json<T: serde::Serialize>(value: &T) -> PyResult<String> {
-    serde_json::to_string(value).map_err(|error| ProblemError::new_err(error.to_string()))
-}
 
 /// Columns to fill: t, x, y, ticks, and p, present as bytes.
 type ColumnsIn<'py> = (
@@ -123,7 +119,8 @@ impl WireDecoder {
 #[pyfunction]
 fn wire_encode<'py>(py: Python<'py>, events: EventsIn<'py>) -> PyResult<Bound<'py, PyBytes>> {
     let events = to_events(events)?;
-    let bytes = enter(py, |_| wire::encode(&events))?;
+    let events = events.view()?;
+    let bytes = enter(py, |_| wire::encode(events))?;
     Ok(PyBytes::new(py, &bytes))
 }
 

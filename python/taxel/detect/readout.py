@@ -362,8 +362,7 @@ class ReadoutStream:
         if isinstance(x, Events):
             return Detections._from_parts(self._begin(x.array).push_events(x._parts()))
         if isinstance(x, Frames):
-            parts = x.array._parts(), x.t, x.values.reshape(-1)
-            return Detections._from_parts(self._begin(x.array).push_frames(*parts))
+            return Detections._from_parts(self._begin(x.array).push_frames(x._parts()))
         raise ProblemError(f"x is {shown(x)}: a readout listens to taxel.Events or taxel.Frames")
 
     def advance(self, t_us: int) -> Detections:
@@ -439,8 +438,7 @@ def run(
         return Detections._from_parts(_core.readout_run_events(text, source._parts(), period, rest))
     if not isinstance(source, Frames):
         raise ProblemError(f"source is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
-    parts = source.array._parts(), source.t, source.values.reshape(-1)
-    return Detections._from_parts(_core.readout_run_frames(text, *parts, period, rest))
+    return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, rest))
 
 
 def _tare(tare: Tare | None) -> str | None:

@@ -106,9 +106,7 @@ class Encoder(Value):
         x = recorded(x)
         if isinstance(x, Events):
             return SpikeTrains._from_parts(_core.encode_events(self._json(), x._parts()))
-        frames = _frames(x)
-        parts = frames.array._parts(), frames.t, frames.values.reshape(-1)
-        return SpikeTrains._from_parts(_core.encode_frames(self._json(), *parts))
+        return SpikeTrains._from_parts(_core.encode_frames(self._json(), _frames(x)._parts()))
 
     def fit(self, recordings: object = None, targets: object = None) -> Self:  # noqa: ARG002  scikit-learn's call
         """Do nothing: an encoder learns nothing; so that it stands in a pipeline of scikit-learn's."""
@@ -187,8 +185,7 @@ class EncoderStream:
         if isinstance(x, Events):
             return SpikeTrains._from_parts(self._begin(x.array).push_events(x._parts()))
         frames = _frames(x)
-        parts = frames.array._parts(), frames.t, frames.values.reshape(-1)
-        return SpikeTrains._from_parts(self._begin(frames.array).push_frames(*parts))
+        return SpikeTrains._from_parts(self._begin(frames.array).push_frames(frames._parts()))
 
     def advance(self, t_us: int) -> SpikeTrains:
         """Say that nothing will come any more before `t_us` (exclusive); an earlier time changes nothing."""

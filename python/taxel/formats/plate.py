@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _arguments as arguments
+from taxel._columns import frozen
 from taxel._core import FormatError, ProblemError
 from taxel._limits import unpacked
 from taxel.array import Array
@@ -115,7 +116,7 @@ def _trial(
     return Trial(
         name=f"{person}/{number:02d}",
         person=person,
-        recorded=Frames(values, np.arange(end) * FRAME_US, unit="counts", array=array),
+        recorded=Frames(frozen(values), np.arange(end) * FRAME_US, unit="counts", array=array),
         truth={e: np.array([frame[e] * FRAME_US]) for e in ("contact", "heel_off", "foot_off")},
         source=_SOURCE,
         about={"row_mm": ROW_MM, "column_mm": COLUMN_MM, **(about or {})},

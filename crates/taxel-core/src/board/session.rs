@@ -1,6 +1,7 @@
 //! A board from reset to stop, as the demo and `taxel emulate` use it: it arms, is tared, starts, and stops.
 
 use super::{Board, BoardCounts};
+use crate::spikes::us;
 use crate::wire::{Command, Registers};
 use crate::{Result, Stop, problem};
 
@@ -16,7 +17,7 @@ pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(
     if !(0.0..=60_000.0).contains(&tare_ms) {
         return Err(problem!("tare of {tare_ms} ms: must be 0 to 60000"));
     }
-    let start = 1 + (tare_ms * 1e3 / registers.frame_us()).ceil() as u64;
+    let start = 1 + (us(tare_ms) / registers.frame_us()).ceil() as u64;
     if frames < start + 2 {
         return Err(problem!("{frames} frames: arming, a tare of {tare_ms} ms, start and stop need {}", start + 2));
     }

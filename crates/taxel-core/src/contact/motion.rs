@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::scene::{Ending, Scene};
+use crate::spikes::us;
 use crate::{Error, Result};
 
 /// Gravity, mm/ms^2.
@@ -222,7 +223,7 @@ impl<'a> Player<'a> {
             // Force crosses zero with depth where the ball is at the foam's face, else inside, where the dashpot frees it.
             let (before, after) = if self.depth <= 0.0 || depth <= 0.0 { (self.depth, depth) } else { (self.raw, raw) };
             let share = if after == before { 1.0 } else { (-before / (after - before)).clamp(0.0, 1.0) };
-            let at = 1e3 * self.inner_ms * (f64::from(self.now) + share);
+            let at = us(self.inner_ms) * (f64::from(self.now) + share);
             if touching {
                 let (start_us, stop_us) = (at, f64::INFINITY);
                 self.motion.contacts.push(Contact { kind, start_us, stop_us, speed_m_s: speed, peak_n: 0.0 });

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{Contact, Footprint, Kind, Motion, Scene, Taxels};
+use crate::spikes::us;
 use crate::{Array, Error, Result};
 
 /// Pictures laid over the array: what a recording of another sensor would have done to this one.
@@ -193,7 +194,7 @@ fn part(array: &Array, frame_us: f64, act: &Act) -> Result<(Part, Vec<Contact>)>
             if !(0.0..=86_400_000.0).contains(ms) {
                 return Err(Error::Scene(format!("silence of {ms} ms: must be 0 to a day")));
             }
-            Ok((Part { frames: (ms * 1e3 / frame_us).round() as usize, what: What::Silence }, vec![]))
+            Ok((Part { frames: (us(*ms) / frame_us).round() as usize, what: What::Silence }, vec![]))
         }
         Act::Ball(scene) => {
             let mut motion = Motion::of(scene, frame_us / GROUPS as f64)?;

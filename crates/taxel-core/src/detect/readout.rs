@@ -9,7 +9,8 @@ use crate::allowed::above_0;
 use crate::detect::{Detection, FrameClock, ReadoutStream, TrainedNeuron};
 use crate::encode::{Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
-use crate::{Array, Error, Events, Result, Stop, problem, reading};
+use crate::spikes::us;
+use crate::{Array, Error, EventsView, FramesView, Result, Stop, problem, reading};
 
 /// What a readout's file says that it is.
 const FORMAT: &str = "taxel readout";
@@ -215,52 +216,50 @@ impl Readout {
 
     /// How long is listened on after the end of a recording, us.
     fn silence_us(&self) -> i64 {
-        SILENCE_US + (1000.0 * self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64
+        SILENCE_US + us(self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64
     }
 
     /// What is said of a whole recording of events, and of a second of silence after it.
     ///
     /// # Errors
     ///
-    /// As [`Readout::stream`], [`ReadoutStream::push_events`] and [`Events::check_order`]; `Interrupted` where asked to
+    /// As [`Readout::stream`], [`ReadoutStream::push_events`] and [`EventsView::check_order`]; `Interrupted` where asked to
     /// stop.
     pub fn run_events(
         &self,
-        events: &Events,
+        events: EventsView<'_>,
         frame_us: f64,
         tare: Option<&Tare>,
         stop: Stop<'_>,
     ) -> Result<Vec<Detection>> {
         let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
-        let mut stream = self.stream(&events.array, frame_us, tare)?;
+        let mut stream = self.stream(events.array, frame_us, tare)?;
         events.check_order()?;
         let mut found = stream.push_recording(events, stop)?;
         stream.advance(last.saturating_add(self.silence_us()), &mut found)?;
         Ok(found)
     }
 
-    /// What is said of whole pictures, one after the other in `values`, at `t` us, and of a second after them in which
-    /// the last one stays. Frames last `frame_us`, or as long as pictures mostly lie apart.
+    /// What is said of a whole recording of pictures, and of a second after them in which the last one stays. Frames last
+    /// `frame_us`, or as long as pictures mostly lie apart.
     ///
     /// # Errors
     ///
-    /// As [`Readout::stream`] and [`ReadoutStream::push_frame`]; `Interrupted` where asked to stop.
-    pub fn run_pictures(
+    /// As [`Readout::stream`] and [`ReadoutStream::push_frames`]; `Interrupted` where asked to stop.
+    pub fn run_frames(
         &self,
-        array: &Array,
-        t: &[i64],
-        values: &[f32],
+        frames: FramesView<'_>,
         frame_us: Option<f64>,
         tare: Option<&Tare>,
         stop: Stop<'_>,
     ) -> Result<Vec<Detection>> {
         let frame_us = match frame_us {
             Some(given) => given,
-            None => usual_distance(t)?,
+            None => usual_distance(frames.t)?,
         };
-        let last = t.last().copied().unwrap_or(0);
-        let mut stream = self.stream(array, frame_us, tare)?;
-        let mut found = stream.push_pictures(array, t, values, stop)?;
+        let last = frames.t.last().copied().unwrap_or(0);
+        let mut stream = self.stream(frames.array, frame_us, tare)?;
+        let mut found = stream.push_frames(frames, stop)?;
         stream.advance(last.saturating_add(self.silence_us()), &mut found)?;
         Ok(found)
     }

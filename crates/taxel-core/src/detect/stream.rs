@@ -3,7 +3,8 @@
 use crate::detect::{Detection, FrameClock, TrainedNeuron};
 use crate::encode::Stream;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike};
-use crate::{Array, Events, Result, Spike, Stop, problem};
+use crate::spikes::{ms, us};
+use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
 
 /// How many events go through the stream between two looks at [`Stop`].
 const PIECE: usize = 65_536;
@@ -77,10 +78,10 @@ impl ReadoutStream {
     /// # Errors
     ///
     /// `Problem` where events come from another array or lack what the encoder needs, or a time is beyond 2^52 us.
-    pub fn push_events(&mut self, events: &Events, out: &mut Vec<Detection>) -> Result<()> {
-        self.check_shape(&events.array)?;
+    pub fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Detection>) -> Result<()> {
+        self.check_shape(events.array)?;
         let Some((&first, rest)) = events.t.split_first() else { return Ok(()) };
-        for &t in &events.t {
+        for &t in events.t {
             check_time(t)?;
         }
         let mut latest = self.now.map_or(first, |now| now.max(first));
@@ -88,13 +89,13 @@ impl ReadoutStream {
         if in_order {
             self.encoder.push_events(events, &mut self.heard)?;
         } else {
-            let mut events = events.clone();
-            for t in &mut events.t {
+            let mut moved = events.t.to_vec();
+            for t in &mut moved {
                 self.late += u64::from(*t < latest);
                 latest = latest.max(*t);
                 *t = latest;
             }
-            self.encoder.push_events(&events, &mut self.heard)?;
+            self.encoder.push_events(EventsView { t: &moved, ..events }, &mut self.heard)?;
         }
         self.settle(events.t[events.len() - 1].max(latest), out)
     }
@@ -149,34 +150,26 @@ impl ReadoutStream {
     /// # Errors
     ///
     /// As [`push_events`](Self::push_events); `Interrupted` where `stop` says so.
-    pub fn push_recording(&mut self, events: &Events, stop: Stop<'_>) -> Result<Vec<Detection>> {
+    pub fn push_recording(&mut self, events: EventsView<'_>, stop: Stop<'_>) -> Result<Vec<Detection>> {
+        events.check()?;
         let mut out = Vec::new();
-        for from in (0..events.len()).step_by(PIECE) {
+        for piece in events.pieces(PIECE) {
             stop.check()?;
-            self.push_events(&events.piece(from..(from + PIECE).min(events.len())), &mut out)?;
+            self.push_events(piece, &mut out)?;
         }
         Ok(out)
     }
 
-    /// Takes whole pictures, one after the other in `values`, at `t` us.
+    /// Takes many pictures, and looks at `stop` now and then.
     ///
     /// # Errors
     ///
     /// As [`push_frame`](Self::push_frame), and where they come from another array; `Interrupted` where `stop` says so.
-    pub fn push_pictures(
-        &mut self,
-        array: &Array,
-        t: &[i64],
-        values: &[f32],
-        stop: Stop<'_>,
-    ) -> Result<Vec<Detection>> {
-        self.check_shape(array)?;
-        if values.len() != t.len() * array.len() {
-            let (n, taxels) = (t.len(), array.len());
-            return Err(problem!("frames: {} values for {n} pictures of {taxels} taxels", values.len()));
-        }
+    pub fn push_frames(&mut self, frames: FramesView<'_>, stop: Stop<'_>) -> Result<Vec<Detection>> {
+        self.check_shape(frames.array)?;
+        frames.check()?;
         let mut out = Vec::new();
-        for (k, (&t, picture)) in t.iter().zip(values.chunks_exact(array.len())).enumerate() {
+        for (k, (t, picture)) in frames.iter().enumerate() {
             if k % 256 == 0 {
                 stop.check()?;
             }
@@ -188,7 +181,7 @@ impl ReadoutStream {
     /// Moves the neurons on to `until` us, before which every spike is known.
     fn settle(&mut self, until: i64, out: &mut Vec<Detection>) -> Result<()> {
         self.now = Some(self.now.map_or(until, |now| now.max(until)));
-        let until_ms = until as f64 / 1000.0;
+        let until_ms = ms(until);
         self.take_in();
         self.waiting.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
         let certain = self.waiting.partition_point(|spike| spike.t < until_ms);
@@ -206,7 +199,7 @@ impl ReadoutStream {
         crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
         out.extend(crossings.into_iter().map(|(t, k, slope)| Detection {
             label: self.voices[k].label.clone(),
-            t: ((t - self.voices[k].offset_ms) * 1000.0).round() as i64,
+            t: us(t - self.voices[k].offset_ms).round() as i64,
             known: self.clock.end_of(t),
             slope,
         }));
@@ -274,8 +267,8 @@ mod tests {
     use rand::{Rng, SeedableRng};
 
     use super::*;
-    use crate::Intensities;
     use crate::neuron::{AfterSpike, Time};
+    use crate::{Events, Intensities};
 
     /// Says each event as a signed spike of its taxel's train at its stamp; a picture as a spike of each loaded taxel.
     #[derive(Clone)]
@@ -299,16 +292,16 @@ mod tests {
         fn latency_ms(&self) -> f64 {
             self.latency_ms
         }
-        fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()> {
+        fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()> {
             for k in 0..events.len() {
                 let train = events.array.index(events.x[k], events.y[k]) as u32;
-                out.push(Spike { t: events.t[k] as f64 / 1000.0, train, value: if events.p[k] { 1.0 } else { -1.0 } });
+                out.push(Spike { t: ms(events.t[k]), train, value: if events.p[k] { 1.0 } else { -1.0 } });
             }
             Ok(())
         }
         fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
             let loaded = values.iter().enumerate().filter(|(_, v)| **v > 0.0);
-            out.extend(loaded.map(|(k, _)| Spike { t: t as f64 / 1000.0, train: k as u32, value: 1.0 }));
+            out.extend(loaded.map(|(k, _)| Spike { t: ms(t), train: k as u32, value: 1.0 }));
             Ok(())
         }
         fn advance(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
@@ -367,7 +360,7 @@ mod tests {
     }
 
     fn run(mut stream: ReadoutStream, events: &Events, end: i64) -> Vec<Detection> {
-        let mut found = stream.push_recording(events, Stop::never()).unwrap();
+        let mut found = stream.push_recording(events.view(), Stop::never()).unwrap();
         stream.advance(end, &mut found).unwrap();
         found
     }
@@ -388,7 +381,7 @@ mod tests {
             }
             while from < 400 {
                 let to = (from + random.random_range(0..40)).min(400);
-                live.push_events(&events.piece(from..to), &mut pieces).unwrap();
+                live.push_events(events.view().piece(from..to), &mut pieces).unwrap();
                 from = to;
                 // Time may move on up to the next event, itself excluded, but no farther.
                 let last = live.now().unwrap_or(events.t[0]);
@@ -437,7 +430,7 @@ mod tests {
         let mut one = events(0, 1);
         (one.x[0], one.y[0], one.p[0]) = (0, 0, true);
         let (mut live, mut out) = (stream(&neuron, 0.0, 192.0), Vec::new());
-        live.push_events(&one, &mut out).unwrap();
+        live.push_events(one.view(), &mut out).unwrap();
         assert_eq!(out, [], "the crossing lies ahead, and something could still come before it");
         live.advance(one.t[0] + 10 * 192, &mut out).unwrap();
         assert_eq!((out.len(), out[0].label.as_str()), (1, "contact"));
@@ -457,8 +450,8 @@ mod tests {
         late.t[20] = late.t[0] - 300;
         let (mut a, mut b) = (stream(&neuron, 0.0, 192.0), stream(&neuron, 0.0, 192.0));
         let (mut said_a, mut said_b) = (Vec::new(), Vec::new());
-        a.push_events(&late, &mut said_a).unwrap();
-        b.push_events(&moved, &mut said_b).unwrap();
+        a.push_events(late.view(), &mut said_a).unwrap();
+        b.push_events(moved.view(), &mut said_b).unwrap();
         a.advance(end, &mut said_a).unwrap();
         b.advance(end, &mut said_b).unwrap();
         assert_eq!(said_a, said_b);
@@ -474,7 +467,8 @@ mod tests {
             values.extend([f32::from(u8::from(k % 40 == 3)), 0.0, 0.0, 0.0]);
         }
         let mut live = stream(&neuron, 0.0, 2000.0);
-        let mut found = live.push_pictures(&array(), &t, &values, Stop::never()).unwrap();
+        let mut found =
+            live.push_frames(FramesView { array: &array(), t: &t, values: &values }, Stop::never()).unwrap();
         live.advance(500_000, &mut found).unwrap();
         assert_eq!(found.len(), 5);
         for (d, k) in found.iter().zip([3, 43, 83, 123, 163]) {
@@ -489,12 +483,12 @@ mod tests {
         let other = Events::empty(Array::new(3, 2, 1.0, "other").unwrap());
         let mut live = stream(&neuron, 0.0, 192.0);
         let mut out = Vec::new();
-        let said = live.push_events(&other, &mut out).unwrap_err().to_string();
+        let said = live.push_events(other.view(), &mut out).unwrap_err().to_string();
         assert_eq!(said, "input from 3 x 2 taxels: this readout listens to 2 x 2");
         assert!(live.advance(i64::MAX, &mut out).is_err());
         assert!(live.push_frame(i64::MIN, &[0.0; 4], &mut out).is_err());
         let mut far = events(1, 1);
         far.t[0] = 1 << 60;
-        assert!(live.push_events(&far, &mut out).is_err());
+        assert!(live.push_events(far.view(), &mut out).is_err());
     }
 }

@@ -10,7 +10,7 @@ use super::tare::Tare;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::spikes::ms;
-use crate::{Array, Events, Result, Spike, problem};
+use crate::{Array, EventsView, Result, Spike, problem};
 
 /// Contact area: rises and falls of the number of loaded taxels through levels.
 ///
@@ -148,12 +148,12 @@ impl Stream for Area {
         0.0
     }
 
-    fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()> {
+    fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()> {
         self.channels.check(events)?;
         let Some(intensity) = &events.intensity else {
             return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
         };
-        let Some(mut present) = self.source.events(&events.t)? else { return Ok(()) };
+        let Some(mut present) = self.source.events(events.t)? else { return Ok(()) };
         for k in 0..events.len() {
             if events.t[k] > present {
                 self.say(present, out);

@@ -2,11 +2,12 @@
 
 use crate::Result;
 use crate::allowed::{Parameter, Range};
+use crate::spikes::us;
 
 /// A time in ms that must be a whole number of us, in us.
 pub(super) fn micros(name: &'static str, ms: f64) -> Result<i64> {
     Parameter { name, unit: "ms", range: Range::WHOLE_US }.check(&ms)?;
-    Ok((ms * 1000.0).round() as i64)
+    Ok(us(ms).round() as i64)
 }
 
 /// The step of the wire's stamps, ms (wire.md, section 1).

@@ -6,9 +6,9 @@
 use super::periods::micros;
 use super::stream::Stream;
 use crate::events::FARTHEST_BACK_US;
-use crate::spikes::ms;
+use crate::spikes::{ms, us};
 use crate::vectors::wide;
-use crate::{Array, Events, Result, Spike, problem};
+use crate::{Array, EventsView, Result, Spike, problem};
 
 /// Channels that are looked at together; the compiler turns loops over a block into vector instructions.
 pub(super) const BLOCK: usize = 64;
@@ -151,7 +151,7 @@ impl Channels {
     }
 
     /// Refuses events of another sensor, or columns that make no sense.
-    pub(super) fn check(&self, events: &Events) -> Result<()> {
+    pub(super) fn check(&self, events: EventsView<'_>) -> Result<()> {
         let (rows, columns) = (events.array.rows, events.array.columns);
         if (rows, columns) != (self.rows, self.columns) {
             let (name, wanted) = (&self.name, (self.rows, self.columns));
@@ -325,13 +325,13 @@ impl<R: Rule> Stream for Sampled<R> {
         self.latency_ms
     }
 
-    fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()> {
+    fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()> {
         self.channels.check(events)?;
         let Some(intensity) = &events.intensity else {
             return Err(problem!("events without intensities: this encoder reads held values, so record intensities"));
         };
         let fresh = matches!(self.source, Source::Unknown);
-        let Some(mut present) = self.source.events(&events.t)? else { return Ok(()) };
+        let Some(mut present) = self.source.events(events.t)? else { return Ok(()) };
         if fresh {
             self.next = present;
         }
@@ -384,7 +384,7 @@ impl<R: Rule> Stream for Sampled<R> {
 
     fn finish(&mut self, out: &mut Vec<Spike>) -> Option<f64> {
         // Rounded up, so that a spike that is due exactly after the latency is in.
-        let latency = (self.latency_ms * 1000.0).ceil() as i64;
+        let latency = us(self.latency_ms).ceil() as i64;
         let end = match self.source {
             Source::Unknown => return None,
             Source::Events { present, .. } => present + self.period + latency,

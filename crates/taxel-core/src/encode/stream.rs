@@ -1,6 +1,6 @@
 //! An encoder at work, piece by piece.
 
-use crate::{Events, Result, Spike};
+use crate::{EventsView, Result, Spike};
 
 /// An encoder at work: takes what comes, in order of time, and hands on spikes as soon as they are certain.
 ///
@@ -22,7 +22,7 @@ pub trait Stream: Send {
     /// # Errors
     ///
     /// `Problem` where the encoder needs intensities that are not there, or the stream was begun with frames.
-    fn push_events(&mut self, events: &Events, out: &mut Vec<Spike>) -> Result<()>;
+    fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()>;
 
     /// Takes the next picture, row by row, at `t` us.
     ///

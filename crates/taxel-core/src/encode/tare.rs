@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::{Array, Events, Result, problem, reading};
+use crate::{Array, EventsView, FramesView, Result, problem, reading};
 
 /// The rest of each taxel: the mean by time of its held values over a stretch at rest.
 ///
@@ -45,6 +45,36 @@ impl Tare {
             Some(place) => Err(problem!("tare: rest of taxel {place} is not finite")),
             None => Ok(()),
         }
+    }
+
+    /// Takes a tare from events in order of time: of `start` to `stop` us, or of all of them.
+    ///
+    /// # Errors
+    ///
+    /// As [`EventsView::check_order`], [`TareBuilder::push_events`] and [`TareBuilder::finish`].
+    pub fn of_events(events: EventsView<'_>, start: Option<i64>, stop: Option<i64>, note: &str) -> Result<Self> {
+        events.check()?;
+        events.check_order()?;
+        let stop = stop.or(events.t.iter().max().copied());
+        let kept = events.t.iter().position(|&t| stop.is_some_and(|stop| t >= stop)).unwrap_or(events.len());
+        let mut tare = TareBuilder::new(events.array, start);
+        tare.push_events(events.piece(0..kept))?;
+        tare.finish(stop.unwrap_or_default(), note)
+    }
+
+    /// Takes a tare from pictures: of `start` to `stop` us, or of all of them.
+    ///
+    /// # Errors
+    ///
+    /// As [`FramesView::check`], [`TareBuilder::push_frame`] and [`TareBuilder::finish`].
+    pub fn of_frames(frames: FramesView<'_>, start: Option<i64>, stop: Option<i64>, note: &str) -> Result<Self> {
+        frames.check()?;
+        let stop = stop.or(frames.t.last().copied());
+        let mut tare = TareBuilder::new(frames.array, start);
+        for (t, picture) in frames.iter().filter(|&(t, _)| stop.is_some_and(|stop| t < stop)) {
+            tare.push_frame(t, picture)?;
+        }
+        tare.finish(stop.unwrap_or_default(), note)
     }
 
     /// Reads a tare from JSON.
@@ -121,7 +151,7 @@ impl TareBuilder {
     /// # Errors
     ///
     /// `Problem` where events have no intensities or are another sensor's.
-    pub fn push_events(&mut self, events: &Events) -> Result<()> {
+    pub fn push_events(&mut self, events: EventsView<'_>) -> Result<()> {
         let (rows, columns) = (events.array.rows, events.array.columns);
         if (rows, columns) != (self.array.rows, self.array.columns) {
             let (own_rows, own_columns) = (self.array.rows, self.array.columns);

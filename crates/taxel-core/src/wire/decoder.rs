@@ -737,7 +737,7 @@ mod tests {
             rest = after;
         }
         decoder.finish_into(&mut events);
-        events.check().unwrap();
+        events.view().check().unwrap();
         (events, *decoder.counts())
     }
 

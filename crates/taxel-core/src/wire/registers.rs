@@ -66,6 +66,16 @@ impl Registers {
         }
     }
 
+    /// The preset of that name on a board of that array: a smaller one has fewer lines to drive.
+    ///
+    /// # Errors
+    ///
+    /// As [`Registers::preset`].
+    pub fn preset_on(name: &str, array: &Array) -> Result<Self> {
+        let preset = Self::preset(name)?;
+        Ok(Self { lines: preset.lines.min(array.columns), ..preset })
+    }
+
     /// What a board of that array and so many channels holds at reset.
     ///
     /// Up to 64 lines the first preset; beyond, version 2 and a preset of 128 lines, its lines and steps fitted to the array.

@@ -11,7 +11,7 @@
 //! Reading: byte 0 is sent first; Z1 and U are sent as 0 and ignored; a marker's X and Y likewise; Pol 1 is more
 //! pressure, and start.
 
-use crate::{Events, Result, problem};
+use crate::{EventsView, Result, problem};
 
 /// Bytes of a word.
 pub const WORD_BYTES: usize = 5;
@@ -110,7 +110,7 @@ pub fn stamp(t_us: i64) -> u16 {
 /// # Errors
 ///
 /// `Problem` where columns are unequal, or a taxel's column or row is above 63, which six bits cannot say.
-pub fn encode(events: &Events) -> Result<Vec<u8>> {
+pub fn encode(events: EventsView<'_>) -> Result<Vec<u8>> {
     events.check()?;
     let mut bytes = Vec::with_capacity(WORD_BYTES * (2 * events.len() + events.markers.len()));
     let mut markers = events.markers.iter().peekable();

@@ -5,10 +5,12 @@ use std::mem::{size_of, zeroed};
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::os::fd::AsRawFd;
 use std::ptr::from_mut;
+use std::time::{Duration, Instant};
 
 use libc::c_void;
 use serde::Serialize;
 use socket2::SockAddr;
+use taxel_core::{Stop, problem};
 
 use crate::{Error, Result};
 
@@ -98,6 +100,44 @@ impl Sender {
         self.train.extend_from_slice(datagram);
         self.datagrams += 1;
         if self.counts.segmenting { Ok(()) } else { self.flush() }
+    }
+
+    /// Sends datagrams over and over, `each` of them every `period_us`, for `seconds` or until asked to stop: for
+    /// benchmarks.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` for arguments that make no sense; else as [`Sender::push`].
+    pub fn repeat(
+        &mut self,
+        datagrams: &[Vec<u8>],
+        each: usize,
+        period_us: f64,
+        seconds: f64,
+        stop: Stop<'_>,
+    ) -> Result<()> {
+        if datagrams.is_empty() || each == 0 {
+            return Err(problem!("send: needs one datagram or more, and one or more at a time").into());
+        }
+        for (name, value) in [("period_us", period_us), ("seconds", seconds)] {
+            if !(0.0..=1e9).contains(&value) {
+                return Err(problem!("{name} is {value}: must lie between 0 and 1e9").into());
+            }
+        }
+        let begun = Instant::now();
+        let mut next = datagrams.iter().cycle();
+        for period in 0_u32.. {
+            let due = Duration::from_secs_f64(f64::from(period) * period_us * 1e-6);
+            if due.as_secs_f64() >= seconds || begun.elapsed().as_secs_f64() >= seconds || stop.asked() {
+                break;
+            }
+            std::thread::sleep(due.saturating_sub(begun.elapsed()));
+            for datagram in next.by_ref().take(each) {
+                self.push(datagram)?;
+            }
+            self.flush()?;
+        }
+        Ok(())
     }
 
     /// Sends what still waits.

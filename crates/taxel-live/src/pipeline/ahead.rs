@@ -2,7 +2,7 @@
 
 use taxel_core::detect::{Detection, ReadoutStream};
 use taxel_core::events::FARTHEST_BACK_US;
-use taxel_core::{Events, Result};
+use taxel_core::{EventsView, Result};
 
 /// Two copies of a readout. One hears what came and nothing else, so it says what the recording will say. The other runs
 /// ahead of it where the host's clock says that nothing comes; it is thrown away when something does. So an event that
@@ -22,7 +22,7 @@ impl Ahead {
     }
 
     /// Takes the next events; adds to `out` what is certain now and was not said before.
-    pub(super) fn push(&mut self, events: &Events, out: &mut Vec<Detection>) -> Result<()> {
+    pub(super) fn push(&mut self, events: EventsView<'_>, out: &mut Vec<Detection>) -> Result<()> {
         if !events.is_empty() {
             self.ahead = None;
             self.heard.push_events(events, &mut self.found)?;
@@ -86,7 +86,7 @@ mod tests {
     use taxel_core::detect::{Readout, TrainedNeuron};
     use taxel_core::encode::Encoder;
     use taxel_core::neuron::{Neuron, Time};
-    use taxel_core::{Array, Intensities};
+    use taxel_core::{Array, Events, Intensities};
 
     use super::*;
 
@@ -118,13 +118,13 @@ mod tests {
     #[test]
     fn what_is_said_in_silence_is_not_said_again_when_events_bear_it_out() {
         let (mut ahead, mut out) = (readout(), vec![]);
-        ahead.push(&event(0, 10), &mut out).unwrap();
-        ahead.push(&event(1000, 20), &mut out).unwrap();
+        ahead.push(event(0, 10).view(), &mut out).unwrap();
+        ahead.push(event(1000, 20).view(), &mut out).unwrap();
         ahead.quiet(5000, &mut out).unwrap();
         assert_eq!(out, []);
         ahead.quiet(20_000, &mut out).unwrap();
         assert_eq!(out.len(), 1);
-        ahead.push(&event(60_000, 22), &mut out).unwrap();
+        ahead.push(event(60_000, 22).view(), &mut out).unwrap();
         ahead.advance(60_000, &mut out).unwrap();
         assert_eq!((out.len(), ahead.wrong(), ahead.late()), (1, 0, 0));
     }
@@ -132,16 +132,16 @@ mod tests {
     #[test]
     fn an_event_that_comes_late_is_heard_in_its_own_time() {
         let (mut ahead, mut out) = (readout(), vec![]);
-        ahead.push(&event(0, 10), &mut out).unwrap();
-        ahead.push(&event(1000, 20), &mut out).unwrap();
+        ahead.push(event(0, 10).view(), &mut out).unwrap();
+        ahead.push(event(1000, 20).view(), &mut out).unwrap();
         ahead.quiet(5000, &mut out).unwrap();
         // 2 ms behind the silence that was believed.
-        ahead.push(&event(3000, 30), &mut out).unwrap();
+        ahead.push(event(3000, 30).view(), &mut out).unwrap();
         ahead.quiet(150_000, &mut out).unwrap();
         let mut straight = readout();
         let mut expected = vec![];
         for (t, ticks) in [(0, 10), (1000, 20), (3000, 30)] {
-            straight.push(&event(t, ticks), &mut expected).unwrap();
+            straight.push(event(t, ticks).view(), &mut expected).unwrap();
         }
         straight.advance(150_000, &mut expected).unwrap();
         assert_eq!(out, expected);
@@ -151,12 +151,12 @@ mod tests {
     #[test]
     fn what_was_said_in_a_silence_that_was_none_is_counted() {
         let (mut ahead, mut out) = (readout(), vec![]);
-        ahead.push(&event(0, 10), &mut out).unwrap();
-        ahead.push(&event(1000, 20), &mut out).unwrap();
+        ahead.push(event(0, 10).view(), &mut out).unwrap();
+        ahead.push(event(1000, 20).view(), &mut out).unwrap();
         ahead.quiet(20_000, &mut out).unwrap();
         let early = out.clone();
         // It came before the crossing, which therefore lay earlier: said anew, as the recording will say it.
-        ahead.push(&event(2000, 30), &mut out).unwrap();
+        ahead.push(event(2000, 30).view(), &mut out).unwrap();
         ahead.advance(40_000, &mut out).unwrap();
         assert_eq!((early.len(), out.len(), ahead.wrong(), ahead.late()), (1, 2, 1, 0));
         assert!(out[1].t < out[0].t);

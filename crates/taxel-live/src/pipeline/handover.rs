@@ -145,7 +145,7 @@ mod tests {
         let intensity = taken.intensity.as_ref().expect("one had an intensity");
         assert_eq!(intensity.ticks, [0, 0, 7, 0]);
         assert_eq!(intensity.present, [false, false, true, false]);
-        taken.check().expect("columns are equally long");
+        taken.view().check().expect("columns are equally long");
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use crossbeam_channel::Sender;
 use taxel_core::Events;
 use taxel_core::detect::{Detection, Readout, ReadoutStream};
+use taxel_core::encode::Tare;
 
 use super::ahead::Ahead;
 use super::handover::Taken;
@@ -24,6 +25,29 @@ pub enum Ear {
     /// A readout that first takes a tare: from the first event on for so long (us of the board's clock), or until the
     /// board marks a start.
     Taring(i64, Box<Readout>),
+}
+
+impl Ear {
+    /// The ear for a readout, where there is one: it takes a fresh tare of `tare_us` where that is given, else it reads at
+    /// once, with `tare` where its encoder needs one.
+    ///
+    /// # Errors
+    ///
+    /// As [`Readout::stream`].
+    pub fn of(
+        readout: Option<Readout>,
+        tare: Option<&Tare>,
+        tare_us: Option<i64>,
+        options: &LiveOptions,
+    ) -> taxel_core::Result<Self> {
+        Ok(match (readout, tare_us) {
+            (None, _) => Self::Deaf,
+            (Some(readout), Some(us)) => Self::Taring(us, Box::new(readout)),
+            (Some(readout), None) => {
+                Self::Reading(Box::new(readout.stream(&options.array, options.registers.frame_us(), tare)?))
+            }
+        })
+    }
 }
 
 pub(super) struct Reader {
@@ -71,7 +95,7 @@ impl Reader {
     fn hear(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
         match &mut self.mode {
             Mode::Reading(readout) => {
-                readout.push(&self.events, &mut self.found)?;
+                readout.push(self.events.view(), &mut self.found)?;
                 match taken.quiet_until {
                     Some(t) if taken.last => readout.advance(t, &mut self.found)?,
                     Some(t) => readout.quiet(t, &mut self.found)?,
@@ -100,7 +124,7 @@ impl Reader {
         let Mode::Taring(rest) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
         let (tare, stream) = rest.finish(stop, self.frame_us)?;
         let mut readout = Ahead::new(Box::new(stream));
-        readout.push(&self.events.piece(inside..self.events.len()), &mut self.found)?;
+        readout.push(self.events.view().piece(inside..self.events.len()), &mut self.found)?;
         self.mode = Mode::Reading(readout);
         let mut shown = shared.shown();
         shown.counters.taring = false;

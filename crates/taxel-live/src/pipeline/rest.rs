@@ -37,11 +37,11 @@ impl Rest {
         let marked = events.markers.iter().find(|m| m.start && m.t > first).map(|m| m.t);
         let stop = marked.unwrap_or(i64::MAX).min(first + self.stretch_us);
         let inside = events.t.iter().position(|&t| t >= stop).unwrap_or(events.len());
-        let piece = events.piece(0..inside);
+        let piece = events.view().piece(0..inside);
         if !piece.is_empty() {
-            self.builder.push_events(&piece)?;
+            self.builder.push_events(piece)?;
         }
-        if let Some(intensity) = &piece.intensity {
+        if let Some(intensity) = piece.intensity {
             for k in (0..inside).filter(|&k| intensity.present[k]) {
                 let last = Last { t: piece.t[k], p: piece.p[k], ticks: intensity.ticks[k] };
                 self.last[self.array.index(piece.x[k], piece.y[k])] = Some(last);
@@ -74,7 +74,7 @@ impl Rest {
         };
         // What is said of the rest itself is not meant.
         let mut unsaid = vec![];
-        stream.push_events(&events, &mut unsaid)?;
+        stream.push_events(events.view(), &mut unsaid)?;
         stream.advance(stop, &mut unsaid)?;
         Ok((tare, stream))
     }

@@ -5,6 +5,9 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
+use taxel_core::wire::{self, Decoder, Pairing};
+use taxel_core::{Array, Events, Stop};
+
 use super::create;
 use crate::{Error, Result};
 
@@ -67,13 +70,42 @@ impl LsaWriter {
     }
 }
 
-/// The bytes of a `.lsa`, and whether its `.lss` says that it is complete.
+/// A `.lsa`, read and decoded.
+#[derive(Debug, Clone)]
+pub struct DecodedLsa {
+    /// As they came.
+    pub bytes: Vec<u8>,
+    /// What changed, when.
+    pub events: Events,
+    /// What the decoder saw and dropped.
+    pub counts: wire::Counts,
+    /// Whether its `.lss` says that it is complete.
+    pub complete: bool,
+}
+
+/// Reads a `.lsa` and decodes it.
 ///
 /// # Errors
 ///
-/// `File` where it cannot be read.
-pub fn read_lsa(path: &Path) -> Result<(Vec<u8>, bool)> {
-    Ok((std::fs::read(path).map_err(Error::file(path))?, done(path).exists()))
+/// `File` where it cannot be read; `Core(Interrupted)` where asked to stop.
+pub fn decode_lsa(
+    path: &Path,
+    array: Array,
+    pairing: Pairing,
+    differences: bool,
+    stop: Stop<'_>,
+) -> Result<DecodedLsa> {
+    /// Bytes between two looks at `stop`.
+    const PIECE: usize = 1 << 22;
+    let bytes = std::fs::read(path).map_err(Error::file(path))?;
+    let mut decoder = Decoder::new(array.clone()).pairing(pairing).differences(differences);
+    let mut events = Events::empty(array);
+    for piece in bytes.chunks(PIECE) {
+        stop.check()?;
+        decoder.push_into(piece, None, &mut events);
+    }
+    decoder.finish_into(&mut events);
+    Ok(DecodedLsa { bytes, events, counts: *decoder.counts(), complete: done(path).exists() })
 }
 
 /// The name of a recording in automatic mode: the index appended to the name, before the extension.

@@ -77,6 +77,19 @@ pub struct Message<'a> {
     pub data: &'a [u8],
 }
 
+/// A recording's datagrams as they came, one after the other.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Datagrams {
+    /// When each came, ns since 1970.
+    pub arrived_ns: Vec<i64>,
+    /// Our arrival number of each.
+    pub number: Vec<u64>,
+    /// Where each begins, and at last where all end.
+    pub offsets: Vec<i64>,
+    /// Their bytes.
+    pub bytes: Vec<u8>,
+}
+
 /// A recording's datagrams as events, with what belongs to each datagram.
 #[derive(Debug, Clone)]
 pub struct Decoded {
@@ -284,6 +297,25 @@ impl Reader {
             Ok(())
         })?;
         Ok((all, bad))
+    }
+
+    /// All datagrams as they came.
+    ///
+    /// # Errors
+    ///
+    /// As [`Reader::messages`].
+    pub fn datagrams(&self, stop: Stop<'_>) -> Result<Datagrams> {
+        let mut all = Datagrams { arrived_ns: vec![], number: vec![], offsets: vec![0], bytes: vec![] };
+        self.messages(stop, |message| {
+            if message.topic == Topic::Datagrams {
+                all.arrived_ns.push(message.at_ns);
+                all.number.push(message.number);
+                all.bytes.extend_from_slice(message.data);
+                all.offsets.push(i64::try_from(all.bytes.len()).unwrap_or(i64::MAX));
+            }
+            Ok(())
+        })?;
+        Ok(all)
     }
 
     /// Decodes all datagrams.

@@ -151,6 +151,26 @@ impl Writer {
         self.push(Topic::Datagrams, arrived_ns, number, bytes)
     }
 
+    /// Keeps many datagrams: each begins in `bytes` where `offsets` say, whose last entry says where all end.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where columns differ in length or name bytes that are not there; else as [`Writer::datagram`].
+    pub fn datagrams(&self, arrived_ns: &[i64], number: &[u64], offsets: &[i64], bytes: &[u8]) -> Result<()> {
+        if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
+            let n = arrived_ns.len();
+            return Err(problem!("{n} arrivals: need {n} numbers and {} offsets", n + 1).into());
+        }
+        for (k, two) in offsets.windows(2).enumerate() {
+            let range = usize::try_from(two[0]).ok().zip(usize::try_from(two[1]).ok());
+            let Some(datagram) = range.and_then(|(from, to)| bytes.get(from..to)) else {
+                return Err(problem!("datagram {k}: bytes {} to {} are not there", two[0], two[1]).into());
+            };
+            self.datagram(arrived_ns[k], number[k], datagram)?;
+        }
+        Ok(())
+    }
+
     /// Keeps the board's registers, as they are from now on.
     ///
     /// # Errors

@@ -1,0 +1,99 @@
+//! An encoder at work whose spikes are handed on as trains, a piece at a time.
+
+use super::{Encoder, Stream};
+use crate::spikes::ms;
+use crate::{Array, EventsView, FramesView, Result, Spike, SpikeTrains, problem};
+
+/// Takes a recording piece by piece; each gives the spikes that are certain then, in a window that begins where the last
+/// one ended.
+pub struct Pieces {
+    array: Array,
+    stream: Box<dyn Stream>,
+    /// Up to where spikes were handed on, ms.
+    known: Option<f64>,
+}
+
+impl Pieces {
+    /// Begins to encode what an array feels.
+    ///
+    /// # Errors
+    ///
+    /// As [`Encoder::stream`].
+    pub fn new(encoder: &Encoder, array: Array) -> Result<Self> {
+        Ok(Self { stream: encoder.stream(&array)?, array, known: None })
+    }
+
+    /// Takes the next events.
+    ///
+    /// # Errors
+    ///
+    /// As [`Stream::push_events`].
+    pub fn push_events(&mut self, events: EventsView<'_>) -> Result<SpikeTrains> {
+        let mut out = vec![];
+        self.stream.push_events(events, &mut out)?;
+        self.piece(&out, events.t.first().copied(), events.t.iter().max().map(|&t| ms(t)))
+    }
+
+    /// Takes the next pictures.
+    ///
+    /// # Errors
+    ///
+    /// As [`FramesView::check`] and [`Stream::push_frame`]; `Problem` where they are another array's.
+    pub fn push_frames(&mut self, frames: FramesView<'_>) -> Result<SpikeTrains> {
+        let (own, given) = ((self.array.rows, self.array.columns), (frames.array.rows, frames.array.columns));
+        if given != own {
+            return Err(problem!(
+                "frames of {} x {} taxels: the encoder was begun for {} x {}",
+                given.0,
+                given.1,
+                own.0,
+                own.1
+            ));
+        }
+        frames.check()?;
+        let mut out = vec![];
+        for (t, picture) in frames.iter() {
+            self.stream.push_frame(t, picture, &mut out)?;
+        }
+        self.piece(&out, frames.t.first().copied(), frames.t.last().map(|&t| ms(t)))
+    }
+
+    /// Says that nothing will come any more before `t` us (exclusive).
+    ///
+    /// # Errors
+    ///
+    /// None that pushing had not.
+    pub fn advance(&mut self, t: i64) -> Result<SpikeTrains> {
+        let mut out = vec![];
+        self.stream.advance(t, &mut out);
+        self.piece(&out, None, Some(ms(t)))
+    }
+
+    /// Says that nothing more will come, as [`Stream::finish`].
+    ///
+    /// # Errors
+    ///
+    /// None that pushing had not.
+    pub fn finish(&mut self) -> Result<SpikeTrains> {
+        let mut out = vec![];
+        let end = self.stream.finish(&mut out);
+        self.piece(&out, None, end)
+    }
+
+    /// How many events came too far behind the time come to.
+    #[must_use]
+    pub fn late(&self) -> u64 {
+        self.stream.late()
+    }
+
+    /// What came out, with the window from where the last piece ended to `until` ms.
+    fn piece(&mut self, out: &[Spike], first: Option<i64>, until: Option<f64>) -> Result<SpikeTrains> {
+        let start = self.known.or(first.map(ms)).unwrap_or(0.0);
+        let stop = until.map_or(start, |until| until.max(start));
+        if first.is_some() || self.known.is_some() {
+            self.known = Some(stop);
+        }
+        let earliest = out.first().map_or(start, |s| s.t.min(start));
+        SpikeTrains::from_spikes(out, self.stream.trains(), self.stream.signed(), earliest, stop)
+    }
+}

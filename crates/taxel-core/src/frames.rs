@@ -1,0 +1,34 @@
+//! Pictures of the whole array over time, wherever they lie.
+
+use crate::{Array, Result, problem};
+
+/// Pictures in the memory of a caller (a file, NumPy), who may not change them meanwhile: nothing here ever holds many.
+#[derive(Debug, Clone, Copy)]
+pub struct FramesView<'a> {
+    /// The sensor.
+    pub array: &'a Array,
+    /// When each was taken, us, ascending.
+    pub t: &'a [i64],
+    /// Picture after picture, row by row, in the sensor's unit.
+    pub values: &'a [f32],
+}
+
+impl<'a> FramesView<'a> {
+    /// Checks that there are as many values as pictures have taxels.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, with the numbers.
+    pub fn check(&self) -> Result<()> {
+        let (n, taxels, values) = (self.t.len(), self.array.len(), self.values.len());
+        if n.checked_mul(taxels) == Some(values) {
+            return Ok(());
+        }
+        Err(problem!("frames: {values} values for {n} pictures of {taxels} taxels"))
+    }
+
+    /// Each picture with its time, us.
+    pub fn iter(self) -> impl Iterator<Item = (i64, &'a [f32])> {
+        self.t.iter().copied().zip(self.values.chunks_exact(self.array.len().max(1)))
+    }
+}

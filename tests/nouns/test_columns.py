@@ -1,0 +1,161 @@
+"""A noun's columns: nobody changes them, and whoever reads them reads them where they lie."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import Array, Detections, Events, Frames, SpikeTrains
+
+ARRAY = Array(8, 8)
+
+
+def events() -> Events:
+    x = np.arange(6) % 8
+    return Events(np.arange(6) * 100, x, x, x % 2 > 0, array=ARRAY, intensity=x * 9, present=x % 3 > 0)
+
+
+def frames() -> Frames:
+    return Frames(np.arange(192.0).reshape(3, 8, 8), [0, 1000, 2000], array=ARRAY)
+
+
+def trains() -> SpikeTrains:
+    return SpikeTrains.from_lists([[1.0, 2.0], [], [1.5]], stop=3.0, values=[[1, -1], [], [2]])
+
+
+def found() -> Detections:
+    return Detections(["a", "b"], [100, 900], [200, 1000], [0.5, 0.25], [210, 1010])
+
+
+MADE = {
+    "events": events,
+    "a slice of events": lambda: events()[1:4],
+    "chosen events": lambda: events()[np.array([3, 1])],
+    "events of both": lambda: events() + events(),
+    "sorted events": lambda: events().sorted(),
+    "decoded events": lambda: taxel.wire.decode(taxel.wire.encode(events()), array=ARRAY),
+    "pushed events": lambda: taxel.wire.Decoder(array=ARRAY).push(taxel.wire.encode(events())),
+    "frames": frames,
+    "a run of frames": lambda: frames()[1:],
+    "a region of frames": lambda: frames().region(slice(2, 5), slice(1, 8)),
+    "frames of events": lambda: Frames.from_events(events(), 100),
+    "trains": trains,
+    "trains of both": lambda: trains() + trains(),
+    "delayed trains": lambda: trains().delayed([0.0, 1.0]),
+    "split trains": lambda: trains().split_by_sign(),
+    "chosen trains": lambda: trains().select([2, 0]),
+    "encoded trains": lambda: taxel.encode.ChangeEvents().encode(events()),
+    "detections": found,
+    "one label's detections": lambda: found()["a"],
+    "detections of both": lambda: found() + found(),
+}
+
+
+def columns(noun: object) -> dict[str, np.ndarray]:
+    held = {name: value for name, value in vars(noun).items() if isinstance(value, np.ndarray)}
+    assert held
+    return held
+
+
+@pytest.mark.parametrize("make", MADE.values(), ids=MADE)
+def test_no_column_can_be_written_to_nor_one_of_a_copy(make) -> None:
+    noun = make()
+    for kept in (noun, copy.copy(noun), copy.deepcopy(noun), pickle.loads(pickle.dumps(noun))):
+        assert kept == noun
+        for name, column in columns(kept).items():
+            assert not column.flags.writeable, name
+            with pytest.raises(ValueError, match="read-only"):
+                column[...] = column
+
+
+GIVEN = {
+    "events": lambda t: Events(t, t, t, t > 0, array=ARRAY, intensity=t.astype(np.uint16)),
+    "events of the columns' own types": lambda t: Events(
+        t, t.astype(np.uint16), t.astype(np.uint16), t > 0, array=ARRAY
+    ),
+    "frames": lambda t: Frames(np.zeros((len(t), 2, 2)), t),
+    "trains": lambda t: SpikeTrains(np.array([0.5]), t, 0.0, 1.0),
+    "detections": lambda t: Detections(["a"] * len(t), t, t),
+}
+
+
+@pytest.mark.parametrize("make", GIVEN.values(), ids=GIVEN)
+def test_a_callers_array_stays_his_and_what_he_does_to_it_is_not_seen(make) -> None:
+    for mine in (np.array([0, 1]), np.array([0, 9, 1])[::2], np.array([[0, 1]])[0]):
+        noun = make(mine)
+        before = copy.deepcopy(noun)
+        assert mine.flags.writeable
+        mine[...] = mine + 1
+        assert noun == before
+    loaned = np.array([0, 1])
+    noun = Events(memoryview(loaned), [0, 1], [0, 1], [True, True], array=ARRAY)
+    loaned[...] = 9
+    assert list(noun.t) == [0, 1]
+    empty = np.array([], np.int64)
+    assert len(Events(empty, [], [], [], array=ARRAY)) == 0
+    assert empty.flags.writeable
+
+
+def test_what_nobody_can_change_is_not_copied_and_a_read_only_view_of_what_he_can_is() -> None:
+    mine = np.zeros((4, 2, 2), np.float32)
+    view = mine[:]
+    view.flags.writeable = False
+    assert not np.shares_memory(Frames(view, range(4)).values, mine)
+    mine.flags.writeable = False
+    assert np.shares_memory(Frames(mine[1:], range(3)).values, mine)
+    pushed = taxel.wire.Decoder(array=ARRAY).push(taxel.wire.encode(events()))
+    again = Events(pushed.t, pushed.x, pushed.y, pushed.p, array=ARRAY)
+    for name in ("t", "x", "y", "p"):
+        assert np.shares_memory(getattr(again, name), getattr(pushed, name))
+    assert np.frombuffer(bytes(16), np.int64).base is not None
+    assert np.shares_memory(Frames(mine, (t := np.frombuffer(np.arange(4).tobytes(), np.int64))).t, t)
+
+
+#: Prints how much more memory a call needed, at its peak, than the columns that it read hold.
+PEAK = """
+import sys
+import numpy as np
+import taxel
+
+
+def resident(what):
+    with open("/proc/self/status") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith(what)) * 1024
+
+
+n, work = 4_000_000, sys.argv[1]
+rng = np.random.default_rng(3)
+x = rng.integers(0, 64, n, dtype=np.uint16)
+array = taxel.Array.thesis()
+events = taxel.Events(np.arange(n) * 20, x, x[::-1], x % 2 > 0, array=array, intensity=x + 40)
+frames = taxel.Frames(rng.random((4_000, 64, 64), np.float32), np.arange(4_000) * 192, array=array)
+tare = taxel.Tare.take(events[:200_000])
+quiet = {
+    "encode": lambda: taxel.encode.ContactArea(tare=tare, noise_floor=200).encode(events),
+    "stream": lambda: taxel.encode.ContactArea(tare=tare, noise_floor=200).stream().push(events),
+    "encode frames": lambda: taxel.encode.ContactArea(tare=tare, noise_floor=200).encode(frames),
+    "tare": lambda: taxel.Tare.take(events),
+    "check": lambda: taxel.Events(events.t, events.x, events.y, events.p, array=array),
+}[work]
+columns = [frames.values] if "frames" in work else [events.t, events.x, events.y, events.p]
+size = sum(column.nbytes for column in columns)
+with open("/proc/self/clear_refs", "w") as reset:
+    reset.write("5")
+before = resident("VmRSS")
+quiet()
+print((resident("VmHWM") - before) / size)
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the peak is read from /proc")
+@pytest.mark.parametrize("work", ["encode", "stream", "encode frames", "tare", "check"])
+def test_columns_are_read_in_place(work: str) -> None:
+    """The peak of work that says little is a fraction of the columns: a copy of one of them would show."""
+    said = subprocess.run([sys.executable, "-c", PEAK, work], capture_output=True, text=True, check=True).stdout
+    assert float(said) < 0.1, f"{work}: {float(said):.2f} of the columns' bytes"
