@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from taxel import _core
 from taxel._arguments import flag, instance, number, shown, text, whole
+from taxel._columns import frozen
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -308,12 +309,17 @@ class Decoder:
         ------
         ProblemError : too little room, or as `push`
         """
-        return self._fill(instance("columns", columns, Columns), _bytes(data), arrived, last=False)
+        return self._fill(instance("columns", columns, Columns), _bytes(data), arrived, again=True)
 
-    def _fill(self, columns: Columns, data: NDArray[np.uint8], arrived: int | None, *, last: bool) -> Events:
-        """Fill columns; end the stream behind the last bytes."""
+    def _fill(
+        self, columns: Columns, data: NDArray[np.uint8], arrived: int | None, *, last: bool = False, again: bool = False
+    ) -> Events:
+        """Fill columns, which the events own then unless they are filled again; may end the stream."""
         when = None if arrived is None else whole("arrived", arrived)
         rows, paired, markers = self._core.fill(data, when, columns._parts(), last)
+        if not again:
+            for column in vars(columns).values():
+                frozen(column)
         return Events._unchecked(
             columns.t[:rows],
             columns.x[:rows],
