@@ -15,5 +15,5 @@ pub(crate) fn parsed<T: DeserializeOwned>(what: &str, json: &str) -> PyResult<T>
 
 /// What is handed to Python, as JSON.
 pub(crate) fn to_json<T: Serialize>(value: &T) -> PyResult<String> {
-    serde_json::to_string(value).map_err(|error| core(problem!("{error}")))
+    serde_json::to_string(value).map_err(|error| core(Error::Problem(error.to_string())))
 }
