@@ -697,6 +697,27 @@ SOUND: dict[str, Sound] = {
         sizes=[2],
         seed=1,
     ),
+    "taxel.information.RateCode": plain(taxel.information.RateCode, window_ms=10.0, resolution_ms=0.0, most_hz=100.0),
+    **{
+        f"taxel.information.{name}": plain(getattr(taxel.information, name), window_ms=10.0, resolution_ms=0.5)
+        for name in ("FirstSpikeLatency", "RelativeLatency", "RankOrder")
+    },
+    "taxel.information.Code.encode": method(
+        taxel.information.RankOrder(window_ms=10.0), "encode", values=[0.5, 1.0], onset_ms=1.0
+    ),
+    "taxel.information.Code.decode": method(
+        taxel.information.RateCode(window_ms=10.0), "decode", trains=UNSIGNED, onset_ms=1.0
+    ),
+    "taxel.information.compare_codes": plain(
+        taxel.information.compare_codes,
+        trials=[UNSIGNED] * 8,
+        labels=[0, 1] * 4,
+        codes={"rank": taxel.information.RankOrder(window_ms=10.0)},
+        onsets_ms=[0.0] * 8,
+        groups=list(range(8)),
+        folds=2,
+        seed=1,
+    ),
     "taxel.information.ConeRReadout": plain(taxel.information.ConeRReadout, tau=5.0, bound=1.0, max_seconds=1.0),
     "taxel.information.ConeRReadout.fit": method(
         taxel.information.ConeRReadout(tau=5.0, bound=1.0), "fit", patterns=[PLAIN, PLAIN], y=[0, 1]
@@ -780,6 +801,7 @@ LEFT_OUT = {
     "taxel.detect.TrainedNeuron": "checked by Readout",
     "taxel.detect.Learner": "a protocol",
     "taxel.formats.Format": "a result",
+    "taxel.information.Code": "abstract: its kinds are tried",
     "taxel.formats.Trial": "a result",
     "taxel.NotFittedError": "raised, not called",
     "taxel.encode.Encoder.fit": "does nothing",

@@ -10,6 +10,14 @@ from taxel.information.bits import (
     quadratic_extrapolation,
     relevant_responses,
 )
+from taxel.information.codes import (
+    Code,
+    FirstSpikeLatency,
+    RankOrder,
+    RateCode,
+    RelativeLatency,
+    compare_codes,
+)
 from taxel.information.estimate import Estimate, ZeroTest, estimate, zero_test
 from taxel.information.fold_sums import FoldSums, fold_predictions
 from taxel.information.folds import folds
@@ -24,19 +32,25 @@ from taxel.information.trials import LabelledTrial, read_trials, recordings_as_t
 __all__ = [
     "LDA",
     "Answer",
+    "Code",
     "ConeRReadout",
     "Control",
     "Estimate",
+    "FirstSpikeLatency",
     "FoldSums",
     "GramLDA",
     "LabelledTrial",
     "NearestNeighbours",
     "Nested",
     "Point",
+    "RankOrder",
+    "RateCode",
+    "RelativeLatency",
     "TempotronReadout",
     "Verdict",
     "ZeroTest",
     "answer",
+    "compare_codes",
     "confusion_matrix",
     "distances_of",
     "estimate",

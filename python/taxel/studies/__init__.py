@@ -32,6 +32,7 @@ STUDIES = {
     "gait": "gait events by one neuron an event, on published walking recordings (6.12 to 6.14)",
     "touch": "contact and lift, and which of two spheres fell, learnt from labels alone",
     "information": "how many bits real touches hold, and what else tells as much",
+    "codes": "what a touch's rate, first-spike latencies, relative latencies and rank order tell",
     "rivals": "how many spike times each rule learns, beside CONE-X",
     "tempotron": "which loads the Tempotron solves, and in how many epochs",
     "fig6.15": "SKIM against CONE on the gait recordings, in the same folds",
