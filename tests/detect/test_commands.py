@@ -391,3 +391,71 @@ def test_weights_are_drawn_by_taxel_where_trains_are_taxels() -> None:
         assert told == {0, 5, 10}
     area = taxel.Readout(taxel.encode.ContactArea(), {"a": (taxel.Neuron(), np.ones(10))})
     assert _planes(np.ones(10), area, 5) == []
+
+
+def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_path: Path, capsys) -> None:
+    """The rows of the folder are those of its recordings, one after the other; the score is of all of them."""
+    trials = tmp_path / "trials"
+    trials.mkdir()
+    rows = ["recording,label,t_us"]
+    for k in range(4):
+        values = np.zeros((200, 2, 2))
+        values[60 + 10 * k : 110 + 10 * k] = 20.0
+        taxel.convert(taxel.Frames(values, range(0, 2_000_000, 10_000), unit="N"), trials / f"t{k}.npz")
+        rows.append(f"t{k},contact,{600_000 + 100_000 * k}")
+    (trials / "labels.csv").write_text("\n".join(rows) + "\n")
+    out = tmp_path / "a.json"
+    plain = ("--encoder", "level_crossing", "--set", "encoder.levels=[10]", "--set", "learner.tau=20")
+    code, _, _ = call(capsys, "train", trials, "-o", out, "--folds", 2, *plain)
+    assert code == 0
+    files = [trials / f"t{k}.npz" for k in range(4)]
+    listed = tmp_path / "b.json"
+    assert call(capsys, "train", *files, "--labels", trials / "labels.csv", "-o", listed, *plain)[0] == 0
+    assert taxel.Readout.load(out) == taxel.Readout.load(listed)
+
+    table = tmp_path / "found.csv"
+    code, said, _ = call(
+        capsys,
+        "detect",
+        trials,
+        "--readout",
+        out,
+        "--truth",
+        "notes",
+        "--json",
+        "--csv",
+        table,
+        "--report",
+        tmp_path / "r",
+    )
+    assert code == 0
+    folder = json.loads(said)
+    alone = []
+    for k, file in enumerate(files):
+        _, said, _ = call(capsys, "detect", file, "--readout", out, "--json")
+        alone.append(json.loads(said))
+        assert folder["recordings"][k]["detections"] == alone[k]["detections"]
+    assert [len(one["detections"]) for one in alone] == [1, 1, 1, 1]
+    assert (folder["score"]["found"], folder["score"]["missed"], folder["score"]["false"]) == (4, 0, 0)
+    assert [line.split(",")[:2] for line in table.read_text().splitlines()[1:]] == [
+        [f'"t{k}.npz"', "contact"] for k in range(4)
+    ]
+    # The table is one of labels too.
+    assert taxel.Labels(table).recordings == ("t0.npz", "t1.npz", "t2.npz", "t3.npz")
+    assert "t3.npz" in (tmp_path / "r" / "report.html").read_text()
+
+
+def test_an_example_may_be_a_recording(folder: Path) -> None:
+    from taxel.detect import Example, train
+
+    one = taxel.open(folder / "1.npz")
+    labels = taxel.Labels(folder / "labels.csv").of(one)
+    trained = [
+        train([Example(source, labels, tare())], taxel.detect.Recipe.load(folder / "recipe.toml"))
+        for source in (one, one.events)
+    ]
+    assert trained[0] == trained[1]
+    with pytest.raises(
+        taxel.ProblemError, match=r"example 0 is .*: must be an Example of a Recording, Events or Frames"
+    ):
+        train([Example("1.npz", labels)], taxel.detect.Recipe.load(folder / "recipe.toml"))

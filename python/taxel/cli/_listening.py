@@ -191,3 +191,11 @@ def open_recording(path: Path) -> Recording:
     from taxel import recording  # noqa: PLC0415  the command line starts quickly
 
     return recording.open_recording(path)
+
+
+def open_all(paths: Sequence[Path]) -> list[Recording]:
+    """Open recordings one after the other; of a folder, or of another maker's file, all trials in it."""
+    from taxel._opening import open_any  # noqa: PLC0415  the command line starts quickly
+
+    opened = (open_any(path) for path in paths)
+    return [one for each in opened for one in (each if isinstance(each, list) else [each])]

@@ -6,25 +6,33 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import TARE_HELP, new_report, open_recording, references, tare_of, told
+from taxel.cli._listening import TARE_HELP, new_report, open_all, references, tare_of, told
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from taxel.detect import Score
     from taxel.detections import Detections
+    from taxel.report import Listened
 
 __all__ = ["detect"]
 
+#: No event.
+_NONE = np.empty(0, np.int64)
 #: Rows of the table that is printed; all go to --csv and --json.
 _ROWS = 40
 
 
 @app.command()
 def detect(
-    recording: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz or .csv.")],
+    recording: Annotated[
+        Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5, or a folder of them.")
+    ],
     readout: Annotated[Path, typer.Option(help="A readout that taxel train wrote.")],
     tare: Annotated[str | None, typer.Option(help=TARE_HELP)] = None,
     frame_us: Annotated[
@@ -41,62 +49,91 @@ def detect(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the table where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Say what happens when in a recording, by a trained readout.
+    """Say what happens when in a recording, or in each of a folder, by a trained readout.
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """
-    from taxel._files import try_whole  # noqa: PLC0415  the command line starts quickly
-    from taxel.detect import Readout, run, score  # noqa: PLC0415  the command line starts quickly
+    from taxel._files import try_whole, write_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel.detect import Readout, run, score  # noqa: PLC0415
+    from taxel.detect.scoring import score_together  # noqa: PLC0415
+    from taxel.report import Listened  # noqa: PLC0415
 
     for place in (csv, None if report is None else new_report(report)):
         if place is not None:
             try_whole(place, overwrite=overwrite and place == csv)
     loaded = Readout.load(readout)
-    opened = open_recording(recording)
+    opened = open_all([recording])
+    heard = []
     with told(as_json) as tell:
-        events = None if truth is None else references(truth, "--truth", [opened])[0]
-        if events is not None and not events:
+        events = [None] * len(opened) if truth is None else references(truth, "--truth", opened)
+        if truth is not None and not any(events):
             raise ProblemError(f"--truth {truth}: names no event in {recording}")
-        tell(f"reading {recording}")
-        rest = tare_of(tare, opened)
-        found = run(loaded, opened, frame_us=frame_us, tare=rest)
-    scored = None
-    if events is not None:
-        # What the readout cannot say it cannot miss.
-        scored = score(found, {label: events.get(label, []) for label in loaded.labels}, window_ms)
+        for one, happened in zip(opened, events, strict=True):
+            tell(f"reading {one.path}")
+            rest = tare_of(tare, one)
+            found = run(loaded, one, frame_us=frame_us, tare=rest)
+            # What the readout cannot say it cannot miss.
+            wanted = None if happened is None else {label: happened.get(label, _NONE) for label in loaded.labels}
+            scored = None if wanted is None else score(found, wanted, window_ms)
+            source = one.events if one.has_events else one.frames()
+            heard.append(Listened(str(one.path), source, found, rest, wanted, scored))
+    truths = [one.truth for one in heard if one.truth is not None]
+    together = score_together([one.found for one in heard], truths, window_ms) if truths else None
     if csv is not None:
-        found.to_csv(csv, overwrite=overwrite)
+        write_whole(csv, lambda file: file.write(_table(heard).encode()), overwrite=overwrite)
     if report is not None:
-        from taxel.report import Listened, write_listening  # noqa: PLC0415  pictures load slowly
+        from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
-        source = opened.events if opened.has_events else opened.frames()
-        heard = Listened(str(recording), source, found, rest, events, scored)
-        write_listening(report, loaded, [heard], title=f"What {readout} says of {recording}")
+        write_listening(report, loaded, heard, title=f"What {readout} says of {recording}")
     written = {"written": csv, "report": None if report is None else report / "report.html"}
     places = {name: str(place) for name, place in written.items() if place is not None}
     if as_json:
-        typer.echo(json.dumps(_result(recording, readout, found, scored, window_ms) | places))
+        typer.echo(json.dumps(_result(recording, readout, heard, together, window_ms) | places))
         return
-    _print(found)
-    if scored is not None:
-        typer.echo(f"\nagainst {truth} (window {window_ms:g} ms):\n{scored!r}")
-    for name, said in places.items():
-        typer.echo(f"written to {said}" if name == "written" else f"{name}: {said}")
+    for said in heard:
+        if recording.is_dir() or len(heard) > 1:
+            typer.echo(f"{said.name}:")
+        _print(said.found)
+    if together is not None:
+        typer.echo(f"\nagainst {truth} (window {window_ms:g} ms):\n{together!r}")
+    for name, path_said in places.items():
+        typer.echo(f"written to {path_said}" if name == "written" else f"{name}: {path_said}")
 
 
 def _result(
-    recording: Path, readout: Path, found: Detections, scored: Score | None, window_ms: float
+    recording: Path, readout: Path, heard: Sequence[Listened], together: Score | None, window_ms: float
 ) -> dict[str, Any]:
-    """Return what was found as JSON holds it; `taxel live --json` has the same keys."""
-    result: dict[str, Any] = {
-        "recording": str(recording),
-        "readout": str(readout),
-        "detections": [
-            {"label": str(label), "t_us": int(t), "known_us": int(known), "slope_mv_per_ms": float(slope)}
-            for label, t, known, slope in zip(found.label, found.t, found.known, found.slope, strict=True)
-        ],
-    }
-    return result if scored is None else result | {"window_ms": window_ms, "score": scored.to_dict()}
+    """Return what was found as JSON holds it; a detection has the keys that `taxel live --json` gives it."""
+    each: list[dict[str, Any]] = [
+        {
+            "recording": one.name,
+            "detections": [
+                {"label": str(label), "t_us": int(t), "known_us": int(known), "slope_mv_per_ms": float(slope)}
+                for label, t, known, slope in zip(
+                    one.found.label, one.found.t, one.found.known, one.found.slope, strict=True
+                )
+            ],
+        }
+        | ({} if one.score is None else {"score": one.score.to_dict()})
+        for one in heard
+    ]
+    if len(each) == 1 and not recording.is_dir():
+        result = {"readout": str(readout), **each[0]}
+    else:
+        result = {"readout": str(readout), "recording": str(recording), "recordings": each}
+    return result if together is None else result | {"window_ms": window_ms, "score": together.to_dict()}
+
+
+def _table(heard: Sequence[Listened]) -> str:
+    """Return the detections as a table; of several recordings each row begins with its recording's name."""
+    if len(heard) == 1:
+        return heard[0].found._csv()
+    lines: list[str] = []
+    for one in heard:
+        head, *rows = one.found._csv().splitlines()
+        name = '"' + Path(one.name).name.replace('"', '""') + '"'
+        lines += [*([] if lines else [f"recording,{head}"]), *(f"{name},{row}" for row in rows)]
+    return "\n".join(lines) + "\n"
 
 
 def _print(found: Detections) -> None:

@@ -17,7 +17,7 @@ from taxel.cli._listening import (
     TARE_HELP,
     assignments,
     new_report,
-    open_recording,
+    open_all,
     references,
     tare_before,
     tare_of,
@@ -36,7 +36,9 @@ __all__ = ["train"]
 
 @app.command()
 def train(
-    recordings: Annotated[list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz or .csv.")],
+    recordings: Annotated[
+        list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz, .csv or .h5, or folders of them.")
+    ],
     labels: Annotated[
         str, typer.Option(help="Reference events: a CSV recording,label,t_us, or notes: the recordings' own.")
     ] = "notes",
@@ -72,6 +74,8 @@ def train(
     also trained as often without a part of the data, which it is then judged on; without, the score is on its own
     training data.
 
+    Example: taxel train trials/ -o gait.json
+
     Example: taxel train walk.npz --labels events.csv --set neurons.contact.kappa=1.5 -o gait.json
 
     Example: taxel train a.mcap b.mcap --labels events.csv --encoder contact_area --tare 0.05
@@ -92,7 +96,7 @@ def train(
         Recipe.load(recipe, changes)  # what is wrong with it is said before the recordings are read
     elif "encoder.name" in changes:
         plan = Recipe.from_dict(changed({}, changes))
-    opened = [open_recording(path) for path in recordings]
+    opened = open_all(recordings)
     with told(as_json) as tell:
         tell("reading")
         happened = references(labels, "--labels", opened)
@@ -137,7 +141,7 @@ def _examples(
 
     wants = tare is None and getattr(plan.encoder, "tare", True) is None
     return [
-        Example(_source(one), events, tare_before(events, one) if wants else tare_of(tare, one))
+        Example(one, events, tare_before(events, one) if wants else tare_of(tare, one))
         for one, events in zip(opened, happened, strict=True)
     ]
 
@@ -158,7 +162,7 @@ def _on_itself(
         truth = {label: example.labels.get(label, []) for label in readout.labels}
         found = run(readout, one, tare=example.tare)
         own = score(found, truth, window_ms)
-        heard.append(Listened(str(one.path), example.source, found, example.tare, truth, own))
+        heard.append(Listened(str(one.path), _source(one), found, example.tare, truth, own))
     return heard
 
 

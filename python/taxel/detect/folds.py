@@ -14,14 +14,11 @@ import numpy as np
 from taxel._arguments import callback, flag, instance, number, whole
 from taxel._core import ProblemError
 from taxel.detect.readout import run
-from taxel.detect.scoring import Score, score
-from taxel.detect.training import Example, Pattern, Recipe, checked, encoded, learn
+from taxel.detect.scoring import Score, score, score_together
+from taxel.detect.training import Checked, Example, Pattern, Recipe, checked, encoded, learn
 from taxel.detections import Detections
 
 __all__ = ["Judged", "choose", "judge"]
-
-#: No detection of one stretch may meet an event of another when all are scored together, us.
-_APART_US = 10**12
 
 
 class _Stretch(NamedTuple):
@@ -75,9 +72,9 @@ def folds(examples: Sequence[Example], k: int) -> tuple[list[_Fold], str]:
     ------
     ProblemError : more folds than examples, or than one example's events allow
     """
-    examples, count = checked(examples), whole("folds", k, 2, 2**31)
-    if len(examples) == 1:
-        edges = [-np.inf, *_between_events(examples[0], count), np.inf]
+    sound, count = checked(examples), whole("folds", k, 2, 2**31)
+    if len(sound) == 1:
+        edges = [-np.inf, *_between_events(sound[0], count), np.inf]
         blocks = [_Stretch(0, *both) for both in pairwise(edges)]
         return [_Fold([b for b in blocks if b is not held], [held]) for held in blocks], f"{count} blocks of time"
     if count > len(examples):
@@ -145,13 +142,7 @@ def judge(
     labels = recipe._labels(examples)
     truths = [{label: example.labels.get(label, np.empty(0, np.int64)) for label in labels} for example in examples]
     scores = tuple(score(*both, window) for both in zip(heard, truths, strict=True))
-    later = range(0, len(examples) * _APART_US, _APART_US)
-    everything = reduce(add, (_later(found, shift) for found, shift in zip(heard, later, strict=True)))
-    happened = {
-        label: np.concatenate([truth[label] + shift for truth, shift in zip(truths, later, strict=True)])
-        for label in labels
-    }
-    return Judged(scores, score(everything, happened, window), how)
+    return Judged(scores, score_together(heard, truths, window), how)
 
 
 def choose(
@@ -195,7 +186,7 @@ def choose(
     return replace(recipe, neurons=best)
 
 
-def _piece(example: Example, stretch: _Stretch) -> Example:
+def _piece(example: Checked, stretch: _Stretch) -> Checked:
     source = example.source.between(stretch.start, stretch.stop)
     first = int(source.t[0]) if len(source) else 0
     # What happened just before the first event of a piece was heard first in it.
@@ -203,7 +194,7 @@ def _piece(example: Example, stretch: _Stretch) -> Example:
         label: np.maximum(times[(times >= stretch.start) & (times < stretch.stop)], first)
         for label, times in example.labels.items()
     }
-    return Example(source, {label: times for label, times in labels.items() if len(times)}, example.tare)
+    return Checked(source, {label: times for label, times in labels.items() if len(times)}, example.tare)
 
 
 def _mark(one: Score) -> tuple[int, float]:
@@ -226,7 +217,3 @@ def _between_events(example: Example, count: int) -> Iterator[float]:
         near = np.arange(max(1, n * len(times) // count - reach + 1), min(len(times), n * len(times) // count + reach))
         widest = near[np.argmax(times[near] - times[near - 1])]
         yield float(times[widest - 1] + times[widest]) / 2
-
-
-def _later(found: Detections, shift: int) -> Detections:
-    return Detections(list(found.label), found.t + shift, found.known + shift, found.slope)

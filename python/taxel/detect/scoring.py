@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
+from operator import add
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +16,10 @@ from taxel._arguments import column, floats, instance, numbers, shown
 from taxel._core import ProblemError
 from taxel.detections import Detections
 
-__all__ = ["Score", "Spread", "score"]
+__all__ = ["Score", "Spread", "score", "score_together"]
+
+#: No detection of one recording may meet an event of another when all are scored together, us.
+_APART_US = 10**12
 
 
 class Spread(NamedTuple):
@@ -201,6 +206,19 @@ def score(
         np.concatenate([one.delays_ms for one in scores.values()] or [np.empty(0)]),
         scores,
     )
+
+
+def score_together(
+    heard: Sequence[Detections], truths: Sequence[Mapping[str, NDArray[np.int64]]], window_ms: float
+) -> Score:
+    """Score what was said of several recordings as one, with the events of each by the same labels (us)."""
+    later = range(0, len(heard) * _APART_US, _APART_US)
+    moved = [Detections(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(heard, later, strict=True)]
+    happened = {
+        label: np.concatenate([truth[label] + by for truth, by in zip(truths, later, strict=True)])
+        for label in truths[0]
+    }
+    return score(reduce(add, moved), happened, window_ms)
 
 
 def _truth(found: Detections, truth: Mapping[str, ArrayLike] | ArrayLike) -> tuple[list[str], NDArray[np.int64]]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from taxel._arguments import callback, column, instance, mapping, number, parameters, several, shown, text
 from taxel._core import ProblemError
+from taxel._recorded import Recorded, recorded
 from taxel.array import Array
 from taxel.detect import recipes
 from taxel.detect.readout import Readout
@@ -33,9 +34,9 @@ SILENCE_MS = 1000.0
 
 
 class Example(NamedTuple):
-    """Something to learn from: events or frames, when what happened in them (us, by label), the taxels' rest."""
+    """Something to learn from: events, frames or a recording, when what happened in it (us, by label), taxels' rest."""
 
-    source: Events | Frames
+    source: Events | Frames | Recorded
     labels: Mapping[str, Any]
     tare: Tare | None = None
 
@@ -103,7 +104,7 @@ class Recipe:
         listed = several(f"neurons.{label}.search", own.pop("search", ()))
         return [own, *({**own, **mapping(f"neurons.{label}.search", point)} for point in listed)]
 
-    def _labels(self, patterns: Sequence[Pattern] | Sequence[Example]) -> tuple[str, ...]:
+    def _labels(self, patterns: Sequence[Pattern] | Sequence[Checked]) -> tuple[str, ...]:
         """Return the labels that are learnt: the recipe's, or where it has none those of the patterns."""
         return tuple(self.neurons) or tuple(sorted({label for pattern in patterns for label in pattern.labels}))
 
@@ -231,9 +232,9 @@ def train(
     >>> train([Example(frames, {"contact": [20_000]})], recipe)
     Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
     """
-    examples = checked(examples)
+    sound = checked(examples)
     told = (lambda _: None) if progress is None else callback("progress", progress)
-    return learn(encoded(examples, recipe, told), recipe, examples[0].source.array, told)
+    return learn(encoded(sound, recipe, told), recipe, sound[0].source.array, told)
 
 
 class Pattern(NamedTuple):
@@ -243,7 +244,7 @@ class Pattern(NamedTuple):
     labels: Mapping[str, NDArray[np.int64]]
 
 
-def encoded(examples: Sequence[Example], recipe: Recipe, told: Callable[[str], object]) -> list[Pattern]:
+def encoded(examples: Sequence[Checked], recipe: Recipe, told: Callable[[str], object]) -> list[Pattern]:
     """Return examples as a recipe's encoder turns them into spikes."""
     instance("recipe", recipe, Recipe)
     arrays = [example.source.array for example in examples]
@@ -316,18 +317,30 @@ def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
     return cone.set_params(**nested), delay_ms
 
 
-def checked(examples: Sequence[Example]) -> list[Example]:
-    """Return examples whose labels are columns of whole us."""
+class Checked(Example):
+    """An example whose source is read and whose labels are columns of whole us."""
+
+    __slots__ = ()
+    source: Events | Frames
+    labels: Mapping[str, NDArray[np.int64]]
+
+
+def checked(examples: Sequence[Example]) -> list[Checked]:
+    """Return examples as they are learnt from; refuse what is none, by its place."""
     if not isinstance(examples, Sequence) or not len(examples):
         raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")
     sound = []
     for k, example in enumerate(examples):
-        if not isinstance(example, tuple) or len(example) not in (2, 3) or not isinstance(example[0], Events | Frames):
-            raise ProblemError(f"example {k} is {shown(example)}: must be an Example of Events or Frames, and labels")
-        source, labels, *rest = example
+        whole = isinstance(example, tuple) and len(example) in (2, 3)
+        source = recorded(example[0]) if whole else None
+        if not isinstance(source, Events | Frames):
+            raise ProblemError(
+                f"example {k} is {shown(example)}: must be an Example of a Recording, Events or Frames, and labels"
+            )
+        _, labels, *rest = example
         if not isinstance(labels, Mapping):
             raise ProblemError(f"example {k}: labels is {shown(labels)}: must be times (us) by label")
         times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
         tare = rest[0] if rest else None
-        sound.append(Example(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
+        sound.append(Checked(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
     return sound
