@@ -16,7 +16,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
             &["error", "reading", "vectors"],
             &["allowed"],
             &["parameters", "array"],
-            &["events", "spikes"],
+            &["events", "frames", "spikes"],
             &["wire", "contact", "neuron"],
             &["board"],
             &["encode"],
