@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import floats, mapping, number, parameters, shown
+from taxel._arguments import floats, mapping, number, numbers, parameters, shown
 from taxel._core import ProblemError
 
 __all__ = ["N_PER_KPA_MM2", "Curve", "Law", "Power", "Table", "Values", "above_0", "curve_of"]
@@ -62,29 +62,46 @@ class Power:
 
 
 class Table:
-    """Straight lines through known points; nothing at rest, and beyond the last point what stands there."""
+    """Straight lines through known points, of one taxel for all or of each; beyond the last point what stands there."""
 
-    def __init__(self, readings: object, values: object) -> None:
-        self.x, self.y = (floats(name, column) for name, column in (("readings", readings), ("values", values)))  # type: ignore[arg-type]
+    def __init__(self, readings: Any, values: Any) -> None:
+        self.x, self.y = numbers("readings", readings, np.float64), floats("values", values)
+        if self.x.ndim not in (1, 3) or not self.y.size or len(self.x) != len(self.y):
+            points = len(self.x) if self.x.ndim else 0
+            raise ProblemError(
+                f"a table of {points} readings and {len(self.y)} values: must be as many, 1 or more, of one taxel "
+                "(points,) or of each (points, rows, columns)"
+            )
         for name, column in (("readings", self.x), ("values", self.y)):
-            if not len(column) or len(self.x) != len(self.y):
-                raise ProblemError(
-                    f"a table of {len(self.x)} readings and {len(self.y)} values: must be as many, 1 or more"
-                )
-            wrong = np.flatnonzero(~(np.isfinite(column) & (np.diff(column, prepend=-np.inf) > 0)) | (column < 0))
+            rising = np.isfinite(column) & (np.diff(column, axis=0, prepend=-np.inf) > 0) & (column >= 0)
+            wrong = np.argwhere(~rising)
             if len(wrong):
-                k = int(wrong[0])
-                raise ProblemError(f"{name}[{k}] is {column[k]:g}: must rise from 0 or more")
-        if (self.x[0] == 0) != (self.y[0] == 0):
-            raise ProblemError(f"the table begins at {self.x[0]:g}, {self.y[0]:g}: what reads 0 above rest bears 0")
-        if self.x[0] > 0:
-            self.x, self.y = np.append(0.0, self.x), np.append(0.0, self.y)
+                place = tuple(wrong[0])
+                index = "".join(f"[{k}]" for k in place)
+                raise ProblemError(f"{name}{index} is {column[place]:g}: must rise from 0 or more")
+        at_rest = self.x[0] == 0
+        if np.any(at_rest != (self.y[0] == 0)):
+            first = float(np.ravel(self.x[0])[0])
+            raise ProblemError(f"the table begins at {first:g}, {self.y[0]:g}: what reads 0 above rest bears 0")
+        if not np.any(at_rest):
+            self.x, self.y = np.concatenate([0 * self.x[:1], self.x]), np.append(0.0, self.y)
+
+    def _each(self, given: Values, *, back: bool) -> Values:
+        if self.x.ndim == 1:
+            return np.asarray(np.interp(given, *((self.y, self.x) if back else (self.x, self.y))))
+        out = np.empty(np.broadcast_shapes(given.shape, self.x.shape[1:]))
+        whole = np.broadcast_to(given, out.shape)
+        for row, column in np.ndindex(self.x.shape[1:]):
+            known = self.x[:, row, column]
+            points = (self.y, known) if back else (known, self.y)
+            out[..., row, column] = np.interp(whole[..., row, column], *points)
+        return out
 
     def values(self, readings: Values, rest: Values) -> Values:
-        return np.asarray(np.interp(readings - rest, self.x, self.y))
+        return self._each(readings - rest, back=False)
 
     def readings(self, values: Values, rest: Values) -> Values:
-        return np.asarray(rest + np.interp(values, self.y, self.x))
+        return np.asarray(rest + self._each(values, back=True))
 
     def said(self) -> dict[str, Any]:
         return {"table": {"readings": self.x.tolist(), "values": self.y.tolist()}}

@@ -114,6 +114,8 @@ class Calibration:
         made.unit, made.of = checked_text("unit", unit, UNITS), checked_text("of", of)
         if not of or of in UNITS:
             raise ProblemError(f"of is {of!r}: must say what is read: ticks, counts")
+        if isinstance(curve, Table) and curve.x.ndim == 3 and curve.x.shape[1:] != array.shape:
+            raise ProblemError(f"readings are of {curve.x.shape[1:]} taxels: the array has {array.shape}")
         made.gain = _by_taxel("gain", how.get("gain", 1.0), array)
         if not (np.isfinite(made.gain) & (made.gain > 0)).all():
             raise ProblemError("gain: must be above 0 and finite at every taxel")
@@ -202,12 +204,13 @@ class Calibration:
         date: str | None = None,
         note: str = "",
     ) -> Calibration:
-        """Take known points of one taxel, straight lines between them: the same for all, but for their gains.
+        """Take known points, straight lines between them: of one taxel for all, or of each.
 
         Parameters
         ----------
         array : Array
-        readings : float64, shape (points,), above rest, rising
+        readings : float64, shape (points,) or (points, rows, columns), above rest, rising
+            The same for all taxels but for their gains, or what each reads under the same values.
         values : float64, shape (points,), in `unit`, rising
             A first point (0, 0) is added. Beyond the last point the last value holds.
         unit : {"N", "kPa"}

@@ -6,9 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import taxel
 from taxel import FormatError, formats
+from taxel.cli import app
 from taxel.formats import tekscan
 
 from .making import shared, write_tekscan
@@ -98,6 +100,17 @@ def test_a_spoilt_line_is_named(tmp_path, change, said):
     with pytest.raises(FormatError, match=f"press.csv.*{said}") as error:
         list(tekscan.trials(file))
     assert "\n" not in str(error.value)
+
+
+def test_info_draws_a_movie_and_says_its_unit(tmp_path):
+    picture, table = tmp_path / "foot.png", tmp_path / "foot.csv"
+    ran = CliRunner().invoke(
+        app, ["info", str(EXCERPTS / "fscan.asf"), "--picture", str(picture), "--table", str(table)]
+    )
+    assert ran.exit_code == 0, ran.output
+    assert "3 (kPa)" in ran.stdout
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert len(table.read_text().splitlines()) == 4
 
 
 def test_the_whole_fscan_movie_says_what_its_readme_says():

@@ -36,6 +36,10 @@ def calibrations(draw):
     kind = draw(st.sampled_from(["law", "table", "power"]))
     if kind == "law":
         return Calibration.law(ARRAY, ramp=draw(st.sampled_from([150.0, 1000.0])), **common)
+    if kind == "table" and draw(st.booleans()):
+        steps = st.lists(st.floats(0.5, 50.0), min_size=24, max_size=24)
+        x = np.cumsum(np.array(draw(steps)).reshape(2, *ARRAY.shape), axis=0)
+        return Calibration.table(ARRAY, x, np.cumsum(draw(st.lists(gains, min_size=2, max_size=2))), **common)
     if kind == "table":
         steps = st.lists(st.floats(0.5, 50.0), min_size=1, max_size=6)
         x = np.cumsum(draw(steps))
@@ -168,6 +172,15 @@ def test_a_law_is_corrected_by_a_known_load():
     found = Calibration.fit([Load(read, 2 * 12 * 0.4)], start=law, date=DAY)
     assert found.apply(read).values == pytest.approx(0.8, rel=1e-5)
     assert "law" in json.loads(found.to_json())["curve"]
+
+
+def test_a_table_of_each_taxel_is_a_table_by_taxel():
+    own = np.linspace(1.0, 3.0, 12).reshape(ARRAY.shape)
+    table = Calibration.table(ARRAY, [5 * own, 20 * own], [1.0, 8.0], unit="kPa", date=DAY)
+    assert table.apply(frames(5 * own)).values == pytest.approx(1.0)
+    assert table.apply(frames(12.5 * own)).values == pytest.approx(4.5)
+    with pytest.raises(ProblemError, match=r"readings are of \(3, 3\) taxels: the array has \(3, 4\)"):
+        Calibration.table(ARRAY, np.ones((1, 3, 3)), [1.0], unit="N")
 
 
 # what lies beside a recording

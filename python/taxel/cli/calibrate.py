@@ -17,6 +17,7 @@ from taxel.cli._listening import TARE_HELP, assignments, tare_of
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from taxel.array import Array
     from taxel.calibration import Calibration, Load
     from taxel.frames import Frames
     from taxel.recording import Recording
@@ -38,7 +39,10 @@ def calibrate(
     law: Annotated[
         bool, typer.Option("--law", help="By the law of the fabric, its amplifier and its ramp; loads correct it.")
     ] = False,
-    table: Annotated[Path | None, typer.Option(help="By a .csv of reading,value (above rest); loads scale it.")] = None,
+    table: Annotated[
+        Path | None,
+        typer.Option(help="By a .csv of reading,value (above rest), of each taxel with x,y; loads scale it."),
+    ] = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE of the law: v_trans, feedback_kohm, exponent ...")
     ] = None,
@@ -94,8 +98,7 @@ def calibrate(
         ramp = 150.0 if held is None else float(held.ramp)
         made = Calibration.law(opened.array, ramp=ramp, sensor=assignments(set_ or []), **how)
     elif table is not None:
-        points = _points(table)
-        made = Calibration.table(opened.array, points[:, 0], points[:, 1], of=read.frames.unit, **how)
+        made = Calibration.table(opened.array, *_points(table, opened.array), of=read.frames.unit, **how)
     laid = [] if loads is None else _loads(loads, read.frames)
     if load is not None:
         laid.append(_load(read.frames, "--load", load, load_unit, (start, stop), None))
@@ -195,9 +198,29 @@ def _loads(path: Path, frames: Frames) -> list[Load]:
     return found
 
 
-def _points(path: Path) -> NDArray[np.float64]:
-    """Read a table of readings and values."""
+def _points(path: Path, array: Array) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Read a table of readings and values, of one taxel for all or, with columns x and y, of each that exists."""
     from taxel.formats import text  # noqa: PLC0415
 
-    rows = [[row["reading"], row["value"]] for row in text.table(path, ["reading", "value"])]
-    return text.numbers(rows, path, 2, ["reading", "value"])
+    rows = text.table(path, ["reading", "value"])
+    pairs = text.numbers([[row["reading"], row["value"]] for row in rows], path, 2, ["reading", "value"])
+    if not rows or "x" not in rows[0] or "y" not in rows[0]:
+        return pairs[:, 0], pairs[:, 1]
+    places = text.numbers([[row["x"], row["y"]] for row in rows], path, 2, ["x", "y"])
+    exists = np.ones(array.shape, bool) if array.exists is None else array.exists
+    values = np.unique(pairs[:, 1])
+    # Taxels that do not exist bear nothing, whatever stands here.
+    every = np.where(exists, np.nan, np.arange(1.0, len(values) + 1)[:, None, None])
+    for k, ((x, y), (reading, value)) in enumerate(zip(places, pairs, strict=True), start=2):
+        if x != int(x) or y != int(y) or not (0 <= x < array.columns and 0 <= y < array.rows):
+            raise FormatError(
+                f"{path.name}, line {k}: taxel {x:g}, {y:g}; the array has {array.columns} x {array.rows}"
+            )
+        every[np.searchsorted(values, value), int(y), int(x)] = reading
+    lacks = np.argwhere(np.isnan(every))
+    if len(lacks):
+        point, y, x = lacks[0]
+        raise FormatError(
+            f"{path.name}: no reading of taxel {x}, {y} under {values[point]:g}; each taxel needs each value"
+        )
+    return every, values

@@ -61,6 +61,8 @@ def info(
     # Shown on a terminal only, and gone when done.
     with Console(stderr=True).status(f"reading {file}"):
         opened = taxel.open(file)
+        # Many files of other people's hold one recording.
+        opened = opened[0] if isinstance(opened, list) and len(opened) == 1 else opened
         if isinstance(opened, list):
             if picture is not None or table is not None:
                 raise ProblemError(f"{file}: holds {len(opened)} recordings; a picture or a table is of one")

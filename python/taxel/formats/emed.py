@@ -116,7 +116,7 @@ def _read(file: Path) -> Trial:
         person=file.stem,
         recorded=Frames(values, t.astype(np.int64), unit=_unit(file, pages, size[0] * size[1]), array=array),
         truth={},
-        source="none: the file has no truth",
+        source="",
         series={"total": np.array([page.force for page in pages])},
         about={"sensor_cm": f"{size[0]:g} x {size[1]:g}"},
     )

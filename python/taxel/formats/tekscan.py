@@ -136,7 +136,7 @@ def _read(file: Path) -> Trial:
         person=file.stem,
         recorded=Frames(values, t, unit=unit, array=array),
         truth={},
-        source="none: the file has no truth",
+        source="",
         series={"raw_sum": sums} if np.isfinite(sums).all() else {},
         about=about,
     )

@@ -195,7 +195,10 @@ function paint(u, spec, images) {
     c.textBaseline = { top: "top", bottom: "bottom", baseline: "alphabetic" }[text.rise] ?? "middle";
     const inside = text.within === "axes";
     const at = [inside ? left + text.x * width : x(text.x), inside ? top + (1 - text.y) * height : y(text.y)];
-    text.text.split("\n").forEach((one, k) => c.fillText(one, at[0], at[1] + 15 * ratio * k));
+    // What was zoomed out of sight says nothing; the margins are the figure's own.
+    const slack = 14 * ratio;
+    const seen = inside || (at[0] > left - slack && at[0] < left + width + slack && at[1] > top - slack && at[1] < top + height + slack);
+    if (seen) text.text.split("\n").forEach((one, k) => c.fillText(one, at[0], at[1] + 15 * ratio * k));
     c.restore();
   }
 }
@@ -400,6 +403,8 @@ async function draw(holder) {
     }
     if (spec.title) element("p", "title", cell).textContent = spec.title;
     const box = element("div", "plot", cell);
+    box.setAttribute("role", "img");
+    box.setAttribute("aria-label", [spec.title || said.title, [spec.y.label, spec.x.label].filter(Boolean).join(" by ")].filter(Boolean).join(": "));
     legend(spec.legend, spec.legend_title, cell);
     const images = await Promise.all(
       (spec.images ?? []).map(async (image) => {

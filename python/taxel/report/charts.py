@@ -324,6 +324,8 @@ class _Drawn:
         )
 
     def _points(self, artist: Any) -> None:
+        if not all(artist.get_offset_transform().contains_branch_seperately(self.axes.transData)):
+            raise _NotKnownError
         offsets: Any = np.ma.filled(np.ma.asarray(artist.get_offsets(), float), np.nan)
         artist.update_scalarmappable()
         faces = artist.get_facecolors()
