@@ -117,8 +117,8 @@ def threshold_izhikevich(t, values, levels, end, published="6.5.1", start="settl
     return sorted(spikes)
 
 
-def fa1(t, values, alpha=0.7, a=20.0, b=0.05, decay="sample", theta_0=None, largest=150.0, period_ms=1.0):
-    """Equations 5.1 to 5.5."""
+def fa1(t, values, alpha=0.7, a=20.0, b=0.05, decay="sample", theta_0=None, largest=150.0, period_ms=1.0, bits=1):
+    """Equations 5.1 to 5.5, and 5.7."""
     rho = np.maximum(np.asarray(values, np.float64), 0.0) ** alpha  # 5.1
     base = largest**alpha / 1024 if theta_0 is None else theta_0
     fall = b * base if decay == "sample" else b * period_ms * base
@@ -135,8 +135,9 @@ def fa1(t, values, alpha=0.7, a=20.0, b=0.05, decay="sample", theta_0=None, larg
             u += rho[k, channel] - rho[k - 1, channel]  # 5.2, 5.3
             s = 1 if u > theta else -1 if u < -theta else 0  # 5.4
             if s:
+                size = 2**bits - 1 if base == 0 else min(max(int(abs(u) / base), 1), 2**bits - 1)  # 5.7
+                spikes.append((t[k], channel, s * size))
                 u = 0.0
-                spikes.append((t[k], channel, s))
     return sorted(spikes)
 
 

@@ -16,6 +16,7 @@ seeds = st.integers(0, 2**32 - 1)
 #: What the laws of all encoders are tried on (test_laws.py).
 EXAMPLES = {
     "FA-1": FA1(period_ms=0.5),
+    "FA-1 of 4 bits": FA1(period_ms=1.0, bits=4),
     "FA-1 by ms": FA1(period_ms=0.2, decay="ms", theta_0=0.3),
 }
 
@@ -33,13 +34,15 @@ def trains_of(encoder, taxels, of):
     theta=st.sampled_from([None, 0.0, 0.163, 2.0]),
     period=st.sampled_from([0.2, 1.0, 5.0]),
     alpha=st.sampled_from([0.2, 0.7, 1.0, 1.4]),
+    bits=st.sampled_from([1, 2, 5, 10]),
 )
-def test_fa1_is_equations_5_1_to_5_5(seed, ticks, decay, theta, period, alpha):
+def test_fa1_is_equations_5_1_to_5_5_and_5_7(seed, ticks, decay, theta, period, alpha, bits):
     rng = np.random.default_rng(seed)
     values = wander(rng, 300, 3, ticks) - 5.0  # some below 0
     t = np.arange(300) * round(period * 1000)
-    encoder = FA1(alpha=alpha, decay=decay, theta_0=theta, period_ms=period)
-    wanted = oracles.fa1(t, values.astype(np.float32), alpha, decay=decay, theta_0=theta, period_ms=period)
+    encoder = FA1(alpha=alpha, decay=decay, theta_0=theta, period_ms=period, bits=bits)
+    given_parameters = {"decay": decay, "theta_0": theta, "period_ms": period, "bits": bits}
+    wanted = oracles.fa1(t, values.astype(np.float32), alpha, **given_parameters)
     assert spikes_of(encoder.encode(frames_of(t, values))) == wanted
 
 
@@ -69,6 +72,7 @@ def test_fa1_on_ticks_by_table_equals_fa1_on_the_same_numbers_without_it():
         (lambda: FA1(b=-1), "b is -1"),
         (lambda: FA1(theta_0=-1), "theta_0 is -1"),
         (lambda: FA1(range=0), "range is 0"),
+        (lambda: FA1(bits=11), "bits is 11"),
         (lambda: FA1(range=1, theta_0=1), "theta_0 and range: give one"),
         (lambda: FA1(decay="s"), 'decay is "s": must be "sample" or "ms"'),
     ],

@@ -32,6 +32,11 @@ def small(tmp_path) -> list[str]:
     return ["study", "fig6.11", "--size", "toy", "--realisations", "1", "--report", str(tmp_path)]
 
 
+@pytest.fixture(scope="module")
+def courses(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("courses")
+
+
 def ends(arguments: list[str]) -> int:
     with pytest.raises(SystemExit) as end:
         main(arguments)
@@ -79,14 +84,15 @@ def test_a_second_run_reckons_nothing_again_and_says_the_same(report, name):
 
 
 @pytest.mark.parametrize("name", MADE_HERE)
-def test_a_realisation_is_a_pure_function_of_parameters_and_seed(name):
+def test_a_realisation_is_a_pure_function_of_parameters_and_seed(name, courses):
     study = load(name)
-    tasks = study.tasks(study.set("toy"))
+    given = {"courses": courses} if study.courses else {}
+    tasks = study.tasks(study.set("toy"), **given)
     task = tasks[-1]
-    first = json.dumps(study.realise(task.params, task.seed))
-    study.realise(tasks[0].params, tasks[0].seed)
+    first = json.dumps(study.realise(task.params, task.seed, **given))
+    study.realise(tasks[0].params, tasks[0].seed, **given)
     np.random.default_rng().random()
-    assert json.dumps(study.realise(json.loads(json.dumps(task.params)), task.seed)) == first
+    assert json.dumps(study.realise(json.loads(json.dumps(task.params)), task.seed, **given)) == first
 
 
 class Page(HTMLParser):

@@ -18,8 +18,9 @@ _DEFAULT = defaults("fa1")
 class FA1(Encoder):
     """Integrate each taxel's change of compressed pressure; fire with its sign where that passes a moving threshold.
 
-    Exactly equations 5.1 to 5.5, polarity kept; the constants are those of Table 5.3. One signed train a taxel. It
-    begins as if the first sample had always been. Reckoned in float64; pressure below 0 counts as 0.
+    Exactly equations 5.1 to 5.5 (and 5.7 where `bits` are more than one), polarity kept; the constants are those of
+    Table 5.3. One signed train a taxel. It begins as if the first sample had always been. Reckoned in float64; pressure
+    below 0 counts as 0.
 
     Parameters
     ----------
@@ -36,6 +37,9 @@ class FA1(Encoder):
     range : float, in the sensor's unit, above 0, optional
         The largest pressure, instead: ``theta_0 = range ** alpha / 1024``. 150 (ticks of the 5.2 kHz preset's ramp)
         where neither is given.
+    bits : int, from 1 to 10
+        Of a spike's value, by 5.7: U in units of `theta_0`, towards zero, from 1 to 2^bits - 1 with its sign. When it
+        fires stays that of 5.4.
     period_ms : float, ms, whole us
         T, the sampling period of events and of frames; frames must come at it, give or take half.
 
@@ -65,4 +69,5 @@ class FA1(Encoder):
     decay: Literal["sample", "ms"] = _DEFAULT.decay
     theta_0: float | None = _DEFAULT.theta_0
     range: float | None = _DEFAULT.range
+    bits: int = _DEFAULT.bits
     period_ms: float = _DEFAULT.period_ms

@@ -36,6 +36,7 @@ class FoldSums:
     Attributes
     ----------
     classes : shape (classes,)
+    folds : int64, shape (trials,)
 
     Raises
     ------
@@ -67,10 +68,10 @@ class FoldSums:
             callback("progress", progress)
         self._table = feature_table(x)
         self.classes, self._row = labelled(y, len(self._table))
-        self._fold = numbers("folds", folds, np.int64)
-        if self._fold.shape != (len(self._table),):
-            raise ProblemError(f"folds has shape {self._fold.shape}: must be ({len(self._table)},), one a trial")
-        self._names = np.unique(self._fold)
+        self.folds = numbers("folds", folds, np.int64)
+        if self.folds.shape != (len(self._table),):
+            raise ProblemError(f"folds has shape {self.folds.shape}: must be ({len(self._table)},), one a trial")
+        self._names = np.unique(self.folds)
         if len(self._names) < 2:
             raise ProblemError(f"folds names {len(self._names)}: must be two at least")
         self._dtype = np.float32 if is_exact(self._table) else np.float64
@@ -91,7 +92,7 @@ class FoldSums:
     def _summed(self, name: np.int64) -> ClassMoments:
         if int(name) in self._kept:
             return self._kept[int(name)]
-        mine = np.flatnonzero(self._fold == name)
+        mine = np.flatnonzero(self.folds == name)
         return ClassMoments.of(
             self._table, self._row, len(self.classes), rows=mine, dtype=self._dtype, shift=self._shift
         )
@@ -148,7 +149,7 @@ class FoldSums:
             if into is not None:
                 training = training.merged(into, len(classes))
             model.from_moments(training if used == count else training.first(used), shift)
-            for block, mine in blocks(self._table[:, :used], np.flatnonzero(self._fold == name), np.float64, None):
+            for block, mine in blocks(self._table[:, :used], np.flatnonzero(self.folds == name), np.float64, None):
                 found[mine] = classes[(block @ model.coef_.T + model.intercept_).argmax(1)]
             if progress is not None:
                 progress(k + 1, len(self._names))

@@ -16,6 +16,10 @@ __all__ = ["STUDIES", "load"]
 
 #: One line on every study, by name, in the order of the page; "fig6.1" lies in ``fig6_1.py``. They load when asked for.
 STUDIES = {
+    "contact": "a half disc pressed on silicone, sampled by taxels at its base (5.1 to 5.4)",
+    "fig5.5": "bits of an indentation by sampling period, by parameter, and by time since contact (5.5, 5.6, 5.8)",
+    "fig5.7": "bits of an indentation by sampling period and by bits an event",
+    "contact_choices": "how much each choice that the thesis leaves open moves the bits of an indentation",
     "fig6.1": "input spikes, potential, threshold and refractory time, and the output spikes they make",
     "fig6.2": "kappa lifts the potential behind the target, steepens the crossing and keeps the spike's time",
     "fig6.3": "the objectives of CONE-X and CONE-R over two weights",

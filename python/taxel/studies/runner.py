@@ -86,7 +86,8 @@ class Results:
 
     def add(self, task: Task, result: Any, seconds: float) -> None:
         """Append one result, and see it written."""
-        row = {"params": task.params, "seed": task.seed, "code": self.code, "seconds": round(seconds, 3)}
+        seconds = round(seconds, 3)
+        row = {"params": task.params, "seed": task.seed, "code": self.code, "seconds": seconds}
         with self.path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row | {"result": result}, sort_keys=True) + "\n")
         self._results[task.key(self.code)], self._seconds[task.key(self.code)] = result, seconds

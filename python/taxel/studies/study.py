@@ -108,7 +108,8 @@ class Row:
 class Study:
     """Describe a study: everything that the runner, the page and the command line need.
 
-    Of studies on recordings `tasks`, `then`, `realise` and `summarise` are also given ``data``, the folder of them.
+    Of studies on recordings `tasks`, `then`, `realise` and `summarise` are also given ``data``, the folder of them; of
+    studies on simulated contact ``courses``, a folder in the report's that these share.
 
     Attributes
     ----------
@@ -130,13 +131,15 @@ class Study:
     draw : function of (parameters, said)
         The picture, as the source draws it; or several.
     then : function of (parameters, rows), optional
-        A second phase: the realisations that depend on what the first gave.
+        The realisations that depend on what others gave: asked again until it lists nothing new.
     tables : function of (parameters, said), optional
         Tables below the picture.
     code : tuple of modules
         What a realisation uses beside its own file: when they change, results are reckoned anew.
     data : tuple of str
         Folders of recordings that it needs.
+    courses : bool
+        Whether it is on simulated contact.
     unread : function of (parameters, data)
         Which of their files cannot be read, and why. It raises `FormatError` where none can.
     """
@@ -156,6 +159,7 @@ class Study:
     tables: Callable[[Parameters, Said], Sequence[Table]] | None = None
     code: tuple[ModuleType, ...] = ()
     data: tuple[str, ...] = field(default=())
+    courses: bool = False
     unread: Callable[[Parameters, Path], Mapping[str, str]] = lambda _parameters, _data: {}
 
     def set(self, size: str = "full", **changes: Any) -> dict[str, Any]:
@@ -226,6 +230,9 @@ class Study:
             refuse(unread, strict=strict)
         folder = report / self.name
         folder.mkdir(parents=True, exist_ok=True)
+        if self.courses:
+            given["courses"] = report / "courses"
+            given["courses"].mkdir(exist_ok=True)
         results = Results(folder / "results.jsonl", code_digest((sys.modules[self.realise.__module__], *self.code)))
         begun = time.time()
         rows: dict[str, Row] = {}
@@ -236,8 +243,11 @@ class Study:
                 rows[t.key("")] = Row(t.params, t.seed, results[t], results.seconds([t]))
 
         phase(self.name, self.tasks(parameters, **given))
-        if self.then is not None:
-            phase(f"{self.name}, second phase", self.then(parameters, list(rows.values()), **given))
+        while self.then is not None:
+            wanted = [t for t in self.then(parameters, list(rows.values()), **given) if t.key("") not in rows]
+            if not wanted:
+                break
+            phase(f"{self.name}, next", wanted)
         said = self.summarise(parameters, list(rows.values()), **given)
         section = {
             "name": self.name,

@@ -46,6 +46,10 @@ pub struct Fa1 {
     /// the ramp of the board's 5.2 kHz preset.
     #[serde(default)]
     pub range: Option<f64>,
+    /// Bits an event, 1 to 10: by equation 5.7 a spike's value is U in units of theta_0, towards zero, from +-1 to
+    /// +-(2^bits - 1). When it fires stays that of 5.4. Default 1: rise or fall.
+    #[serde(default = "one_bit")]
+    pub bits: u32,
     /// T, ms: the sampling period, of events and of frames; default 1, where "about 100 Hz" holds. Frames must come at
     /// this period, give or take half of it.
     #[serde(default = "one")]
@@ -75,6 +79,10 @@ fn one_twentieth() -> f64 {
     0.05
 }
 
+fn one_bit() -> u32 {
+    1
+}
+
 fn one() -> f64 {
     1.0
 }
@@ -91,6 +99,7 @@ impl Default for Fa1 {
             decay: Decay::default(),
             theta_0: None,
             range: None,
+            bits: one_bit(),
             period_ms: one(),
         }
     }
@@ -103,6 +112,7 @@ impl Fa1 {
         b: "", Range::FROM_0;
         theta_0: "", Range::FROM_0;
         range: "", Range::ABOVE_0;
+        bits: "", Range::within(1.0, 10.0);
         period_ms: "ms", Range::WHOLE_US;
     }
 
@@ -149,6 +159,8 @@ struct Afferents {
     jump: f64,
     decay: f64,
     theta_0: f64,
+    /// The largest value of a spike.
+    most: f64,
     blocks: Vec<Afferent>,
     channels: usize,
     /// 5.1 of every tick.
@@ -174,6 +186,7 @@ impl Afferents {
                 Decay::Ms => parameters.b * t * theta_0,
             },
             theta_0,
+            most: f64::from((1_u32 << parameters.bits) - 1),
             blocks: vec![],
             channels,
             table,
@@ -201,9 +214,17 @@ impl Afferents {
 }
 
 impl Afferent {
-    /// One sample; fills `s` (5.4) and says whether any afferent fired.
+    /// One sample; fills `s` (5.4) and says whether any afferent fired. Where `GRADED`, `s` holds sizes (5.7).
     #[inline(always)]
-    fn sample(&mut self, rho: &[f64; BLOCK], s: &mut [f64; BLOCK], jump: f64, decay: f64, theta_0: f64) -> bool {
+    fn sample<const GRADED: bool>(
+        &mut self,
+        rho: &[f64; BLOCK],
+        s: &mut [f64; BLOCK],
+        jump: f64,
+        decay: f64,
+        theta_0: f64,
+        most: f64,
+    ) -> bool {
         let (mut fired, mut moved) = (0, 0);
         for (lane, &rho) in rho.iter().enumerate() {
             let (base, theta) = (self.base[lane], self.theta[lane]);
@@ -213,7 +234,8 @@ impl Afferent {
             let said: f64 = rise + fall;
             let quiet = if theta > theta_0 { theta - decay } else { theta_0 };
             let next = if said == 0.0 { quiet } else { theta + jump };
-            s[lane] = said;
+            // A baseline of 0 makes every change as large as can be said.
+            s[lane] = if GRADED && said != 0.0 { said * (u.abs() / theta_0).trunc().clamp(1.0, most) } else { said };
             self.base[lane] = if said == 0.0 { base } else { rho };
             self.theta[lane] = next;
             fired |= said.to_bits();
@@ -239,14 +261,19 @@ impl Rule for Afferents {
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
-        let (jump, decay, theta_0) = (self.jump, self.decay, self.theta_0);
+        let (jump, decay, theta_0, most) = (self.jump, self.decay, self.theta_0, self.most);
         let (mut rho, mut s) = ([0.0; BLOCK], [0.0; BLOCK]);
         for (block, afferent) in self.blocks.iter_mut().enumerate() {
             if afferent.still && !changed[block] {
                 continue;
             }
             Self::compress(self.alpha, &self.table, &held[block], &mut rho);
-            if afferent.sample(&rho, &mut s, jump, decay, theta_0) {
+            let fired = if most > 1.0 {
+                afferent.sample::<true>(&rho, &mut s, jump, decay, theta_0, most)
+            } else {
+                afferent.sample::<false>(&rho, &mut s, jump, decay, theta_0, most)
+            };
+            if fired {
                 for (part, eight) in s.as_chunks::<8>().0.iter().enumerate() {
                     if eight.iter().fold(0, |any, s| any | s.to_bits()) != 0 {
                         for (lane, &s) in eight.iter().enumerate().filter(|&(_, &s)| s != 0.0) {
