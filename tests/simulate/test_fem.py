@@ -101,6 +101,31 @@ def test_the_forces_of_solids_and_contact_have_the_right_derivative(slanted):
     assert energy == pytest.approx(solids.forces(u)[0] @ way, rel=1e-6)
 
 
+def test_friction_holds_back_what_slides_and_no_more_than_coulomb_says():
+    asked = Indentation(diameter_mm=2, modulus_kpa=150, depth_mm=0.6, **COARSE)
+    course = press(asked)
+    ground, disc = bodies(asked)
+    nodes = np.concatenate([ground.nodes, disc.nodes])
+    rough, smooth = (
+        Contact(nodes, ground.touching, disc.touching + len(ground.nodes), 4000.0, friction) for friction in (0.7, 0.0)
+    )
+    x = course.shapes[max(course.shapes)]
+    touch = rough.forces(x, rough.apart())[2]
+
+    def held(contact: Contact, aside: float) -> np.ndarray:
+        """The force that holds the block's top when it is moved to the right."""
+        moved = x.copy()
+        moved[ground.touching] += [aside, 0]
+        return contact.forces(moved, touch)[0].reshape(-1, 2)[ground.touching].sum(0)
+
+    normal = held(smooth, 0.02)[1]
+    still, little, far, back = (held(rough, a)[0] - held(smooth, a)[0] for a in (0.0, 1e-4, 0.02, -0.02))
+    assert abs(still) < 1e-9 * normal
+    assert 0 < little < far
+    assert back == pytest.approx(-far, rel=1e-6)
+    assert 0.4 * normal < far <= 0.7 * normal  # points that newly touch have no traction yet
+
+
 # The whole
 
 
