@@ -224,7 +224,7 @@ def _losses(material: Material) -> list[tuple[str, int]]:
         ("bytes skipped", wire["skipped"]),
         ("words short, contradictory or outside", wire["short"] + wire["contradictory"] + wire["outside"]),
         ("intensities without their change", wire["unpaired"]),
-        ("events", material.counters["events"]),
+        ("events, those of the tare among them", material.counters["events"]),
         ("events dropped before the readout", material.counters["events_dropped"]),
         ("events that came after the readout's time", material.counters["late"]),
     ]

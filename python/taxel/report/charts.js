@@ -274,9 +274,9 @@ function build(box, spec, images, group) {
   const rows = 17 * (spec.y.names ?? []).length;
   let height = Math.max(spec.height, rows + 30) + (xAxis.size - 20) + (spec.x.label ? 20 : 0);
   if (spec.equal) {
-    const margins = (typeof yAxis.size === "number" ? yAxis.size : 34) + yAxis.labelSize + 12;
+    const margins = (typeof yAxis.size === "number" ? yAxis.size : 48) + yAxis.labelSize + 16;
     const tall = (spec.y.max - spec.y.min) / (spec.x.max - spec.x.min);
-    height = Math.min(620, Math.max(120, (width - margins) * tall)) + xAxis.size + xAxis.labelSize + 12;
+    height = Math.min(620, Math.max(50, (width - margins) * tall)) + xAxis.size + xAxis.labelSize + 12;
   }
   const tip = element("div", "tip");
   const show = (axis, stretch) => { Object.assign(view[axis], stretch); u.setScale(axis, { ...stretch }); };
@@ -388,7 +388,7 @@ async function draw(holder) {
   if (said.title) element("p", "title", holder).textContent = said.title;
   const grid = element("div", "grid", holder);
   // As many side by side as the figure has, and as stay legible.
-  const least = said.axes.some((spec) => spec.equal) ? 150 : 290;
+  const least = said.axes.some((spec) => spec.equal) ? 165 : 290;
   const fit = Math.max(1, Math.min(said.columns, Math.floor(grid.clientWidth / least)));
   const whole = fit === said.columns && said.axes.every((spec) => spec.place);
   // Where fewer fit, rows are filled evenly.
