@@ -135,7 +135,8 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "half of the bits after "
             + ", ".join(f"{half[code]:g} ms ({NAMES[code]})" for code in NAMES)
             + f"; {said['spikes'][early]:.2f} spikes a train in the first {early} ms",
-            min(half[code] for code in ("first", "relative", "rank")) <= half["rate"],
+            min(half[code] for code in ("first", "relative", "rank")) < half["rate"],
+            "hardly a train fires twice so soon: a count then says which trains fired at all, and that tells as much",
         ),
         Statement(
             "First-spike latency needs a reliable reference; relative codes need none.",
