@@ -3,17 +3,14 @@
 use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
+use taxel_core::Error;
 use taxel_core::board::{Board, IntensityWord, Previous};
-use taxel_core::wire::{self, Command, Counts, Decoder, Pairing, Registers, Room};
-use taxel_core::{Error, Marker, problem};
+use taxel_core::wire::{self, Command, Counts, Decoder, Filled, Pairing, Registers, Room};
 
 use crate::convert::{ArrayParts, EventsIn, EventsOut, from_events, slice, to_array, to_events};
 use crate::enter::{Shared, enter};
 use crate::errors::{ProblemError, core};
 use crate::parameters::{parsed, to_json};
-
-/// Bytes between two looks at Ctrl-C: some milliseconds of work.
-const PIECE: usize = 16 << 20;
 
 /// Columns to fill: t, x, y, ticks, and p, present as bytes.
 type ColumnsIn<'py> = (
@@ -59,39 +56,9 @@ impl WireDecoder {
         let ticks = ticks.as_slice_mut().map_err(contiguous)?;
         let p = p.as_slice_mut().map_err(contiguous)?;
         let present = present.as_slice_mut().map_err(contiguous)?;
-        let room = [x.len(), y.len(), ticks.len(), p.len(), present.len()].into_iter().fold(t.len(), usize::min);
-        let (rows, paired, markers) = self.0.enter(py, |decoder, stop| {
-            let most = decoder.most_rows(data.len());
-            if room < most {
-                let len = data.len();
-                return Err(problem!("columns have room for {room} rows: {len} bytes may need {most}"));
-            }
-            let (mut rows, mut paired, mut markers): (usize, bool, Vec<Marker>) = (0, false, vec![]);
-            for piece in data.chunks(PIECE) {
-                stop.check()?;
-                let room = Room::new(
-                    &mut t[rows..room],
-                    [&mut x[rows..room], &mut y[rows..room], &mut ticks[rows..room]],
-                    [&mut p[rows..room], &mut present[rows..room]],
-                )?;
-                let filled = decoder.fill(piece, arrived, room, paired, &mut markers)?;
-                if filled.paired && !paired {
-                    ticks[..rows].fill(0);
-                    present[..rows].fill(0);
-                }
-                paired = filled.paired;
-                rows += filled.rows;
-            }
-            if last {
-                let room = Room::new(
-                    &mut t[rows..room],
-                    [&mut x[rows..room], &mut y[rows..room], &mut ticks[rows..room]],
-                    [&mut p[rows..room], &mut present[rows..room]],
-                )?;
-                rows += decoder.finish_filling(room, paired)?;
-            }
-            Ok::<_, Error>((rows, paired, markers))
-        })?;
+        let room = Room::new(t, [x, y, ticks], [p, present]).map_err(core)?;
+        let (Filled { rows, paired }, markers) =
+            self.0.enter(py, |decoder, stop| decoder.fill(data, arrived, room, last, stop))?;
         Ok((rows, paired, markers.iter().map(|m| (m.t, m.start)).collect()))
     }
 

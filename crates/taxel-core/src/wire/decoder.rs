@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::vectors::Instructions;
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
-use crate::{Array, Events, Intensities, Marker, Result, problem};
+use crate::{Array, Events, Intensities, Marker, Result, Stop, problem};
 
 /// Which change an intensity belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -242,43 +242,45 @@ impl Decoder {
         }
     }
 
-    /// As [`Self::push`], into columns that the caller lays out; `paired` says whether the columns of intensities are
-    /// to be written before the first intensity comes, and markers are appended.
+    /// As [`Self::push`], into columns that the caller lays out, from their first row on; where these bytes are the `last`,
+    /// the stream ends behind them. Gives the markers too. With [`Pairing::Taxel`] all events wait for [`Self::finish`].
     ///
     /// # Errors
     ///
-    /// `Problem` where a column has fewer entries than [`Self::most_rows`] asks for; then nothing was read.
+    /// `Problem` where a column has fewer entries than [`Self::most_rows`] asks for, and nothing was read; `Interrupted`
+    /// where asked to stop.
     pub fn fill(
         &mut self,
         bytes: &[u8],
         arrived: Option<i64>,
-        room: Room<'_>,
-        paired: bool,
-        markers: &mut Vec<Marker>,
-    ) -> Result<Filled> {
+        mut room: Room<'_>,
+        last: bool,
+        stop: Stop<'_>,
+    ) -> Result<(Filled, Vec<Marker>)> {
+        /// Bytes between two looks at `stop`: some milliseconds of work.
+        const PIECE: usize = 16 << 20;
         let most = self.most_rows(bytes.len());
         if room.len() < most {
             return Err(problem!("columns have room for {} rows: {} bytes may need {most}", room.len(), bytes.len()));
         }
-        Ok(self.fill_columns(bytes, arrived, room, paired, markers))
-    }
-
-    /// As [`Self::finish`], into columns that are filled; gives how many rows more. With [`Pairing::Taxel`] all events wait
-    /// for the end, so there it is [`Self::finish`] that gives them.
-    ///
-    /// # Errors
-    ///
-    /// `Problem` where a row waits and there is no room for it.
-    pub fn finish_filling(&mut self, room: Room<'_>, paired: bool) -> Result<usize> {
-        if self.waiting.is_some() && room.len() == 0 {
-            return Err(problem!("columns have no room for the event that waits: they need one row more"));
+        let (mut done, mut markers) = (Filled { rows: 0, paired: false }, vec![]);
+        for piece in bytes.chunks(PIECE) {
+            stop.check()?;
+            let filled = self.fill_columns(piece, arrived, room.behind(done.rows), done.paired, &mut markers);
+            if filled.paired && !done.paired {
+                room.without_intensities(done.rows);
+            }
+            done = Filled { rows: done.rows + filled.rows, paired: filled.paired };
         }
-        let mut filling = Filling { room, rows: 0, paired, open: false };
-        if let Some(change) = self.waiting.take() {
-            filling.change(change);
+        if last {
+            let mut filling = Filling { room: room.behind(done.rows), rows: 0, paired: done.paired, open: false };
+            if let Some(change) = self.waiting.take() {
+                filling.change(change);
+            }
+            done.rows += filling.rows;
+            self.as_new();
         }
-        self.as_new();
-        Ok(filling.rows)
+        Ok((done, markers))
     }
 
     fn fill_columns(

@@ -44,6 +44,24 @@ impl<'a> Room<'a> {
     pub(super) fn len(&self) -> usize {
         self.t.len()
     }
+
+    /// The room from a row on.
+    pub(super) fn behind(&mut self, row: usize) -> Room<'_> {
+        Room {
+            t: &mut self.t[row..],
+            x: &mut self.x[row..],
+            y: &mut self.y[row..],
+            p: &mut self.p[row..],
+            ticks: &mut self.ticks[row..],
+            present: &mut self.present[row..],
+        }
+    }
+
+    /// Writes "none" for the first rows.
+    pub(super) fn without_intensities(&mut self, rows: usize) {
+        self.ticks[..rows].fill(MaybeUninit::new(0));
+        self.present[..rows].fill(MaybeUninit::new(false));
+    }
 }
 
 /// The same entries, to be written only.
@@ -115,8 +133,7 @@ impl Filling<'_> {
     #[inline]
     pub(super) fn begin_pairs(&mut self) {
         if !self.paired {
-            self.room.ticks[..self.rows].fill(MaybeUninit::new(0));
-            self.room.present[..self.rows].fill(MaybeUninit::new(false));
+            self.room.without_intensities(self.rows);
             self.paired = true;
         }
     }
