@@ -14,7 +14,7 @@ mod streaming;
 mod threshold;
 
 pub(crate) use crossing::peak;
-pub use kernel::{Kernel, Shape, State, Step};
+pub use kernel::{Kernel, KernelSum, Shape, Step};
 pub(crate) use model::{AT_EDGE, ROUNDING_MS};
 pub use model::{AfterSpike, FirstThreshold, Neuron, Time};
 pub use population::Weight;

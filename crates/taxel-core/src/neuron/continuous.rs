@@ -1,7 +1,7 @@
 //! The neuron in continuous time: the next crossing is known exactly from the state after the last input.
 
 use super::crossing::next_crossing;
-use super::kernel::{Shape, State};
+use super::kernel::{KernelSum, Shape};
 use super::model::{AT_EDGE, AfterSpike, Neuron};
 use super::threshold::{OutputSpike, Threshold};
 
@@ -12,7 +12,7 @@ pub(super) struct ContinuousStream {
     shape: Shape,
     pub(super) threshold: Threshold,
     /// The potential at `at`.
-    state: State,
+    state: KernelSum,
     at: f64,
     /// The end of the refractory time (or the start of the printed first rise), while it lies ahead.
     edge: Option<f64>,
@@ -31,19 +31,19 @@ impl ContinuousStream {
     pub(super) fn new(neuron: &Neuron, factor: f64, start: f64) -> Self {
         let threshold = Threshold::new(neuron, factor, start);
         let edge = threshold.edge();
-        let (shape, state) = (neuron.shape(), State::default());
+        let (shape, state) = (neuron.shape(), KernelSum::default());
         Self { neuron: neuron.clone(), shape, threshold, state, at: start, edge, next: Next::Never }
     }
 
     /// Goes from a state that somebody else kept at `at` to `until`, where an input comes or the end; gives the state there.
     pub(super) fn resume(
         &mut self,
-        state: State,
+        state: KernelSum,
         at: f64,
         until: f64,
         input: bool,
         out: &mut Vec<OutputSpike>,
-    ) -> State {
+    ) -> KernelSum {
         (self.state, self.at, self.next) = (state, at, Next::Unknown);
         if input {
             self.settle_at_input(until, until + AT_EDGE, out);
@@ -132,7 +132,7 @@ impl ContinuousStream {
         self.threshold.fire(t);
         self.edge = self.threshold.edge();
         if self.neuron.after_spike == AfterSpike::Reset {
-            self.state = State::default();
+            self.state = KernelSum::default();
         }
         self.move_to(t);
     }

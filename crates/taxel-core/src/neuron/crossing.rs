@@ -4,7 +4,7 @@
 //! ends at `-theta`. Its derivative changes sign twice at most, so that `g` has one inner maximum at most, with a rise
 //! before it: the only stretch in which the threshold can be crossed from below.
 
-use super::kernel::{Kernel, Shape, State};
+use super::kernel::{Kernel, KernelSum, Shape};
 
 /// The inner maximum of potential less threshold, ms from now.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,7 +20,7 @@ pub(crate) struct Peak {
 /// A maximum `touch` mV below the threshold reaches it. Asked for up to `within` ms from now; may be left out beyond.
 pub(super) fn next_crossing(
     shape: &Shape,
-    state: State,
+    state: KernelSum,
     (theta, touch): (f64, f64),
     rise: f64,
     tau_rec: f64,
@@ -76,7 +76,7 @@ pub(super) fn next_crossing(
 }
 
 /// The inner maximum of potential less threshold; `None` where it falls from now on, or rises for ever.
-pub(crate) fn peak(shape: &Shape, state: State, rise: f64, tau_rec: f64) -> Option<Peak> {
+pub(crate) fn peak(shape: &Shape, state: KernelSum, rise: f64, tau_rec: f64) -> Option<Peak> {
     match shape.kernel {
         Kernel::Alpha => alpha_peak(state, shape.tau, rise, tau_rec).map(|at| Peak { from: 0.0, at }),
         Kernel::DoubleExponential => double_exponential_peak(shape, state, rise, tau_rec),
@@ -86,8 +86,8 @@ pub(crate) fn peak(shape: &Shape, state: State, rise: f64, tau_rec: f64) -> Opti
 }
 
 /// With `f(s) = e^{s/tau} g'(s)`, a straight line and a convex exponential: the first of its zeros.
-fn alpha_peak(state: State, tau: f64, rise: f64, tau_rec: f64) -> Option<f64> {
-    let State { a, b } = state;
+fn alpha_peak(state: KernelSum, tau: f64, rise: f64, tau_rec: f64) -> Option<f64> {
+    let KernelSum { a, b } = state;
     let line = -a / (tau * tau);
     if rise == 0.0 {
         let s = tau * (a - b) / a;
@@ -120,7 +120,7 @@ fn alpha_peak(state: State, tau: f64, rise: f64, tau_rec: f64) -> Option<f64> {
 }
 
 /// With `f(s) = e^{s/tau_s} g'(s) = B/tau_s - A/tau e^{p s} + c/tau_rec e^{q s}`, which turns once at most.
-fn double_exponential_peak(shape: &Shape, state: State, rise: f64, tau_rec: f64) -> Option<Peak> {
+fn double_exponential_peak(shape: &Shape, state: KernelSum, rise: f64, tau_rec: f64) -> Option<Peak> {
     let Shape { tau, tau_s, scale, rate: p, .. } = *shape;
     let slow = scale * state.a;
     let (constant, fall, height, q) =

@@ -1,6 +1,6 @@
 //! The neuron on a grid: potential and threshold are compared at the points `start + k step` only.
 
-use super::kernel::{Shape, State, Step};
+use super::kernel::{KernelSum, Shape, Step};
 use super::model::{AfterSpike, Neuron};
 use super::threshold::{OutputSpike, Threshold};
 
@@ -12,7 +12,7 @@ pub(super) struct GridStream {
     pub(super) threshold: Threshold,
     start: f64,
     /// The potential at grid point `point`; inputs of the interval before it are in already.
-    state: State,
+    state: KernelSum,
     /// The weights of inputs at that point itself: they move neither potential nor slope before it is left.
     arriving: f64,
     point: f64,
@@ -30,7 +30,7 @@ impl GridStream {
             shape,
             threshold: Threshold::new(neuron, factor, start),
             start,
-            state: State::default(),
+            state: KernelSum::default(),
             arriving: 0.0,
             point: 0.0,
             compared: false,
@@ -88,7 +88,7 @@ impl GridStream {
         }
     }
 
-    fn leaving(&self) -> State {
+    fn leaving(&self) -> KernelSum {
         let mut state = self.state;
         self.shape.add(&mut state, self.arriving, 0.0);
         state
@@ -114,7 +114,7 @@ impl GridStream {
         out.push(OutputSpike { t, slope: self.shape.slope(self.state) });
         self.threshold.fire(t);
         if self.neuron.after_spike == AfterSpike::Reset {
-            self.state = State::default();
+            self.state = KernelSum::default();
             self.arriving = 0.0;
         }
     }

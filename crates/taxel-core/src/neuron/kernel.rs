@@ -31,14 +31,14 @@ pub struct Shape {
 ///
 /// This stepwise form neither overflows nor loses digits after a long time, as `e^{-t/tau} (A t/tau - B)` does.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct State {
+pub struct KernelSum {
     /// The sum of the decayed weights, which drives the potential, mV; unused where the input itself moves the potential.
     pub a: f64,
     /// The potential, mV.
     pub b: f64,
 }
 
-/// What a stretch of time without input does to a [`State`]: `a' = aa a`, `b' = ba a + bb b`.
+/// What a stretch of time without input does to a [`KernelSum`]: `a' = aa a`, `b' = ba a + bb b`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
     /// From `a` to `a`.
@@ -53,8 +53,8 @@ impl Step {
     /// The state after this stretch.
     #[must_use]
     #[inline]
-    pub fn apply(&self, state: State) -> State {
-        State { a: state.a * self.aa, b: state.b * self.bb + state.a * self.ba }
+    pub fn apply(&self, state: KernelSum) -> KernelSum {
+        KernelSum { a: state.a * self.aa, b: state.b * self.bb + state.a * self.ba }
     }
 }
 
@@ -71,10 +71,10 @@ impl Shape {
     /// What one input of weight 1 makes of a state of 0, just after it.
     #[must_use]
     #[inline]
-    pub fn input(&self) -> State {
+    pub fn input(&self) -> KernelSum {
         match self.kernel {
-            Kernel::Alpha | Kernel::DoubleExponential => State { a: 1.0, b: 0.0 },
-            Kernel::Exponential => State { a: 0.0, b: 1.0 },
+            Kernel::Alpha | Kernel::DoubleExponential => KernelSum { a: 1.0, b: 0.0 },
+            Kernel::Exponential => KernelSum { a: 0.0, b: 1.0 },
         }
     }
 
@@ -96,13 +96,13 @@ impl Shape {
     /// The state `dt` ms later.
     #[must_use]
     #[inline]
-    pub fn after(&self, state: State, dt: f64) -> State {
+    pub fn after(&self, state: KernelSum, dt: f64) -> KernelSum {
         self.step(dt).apply(state)
     }
 
     /// Adds an input of this weight that came `age` ms ago, 0 or more.
     #[inline]
-    pub fn add(&self, state: &mut State, weight: f64, age: f64) {
+    pub fn add(&self, state: &mut KernelSum, weight: f64, age: f64) {
         let one = self.after(self.input(), age);
         state.a += weight * one.a;
         state.b += weight * one.b;
@@ -128,7 +128,7 @@ impl Shape {
     /// How steeply the potential rises now, mV/ms.
     #[must_use]
     #[inline]
-    pub fn slope(&self, state: State) -> f64 {
+    pub fn slope(&self, state: KernelSum) -> f64 {
         match self.kernel {
             Kernel::Alpha => (state.a - state.b) / self.tau,
             Kernel::DoubleExponential => self.scale * self.rate * state.a - state.b / self.tau_s,
@@ -139,7 +139,7 @@ impl Shape {
     /// A value that the potential will not exceed while no input comes, mV.
     #[must_use]
     #[inline]
-    pub fn bound(&self, state: State) -> f64 {
+    pub fn bound(&self, state: KernelSum) -> f64 {
         const ONE_OVER_E: f64 = 0.367_879_441_171_442_33;
         let largest = match self.kernel {
             Kernel::Alpha => ONE_OVER_E,

@@ -1,6 +1,6 @@
 //! A neuron on whole trains: its spikes, and its potential where they are given.
 
-use super::kernel::State;
+use super::kernel::KernelSum;
 use super::model::{AfterSpike, MOST_STEPPED, Neuron, Time};
 use super::streaming::NeuronStream;
 use super::threshold::OutputSpike;
@@ -111,7 +111,7 @@ impl Neuron {
 /// The potential at ascending `times` of a neuron that fired at ascending `spikes`.
 fn potential(neuron: &Neuron, weights: &[f64], trains: &SpikeTrains, times: &[f64], spikes: &[f64]) -> Vec<f64> {
     let (inputs, shape) = (trains.by_time(), neuron.shape());
-    let (mut state, mut at) = (State::default(), trains.start);
+    let (mut state, mut at) = (KernelSum::default(), trains.start);
     let (mut next_input, mut next_spike, mut last) = (0, 0, None);
     let mut out = Vec::with_capacity(times.len());
     for &t in times {
@@ -130,7 +130,7 @@ fn potential(neuron: &Neuron, weights: &[f64], trains: &SpikeTrains, times: &[f6
                 next_spike += 1;
                 last = Some(spike);
                 if neuron.after_spike == AfterSpike::Reset {
-                    state = State::default();
+                    state = KernelSum::default();
                 }
             } else {
                 break;

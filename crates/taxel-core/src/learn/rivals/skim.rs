@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::batch::{BatchRule, Learnt};
 use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::metrics::matching::matched;
-use crate::neuron::{Kernel, Shape, State};
+use crate::neuron::{Kernel, Shape, KernelSum};
 use crate::parameters::Described;
 use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
@@ -179,7 +179,7 @@ struct Branch {
     /// ms and weight, by time.
     inputs: Vec<(f64, f64)>,
     next: usize,
-    state: State,
+    state: KernelSum,
 }
 
 impl Skim {
@@ -215,7 +215,7 @@ impl Skim {
 
     /// The branches of a pattern, each with its own inputs; weights and delays come from the seed alone.
     fn branches(&self, pattern: &SpikeTrains) -> Vec<Branch> {
-        let branch = |inputs| Branch { inputs, next: 0, state: State::default() };
+        let branch = |inputs| Branch { inputs, next: 0, state: KernelSum::default() };
         let Some(layer) = self.layer() else {
             return (0..pattern.len()).map(|n| branch(pattern.train(n).iter().map(|&t| (t, 1.0)).collect())).collect();
         };

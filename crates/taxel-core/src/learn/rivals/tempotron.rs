@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::epochs::{Ended, Trained};
 use crate::allowed::{Range, one_weight_a_train, ranges};
-use crate::neuron::{Kernel, Shape, State, Step};
+use crate::neuron::{Kernel, KernelSum, Shape, Step};
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
@@ -139,7 +139,7 @@ impl Tempotron {
 
     /// The highest point of the potential, exactly: between inputs it has one maximum at most, and its time is known.
     fn reach(&self, shape: &Shape, weights: &[f64], events: &Inputs) -> Reached {
-        let mut state = State::default();
+        let mut state = KernelSum::default();
         let mut best = Peak { v_max: 0.0, t_max: events.start, t_spike: None };
         for k in 0..=events.times.len() {
             let t = if k == 0 { events.start } else { events.times[k - 1] };
@@ -205,7 +205,7 @@ impl Tempotron {
         let mut t_max = reached.peak.t_max;
         if reached.peak.v_max <= 0.0 {
             // Never above rest: the peak of the last input (the paper's supplement).
-            let kernel_peak = summit(shape, State { a: 1.0, b: 0.0 });
+            let kernel_peak = summit(shape, KernelSum { a: 1.0, b: 0.0 });
             t_max = events.times.last().map_or(t_max, |last| last + kernel_peak);
         }
         for (&t, &n) in events.times.iter().zip(&events.trains).take(reached.inputs) {
@@ -290,7 +290,7 @@ impl Tempotron {
 }
 
 /// How long after a state that rises its maximum comes, ms; infinite where it has none.
-fn summit(shape: &Shape, state: State) -> f64 {
+fn summit(shape: &Shape, state: KernelSum) -> f64 {
     // v = P e^{-s/tau} + (b - P) e^{-s/tau_s}: its slope is 0 where the two decays are in this proportion.
     let slow = shape.scale * state.a;
     let ratio = (slow - state.b) * shape.tau / (slow * shape.tau_s);
@@ -298,7 +298,7 @@ fn summit(shape: &Shape, state: State) -> f64 {
 }
 
 /// How long after `state` the potential, which rises until `end`, reaches the threshold, ms.
-fn crossing(shape: &Shape, state: State, end: f64, threshold: f64) -> f64 {
+fn crossing(shape: &Shape, state: KernelSum, end: f64, threshold: f64) -> f64 {
     let (mut low, mut high) = (0.0, end);
     for _ in 0..200 {
         let middle = 0.5 * (low + high);

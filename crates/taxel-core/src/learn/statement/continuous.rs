@@ -7,7 +7,7 @@
 
 use super::peak::{Peak, exceeds};
 use super::rows::{AT_TARGET, Sheet, Statement, lost};
-use crate::neuron::{AfterSpike, FirstThreshold, Shape, State, Step, peak};
+use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak};
 
 /// How long before a rise of the threshold silence is asked for at the lower one, ms: the simulator's edge has some width.
 const BEFORE_RISE: f64 = 2e-9;
@@ -37,7 +37,7 @@ struct Asked {
     /// What is left of the threshold's rise at the node, mV.
     rise: f64,
     /// The margin at the node: in a taper as a state of the kernel's family, else constant.
-    taper: State,
+    taper: KernelSum,
     height: f64,
 }
 
@@ -69,10 +69,10 @@ impl SilentTimes {
         let mut found = Vec::new();
         let one = self.shape.input();
         for (pattern, strip) in self.strips.iter().enumerate() {
-            let (mut state, mut next) = (State::default(), 0);
+            let (mut state, mut next) = (KernelSum::default(), 0);
             let mut worst: Option<Peak> = None;
             for (node, asked) in strip.nodes.iter().zip(&strip.asked) {
-                state = if node.reset { State::default() } else { node.step.apply(state) };
+                state = if node.reset { KernelSum::default() } else { node.step.apply(state) };
                 let inputs = &strip.trains[next..node.inputs as usize];
                 next = node.inputs as usize;
                 if !inputs.is_empty() {
@@ -99,9 +99,9 @@ impl SilentTimes {
     }
 
     /// The largest excess from a node to the next, when it is, and the excess at the end.
-    fn largest(&self, asked: &Asked, state: State, share: f64) -> (f64, f64, f64) {
-        let State { a, b } = asked.taper;
-        let state = State { a: state.a + share * a, b: state.b + share * b };
+    fn largest(&self, asked: &Asked, state: KernelSum, share: f64) -> (f64, f64, f64) {
+        let KernelSum { a, b } = asked.taper;
+        let state = KernelSum { a: state.a + share * a, b: state.b + share * b };
         let limit = asked.theta - share * asked.height;
         let excess = |s: f64| self.shape.after(state, s).b - limit - asked.rise * (-s / self.tau_rec).exp();
         let length = asked.to - asked.t;
@@ -153,7 +153,7 @@ fn strip(statement: &Statement, sheet: &Sheet) -> Strip {
         }
         next += heard[next..].iter().take_while(|i| i.0 <= t).count();
         let reset = neuron.after_spike == AfterSpike::Reset && sheet.next(t) == Some(t);
-        let mut here = Asked { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: State::default(), height: 0.0 };
+        let mut here = Asked { t, to: t, theta: neuron.theta_0, rise: 0.0, taper: KernelSum::default(), height: 0.0 };
         let (mut reach, mut least) = (0.0, f64::INFINITY);
         if let Some(to) = times.get(k + 1).copied().filter(|&to| asks(statement, sheet, t, to)) {
             here.to = to;

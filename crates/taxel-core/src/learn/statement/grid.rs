@@ -6,7 +6,7 @@
 
 use super::peak::{Peak, exceeds};
 use super::rows::{Sheet, Statement, lost};
-use crate::neuron::{AfterSpike, Shape, State, Step};
+use crate::neuron::{AfterSpike, KernelSum, Shape, Step};
 use crate::vectors::{add, dot};
 use crate::{Result, Stop};
 
@@ -135,7 +135,7 @@ impl SilentRows {
             let late = time(point) - t <= 0.0 && self.shape.input().b != 0.0;
             let felt = if late { point + 1.0 } else { point };
             if felt < points as f64 && !lost(neuron, targets, t, time(felt)) {
-                let State { a, b } = self.shape.after(self.shape.input(), (time(felt) - t).max(0.0));
+                let KernelSum { a, b } = self.shape.after(self.shape.input(), (time(felt) - t).max(0.0));
                 inputs.push(GridInput { point: felt as u32, train, a, b });
             }
         }
@@ -222,10 +222,10 @@ impl SilentRows {
 
     /// The potential on the rows of one pattern.
     fn potential_of(&self, lane: &Lane, weights: &[f64], rows: &mut [f64]) {
-        let mut state = State::default();
+        let mut state = KernelSum::default();
         let (mut input, mut at) = (0, 0);
         for (k, station) in lane.stations.iter().enumerate() {
-            state = if station.reset { State::default() } else { self.step(station.point - at).apply(state) };
+            state = if station.reset { KernelSum::default() } else { self.step(station.point - at).apply(state) };
             at = station.point;
             for i in &lane.inputs[input..station.inputs as usize] {
                 let w = weights[i.train as usize];
@@ -264,7 +264,7 @@ impl SilentRows {
     }
 
     /// The potential on a run of rows without an input, from the state at the first of them.
-    fn run(&self, mut state: State, rows: &mut [f64]) {
+    fn run(&self, mut state: KernelSum, rows: &mut [f64]) {
         for rows in rows.chunks_mut(RUN) {
             let steps = self.steps.ba.iter().zip(&self.steps.bb);
             rows.iter_mut().zip(steps).for_each(|(row, (ba, bb))| *row = state.a * ba + state.b * bb);
@@ -281,7 +281,7 @@ impl SilentRows {
         for lane in &self.lanes {
             let factors = &factors[lane.first..lane.first + lane.points];
             // How much the rows from here on hear of the state here.
-            let mut heard = State::default();
+            let mut heard = KernelSum::default();
             let mut end = lane.points;
             for (k, station) in lane.stations.iter().enumerate().rev() {
                 let at = station.point as usize;
@@ -291,7 +291,7 @@ impl SilentRows {
                     sum[i.train as usize] += heard.a * i.a + heard.b * i.b;
                 }
                 if station.reset {
-                    heard = State::default();
+                    heard = KernelSum::default();
                 }
                 end = at;
             }
@@ -299,11 +299,11 @@ impl SilentRows {
     }
 
     /// How much a run of rows, and what comes behind it, hear of the state at the first of them.
-    fn run_back(&self, mut heard: State, factors: &[f64]) -> State {
+    fn run_back(&self, mut heard: KernelSum, factors: &[f64]) -> KernelSum {
         for factors in factors.rchunks(RUN) {
             let step = self.steps.of(factors.len());
-            let State { a, b } = heard;
-            heard = State { a: a * step.aa + b * step.ba, b: b * step.bb };
+            let KernelSum { a, b } = heard;
+            heard = KernelSum { a: a * step.aa + b * step.ba, b: b * step.bb };
             if factors.iter().any(|&f| f != 0.0) {
                 heard.a += factors.iter().zip(&self.steps.ba).map(|(f, ba)| f * ba).sum::<f64>();
                 heard.b += factors.iter().zip(&self.steps.bb).map(|(f, bb)| f * bb).sum::<f64>();
@@ -344,7 +344,7 @@ impl SilentRows {
                 }
                 let end = passed.last().map_or(input, |s| s.inputs as usize);
                 for i in &lane.inputs[input..end] {
-                    let now = self.step(point - i.point).apply(State { a: i.a, b: i.b });
+                    let now = self.step(point - i.point).apply(KernelSum { a: i.a, b: i.b });
                     a[i.train as usize] += now.a;
                     b[i.train as usize] += now.b;
                 }

@@ -11,7 +11,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, Neuron, ROUNDING_MS, Shape, State, Time};
+use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, KernelSum, Neuron, ROUNDING_MS, Shape, Time};
 use crate::{Result, SpikeTrains, problem};
 
 /// From so near a target on the target's row and its slope row stand for silence, ms; an input so near before it is at it and
@@ -76,7 +76,7 @@ impl Margin {
 pub(crate) struct Taper {
     shape: Shape,
     /// The state at the target, which is 0 there and falls with `slope`.
-    end: State,
+    end: KernelSum,
     /// Where it reaches `height`, ms before the target.
     pub(crate) length: f64,
 }
@@ -84,9 +84,9 @@ pub(crate) struct Taper {
 impl Taper {
     fn new(shape: Shape, margin: Margin) -> Self {
         if margin.slope == 0.0 {
-            return Self { shape, end: State::default(), length: 0.0 };
+            return Self { shape, end: KernelSum::default(), length: 0.0 };
         }
-        let end = State { a: -margin.slope / shape.slope(State { a: 1.0, b: 0.0 }), b: 0.0 };
+        let end = KernelSum { a: -margin.slope / shape.slope(KernelSum { a: 1.0, b: 0.0 }), b: 0.0 };
         // The family lies above its tangent, so its height is reached within height/slope.
         let (mut low, mut high) = (0.0, margin.height / margin.slope);
         loop {
@@ -104,7 +104,7 @@ impl Taper {
     }
 
     /// The state `x` ms before the target; its potential is the margin there.
-    pub(crate) fn before(&self, x: f64) -> State {
+    pub(crate) fn before(&self, x: f64) -> KernelSum {
         self.shape.after(self.end, -x)
     }
 }
@@ -402,7 +402,7 @@ impl Statement {
     }
 
     /// Adds up, by train, what `part` sees at `t` of inputs before, the neuron having fired at `earlier` targets only.
-    fn sum(&self, inputs: &[(f64, u32)], t: f64, earlier: &[f64], part: impl Fn(State) -> f64, out: &mut [f64]) {
+    fn sum(&self, inputs: &[(f64, u32)], t: f64, earlier: &[f64], part: impl Fn(KernelSum) -> f64, out: &mut [f64]) {
         out.fill(0.0);
         let from = inputs.partition_point(|i| i.0 < t - self.shape.forgotten());
         let (mut at, mut one) = (f64::NAN, 0.0);

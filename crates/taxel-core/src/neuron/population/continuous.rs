@@ -3,7 +3,7 @@
 use super::lanes::{FADED, LANES, Lanes, SLACK, Weight};
 use crate::SpikeTrains;
 use crate::neuron::continuous::ContinuousStream;
-use crate::neuron::kernel::{State, Step};
+use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AT_EDGE, AfterSpike, Neuron};
 use crate::neuron::threshold::OutputSpike;
 use crate::vectors::wide;
@@ -19,7 +19,7 @@ pub(super) struct Script {
     inputs: Vec<u32>,
     all_hear: bool,
     /// The slope that a state of 1 gives, of `a` and of `b`, 1/ms.
-    slope: State,
+    slope: KernelSum,
     /// The base of the threshold, less the rounding of the bound, mV.
     floor: f64,
 }
@@ -71,7 +71,10 @@ impl Script {
             begin: ContinuousStream::new(neuron, threshold, trains.start),
             inputs: spikes.iter().map(|s| s.train).collect(),
             all_hear: neuron.after_spike == AfterSpike::Keep,
-            slope: State { a: shape.slope(State { a: 1.0, b: 0.0 }), b: shape.slope(State { a: 0.0, b: 1.0 }) },
+            slope: KernelSum {
+                a: shape.slope(KernelSum { a: 1.0, b: 0.0 }),
+                b: shape.slope(KernelSum { a: 0.0, b: 1.0 }),
+            },
             floor: neuron.theta_0 * threshold - SLACK * neuron.unit(),
             intervals,
         }
@@ -92,7 +95,7 @@ pub(super) fn run<W: Weight>(neuron: &Neuron, script: &Script, block: &[[W; LANE
         for lane in (0..LANES).filter(|&l| perhaps[l]) {
             let stream = &mut streams[lane];
             found.clear();
-            let state = State { a: before.0[lane], b: before.1[lane] };
+            let state = KernelSum { a: before.0[lane], b: before.1[lane] };
             let after =
                 stream.resume(state, interval.from, interval.until, at + 1 < script.intervals.len(), &mut found);
             if let Some(last) = found.last() {

@@ -3,7 +3,7 @@
 use super::lanes::{FADED, LANES, Lanes, SLACK, Weight};
 use crate::SpikeTrains;
 use crate::neuron::ROUNDING_MS;
-use crate::neuron::kernel::{State, Step};
+use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AfterSpike, Neuron};
 use crate::neuron::threshold::Threshold;
 use crate::vectors::wide;
@@ -33,7 +33,7 @@ struct Input {
     train: u32,
     t: f64,
     /// What a weight of 1 has become at the point.
-    one: State,
+    one: KernelSum,
 }
 
 impl Lanes {
