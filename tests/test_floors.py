@@ -93,3 +93,41 @@ def test_no_module_comes_back_to_itself_by_way_of_a_package() -> None:
         assert done, f"a circle of imports within {', '.join(sorted(above))}"
         for module in done:
             del above[module]
+
+
+#: Who reckons with thousands that are no us and ms, and why.
+THOUSANDS = {
+    "taxel.spikes": "the home of us and ms; NWB counts in seconds",
+    "taxel._convert": "ns of the host's clock",
+    "taxel.recording": "ns of the host's clock",
+    "taxel.cli.emulate": "seconds; ns of the host's clock",
+    "taxel.detect.exchange": "NIR counts in seconds and volts",
+    "taxel.demo": "seconds, kbit/s, seeds",
+    "taxel.information.answers": "bits a thousand events",
+    "taxel.information.wire_rate": "kbit/s",
+    "taxel.report.listening": "seconds",
+    "taxel.simulate.fem": "N/m, kPa",
+    "taxel.studies": "seconds, Hz, seeds, frames of whole ms",
+}
+
+
+def thousands(module: str) -> list[int]:
+    """Return the lines of a module that multiply or divide by a thousand."""
+    found = []
+    for node in ast.walk(MODULES[module]):
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult | ast.Div | ast.FloorDiv):
+            values = [side.value for side in (node.left, node.right) if isinstance(side, ast.Constant)]
+            found += [node.lineno for value in values if value in (1000, 1e-3)]
+    return found
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_us_and_ms_are_turned_into_each_other_in_one_place(module: str) -> None:
+    """`taxel.spikes.to_ms` and `to_us`: whoever reckons with other thousands says so above."""
+    known = any(f"{module}.".startswith(f"{name}.") for name in THOUSANDS)
+    assert known or not thousands(module), f"{module}, lines {thousands(module)}: take to_ms or to_us of taxel.spikes"
+
+
+def test_who_is_listed_for_thousands_has_some() -> None:
+    for name in THOUSANDS:
+        assert any(thousands(module) for module in MODULES if f"{module}.".startswith(f"{name}."))

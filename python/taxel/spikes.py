@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 from uuid import uuid4
 from warnings import catch_warnings, filterwarnings
 from zipfile import BadZipFile
@@ -25,7 +25,25 @@ from taxel._files import whole_file, write_whole
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["SpikeTrains"]
+__all__ = ["SpikeTrains", "to_ms", "to_us"]
+
+
+@overload
+def to_ms(us: float | np.integer[Any]) -> float: ...
+@overload
+def to_ms(us: NDArray[Any]) -> NDArray[np.float64]: ...
+def to_ms(us: Any) -> Any:
+    """Return times of the wire, us, as neurons count them, ms."""
+    return us / 1000.0
+
+
+@overload
+def to_us(ms: float) -> float: ...
+@overload
+def to_us(ms: NDArray[Any]) -> NDArray[np.float64]: ...
+def to_us(ms: Any) -> Any:
+    """Return times of neurons, ms, as the wire counts them, us; not rounded."""
+    return ms * 1000.0
 
 
 class SpikeTrains(Columns):

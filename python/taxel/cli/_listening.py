@@ -13,6 +13,7 @@ import numpy as np
 import typer
 
 from taxel._core import ProblemError
+from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -99,7 +100,7 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     if isinstance(source, Events):
         ends += [t for t, start in source.markers if start and t > first]
     if not ends or min(ends) - first < _LEAST_REST_US:
-        what = f"only {max(0, min(ends) - first) / 1e3:g} ms before its first label" if ends else "no label"
+        what = f"only {to_ms(max(0, min(ends) - first)):g} ms before its first label" if ends else "no label"
         raise ProblemError(
             f"{recording.path}: holds {what}, from which to take the taxels' rest; give --tare SECONDS or --tare FILE"
         )

@@ -12,6 +12,7 @@ import typer
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._listening import TARE_HELP, new_report, open_all, references, tare_of, told
+from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -143,7 +144,7 @@ def _print(found: Detections) -> None:
     width = max(5, *(len(label) for label in found.labels))
     typer.echo(f"{'label':<{width}}  {'t (ms)':>12}  {'known (ms)':>12}  {'slope (mV/ms)':>13}")
     for k in range(min(len(found), _ROWS)):
-        row = f"{found.t[k] / 1000:>12.3f}  {found.known[k] / 1000:>12.3f}  {found.slope[k]:>13.4g}"
+        row = f"{to_ms(found.t[k]):>12.3f}  {to_ms(found.known[k]):>12.3f}  {found.slope[k]:>13.4g}"
         typer.echo(f"{found.label[k]:<{width}}  {row}")
     if len(found) > _ROWS:
         typer.echo(f"... and {len(found) - _ROWS} more; --csv and --json give all")

@@ -20,6 +20,7 @@ from taxel.cli._board import HostOption, PortOption, PresetOption, counters_tabl
 from taxel.cli._listening import new_report
 from taxel.detect import Readout
 from taxel.live import Live, Said, Summary, delays
+from taxel.spikes import to_ms
 from taxel.tare import Tare
 
 __all__ = ["live"]
@@ -180,7 +181,7 @@ def _state(now: dict[str, object], shown: deque[Said]) -> Text:
     if now["taring"]:
         return Text("taking a tare: leave the sensor at rest")
     lines = [
-        f"{s.t / 1e6:10.4f} s  {s.label:<16} said {(s.said - s.known) / 1e3:.2f} ms after it was known" for s in shown
+        f"{s.t / 1e6:10.4f} s  {s.label:<16} said {to_ms(s.said - s.known):.2f} ms after it was known" for s in shown
     ]
     dropped = f"\n{now['events_dropped']} events dropped before the readout" if now["events_dropped"] else ""
     return Text("\n".join(lines) + dropped)

@@ -14,7 +14,7 @@ from taxel.detections import Detections
 from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.simulate import Act, Contact, play, truth
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_ms, to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
@@ -42,7 +42,7 @@ class Hearing:
     @property
     def start_us(self) -> int:
         """When the board marked the start."""
-        return int(self.area.start * 1000)
+        return int(to_us(self.area.start))
 
     @property
     def stop_us(self) -> float:
@@ -51,7 +51,7 @@ class Hearing:
 
     def crossings(self, label: str) -> NDArray[np.float64]:
         """Return when a neuron's potential crossed its threshold, ms."""
-        return self.found[label].t / 1000.0 + self.readout.neurons[label].delay_ms
+        return to_ms(self.found[label].t) + self.readout.neurons[label].delay_ms
 
     def potential(self, label: str, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return a neuron's potential at `times` (ms), mV."""
@@ -61,7 +61,7 @@ class Hearing:
     def first_input(self, contact: Contact, label: str) -> float | None:
         """Return the stamp (us) of the first spike that told of a touch, or of its end; None where none did."""
         begin, end = contact.start_us - FRAME_US, contact.stop_us + 5_000.0
-        rises, falls = self.area[0] * 1000.0, self.area[5] * 1000.0
+        rises, falls = to_us(self.area[0]), to_us(self.area[5])
         if label == "contact":
             told = rises[(rises >= begin) & (rises < contact.stop_us)]
             return float(told[0]) if len(told) else None
@@ -88,7 +88,7 @@ def listen(events: Events, acts: Sequence[Act], readout: Readout, found: Detecti
     # Before the start marker the board tells of every taxel's rest: nothing of it is meant.
     found = found[found.t >= start]
     area = ContactArea(tare=tare).encode(events)
-    area = area.between(start / 1000.0, area.stop)
+    area = area.between(to_ms(start), area.stop)
     contacts, force = truth(acts)
     plain = plain_rule(area, FRAME_US)
     return Hearing(

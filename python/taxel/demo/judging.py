@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taxel.detect import Spread, score
 from taxel.detections import Detections
 from taxel.simulate import Contact
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_ms, to_us
 
 __all__ = ["CLASSES", "GOALS", "LABELS", "Judged", "Row", "judge", "plain_rule"]
 
@@ -124,7 +124,7 @@ def judge(found: Detections, contacts: Sequence[Contact]) -> Judged:
         # Scored on whole us; errors are taken from the truth itself.
         result = score(mine, {label: np.rint(true).astype(np.int64)}, {label: windows})
         said, touch = result.pairs[:, 0], result.pairs[:, 1]
-        errors, delays = (mine.t[said] - true[touch]) / 1000.0, (mine.known[said] - true[touch]) / 1000.0
+        errors, delays = to_ms(mine.t[said] - true[touch]), to_ms(mine.known[said] - true[touch])
         for name, belongs in CLASSES:
             of_class = np.array([belongs(c) for c in contacts], bool)
             chosen = of_class[touch] if len(touch) else np.zeros(0, bool)
@@ -148,7 +148,7 @@ def plain_rule(area: SpikeTrains, frame_us: float) -> Detections:
     times = np.concatenate([area[0], area[5]])
     label = np.repeat(LABELS, [len(area[0]), len(area[5])])
     order = np.argsort(times, kind="stable")
-    t = np.rint(times[order] * 1000.0).astype(np.int64)
+    t = np.rint(to_us(times[order])).astype(np.int64)
     # A stamp is its frame's start, cut down to whole 100 us.
     frame = np.ceil(t / frame_us)
     return Detections(label[order], t, np.ceil((frame + 1) * frame_us).astype(np.int64))

@@ -16,6 +16,7 @@ from taxel.demo.judging import LABELS, Judged
 from taxel.events import Events
 from taxel.report.charts import INK
 from taxel.simulate import Contact
+from taxel.spikes import to_ms, to_us
 from taxel.wire import FRAME_US
 
 __all__ = ["close_up", "delay_split", "delays_by_class", "maps", "noise", "rates", "scene_picture"]
@@ -46,7 +47,7 @@ def scene_picture(hearing: Hearing, start_us: float, stop_us: float) -> Figure:
         for contact in shown:
             edges = contact.start_us * 1e-6, contact.stop_us * 1e-6
             axis.axvspan(*edges, color=_TRUE, alpha=0.3, linewidth=0, label="really touches" * (contact is shown[0]))
-    times = np.arange(start_us, stop_us, FRAME_US) / 1000.0
+    times = to_ms(np.arange(start_us, stop_us, FRAME_US))
     for axis, label in zip(axes[1:, 0], LABELS, strict=True):
         colour = _SAID[label]
         threshold = hearing.readout.neurons[label].neuron.theta_0 * hearing.readout.run_threshold
@@ -71,19 +72,19 @@ def close_up(hearing: Hearing, contact: Contact, reach_us: float = 5_000.0) -> F
         begin, end = at - reach_us, at + reach_us
         frames = np.arange(max(0, int(begin / FRAME_US)), min(len(hearing.force_n), int(end / FRAME_US) + 1))
         force, raster, area = axes[:, column]
-        force.plot((frames * FRAME_US - at) / 1000.0, hearing.force_n[frames], color=INK, linewidth=1.2)
+        force.plot(to_ms(frames * FRAME_US - at), hearing.force_n[frames], color=INK, linewidth=1.2)
         force.set(ylabel="force (N)", title=f"{label}, {contact.kind}, {contact.speed_m_s:.2f} m/s")
         near = hearing.events.between(begin, end)
         index = near.y.astype(int) * near.array.columns + near.x
         for on, colour in ((True, "#c44e52"), (False, "#4c72b0")):
             mine = near.p == on
             name = f"{'more' if on else 'less'} pressure ({int(mine.sum())})"
-            raster.plot((near.t[mine] - at) / 1000.0, index[mine], ".", color=colour, markersize=2.5, label=name)
+            raster.plot(to_ms(near.t[mine] - at), index[mine], ".", color=colour, markersize=2.5, label=name)
         raster.set(ylabel="taxel (row by row)")
-        spikes = hearing.area.between(begin / 1000.0, end / 1000.0)
+        spikes = hearing.area.between(to_ms(begin), to_ms(end))
         for train in range(len(spikes)):
             colour = _SAID["contact"] if train < 5 else _SAID["lift"]
-            ms = spikes[train] - at / 1000.0
+            ms = spikes[train] - to_ms(at)
             area.plot(ms, np.full(len(ms), train), "|", color=colour, markersize=9)
         names = [f"{sign} {n}" for sign in ("≥", "<") for n in (2, 4, 8, 16, 32)]
         area.set(yticks=range(10), yticklabels=names, ylim=(-0.7, 9.7), xlabel="from the true moment (ms)")
@@ -92,7 +93,7 @@ def close_up(hearing: Hearing, contact: Contact, reach_us: float = 5_000.0) -> F
             axis.axvline(0.0, color=_TRUE, linewidth=2.0, zorder=0, label="true moment")
             for k, known in enumerate(hearing.found[label].between(begin, end).known):
                 name = f"{label} known" * (k == 0)
-                axis.axvline((known - at) / 1000.0, color=_SAID[label], linewidth=1.0, label=name)
+                axis.axvline(to_ms(known - at), color=_SAID[label], linewidth=1.0, label=name)
             axis.legend()
     return figure
 
@@ -102,7 +103,7 @@ def maps(hearing: Hearing, contact: Contact) -> Figure:
     moments = (-0.4, 0.4, 1.0, 3.0, 8.0, 1e-3 * (contact.stop_us - contact.start_us) + 1.0)
     figure, axes = _figure(1, len(moments), (9.5, 1.9))
     rest = np.nan_to_num(hearing.tare.rest)
-    held = [_held(hearing.events, contact.start_us + 1000.0 * after, rest) for after in moments]
+    held = [_held(hearing.events, contact.start_us + to_us(after), rest) for after in moments]
     touched = hearing.events.between(contact.start_us, contact.start_us + 3_000.0)
     middle = [float(np.median(v)) if len(v) else 31.5 for v in (touched.y, touched.x)]
     top, left = (int(np.clip(m - _CROP / 2, 0, n - _CROP)) for m, n in zip(middle, rest.shape, strict=True))

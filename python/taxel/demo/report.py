@@ -22,6 +22,7 @@ from taxel.demo.judging import GOALS, LABELS, Judged, Row
 from taxel.live import delays
 from taxel.report.charts import STYLE, chart
 from taxel.report.page import render
+from taxel.spikes import to_ms, to_us
 from taxel.wire import FRAME_US
 
 __all__ = ["GUESSES", "Material", "figures", "write"]
@@ -198,12 +199,12 @@ def _split(hearing: Hearing) -> dict[str, dict[str, float]]:
                 continue
             true = contact.start_us if row.label == "contact" else contact.stop_us
             begin = np.ceil(stamp / FRAME_US) * FRAME_US
-            crossing = said.t[place] + 1000.0 * delay
+            crossing = said.t[place] + to_us(delay)
             known = float(said.known[place])
             host = float(said.said[place]) - known if said.said is not None else 0.0
             parts.append([begin - true, crossing - begin, known - crossing, host])
         if parts:
-            medians = np.median(np.array(parts), axis=0) / 1000.0
+            medians = to_ms(np.median(np.array(parts), axis=0))
             split[f"{row.label}, {row.name}"] = dict(
                 zip(("physics", "kernel", "frame", "host"), medians.tolist(), strict=True)
             )

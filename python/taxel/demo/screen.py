@@ -17,6 +17,7 @@ from rich.text import Text
 from taxel.demo.judging import LABELS
 from taxel.live import Said, delays
 from taxel.simulate import Contact
+from taxel.spikes import to_ms
 
 __all__ = ["Screen"]
 
@@ -94,8 +95,8 @@ class Screen:
         line = Text(f"{said.t * 1e-6:8.3f} s  ").append(f"{said.label:<8}", style=f"bold {colour}")
         if len(true):
             nearest = int(np.abs(true - said.t).argmin())
-            line.append(f"{self._kinds[nearest]:<7} known {(said.known - true[nearest]) / 1e3:+6.2f} ms, ")
-            line.append(f"said {(said.said - true[nearest]) / 1e3:+6.2f} ms after the truth", style="dim")
+            line.append(f"{self._kinds[nearest]:<7} known {to_ms(said.known - true[nearest]):+6.2f} ms, ")
+            line.append(f"said {to_ms(said.said - true[nearest]):+6.2f} ms after the truth", style="dim")
         return line
 
 

@@ -15,14 +15,14 @@ from taxel.encode import ContactArea
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
 from taxel.simulate import Contact, play, truth
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
 __all__ = ["train"]
 
 #: One frame, ms: the step of silent rows and of the neuron's grid.
-_FRAME_MS = FRAME_US / 1e3
+_FRAME_MS = to_ms(FRAME_US)
 
 #: How much later than the event each neuron is trained to fire, ms.
 _DELAY_MS = {"contact": 0.2, "lift": 0.5}
@@ -80,7 +80,7 @@ def _example(seed: int, scenes: int, *, left_to_rest: bool) -> _Example:
     start = events.markers[0][0]
     area = ContactArea(tare=Tare.take(events, stop_us=start)).encode(events)
     # What comes before the start marker is the tare's.
-    return _Example(area.between(start / 1000.0, area.stop), truth(acts)[0])
+    return _Example(area.between(to_ms(start), area.stop), truth(acts)[0])
 
 
 def _targets(example: _Example, label: str) -> NDArray[np.float64]:
@@ -88,7 +88,7 @@ def _targets(example: _Example, label: str) -> NDArray[np.float64]:
     rises = example.area[0]
     targets: list[float] = []
     for contact in example.contacts:
-        start, stop = contact.start_us / 1000.0, contact.stop_us / 1000.0
+        start, stop = to_ms(contact.start_us), to_ms(contact.stop_us)
         inputs = rises[(rises >= start - _FRAME_MS) & (rises < stop)]
         if not len(inputs):
             continue

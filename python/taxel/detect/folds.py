@@ -17,6 +17,7 @@ from taxel.detect.readout import run
 from taxel.detect.scoring import Score, score, score_together
 from taxel.detect.training import Checked, Example, Pattern, Recipe, checked, encoded, learn
 from taxel.detections import Detections
+from taxel.spikes import to_ms
 
 __all__ = ["Judged", "choose", "judge"]
 
@@ -31,7 +32,7 @@ class _Stretch(NamedTuple):
     def of(self, pattern: Pattern) -> Pattern:
         """Return what of the example's pattern lies in it."""
         trains, labels = pattern
-        start, stop = max(self.start / 1000.0, trains.start), min(self.stop / 1000.0, trains.stop)
+        start, stop = max(to_ms(self.start), trains.start), min(to_ms(self.stop), trains.stop)
         kept = {label: times[(times >= self.start) & (times < self.stop)] for label, times in labels.items()}
         return Pattern(trains.between(start, max(start, stop)), {label: t for label, t in kept.items() if len(t)})
 

@@ -15,6 +15,7 @@ from taxel import _core
 from taxel._arguments import column, floats, instance, numbers, shown
 from taxel._core import ProblemError
 from taxel.detections import Detections
+from taxel.spikes import to_us
 
 __all__ = ["Score", "Spread", "score", "score_together"]
 
@@ -258,5 +259,5 @@ def _windows(labels: Sequence[str], window_ms: Any) -> NDArray[np.int64]:
         raise ProblemError(
             f"window_ms is {np.atleast_1d(given)[np.atleast_1d(wrong)][0]}: must lie between 0 and 3600000"
         )
-    windows[:] = np.rint(given * 1000.0)
+    windows[:] = np.rint(to_us(given))
     return windows

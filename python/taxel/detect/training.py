@@ -23,7 +23,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 
 __all__ = ["Example", "Recipe", "train"]
@@ -276,7 +276,7 @@ def learn(patterns: Sequence[Pattern], recipe: Recipe, array: Array, told: Calla
         shift_ms = recipe.encoder.latency_ms + delay_ms
         targets = []
         for k, (trains, labels) in enumerate(patterns):
-            times = np.sort(labels.get(label, np.empty(0, np.int64))) / 1000.0
+            times = to_ms(np.sort(labels.get(label, np.empty(0, np.int64))))
             outside = times[(times < trains.start) | (times > trains.stop + SILENCE_MS)]
             if len(outside):
                 raise ProblemError(

@@ -23,6 +23,7 @@ from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
+from taxel.spikes import to_us
 
 __all__ = ["files", "trials"]
 
@@ -102,7 +103,7 @@ def _read(file: Path) -> Trial:
     for before, page in pairwise(pages):
         if page.number <= before.number:
             raise FormatError(f"{file.name}, line {page.line}: picture {page.number} after picture {before.number}")
-    t = np.rint((np.array([page.number for page in pages], np.float64) - 1) * period * 1000)
+    t = np.rint(to_us((np.array([page.number for page in pages], np.float64) - 1) * period))
     if t[-1] > TIME_US or (np.diff(t) <= 0).any():
         raise FormatError(f"{file.name}: {period:g} ms a picture; must be .001 ms or more, and end within 142 years")
     unpacked(file.name, 4 * len(pages) * shape[0] * shape[1])

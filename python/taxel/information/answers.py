@@ -31,6 +31,7 @@ from taxel.information.sampling import (
 from taxel.information.spiking import readout_responses
 from taxel.information.trials import LabelledTrial
 from taxel.information.wire_rate import WIRE, kilobits_per_second
+from taxel.spikes import to_ms, to_us
 
 __all__ = ["CLASSIFIERS", "Answer", "Control", "Point", "answer"]
 
@@ -335,9 +336,9 @@ class _Asked:
                 raise ProblemError(f"{endless.name}: has no end; give window_ms, or every trial its stop_us")
             reach = np.inf
         else:
-            reach = number("window_ms", self.window_ms) * 1000.0
+            reach = to_us(number("window_ms", self.window_ms))
             if not self.finest <= reach < 1e12:
-                raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be {self.finest / 1000:g} at least")
+                raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least")
         self.contact = contacts(self.trials, self.held, self.encoder, self.finest, reach)
         if np.isnan(self.contact).all():
             raise ProblemError(f"trials: no event in any of them by {self.encoder!r}; a lower floor may help")
@@ -348,7 +349,7 @@ class _Asked:
         if np.isfinite(reach) and (lengths < self.window_us).any():
             short = int((lengths < self.window_us).sum())
             self.notes.append(
-                f"{short} trials end before {self.window_us / 1000:g} ms: what comes late may tell their length"
+                f"{short} trials end before {to_ms(self.window_us):g} ms: what comes late may tell their length"
             )
 
     def set_out(
@@ -369,25 +370,25 @@ class _Asked:
             self.periods = checked_periods([*([self.finest] if self.finest >= least else []), *found], self.finest)
             self.periods = self.periods[:7]
         else:
-            given = [number("periods_ms", p) * 1000.0 for p in several("periods_ms", periods_ms)]
+            given = [to_us(number("periods_ms", p)) for p in several("periods_ms", periods_ms)]
             if any(not 0 < p <= window or abs(p - round(p)) > 1e-6 for p in given):
-                raise ProblemError(f"periods_ms is {shown(periods_ms)}: must be whole us, up to {window / 1000:g} ms")
+                raise ProblemError(f"periods_ms is {shown(periods_ms)}: must be whole us, up to {to_ms(window):g} ms")
             self.periods = checked_periods([round(p) for p in given], self.finest)
         if windows_ms is None:
             self.windows = [*[float(w) for w in _series(max(window / 40, self.finest), window * 0.99)], window]
         else:
-            wanted = sorted(number("windows_ms", w) * 1000.0 for w in several("windows_ms", windows_ms))
+            wanted = sorted(to_us(number("windows_ms", w)) for w in several("windows_ms", windows_ms))
             if any(not self.finest <= w <= window for w in wanted):
                 raise ProblemError(
-                    f"windows_ms is {shown(windows_ms)}: must lie in {self.finest / 1000:g} to {window / 1000:g} ms"
+                    f"windows_ms is {shown(windows_ms)}: must lie in {to_ms(self.finest):g} to {to_ms(window):g} ms"
                 )
             self.windows = sorted({*wanted, window})
         self.taxels_at = self.periods[0]
         if taxels_at_ms is not None:
-            at = number("taxels_at_ms", taxels_at_ms) * 1000.0
+            at = to_us(number("taxels_at_ms", taxels_at_ms))
             self.taxels_at = next((p for p in self.periods if p == at), 0)
             if not self.taxels_at:
-                listed = ", ".join(f"{p / 1000:g}" for p in self.periods)
+                listed = ", ".join(f"{to_ms(p):g}" for p in self.periods)
                 raise ProblemError(f"taxels_at_ms is {shown(taxels_at_ms)}: must be one of the periods {listed} ms")
         self.active = np.unique(self.spikes(self.taxels_at, 0).taxel)
         there = len(self.active)
@@ -433,8 +434,8 @@ class _Asked:
 
     def grams(self, spikes: Spikes, windows: Sequence[float]) -> list[list[NDArray[np.float64]]]:
         """Return by window the matrices of all smoothings that a period can tell apart."""
-        taus = [share * self.window_us / 1000.0 for share in SMOOTHINGS]
-        taus = [tau for tau in taus if tau == 0 or tau * 1000.0 > spikes.period_us / 2]
+        taus = [to_ms(share * self.window_us) for share in SMOOTHINGS]
+        taus = [tau for tau in taus if tau == 0 or to_us(tau) > spikes.period_us / 2]
         return [list(one) for one in zip(*(event_grams(spikes, windows, tau) for tau in taus), strict=True)]
 
     def answer(self, classifiers: list[str], shuffles: int) -> Answer:
@@ -448,7 +449,7 @@ class _Asked:
         missing: set[str] = set()
         for period in self.periods:
             for draw in range(self.draws):
-                self.tell(f"{period / 1000:g} ms, draw {draw + 1}")
+                self.tell(f"{to_ms(period):g} ms, draw {draw + 1}")
                 spikes = self.spikes(period, draw)
                 for window, grams in zip(self.windows, self.grams(spikes, self.windows), strict=True):
                     sizes = [features(spikes, window)] * len(grams)
@@ -459,9 +460,9 @@ class _Asked:
                     if reference is None and window == self.windows[-1]:
                         reference = spikes, grams, sizes, found
                 for name, column in self.columns.items():
-                    self.tell(f"{period / 1000:g} ms, {name}")
+                    self.tell(f"{to_ms(period):g} ms, {name}")
                     by_column.setdefault((name, period), []).append(self.nested(grams, sizes, column, draw).responses)
-                self.tell(f"{period / 1000:g} ms, pictures")
+                self.tell(f"{to_ms(period):g} ms, pictures")
                 picture = self._pictures(spikes)
                 if picture is not None:
                     frames.setdefault(period, []).append(self.nested(*picture, draw=draw).responses)
@@ -474,7 +475,7 @@ class _Asked:
             if period != self.periods[0]:
                 verdict = keeps(one, estimates[self.periods[0], window], groups=self.groups)
             points.append(_point(period, window, everything, "all", one, about[period, window], verdict))
-        full = next(p for p in points if p.verdict is None and p.window_ms == self.windows[-1] / 1000.0)
+        full = next(p for p in points if p.verdict is None and p.window_ms == to_ms(self.windows[-1]))
         spikes, grams, sizes, first = reference
         self.tell("labels shuffled", 0)
         zero = zero_test(
@@ -493,7 +494,7 @@ class _Asked:
             full=full,
             points=tuple(points),
             taxels=self._by_taxels(full, values),
-            frames={period / 1000.0: self.estimate(responses) for period, responses in frames.items()},
+            frames={to_ms(period): self.estimate(responses) for period, responses in frames.items()},
             controls=self._controls(),
             zero=zero,
             training=self._training(grams, sizes, first),
@@ -547,9 +548,9 @@ class _Asked:
         count = spikes.counts(window).astype(np.float64)
         found = [self._before()]
         last = np.zeros(len(self.trials))
-        np.maximum.at(last, spikes.trial, (spikes.first_us[spikes.trial] + spikes.bin * float(finest)) / 1000.0)
+        np.maximum.at(last, spikes.trial, to_ms(spikes.first_us[spikes.trial] + spikes.bin * float(finest)))
         if self.ended:
-            length = spikes.length_us / 1000.0
+            length = to_ms(spikes.length_us)
             found.append(Control("length", self._scalar(length), "from contact to the trial's end"))
         else:
             found.append(Control("length", self._scalar(last), "from contact to the last event in the window"))
@@ -607,7 +608,7 @@ class _Asked:
         grams = self.grams(spikes, [length])[0]
         found = self.estimate(self.nested(grams, [features(spikes, length)] * len(grams)).responses)
         without = int((room < length).sum())
-        about = f"{length / 1000:g} ms before it" + (
+        about = f"{to_ms(length):g} ms before it" + (
             f", {without} trials have less and count as silent" if without else ""
         )
         return Control("before contact", found, about)
@@ -681,9 +682,7 @@ def _point(
     period: int, window: float, taxels: int, kind: str, found: Estimate, about: list[Any], verdict: Verdict | None
 ) -> Point:
     events, silent, kbps = np.mean(about, axis=0)
-    return Point(
-        period / 1000.0, window / 1000.0, taxels, kind, found, float(events), float(silent), float(kbps), verdict
-    )
+    return Point(to_ms(period), to_ms(window), taxels, kind, found, float(events), float(silent), float(kbps), verdict)
 
 
 def _series(least: float, most: float) -> list[int]:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel.information.sampling import Spikes
+from taxel.spikes import to_ms
 
 __all__ = ["event_grams", "features", "frame_grams"]
 
@@ -36,7 +37,7 @@ def event_grams(spikes: Spikes, windows_us: Sequence[float], tau_ms: float) -> l
     """
     ends = _ends(spikes, windows_us)
     last = max((int(end.max()) for end in ends), default=0)
-    decay = np.float32(np.exp(-spikes.period_us / 1000.0 / tau_ms)) if tau_ms > 0 else np.float32(0)
+    decay = np.float32(np.exp(to_ms(-spikes.period_us) / tau_ms)) if tau_ms > 0 else np.float32(0)
     active, taxel = np.unique(spikes.taxel, return_inverse=True)
     state = np.zeros((spikes.trials, len(active)), np.float32)
     begins = np.searchsorted(spikes.bin, np.arange(last + 1))

@@ -16,6 +16,7 @@ from taxel.encode import FA1, ChangeEvents, Encoder
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.information.trials import LabelledTrial
+from taxel.spikes import to_ms, to_us
 
 __all__ = ["HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "pictures_of", "spikes_of"]
 
@@ -304,14 +305,14 @@ def _encoded(
     frames = Frames(values[:, None, :], grid, unit="held", array=Array(1, values.shape[1]))
     trains = _at_period(encoder, period_us).encode(frames)
     taxel = np.repeat(np.arange(len(trains)), trains.counts)
-    bins = np.searchsorted(grid, np.rint(trains.times * 1000.0).astype(np.int64))
+    bins = np.searchsorted(grid, np.rint(to_us(trains.times)).astype(np.int64))
     value = np.ones(len(bins), np.float32) if trains.values is None else trains.values
     return bins, taxel, value
 
 
 def _at_period(encoder: Encoder, period_us: int) -> Encoder:
     if isinstance(encoder, FA1):
-        return FA1(**{**encoder.get_params(), "period_ms": period_us / 1000.0})
+        return FA1(**{**encoder.get_params(), "period_ms": to_ms(period_us)})
     return instance("encoder", encoder, ChangeEvents)
 
 
@@ -346,6 +347,6 @@ def checked_periods(periods_us: Sequence[int], finest: int) -> list[int]:
         raise ProblemError("periods is []: must name one at least")
     if found[0] < finest:
         raise ProblemError(
-            f"period {found[0] / 1000:g} ms is finer than the recordings, which show {finest / 1000:g} ms at best"
+            f"period {to_ms(found[0]):g} ms is finer than the recordings, which show {to_ms(finest):g} ms at best"
         )
     return found

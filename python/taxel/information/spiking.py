@@ -14,7 +14,7 @@ from taxel.information._estimator import Classifier, labelled
 from taxel.information.sampling import Spikes
 from taxel.learn import ConeR, Tempotron
 from taxel.neuron import Neuron
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_ms
 
 __all__ = ["ConeRReadout", "TempotronReadout", "patterns_of", "readout_responses"]
 
@@ -192,14 +192,14 @@ def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
     kept = np.flatnonzero(spikes.bin < spikes.bins_to(window_us)[spikes.trial])
     sign = (spikes.value[kept] < 0).astype(np.int64)
     active, train = np.unique(2 * spikes.taxel[kept] + sign, return_inverse=True)
-    trial, times = spikes.trial[kept], spikes.bin[kept] * (spikes.period_us / 1000.0)
+    trial, times = spikes.trial[kept], spikes.bin[kept] * (to_ms(spikes.period_us))
     order = np.lexsort((times, train, trial))
     key = trial[order] * len(active) + train[order]
     offsets = np.searchsorted(key, np.arange(spikes.trials * len(active) + 1))
     times, found = times[order], []
     for k in range(spikes.trials):
         own = offsets[k * len(active) : (k + 1) * len(active) + 1]
-        found.append(SpikeTrains(times[own[0] : own[-1]], own - own[0], 0.0, window_us / 1000.0))
+        found.append(SpikeTrains(times[own[0] : own[-1]], own - own[0], 0.0, to_ms(window_us)))
     return found
 
 
@@ -224,7 +224,7 @@ def readout_responses(
     patterns = patterns_of(spikes, window_us)
     found = np.empty_like(labels)
     # Far shorter, and at the window's end nothing would be left of its beginning.
-    tau = max(1.0, window_us / 1000.0 / 3)
+    tau = max(1.0, to_ms(window_us) / 3)
     for fold in np.unique(folds):
         train, test = np.flatnonzero(folds != fold), np.flatnonzero(folds == fold)
         model: Any = ConeRReadout(tau=tau) if name == "cone_r" else TempotronReadout(tau=tau)

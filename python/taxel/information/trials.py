@@ -18,6 +18,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording import Recording
+from taxel.spikes import to_ms, to_us
 
 __all__ = ["LabelledTrial", "read_trials", "recordings_as_trials"]
 
@@ -131,7 +132,7 @@ def read_trials(
             raise FormatError(f"{where}: label is empty")
         more = {name: cell for name, cell in row.items() if name not in _KNOWN}
         found.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
-        end = start + round((window_ms or 0.0) * 1000.0) if stop is None else stop
+        end = start + round(to_us(window_ms or 0.0)) if stop is None else stop
         # Silence before the first event is not recorded, and a touch may be waited for in it.
         if not len(source) or start > source.t.max() or end < source.t.min():
             there = f"{source.t.min()} to {source.t.max()} us" if len(source) else "nothing"
@@ -140,7 +141,7 @@ def read_trials(
         nameless = next(trial for trial in found if not trial.group)
         raise ProblemError(f"{nameless.name}: group is empty; give every trial one, or none")
     if window_ms is not None:
-        _apart(found, round(window_ms * 1000.0))
+        _apart(found, round(to_us(window_ms)))
     return found
 
 
@@ -179,10 +180,10 @@ def _apart(trials: list[LabelledTrial], window_us: int) -> None:
         mine = sorted((trial for trial in trials if id(trial.source) == source), key=lambda trial: trial.start_us)
         for trial, after in pairwise(mine):
             if trial.stop_us is None and after.start_us < trial.start_us + window_us:
-                apart = (after.start_us - trial.start_us) / 1000.0
+                apart = to_ms(after.start_us - trial.start_us)
                 raise ProblemError(
                     f"{after.name}: begins {apart:g} ms after {trial.name.split(', ')[-1]}, inside its window of "
-                    f"{window_us / 1000.0:g} ms; give stop_us, or a shorter --window-ms"
+                    f"{to_ms(window_us):g} ms; give stop_us, or a shorter --window-ms"
                 )
 
 

@@ -13,7 +13,7 @@ from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.spikes import SpikeTrains
+from taxel.spikes import SpikeTrains, to_ms
 
 __all__ = ["detections", "event_picture", "pressure_map", "raster"]
 
@@ -60,7 +60,7 @@ def pressure_map(frames: Frames, at: int | None = None, ax: Axes | None = None) 
     values = np.where(exists, frames.values[k], np.nan)
     image = ax.imshow(values, origin="upper", cmap="magma", interpolation="nearest")
     ax.figure.colorbar(image, ax=ax, label=frames.unit)
-    ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{frames.t[k] / 1000:.3f} ms")
+    ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{to_ms(frames.t[k]):.3f} ms")
     return ax
 
 
@@ -81,7 +81,7 @@ def event_picture(events: Events, ax: Axes | None = None) -> Axes:
         scale = ScalarMappable(Normalize(0, most), shades)
         ax.figure.colorbar(scale, ax=ax, label=name, fraction=0.05)
     ax.imshow(picture, origin="upper", interpolation="nearest")
-    ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{len(events)} events, {events.duration_us / 1000:.1f} ms")
+    ax.set(xlabel="x (column)", ylabel="y (row)", title=f"{len(events)} events, {to_ms(events.duration_us):.1f} ms")
     return ax
 
 

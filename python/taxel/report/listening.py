@@ -25,6 +25,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.report.charts import INK, STYLE, chart
 from taxel.report.page import render
+from taxel.spikes import to_ms, to_us
 from taxel.tare import Tare
 
 if TYPE_CHECKING:
@@ -139,7 +140,7 @@ def _moments(listened: list[Listened], label: str) -> list[_Moment]:
             moments += [_Moment(k, label, float(t), "said", 0.0) for t in one.found[label].t]
             continue
         own, said = one.score[label], one.found.t
-        happened = said[own.pairs[:, 0]] - np.rint(1000 * own.errors_ms).astype(np.int64)
+        happened = said[own.pairs[:, 0]] - np.rint(to_us(own.errors_ms)).astype(np.int64)
         true = np.asarray(one.truth.get(label, ()), np.int64)
         moments += [_Moment(k, label, float(t), "missed", np.inf) for t in np.setdiff1d(true, happened)]
         moments += [_Moment(k, label, float(t), "false", np.inf) for t in said[own.false_detections]]
@@ -162,8 +163,8 @@ def _potential(readout: Readout, listened: list[Listened], label: str, moments: 
     for axis, moment in zip(axes[0], moments, strict=True):
         heard = listened[moment.recording]
         trains = _trains(readout, heard)
-        found = heard.found[label].t / 1000.0
-        at = moment.t / 1000.0
+        found = to_ms(heard.found[label].t)
+        at = to_ms(moment.t)
         times = np.linspace(at - reach, at + reach, 600)
         crossings = found + readout.encoder.latency_ms + one.delay_ms
         potential = one.neuron.potential(one.weights, trains, times, spikes=crossings)
@@ -172,7 +173,7 @@ def _potential(readout: Readout, listened: list[Listened], label: str, moments: 
         axis.axhline(threshold, color="#999999", linewidth=0.8, linestyle=":", label="threshold at rest")
         for k, t in enumerate(found[np.abs(found - at) < reach]):
             axis.axvline(t - at, color=_SAID, linewidth=1.2, label="said" * (k == 0))
-        true = np.asarray((heard.truth or {}).get(label, ()), np.float64) / 1000.0
+        true = to_ms(np.asarray((heard.truth or {}).get(label, ()), np.float64))
         for k, t in enumerate(true[np.abs(true - at) < reach]):
             axis.axvline(t - at, color=_TRUE, linewidth=1.2, linestyle="--", label="true" * (k == 0))
         axis.set_title(f"{moment.what}, {at / 1000.0:.3f} s", fontsize=9)

@@ -16,6 +16,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence
+from taxel.spikes import to_ms
 
 __all__ = ["EmulatorReport", "Played", "emulate", "play", "truth"]
 
@@ -72,7 +73,7 @@ class EmulatorReport:
     @property
     def verdict(self) -> str:
         """One line: whether the rate was held, or by how much not, and how late frames were."""
-        late = ", ".join(f"{self.late_us[q] / 1000.0:.2f} ms ({said})" for q, said in _QUANTILES.items())
+        late = ", ".join(f"{to_ms(self.late_us[q]):.2f} ms ({said})" for q, said in _QUANTILES.items())
         late = f"late by {late}; {self.late_frames} of {self.frames} by a frame or more"
         if self.held:
             whole = "held" if self.late_frames <= 0.01 * self.frames else "held on the whole, but not frame by frame"

@@ -28,6 +28,7 @@ from taxel.frames import Frames
 from taxel.labels import Labels
 from taxel.recording import open_recording
 from taxel.simulate import Act, Contact, Scene, Silence, play, truth
+from taxel.spikes import to_ms, to_us
 from taxel.studies.runner import Task
 from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table
 from taxel.tare import Tare
@@ -155,7 +156,7 @@ def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Trial], 
         if first is None:
             right["silent"] += 1
         else:
-            right["said_ms"].append((first.known - contact_us) / 1000)
+            right["said_ms"].append(to_ms(first.known - contact_us))
         good = first is not None and first.label == KINDS[trial.kind]
         right["neuron"].append([good and right["said_ms"][-1] <= t for t in times])
     truths = [np.array([trial.kind for trial in which]) for which in (train, test)]
@@ -181,7 +182,7 @@ def _kinds(params: dict[str, Any], readout: detect.Readout, train: list[Trial], 
 def _since_contact(trial: Trial, times: Sequence[float]) -> list[Frames]:
     """Return the picture above rest at times (ms) since the touch really began."""
     contact = trial.contacts[0].start_us
-    at = [round(contact + 1000 * t) for t in times]
+    at = [round(contact + to_us(t)) for t in times]
     return [trial.frames(1, t, t + 1) for t in at]
 
 
@@ -275,7 +276,7 @@ def _tally(found: list[Detections], trials: list[Trial], window_ms: float) -> di
 def _by_area(trial: Trial, level: int) -> Detections:
     """Say contact where so many taxels are loaded, and lift where fewer are."""
     spikes = ContactArea(levels=[level], tare=trial.tare).encode(trial.events)
-    times = [np.rint(1000 * train).astype(np.int64) for train in spikes]
+    times = [np.rint(to_us(train)).astype(np.int64) for train in spikes]
     return _said(times[0]) + _said(times[1], "lift")
 
 

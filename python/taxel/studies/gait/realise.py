@@ -15,6 +15,7 @@ from taxel.detect import score
 from taxel.detect.training import learner_from
 from taxel.detections import Detections
 from taxel.learn import SKIM, ConeR
+from taxel.spikes import to_us
 from taxel.studies.gait import insole, protocols, rules
 from taxel.studies.gait.folds import Scope
 from taxel.studies.gait.pieces import Piece, joined
@@ -199,9 +200,9 @@ def _scored(spikes: NDArray[np.float64], piece: Piece, event: str, later: float)
     """Score the spikes of one row: `later` is the encoder's latency and the trained delay together."""
     t = spikes - later
     inside = (t >= piece.scored[0]) & (t <= piece.scored[1])
-    micros = (np.rint(x[inside] * 1000).astype(np.int64) for x in (t, spikes))
+    micros = (np.rint(to_us(x[inside])).astype(np.int64) for x in (t, spikes))
     truth = piece.truth[event]
-    truth = np.rint(truth[(truth >= piece.scored[0]) & (truth <= piece.scored[1])] * 1000).astype(np.int64)
+    truth = np.rint(to_us(truth[(truth >= piece.scored[0]) & (truth <= piece.scored[1])])).astype(np.int64)
     result = score(Detections([event] * int(inside.sum()), *micros), {event: truth}, WINDOW_MS)
     return {
         "person": piece.person,

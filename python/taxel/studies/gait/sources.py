@@ -20,6 +20,7 @@ from taxel.array import Array
 from taxel.encode import Encoder
 from taxel.formats import Trial, plate
 from taxel.frames import Frames
+from taxel.spikes import to_ms
 from taxel.studies.gait import insole
 from taxel.studies.gait.pieces import Piece
 from taxel.studies.study import refuse
@@ -242,7 +243,7 @@ def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piec
     for trial in readings(folder, name).trials:
         if not any(len(times) for times in trial.truth.values()):
             continue
-        start, stop = (float(t) / 1000 for t in (trial.frames.t[0], trial.frames.t[-1]))
+        start, stop = (to_ms(float(t)) for t in (trial.frames.t[0], trial.frames.t[-1]))
         spikes = encoder.encode(trial.frames).split_by_sign()
         spikes = _moved(spikes, -start, stop - start)
         assert trial.scored is not None
@@ -253,9 +254,9 @@ def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piec
                 person=trial.person,
                 group=trial.group,
                 spikes=spikes,
-                truth={e: times / 1000 - start for e, times in trial.truth.items()},
-                scored=(trial.scored[0] / 1000 - start, trial.scored[1] / 1000 - start),
-                sums={name: (trial.frames.t / 1000 - start, column) for name, column in trial.series.items()},
+                truth={e: to_ms(times) - start for e, times in trial.truth.items()},
+                scored=(to_ms(trial.scored[0]) - start, to_ms(trial.scored[1]) - start),
+                sums={name: (to_ms(trial.frames.t) - start, column) for name, column in trial.series.items()},
             )
         )
     return found
@@ -301,7 +302,7 @@ def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
                 spikes=_moved(part, -start, stop - start),
                 truth={e: times + at - start for e, times in cuts[k].truth.items()},
                 scored=(0.0, stop - start),
-                sums={"total": (t[rows] / 1000 - start, total[rows]), "heel": (t[rows] / 1000 - start, heel[rows])},
+                sums={"total": (to_ms(t[rows]) - start, total[rows]), "heel": (to_ms(t[rows]) - start, heel[rows])},
             )
         )
     return found
@@ -328,7 +329,7 @@ def cuts(folder: Path, name: str, placed: str) -> tuple[Cut, ...]:
             prints[n] for n, other in enumerate(feet) if n != k and (other.person == trial.person) == (placed == "own")
         ]
         frames = insole.cut(trial, prints[k].origin_mm, insole.placement(others))
-        truth = {e: times / 1000 for e, times in trial.truth.items()}
+        truth = {e: to_ms(times) for e, times in trial.truth.items()}
         found.append(Cut(trial.name, trial.person, frames.values[:, 0, :], truth))
     return tuple(found)
 
