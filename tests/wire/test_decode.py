@@ -253,7 +253,7 @@ def test_a_column_made_short_or_scattered_is_refused():
         wire.Decoder().push_into(columns, b"")
     columns = wire.Columns(10)
     columns.y = columns.y[:1]
-    with pytest.raises(taxel.ProblemError, match="columns have room for 1 rows"):
+    with pytest.raises(taxel.ProblemError, match="columns to fill must be equally long"):
         wire.Decoder().push_into(columns, bytes(10))
 
 
