@@ -114,7 +114,7 @@ def test_a_course_without_equilibrium_is_said(tmp_path):
     """And no statement of Table 5.1 holds then."""
     p = contact.STUDY.set("toy")
     one = {**p["drawn"], "fault": "stopped at 0.3 mm: no equilibrium", "asymmetry": 0.3, "unbalanced": 0.0}
-    one |= {"seconds": 1.0, "cuts": 9}
+    one |= {"factorisations": 40, "cuts": 9}
     drawn = {"times": [[1.0]], "least_change": 1.2}
     told = contact.statements(p, {"paths": [one], "conditions": 2, "sampled": drawn})[0]
     assert told.holds is False
