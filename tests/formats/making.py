@@ -67,8 +67,8 @@ def pack_212(values: np.ndarray) -> bytes:
     return np.stack([a & 255, (a >> 8) | ((b >> 8) << 4), b & 255], axis=1).astype(np.uint8).tobytes()
 
 
-def write_gaitndd(folder: Path, name: str = "control99") -> Path:
-    left = np.where(np.arange(3000) % 300 < 180, 500, -1900)
+def write_gaitndd(folder: Path, name: str = "control99", samples: int = 3000) -> Path:
+    left = np.where(np.arange(samples) % 300 < 180, 500, -1900)
     right = left.copy()
     right[0] = -2048
 
@@ -78,7 +78,7 @@ def write_gaitndd(folder: Path, name: str = "control99") -> Path:
     (folder / f"{name}.let").write_bytes(pack_212(left))
     (folder / f"{name}.rit").write_bytes(pack_212(right))
     (folder / f"{name}.hea").write_text(
-        f"{name} 2 300 3000\r\n"
+        f"{name} 2 300 {samples}\r\n"
         f"{name}.let 212 3000 12 0 {left[0]} {int16(left)} 0 left-foot\r\n"
         f"{name}.rit 212 3000 12 0 -32768 {int16(right)} 0 right-foot\r\n"
     )

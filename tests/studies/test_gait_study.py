@@ -13,7 +13,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from tests.formats.making import interpolated
+from tests.formats.making import interpolated, write_gaitndd
 
 from taxel import FormatError, ProblemError
 from taxel.cli import main
@@ -329,3 +329,20 @@ def test_a_folder_in_which_nothing_can_be_read_is_refused(damaged, tmp_path):
     (damaged / "insole_gaitpdb" / "GaPt99_01.txt").write_text("no numbers\n")
     with pytest.raises(FormatError, match=r"GaPt99_01\.txt"):
         load("fig6.15").run(tmp_path / "report", size="toy", data=damaged, quiet=True)
+
+
+def test_a_recording_shorter_than_the_running_range_is_left_out_and_said(tmp_path):
+    folder = tmp_path / "insole_gaitndd"
+    folder.mkdir()
+    for name in ("control1", "control2", "park1", "park2"):
+        write_gaitndd(folder, name, samples=3900)
+    write_gaitndd(folder, "park3", samples=2700)
+    section = study(tmp_path, tmp_path / "report")
+    why = "lasts 8.99667 s, and levels in shares of the running range want 10 s"
+    assert section["unread"] == {"insole_gaitndd/park3.hea": why}
+    assert [one["source"] for one in section["said"]["sources"]] == ["gaitndd"]
+    alone = tmp_path / "alone"
+    (alone / "insole_gaitndd").mkdir(parents=True)
+    write_gaitndd(alone / "insole_gaitndd", "park3", samples=2700)
+    with pytest.raises(FormatError, match=f"^insole_gaitndd/park3.hea: {why}$"):
+        study(alone, tmp_path / "other")

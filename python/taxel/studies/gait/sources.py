@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from taxel import _arguments as arguments
 from taxel import formats
 from taxel._core import FormatError
+from taxel._parameters import defaults
 from taxel.array import Array
 from taxel.encode import Encoder
 from taxel.formats import Trial, plate
@@ -23,6 +24,7 @@ from taxel.frames import Frames
 from taxel.spikes import to_ms
 from taxel.studies.gait import insole
 from taxel.studies.gait.pieces import Piece
+from taxel.studies.gait.recipes import RULE_ENCODERS
 from taxel.studies.study import refuse
 
 __all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "readable", "readings", "unread"]
@@ -150,8 +152,8 @@ class Readings:
 
 @lru_cache(maxsize=8)
 def readings(folder: Path, name: str) -> Readings:
-    """Read all of a source's files, once; one that cannot be read is left out, and the others are read."""
-    kind = formats.FORMATS[name]
+    """Read all of a source's files, once; what cannot be read, or is too short to be encoded, is left out."""
+    kind, least_s = formats.FORMATS[name], _least_s(name)
     trials: list[Trial] = []
     read, unread = [], {}
     for file in kind.files(folder):
@@ -161,9 +163,27 @@ def readings(folder: Path, name: str) -> Readings:
             why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
             unread[f"{folder.name}/{file.name}"] = why.removeprefix(f"{file.name}: ").removeprefix(f"{file.name}, ")
         else:
-            trials += map(_boxed, found) if name == "plate" else found
-            read.append(file)
+            long = [trial for trial in found if _lasts_s(trial) >= least_s]
+            short = [trial for trial in found if _lasts_s(trial) < least_s]
+            for trial in short if long else short[:1]:
+                which = trial.name if long else file.name
+                unread[f"{folder.name}/{which}"] = (
+                    f"lasts {_lasts_s(trial):g} s, and levels in shares of the running range want {least_s:g} s"
+                )
+            trials += map(_boxed, long) if name == "plate" else long
+            if long:
+                read.append(file)
     return Readings(tuple(trials), tuple(read), unread)
+
+
+def _lasts_s(trial: Trial) -> float:
+    return (int(trial.frames.t[-1]) - int(trial.frames.t[0])) / 1e6
+
+
+def _least_s(name: str) -> float:
+    """Return how long a source's recordings must last at least: until its encoders' running ranges are full, s."""
+    ranges = [encoder["running_range"] for encoder in RULE_ENCODERS[name].values() if "running_range" in encoder]
+    return max((one.get("window_s", defaults("running_range").window_s) for one in ranges), default=0.0)
 
 
 def readable(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
