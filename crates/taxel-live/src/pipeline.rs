@@ -7,6 +7,7 @@
 mod ahead;
 mod counters;
 mod decode;
+mod handle;
 mod handover;
 mod options;
 mod read;
@@ -14,6 +15,7 @@ mod recorder;
 mod rest;
 mod said;
 mod shared;
+mod tap;
 
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,12 +31,14 @@ use taxel_core::{Marker, Stop};
 use crate::capture::Receiver;
 use crate::{Error, Result};
 pub use counters::{Counters, Summary};
+pub use handle::Handle;
 use handover::Handover;
 pub use options::{LiveOptions, Record};
 pub use read::Ear;
 use recorder::Recorder;
 pub use said::{Lines, Said, Sink};
-use shared::{Shared, Shown};
+use shared::{Shared, Shown, lock};
+pub use tap::{Change, Outlet, Piece, UNKNOWN};
 
 /// How long a wait lasts before it is asked whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -47,7 +51,6 @@ pub struct Live {
     shared: Arc<Shared>,
     said: channel::Receiver<Said>,
     threads: Vec<JoinHandle<()>>,
-    begun: Instant,
 }
 
 impl Live {
@@ -81,14 +84,22 @@ impl Live {
             receiver,
             handover: Handover::new(&options.array, options.readout_events),
             shown: Mutex::new(shown),
-            recorder,
+            recorder: Mutex::new(recorder),
+            broken: Mutex::default(),
+            wishes: Mutex::default(),
+            wished: AtomicBool::new(false),
+            records: AtomicBool::new(false),
+            listeners: Mutex::default(),
+            registers: Mutex::new(options.registers),
+            options: options.clone(),
+            begun: Instant::now(),
             ended: AtomicBool::new(false),
         });
         let (say, said) = channel::bounded(SAID_WAITING);
         let decoder = Decoder::new(options.array.clone()).differences(options.differences);
         let sender = wire::Receiver::new(decoder, 1);
         let listens = !matches!(ear, Ear::Deaf);
-        let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![], begun: Instant::now() };
+        let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![] };
         let theirs = Arc::clone(&shared);
         let decode_options = options.clone();
         live.spawn("taxel-decode", move || decode::run(&theirs, sender, &decode_options, listens))?;
@@ -109,6 +120,12 @@ impl Live {
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()
+    }
+
+    /// What others may do with it.
+    #[must_use]
+    pub fn handle(&self) -> Handle {
+        Handle { shared: Arc::clone(&self.shared) }
     }
 
     /// The next detection; `None` after `timeout` without one, or at once when all is over.
@@ -162,14 +179,7 @@ impl Live {
     /// What came and what became of it up to now.
     #[must_use]
     pub fn counters(&self) -> Counters {
-        let shown = self.shared.shown();
-        Counters {
-            capture: self.shared.receiver.counts(),
-            decode_latency: shown.decode_latency.quantiles(),
-            said_latency: shown.said_latency.quantiles(),
-            seconds: self.begun.elapsed().as_secs_f64(),
-            ..shown.counters.clone()
-        }
+        self.shared.counters()
     }
 
     /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 until a taxel was heard of.
@@ -196,11 +206,7 @@ impl Live {
     ///
     /// `Core(Problem)` where nothing is recorded that can hold notes, `File` where the disk is full.
     pub fn note(&self, text: &str) -> Result<()> {
-        let Some(recorder) = &self.shared.recorder else {
-            return Err(taxel_core::problem!("a note is kept in a recording: record to a .mcap file").into());
-        };
-        let board_us = self.shared.shown().counters.board_us;
-        recorder.note(board_us, text)
+        self.shared.note(text)
     }
 
     /// Asks all threads to end once they have worked through what came; [`Live::stop`] waits for them.
@@ -216,8 +222,7 @@ impl Live {
     pub fn stop(mut self) -> Result<Summary> {
         let joined = self.join();
         let counters = self.counters();
-        // All other holders were threads that have ended.
-        let recorder = Arc::get_mut(&mut self.shared).and_then(|shared| shared.recorder.take());
+        let recorder = lock(&self.shared.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
         let verdict = if counters.nothing_came() {
             let address = self.address();
@@ -227,7 +232,7 @@ impl Live {
                 address.port()
             )
         } else {
-            recorder::losses(&counters).verdict()
+            recorder::losses(&counters, None).verdict()
         };
         joined?;
         self.check()?;

@@ -23,7 +23,7 @@ use taxel_core::wire::{self, Registers};
 use taxel_core::{Array, problem};
 
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
-pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Reader, Rebuilt, Remarks};
+pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks};
 pub use mcap_writer::Writer;
 pub use topic::Topic;
 

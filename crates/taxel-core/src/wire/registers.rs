@@ -94,6 +94,16 @@ impl Registers {
         registers
     }
 
+    /// The registers whose eight words a board of so many channels read back, whatever the rules say.
+    #[must_use]
+    pub fn of_words(words: &[u32; 8], channels: u8) -> Self {
+        let mut registers = Self { channels, ..Self::default() };
+        for (register, &word) in (0..).zip(words) {
+            registers.store(register, word);
+        }
+        registers
+    }
+
     /// Multiplexer steps in a line: on a board of 64 sense lines 4 with 16 channels, 1 with 64.
     #[must_use]
     pub fn steps(&self, array: &Array) -> u32 {
@@ -308,6 +318,8 @@ mod tests {
                 board.write(command, &array).unwrap();
             }
             assert_eq!(board, preset);
+            let words = std::array::from_fn(|n| board.word(n as u8));
+            assert_eq!(Registers::of_words(&words, preset.channels), preset);
         }
     }
 

@@ -1,13 +1,16 @@
 //! The second thread: decodes what was received, hands the events on, and records.
 
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use taxel_core::Events;
-use taxel_core::wire::{Receiver, Took};
+use taxel_core::wire::{Decoder, Receiver, Took};
 
 use super::handover;
 use super::options::LiveOptions;
-use super::shared::Shared;
+use super::recorder::Recorder;
+use super::shared::{Shared, Wish, lock};
+use super::tap::{Tap, UNKNOWN, tap};
 use crate::Result;
 use crate::capture::Batch;
 use crate::clock::BoardClock;
@@ -41,7 +44,10 @@ pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, list
         listens,
         clock: BoardClock::default(),
         events: Events::empty(options.array.clone()),
-        held: vec![0; options.array.len()],
+        held: vec![UNKNOWN; options.array.len()],
+        taps: vec![],
+        frame_us: options.registers.frame_us(),
+        fresh: None,
         has_intensities: false,
         decoded: 0,
         counted: 0,
@@ -68,7 +74,12 @@ struct Work<'a> {
     listens: bool,
     clock: BoardClock,
     events: Events,
+    /// [`UNKNOWN`] until a taxel was heard of.
     held: Vec<u16>,
+    taps: Vec<Tap>,
+    frame_us: f64,
+    /// Decodes from a recording's first datagram on, until it is known by how much the recording's clock is behind.
+    fresh: Option<Box<Receiver>>,
     /// Whether any intensity has come: from then on every piece has the column, so that a lost one is one missing value.
     has_intensities: bool,
     decoded: u64,
@@ -111,23 +122,92 @@ impl Promise {
 
 impl Work<'_> {
     fn all(&mut self) -> Result<()> {
-        let frame_us = self.options.registers.frame_us();
-        let tick = if self.listens { TICK.max(Duration::from_secs_f64(frame_us * 1e-6)) } else { IDLE };
+        let tick = if self.listens { TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)) } else { IDLE };
         let mut batch = Batch::new();
         while !self.shared.receiver.is_done() {
             if self.shared.receiver.take(&mut batch, tick)? {
                 self.decode(&batch)?;
-                if let Some(recorder) = &self.shared.recorder {
-                    recorder.datagrams(&batch)?;
-                }
+                self.record(|recorder| recorder.datagrams(&batch))?;
             } else {
                 self.silence();
             }
+            self.taps.retain_mut(Tap::tick);
             self.look()?;
+            if self.shared.wished.swap(false, Ordering::Acquire) {
+                self.fulfil()?;
+            }
         }
         self.sender.finish_into(&mut self.events, &mut self.repaired);
         self.hand_on()?;
         self.silence();
+        self.taps.retain_mut(Tap::tick);
+        self.fulfil()
+    }
+
+    /// Does something with the recording that runs. An error ends all where the recording was asked for from the
+    /// beginning, and the recording alone where it was begun while listening.
+    fn record(&self, work: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<()> {
+        let mut slot = lock(&self.shared.recorder);
+        let Some(recorder) = &mut *slot else { return Ok(()) };
+        match work(recorder) {
+            Err(error) if recorder.is_a_guest() => {
+                *slot = None;
+                lock(&self.shared.broken).get_or_insert(error);
+                self.shared.records.store(false, Ordering::Release);
+                Ok(())
+            }
+            outcome => outcome,
+        }
+    }
+
+    /// What was asked for between two batches.
+    fn fulfil(&mut self) -> Result<()> {
+        let wishes = std::mem::take(&mut *lock(&self.shared.wishes));
+        for wish in wishes {
+            match wish {
+                Wish::Begin(mut recorder) => {
+                    let now = self.shared.counters();
+                    recorder.begin(&now, &self.held)?;
+                    let decoder = Decoder::new(self.options.array.clone()).differences(self.options.differences);
+                    self.fresh = Some(Box::new(Receiver::new(decoder, 1)));
+                    *lock(&self.shared.recorder) = Some(*recorder);
+                }
+                Wish::End(give) => {
+                    self.fresh = None;
+                    let recorder = lock(&self.shared.recorder).take();
+                    self.shared.records.store(false, Ordering::Release);
+                    // Who asked may have gone.
+                    let _ = give.send((recorder, self.shared.counters()));
+                }
+                Wish::Look(give) => {
+                    let counters = &self.shared.shown().counters;
+                    let (tap, outlet) = tap(&self.options.array, self.held.clone(), counters.board_us, counters.events);
+                    if give.send(outlet).is_ok() {
+                        self.taps.push(tap);
+                    }
+                }
+                Wish::Registers(registers) => {
+                    self.frame_us = registers.frame_us();
+                    if registers.wire_version != self.sender.version() {
+                        self.sender.expect(registers.wire_version, &mut self.events);
+                    }
+                    self.record(|recorder| recorder.registers(&registers))?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The recording's own decoder has come to its first event: from then on it is known what its clock lacks.
+    fn compare(&mut self, bytes: &[u8], arrived_us: i64, heard: usize) -> Result<()> {
+        let Some(fresh) = &mut self.fresh else { return Ok(()) };
+        let (mut events, mut repaired) = (Events::empty(self.options.array.clone()), vec![]);
+        fresh.push(bytes, Some(arrived_us), &mut events, &mut repaired);
+        if let (Some(ours), Some(theirs)) = (self.events.t.get(heard), events.t.first()) {
+            let origin_us = ours - theirs;
+            self.fresh = None;
+            self.record(|recorder| recorder.set_origin(origin_us))?;
+        }
         Ok(())
     }
 
@@ -138,6 +218,7 @@ impl Work<'_> {
             let took = self.sender.push(bytes, Some(arrived_us), &mut self.events, &mut self.repaired);
             let now = now_ns();
             self.decoded += 1;
+            self.compare(bytes, arrived_us, before)?;
             if took.version == 2 {
                 self.promise.note(&took, arrived_us, self.frame_us());
                 if let Some(until) = took.until {
@@ -159,7 +240,7 @@ impl Work<'_> {
 
     #[allow(clippy::cast_possible_truncation)]
     fn frame_us(&self) -> i64 {
-        self.options.registers.frame_us() as i64
+        self.frame_us as i64
     }
 
     /// Hands the events on to the readout, and tells those who look on.
@@ -173,9 +254,13 @@ impl Work<'_> {
                 }
             }
         }
-        if let Some(recorder) = &self.shared.recorder {
-            events.markers.iter().try_for_each(|m| recorder.marker(*m))?;
+        self.taps.iter_mut().for_each(|tap| tap.take(events));
+        if !events.markers.is_empty() {
+            let markers = std::mem::take(&mut self.events.markers);
+            self.record(|recorder| markers.iter().try_for_each(|m| recorder.marker(*m)))?;
+            self.events.markers = markers;
         }
+        let events = &mut self.events;
         {
             let mut shown = self.shared.shown();
             shown.markers.extend_from_slice(&events.markers);
@@ -214,7 +299,7 @@ impl Work<'_> {
             && self.sender.version() == 1
             && let Some(offset) = self.clock.offset()
         {
-            let guard = (self.options.guard_frames * self.options.registers.frame_us()) as i64;
+            let guard = (self.options.guard_frames * self.frame_us) as i64;
             // What a frame sees leaves at its end: before the start of the frame that ends now all has come.
             self.shared.handover.quiet(offset.board_us(now_ns()) - self.frame_us() - guard);
         }
@@ -230,24 +315,32 @@ impl Work<'_> {
         self.counted = self.decoded;
         let (counters, tare) = {
             let mut shown = self.shared.shown();
-            shown.picture.copy_from_slice(&self.held);
+            // Who asks for a picture hears 0 of a taxel that was never heard of.
+            for (shown, &held) in shown.picture.iter_mut().zip(&self.held) {
+                *shown = if held == UNKNOWN { 0 } else { held };
+            }
             let tare = if self.tared { None } else { shown.tare.clone() };
             (shown.counters.clone(), tare)
         };
-        let Some(recorder) = &self.shared.recorder else { return Ok(()) };
-        if let Some(tare) = tare {
-            recorder.tare(&tare)?;
-            self.tared = true;
+        if lock(&self.shared.recorder).is_none() {
+            return Ok(());
         }
-        recorder.flush()?;
-        if new && let Some(board_us) = counters.board_us {
-            recorder.picture(board_us, self.options.array.columns, &self.held)?;
-        }
-        if self.told.elapsed() >= COUNTS_EVERY {
+        self.tared |= tare.is_some();
+        let picture = self.shared.shown().picture.clone();
+        let tell = self.told.elapsed() >= COUNTS_EVERY;
+        if tell {
             self.told = Instant::now();
-            let capture = self.shared.receiver.counts();
-            recorder.so_far(&super::Counters { capture, ..counters })?;
         }
-        Ok(())
+        let capture = self.shared.receiver.counts();
+        self.record(|recorder| {
+            if let Some(tare) = tare {
+                recorder.tare(&tare)?;
+            }
+            recorder.flush()?;
+            if new && let Some(board_us) = counters.board_us {
+                recorder.picture(board_us, self.options.array.columns, &picture)?;
+            }
+            if tell { recorder.so_far(&super::counters::Counters { capture, ..counters }) } else { Ok(()) }
+        })
     }
 }

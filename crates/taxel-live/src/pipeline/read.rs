@@ -12,7 +12,7 @@ use super::handover::Taken;
 use super::options::LiveOptions;
 use super::rest::Rest;
 use super::said::{Said, Sink};
-use super::shared::Shared;
+use super::shared::{Shared, lock};
 use crate::Error;
 use crate::recording::now_ns;
 
@@ -139,9 +139,13 @@ impl Reader {
             let offset = shared.shown().counters.offset;
             let said = Said { said: offset.map_or(detection.known, |o| o.board_us(said_ns)), detection, said_ns };
             self.sinks.iter_mut().try_for_each(|sink| sink.take(&said)).map_err(Error::Sink)?;
-            if let Some(recorder) = &shared.recorder {
-                recorder.detection(&said)?;
+            if let Some(recorder) = &*lock(&shared.recorder) {
+                // Where only a guest's recording is broken, the decoding thread will find that too.
+                recorder.detection(&said).or_else(|error| if recorder.is_a_guest() { Ok(()) } else { Err(error) })?;
             }
+            lock(&shared.listeners).retain(|listener| {
+                !matches!(listener.try_send(said.clone()), Err(crossbeam_channel::TrySendError::Disconnected(_)))
+            });
             let late_ns = (said.said - said.detection.known) * 1000;
             let dropped = self.say.try_send(said).is_err();
             let mut shown = shared.shown();

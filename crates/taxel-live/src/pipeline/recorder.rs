@@ -3,15 +3,17 @@
 use std::fs::OpenOptions;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
 use taxel_core::encode::Tare;
+use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::counters::Counters;
 use super::options::{LiveOptions, Record};
 use super::said::Said;
+use super::shared::lock;
 use crate::capture::Batch;
 use crate::recording::{self, Header, LsaWriter, Writer, now_ns};
 use crate::{Error, Result};
@@ -29,7 +31,29 @@ pub(super) struct Recorder {
     kind: OnceLock<Kind>,
     /// Held by the one who opens the file.
     opening: Mutex<()>,
+    guest: Option<Guest>,
 }
+
+/// A recording that was begun while listening. Its own clock begins with its first stamp, so the file is opened when that
+/// is known; what comes before waits.
+struct Guest {
+    /// What had been counted when it began.
+    since: Counters,
+    waiting: Mutex<Vec<Entry>>,
+    /// Its bytes.
+    bytes: AtomicUsize,
+}
+
+/// What waits for a guest's file.
+enum Entry {
+    Datagram(i64, u64, Vec<u8>),
+    Registers(i64, Registers),
+    Held(i64, Option<i64>, Vec<u16>),
+    Note(i64, Option<i64>, String),
+}
+
+/// What may wait for a guest's first event, bytes: heartbeats of a board of version 2 at rest for hours.
+const MOST_WAITING: usize = 1 << 22;
 
 enum Kind {
     Mcap(Writer),
@@ -56,6 +80,7 @@ impl Recorder {
             noted: AtomicBool::new(false),
             kind: OnceLock::new(),
             opening: Mutex::new(()),
+            guest: None,
         };
         if new {
             recorder.kind()?;
@@ -67,9 +92,71 @@ impl Recorder {
         Ok(recorder)
     }
 
+    /// A recording that begins while listening: takes the name, so that nobody else can; the file is written later.
+    pub(super) fn reserve(record: &Record, options: &LiveOptions, address: SocketAddr) -> Result<Self> {
+        let path = &record.path;
+        named(path)?;
+        let done = path.with_extension("lss");
+        if path.extension().is_some_and(|e| e == "lsa") && done.exists() {
+            return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
+        }
+        OpenOptions::new().write(true).create_new(true).open(path).map_err(Error::file(path))?;
+        let whole = Self::create(&Record { overwrite: true, ..record.clone() }, options, address)?;
+        let guest = Guest { since: Counters::default(), waiting: Mutex::default(), bytes: AtomicUsize::new(0) };
+        Ok(Self { new: true, guest: Some(guest), ..whole })
+    }
+
+    /// Begins with the registers and what the taxels hold, by the counters of now.
+    pub(super) fn begin(&mut self, now: &Counters, held: &[u16]) -> Result<()> {
+        let Some(guest) = &mut self.guest else { return Ok(()) };
+        guest.since = now.clone();
+        if let Some(registers) = self.header.registers {
+            self.push(Entry::Registers(now_ns(), registers))?;
+        }
+        self.push(Entry::Held(now_ns(), now.board_us, held.to_vec()))
+    }
+
+    /// Whether it was begun while listening: then it ends alone.
+    pub(super) fn is_a_guest(&self) -> bool {
+        self.guest.is_some()
+    }
+
+    /// Says by how much its own clock, which begins with its first stamp, is behind, us: now it can be written.
+    pub(super) fn set_origin(&mut self, origin_us: i64) -> Result<()> {
+        self.header.origin_us = origin_us;
+        self.kind().map(drop)
+    }
+
+    /// Keeps it now, or when the file is open.
+    fn push(&self, entry: Entry) -> Result<()> {
+        if let (Some(guest), None) = (&self.guest, self.kind.get()) {
+            let bytes = match &entry {
+                Entry::Datagram(_, _, bytes) => bytes.len() + 64,
+                _ => 64,
+            };
+            lock(&guest.waiting).push(entry);
+            if guest.bytes.fetch_add(bytes, Ordering::Relaxed) + bytes > MOST_WAITING {
+                self.kind()?;
+            }
+            return Ok(());
+        }
+        Self::write(self.kind()?, entry)
+    }
+
+    fn write(kind: &Kind, entry: Entry) -> Result<()> {
+        match (kind, entry) {
+            (Kind::Mcap(writer), Entry::Datagram(at, number, bytes)) => writer.datagram(at, number, &bytes),
+            (Kind::Lsa(writer), Entry::Datagram(_, _, bytes)) => lock(writer).bytes(&bytes),
+            (Kind::Mcap(writer), Entry::Registers(at, registers)) => writer.registers(at, &registers),
+            (Kind::Mcap(writer), Entry::Held(at, t_us, held)) => writer.held(at, t_us, &held),
+            (Kind::Mcap(writer), Entry::Note(at, t_us, text)) => writer.note(at, t_us, &text),
+            (Kind::Lsa(_), _) => Ok(()),
+        }
+    }
+
     /// The open file.
     fn kind(&self) -> Result<&Kind> {
-        let _one = self.opening.lock().unwrap_or_else(PoisonError::into_inner);
+        let _one = lock(&self.opening);
         if let Some(kind) = self.kind.get() {
             return Ok(kind);
         }
@@ -81,10 +168,22 @@ impl Recorder {
             }
             _ => Kind::Lsa(Mutex::new(LsaWriter::create(path, *overwrite)?)),
         };
+        if let Some(guest) = &self.guest {
+            lock(&guest.waiting).drain(..).try_for_each(|entry| Self::write(&kind, entry))?;
+        }
         Ok(self.kind.get_or_init(|| kind))
     }
 
+    /// Whether the file waits for its first event.
+    fn waits(&self) -> bool {
+        self.guest.is_some() && self.kind.get().is_none()
+    }
+
     pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
+        if self.waits() {
+            let mut all = batch.iter();
+            return all.try_for_each(|(d, bytes)| self.push(Entry::Datagram(d.arrived_ns, d.number, bytes.to_vec())));
+        }
         match self.kind()? {
             Kind::Mcap(writer) => {
                 batch.iter().try_for_each(|(d, bytes)| writer.datagram(d.arrived_ns, d.number, bytes))
@@ -94,6 +193,11 @@ impl Recorder {
                 batch.iter().try_for_each(|(_, bytes)| writer.bytes(bytes))
             }
         }
+    }
+
+    /// The board's registers as they are from now on.
+    pub(super) fn registers(&self, registers: &Registers) -> Result<()> {
+        self.push(Entry::Registers(now_ns(), *registers))
     }
 
     pub(super) fn marker(&self, marker: Marker) -> Result<()> {
@@ -119,6 +223,9 @@ impl Recorder {
     }
 
     pub(super) fn picture(&self, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
+        if self.waits() {
+            return Ok(());
+        }
         match self.kind()? {
             Kind::Mcap(writer) => writer.picture(now_ns(), board_us, columns, held),
             Kind::Lsa(_) => Ok(()),
@@ -128,7 +235,7 @@ impl Recorder {
     /// What an unfinished recording will know of its losses; a raw one knows nothing, but its bytes reach the system.
     pub(super) fn so_far(&self, counters: &Counters) -> Result<()> {
         match self.kind.get() {
-            Some(Kind::Mcap(writer)) => writer.counts(now_ns(), &losses(counters)),
+            Some(Kind::Mcap(writer)) => writer.counts(now_ns(), &self.losses(counters)),
             Some(Kind::Lsa(_)) | None => Ok(()),
         }
     }
@@ -146,16 +253,31 @@ impl Recorder {
             return Err(problem!("a .lsa holds raw bytes and no notes: record to a .mcap file").into());
         }
         self.noted.store(true, Ordering::Relaxed);
-        match self.kind()? {
-            Kind::Mcap(writer) => writer.note(now_ns(), board_us, text),
-            Kind::Lsa(_) => Ok(()),
-        }
+        self.push(Entry::Note(now_ns(), board_us, text.to_owned()))
+    }
+
+    /// What was lost, as the file keeps it.
+    fn losses(&self, counters: &Counters) -> recording::Counts {
+        losses(counters, self.guest.as_ref().map(|guest| &guest.since))
+    }
+
+    /// The same in a line.
+    pub(super) fn verdict(&self, counters: &Counters) -> String {
+        self.losses(counters).verdict()
     }
 
     /// Closes the file and says where it is; a file that would hold nothing is not kept.
     pub(super) fn finish(self, counters: &Counters) -> Result<Option<PathBuf>> {
+        let lost = self.losses(counters);
+        let nothing = match &self.guest {
+            Some(guest) => counters.decoded == guest.since.decoded,
+            None => counters.nothing_came(),
+        };
+        if (!nothing || self.noted.load(Ordering::Relaxed)) && self.waits() {
+            self.kind()?;
+        }
         let path = self.record.path;
-        if counters.nothing_came() && !self.noted.into_inner() {
+        if nothing && !self.noted.into_inner() {
             drop(self.kind);
             if self.new {
                 std::fs::remove_file(&path).map_err(Error::file(&path))?;
@@ -163,7 +285,7 @@ impl Recorder {
             return Ok(None);
         }
         match self.kind.into_inner() {
-            Some(Kind::Mcap(writer)) => drop(writer.finish(losses(counters))?),
+            Some(Kind::Mcap(writer)) => drop(writer.finish(lost)?),
             Some(Kind::Lsa(writer)) => writer.into_inner().unwrap_or_else(PoisonError::into_inner).finish()?,
             None => {}
         }
@@ -182,19 +304,31 @@ fn named(path: &Path) -> Result<&str> {
     }
 }
 
-/// What was lost, as recordings keep it.
-pub(super) fn losses(counters: &Counters) -> recording::Counts {
-    let capture = &counters.capture;
-    let (second, missing) = recording::damage_of_version_2(&counters.wire_v2).unzip();
-    let mut decoder = recording::damage(&counters.wire);
-    decoder.extend(second.unwrap_or_default());
+/// What was lost, as recordings keep it; of one that began later, since then.
+pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::Counts {
+    let none = Counters::default();
+    let begun = since.unwrap_or(&none);
+    let (capture, before) = (&counters.capture, &begun.capture);
+    let damage = |now: &Counters| {
+        let (second, missing) = recording::damage_of_version_2(&now.wire_v2).unzip();
+        let mut decoder = recording::damage(&now.wire);
+        decoder.extend(second.unwrap_or_default());
+        (decoder, missing)
+    };
+    let ((mut decoder, missing), (earlier, missed)) = (damage(counters), damage(begun));
+    for (cause, n) in &mut decoder {
+        *n -= earlier.get(cause).copied().unwrap_or(0).min(*n);
+    }
+    let recorded = counters.decoded - begun.decoded;
+    let dropped_by_queue = capture.dropped_by_queue - before.dropped_by_queue;
     recording::Counts {
-        received: capture.datagrams,
-        recorded: counters.decoded,
-        dropped_by_kernel: capture.dropped_by_kernel,
-        dropped_by_queue: capture.dropped_by_queue,
+        // What waits when it ends is none of its business.
+        received: if since.is_some() { recorded + dropped_by_queue } else { capture.datagrams },
+        recorded,
+        dropped_by_kernel: capture.dropped_by_kernel - before.dropped_by_kernel,
+        dropped_by_queue,
         decoder,
-        missing,
+        missing: missing.map(|n| n.saturating_sub(missed.unwrap_or(0))),
         converted: None,
     }
 }

@@ -1,17 +1,23 @@
 //! What the threads of a pipeline share, and what they show to those who look on.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
+use crossbeam_channel as channel;
 use taxel_core::Marker;
 use taxel_core::encode::Tare;
+use taxel_core::wire::Registers;
 
 use super::counters::Counters;
 use super::handover::Handover;
+use super::options::LiveOptions;
 use super::recorder::Recorder;
-use crate::Error;
+use super::said::Said;
+use super::tap::Outlet;
 use crate::capture::Receiver;
 use crate::latency::Latencies;
+use crate::{Error, Result};
 
 /// What the threads tell those who look on.
 #[derive(Debug, Default)]
@@ -27,16 +33,71 @@ pub(super) struct Shown {
 
 /// What all threads share.
 pub(super) struct Shared {
+    pub(super) options: LiveOptions,
+    pub(super) begun: Instant,
     pub(super) receiver: Receiver,
     pub(super) handover: Handover,
     pub(super) shown: Mutex<Shown>,
-    pub(super) recorder: Option<Recorder>,
+    pub(super) recorder: Mutex<Option<Recorder>>,
+    /// What ended a recording that was begun while listening, early.
+    pub(super) broken: Mutex<Option<Error>>,
+    /// What the decoding thread is asked for between two batches.
+    pub(super) wishes: Mutex<Vec<Wish>>,
+    pub(super) wished: AtomicBool,
+    /// Whether a recording was begun while listening, and has not ended.
+    pub(super) records: AtomicBool,
+    /// Those who hear detections beside [`Live::next`](super::Live::next); who is too slow misses some.
+    pub(super) listeners: Mutex<Vec<channel::Sender<Said>>>,
+    /// What the registers hold now, which may not be what they held at the beginning.
+    pub(super) registers: Mutex<Registers>,
     pub(super) ended: AtomicBool,
+}
+
+/// What the decoding thread does between two batches.
+pub(super) enum Wish {
+    /// Record from here on.
+    Begin(Box<Recorder>),
+    /// End the recording: the recorder and the counters of its last datagram go where they are waited for.
+    End(channel::Sender<(Option<Recorder>, Counters)>),
+    /// Let somebody look on.
+    Look(channel::Sender<Outlet>),
+    /// The registers were written.
+    Registers(Registers),
+}
+
+/// No holder of these locks can panic half-way through a change, so a poisoned lock still guards a sound state.
+pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Shared {
     pub(super) fn shown(&self) -> MutexGuard<'_, Shown> {
-        self.shown.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.shown)
+    }
+
+    /// Asks the decoding thread for something; it hears it within 20 ms, and never where it has ended.
+    pub(super) fn wish(&self, wish: Wish) {
+        lock(&self.wishes).push(wish);
+        self.wished.store(true, Ordering::Release);
+    }
+
+    pub(super) fn counters(&self) -> Counters {
+        let shown = self.shown();
+        Counters {
+            capture: self.receiver.counts(),
+            decode_latency: shown.decode_latency.quantiles(),
+            said_latency: shown.said_latency.quantiles(),
+            seconds: self.begun.elapsed().as_secs_f64(),
+            ..shown.counters.clone()
+        }
+    }
+
+    pub(super) fn note(&self, text: &str) -> Result<()> {
+        let board_us = self.shown().counters.board_us;
+        match &*lock(&self.recorder) {
+            Some(recorder) => recorder.note(board_us, text),
+            None => Err(taxel_core::problem!("a note is kept in a recording: record to a .mcap file").into()),
+        }
     }
 
     /// Ends everything because of an error, which [`Live::next`](super::Live::next) and [`Live::stop`](super::Live::stop) then give.

@@ -18,7 +18,7 @@ use taxel_core::detect::Detection;
 use taxel_core::wire::{self, Decoder, Pairing, Registers};
 use taxel_core::{Events, Marker, Stop};
 
-use super::mcap_writer::{BEGIN, END};
+use super::mcap_writer::{BEGIN, END, unbase64};
 use super::{Counts, Header, Note, Topic, limits};
 use crate::{Error, Result};
 
@@ -47,6 +47,23 @@ pub enum Ending {
     },
     /// Writing failed: what the operating system said.
     Stopped(String),
+}
+
+/// What reading some blocks leaves for the next: the file's own channels, where numbers have come to.
+#[derive(Debug, Clone, Default)]
+pub struct Place {
+    topics: BTreeMap<u16, Option<Topic>>,
+    last: u64,
+    in_datagrams: u64,
+    bytes: Vec<u8>,
+}
+
+impl Place {
+    /// The same place without the memory that reading uses again.
+    #[must_use]
+    pub fn kept(&self) -> Self {
+        Self { bytes: vec![], topics: self.topics.clone(), ..*self }
+    }
 }
 
 /// What had to be left out of a file, or put up with.
@@ -139,6 +156,62 @@ pub struct Remarks {
     pub arrivals: Option<(i64, i64)>,
     /// How many pictures there are.
     pub pictures: u64,
+    /// What the taxels held when the recording began, ticks by index, 65 535 where a taxel was not heard of; where it says.
+    pub held: Option<Vec<u16>>,
+}
+
+impl Remarks {
+    /// Takes the next message; of a datagram and a picture only that there is one.
+    pub fn take(&mut self, message: &Message<'_>) {
+        match message.topic {
+            Topic::Datagrams => {
+                self.datagrams += 1;
+                self.datagram_bytes += message.data.len() as u64;
+                let (first, last) = self.arrivals.unwrap_or((message.at_ns, message.at_ns));
+                self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
+            }
+            Topic::Pressure => self.pictures += 1,
+            // A message that does not parse has a sound checksum: another program wrote it, and it is left alone.
+            Topic::Registers => {
+                if let Ok(said) = serde_json::from_slice(message.data) {
+                    self.registers.push((message.at_ns, said));
+                }
+            }
+            Topic::Markers => {
+                if let Ok(said) = serde_json::from_slice::<Value>(message.data)
+                    && let (Some(t), Some(start)) = (said["t_us"].as_i64(), said["start"].as_bool())
+                {
+                    self.markers.push(Marker { t, start });
+                }
+            }
+            Topic::Notes => {
+                if let Ok(said) = serde_json::from_slice::<Value>(message.data)
+                    && let Some(text) = said["message"].as_str()
+                {
+                    let t_us = said["t_us"].as_i64();
+                    self.notes.push(Note { at_ns: message.at_ns, t_us, text: text.to_owned() });
+                }
+            }
+            Topic::Detections => {
+                if let Ok(said) = serde_json::from_slice::<Value>(message.data)
+                    && let (Some(label), Some(t), Some(known)) =
+                        (said["label"].as_str(), said["t_us"].as_i64(), said["known_us"].as_i64())
+                {
+                    // JSON has no NaN: a slope that is not known is written as null.
+                    let slope = said["slope"].as_f64().unwrap_or(f64::NAN);
+                    self.detections.push((message.at_ns, Detection { label: label.to_owned(), t, known, slope }));
+                }
+            }
+            Topic::Held => {
+                if let Ok(said) = serde_json::from_slice::<Value>(message.data)
+                    && let Some(ticks) = said["ticks"].as_str().and_then(unbase64)
+                {
+                    self.held = Some(ticks.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect());
+                }
+            }
+            Topic::Counts => self.counts = serde_json::from_slice(message.data).ok().or(self.counts.take()),
+        }
+    }
 }
 
 /// A chunk, or a run of records outside chunks (as other tools may write them).
@@ -198,51 +271,69 @@ impl Reader {
     ///
     /// `File` where the file cannot be read, `Core` where `take` says so or the caller stops.
     pub fn messages(&self, stop: Stop<'_>, mut take: impl FnMut(Message<'_>) -> Result<()>) -> Result<u64> {
-        let mut topics: BTreeMap<u16, Option<Topic>> = BTreeMap::new();
-        let (mut bad, mut last) = (0, 0_u64);
-        let (mut bytes, mut in_datagrams, most) = (Vec::new(), 0, limits::datagrams(self.blocks.length));
-        for block in &self.blocks.places {
+        let (mut place, mut bad) = (Place::default(), 0);
+        for block in 0..self.blocks() {
             stop.check()?;
-            let mut wrong = None;
-            let sound = self.blocks.records(*block, &mut bytes, |record| {
-                match record {
-                    Record::Channel(channel) => {
-                        topics.insert(channel.id, Topic::of_name(&channel.topic));
-                    }
-                    Record::Message { header, data } => {
-                        let topic = topics.get(&header.channel_id).copied();
-                        if let Some(topic) = topic.unwrap_or_else(|| Topic::of_number(header.channel_id)) {
-                            let mut number = u64::from(header.sequence);
-                            if topic == Topic::Datagrams {
-                                number = unwrap(last, header.sequence);
-                                last = number;
-                                in_datagrams += data.len() as u64;
-                                if in_datagrams > most {
-                                    wrong = Some(format(
-                                        &self.blocks.path,
-                                        &format!(
-                                            "chunk at byte {}: the datagrams up to here unpack to more than {most} bytes \
-                                             (100 times the file and 64 MiB)",
-                                            block.offset
-                                        ),
-                                    ));
-                                    return false;
-                                }
-                            }
-                            let at_ns = i64::try_from(header.log_time).unwrap_or(i64::MAX);
-                            wrong = take(Message { topic, number, at_ns, data: &data }).err();
-                        }
-                    }
-                    _ => {}
-                }
-                wrong.is_none()
-            })?;
-            if let Some(error) = wrong {
-                return Err(error);
-            }
-            bad += u64::from(!sound);
+            bad += u64::from(!self.block(block, &mut place, &mut take)?);
         }
         Ok(bad)
+    }
+
+    /// How many blocks (chunks) there are.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.blocks.places.len()
+    }
+
+    /// Hands out the messages of one block; `place` is what reading the blocks before it, or some of them, left. Gives
+    /// whether the block is sound.
+    ///
+    /// # Errors
+    ///
+    /// As [`Reader::messages`].
+    pub fn block(
+        &self,
+        block: usize,
+        place: &mut Place,
+        mut take: impl FnMut(Message<'_>) -> Result<()>,
+    ) -> Result<bool> {
+        let (block, most) = (self.blocks.places[block], limits::datagrams(self.blocks.length));
+        let Place { topics, last, in_datagrams, bytes } = place;
+        let mut wrong = None;
+        let sound = self.blocks.records(block, bytes, |record| {
+            match record {
+                Record::Channel(channel) => {
+                    topics.insert(channel.id, Topic::of_name(&channel.topic));
+                }
+                Record::Message { header, data } => {
+                    let topic = topics.get(&header.channel_id).copied();
+                    if let Some(topic) = topic.unwrap_or_else(|| Topic::of_number(header.channel_id)) {
+                        let mut number = u64::from(header.sequence);
+                        if topic == Topic::Datagrams {
+                            number = unwrap(*last, header.sequence);
+                            *last = number;
+                            *in_datagrams += data.len() as u64;
+                            if *in_datagrams > most {
+                                wrong = Some(format(
+                                    &self.blocks.path,
+                                    &format!(
+                                        "chunk at byte {}: the datagrams up to here unpack to more than {most} bytes \
+                                         (100 times the file and 64 MiB)",
+                                        block.offset
+                                    ),
+                                ));
+                                return false;
+                            }
+                        }
+                        let at_ns = i64::try_from(header.log_time).unwrap_or(i64::MAX);
+                        wrong = take(Message { topic, number, at_ns, data: &data }).err();
+                    }
+                }
+                _ => {}
+            }
+            wrong.is_none()
+        })?;
+        wrong.map_or(Ok(sound), Err)
     }
 
     /// Collects everything but the datagrams' bytes and the pictures. Gives how many chunks are bad, too.
@@ -253,47 +344,7 @@ impl Reader {
     pub fn remarks(&self, stop: Stop<'_>) -> Result<(Remarks, u64)> {
         let mut all = Remarks::default();
         let bad = self.messages(stop, |message| {
-            match message.topic {
-                Topic::Datagrams => {
-                    all.datagrams += 1;
-                    all.datagram_bytes += message.data.len() as u64;
-                    let (first, last) = all.arrivals.unwrap_or((message.at_ns, message.at_ns));
-                    all.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
-                }
-                Topic::Pressure => all.pictures += 1,
-                // A message that does not parse has a sound checksum: another program wrote it, and it is left alone.
-                Topic::Registers => {
-                    if let Ok(said) = serde_json::from_slice(message.data) {
-                        all.registers.push((message.at_ns, said));
-                    }
-                }
-                Topic::Markers => {
-                    if let Ok(said) = serde_json::from_slice::<Value>(message.data)
-                        && let (Some(t), Some(start)) = (said["t_us"].as_i64(), said["start"].as_bool())
-                    {
-                        all.markers.push(Marker { t, start });
-                    }
-                }
-                Topic::Notes => {
-                    if let Ok(said) = serde_json::from_slice::<Value>(message.data)
-                        && let Some(text) = said["message"].as_str()
-                    {
-                        let t_us = said["t_us"].as_i64();
-                        all.notes.push(Note { at_ns: message.at_ns, t_us, text: text.to_owned() });
-                    }
-                }
-                Topic::Detections => {
-                    if let Ok(said) = serde_json::from_slice::<Value>(message.data)
-                        && let (Some(label), Some(t), Some(known)) =
-                            (said["label"].as_str(), said["t_us"].as_i64(), said["known_us"].as_i64())
-                    {
-                        // JSON has no NaN: a slope that is not known is written as null.
-                        let slope = said["slope"].as_f64().unwrap_or(f64::NAN);
-                        all.detections.push((message.at_ns, Detection { label: label.to_owned(), t, known, slope }));
-                    }
-                }
-                Topic::Counts => all.counts = serde_json::from_slice(message.data).ok().or(all.counts.take()),
-            }
+            all.take(&message);
             Ok(())
         })?;
         Ok((all, bad))

@@ -251,6 +251,18 @@ impl Writer {
         self.push_json(Topic::Pressure, at_ns, &picture)
     }
 
+    /// Keeps what the taxels hold before the recording's first datagram, ticks by taxel index; 65 535 of one that was
+    /// never heard of. A recording that begins in mid-stream would else know a taxel from its next change on.
+    ///
+    /// # Errors
+    ///
+    /// As [`Writer::datagram`].
+    pub fn held(&self, at_ns: i64, t_us: Option<i64>, ticks: &[u16]) -> Result<()> {
+        let bytes: Vec<u8> = ticks.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let held = json!({ "t_us": t_us, "encoding": "uint16, little-endian", "ticks": base64(&bytes) });
+        self.push_json(Topic::Held, at_ns, &held)
+    }
+
     /// Ends the recording with what was lost and a verdict line, which it gives back.
     ///
     /// The file is on the disk when this returns.
@@ -604,6 +616,30 @@ fn base64(bytes: &[u8]) -> String {
     text
 }
 
+/// Bytes of base64 with padding; `None` where it is none.
+pub(super) fn unbase64(text: &str) -> Option<Vec<u8>> {
+    let digit = |c: u8| match c {
+        b'A'..=b'Z' => Some(c - b'A'),
+        b'a'..=b'z' => Some(c - b'a' + 26),
+        b'0'..=b'9' => Some(c - b'0' + 52),
+        b'+' => Some(62),
+        b'/' => Some(63),
+        _ => None,
+    };
+    let text = text.as_bytes();
+    let digits = text.iter().rposition(|&c| c != b'=').map_or(0, |last| last + 1);
+    if !text.len().is_multiple_of(4) || text.len() - digits > 2 {
+        return None;
+    }
+    let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
+    for four in text[..digits].chunks(4) {
+        let word =
+            four.iter().try_fold(0_u32, |word, &c| Some(word << 6 | u32::from(digit(c)?)))? << (6 * (4 - four.len()));
+        bytes.extend_from_slice(&word.to_be_bytes()[1..four.len()]);
+    }
+    Some(bytes)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -650,6 +686,7 @@ mod tests {
         let vectors = ["", "", "f", "Zg==", "fo", "Zm8=", "foo", "Zm9v", "foob", "Zm9vYg==", "fooba", "Zm9vYmE="];
         for pair in vectors.chunks(2) {
             assert_eq!(base64(pair[0].as_bytes()), pair[1]);
+            assert_eq!(unbase64(pair[1]).as_deref(), Some(pair[0].as_bytes()));
         }
     }
 }

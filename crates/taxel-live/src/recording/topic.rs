@@ -19,12 +19,22 @@ pub enum Topic {
     Counts = 6,
     /// The low-rate picture.
     Pressure = 7,
+    /// What the taxels held when the recording began.
+    Held = 8,
 }
 
 impl Topic {
     /// All, by number.
-    pub const ALL: [Self; 7] =
-        [Self::Datagrams, Self::Registers, Self::Markers, Self::Notes, Self::Detections, Self::Counts, Self::Pressure];
+    pub const ALL: [Self; 8] = [
+        Self::Datagrams,
+        Self::Registers,
+        Self::Markers,
+        Self::Notes,
+        Self::Detections,
+        Self::Counts,
+        Self::Pressure,
+        Self::Held,
+    ];
 
     /// The name in the file.
     #[must_use]
@@ -37,6 +47,7 @@ impl Topic {
             Self::Detections => "/detections",
             Self::Counts => "/counts",
             Self::Pressure => "/pressure",
+            Self::Held => "/held",
         }
     }
 
@@ -58,6 +69,7 @@ impl Topic {
             Self::Detections => ("taxel.Detection", include_str!("schemas/Detection.json")),
             Self::Counts => ("taxel.Counts", include_str!("schemas/Counts.json")),
             Self::Pressure => ("foxglove.RawImage", include_str!("schemas/RawImage.json")),
+            Self::Held => ("taxel.Held", include_str!("schemas/Held.json")),
         })
     }
 

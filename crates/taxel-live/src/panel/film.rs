@@ -1,0 +1,844 @@
+//! Changes that can be looked at from any time on: the last minute while live, or a recording of any length.
+//!
+//! Both keep keyframes, from which reading on gives what reading from the beginning gives. Of a recording a keyframe holds
+//! the decoder itself, so that its clock, what it has seen and what waits in it are as they were.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use taxel_core::wire::{self, Decoder};
+use taxel_core::{Array, Events, problem};
+
+use super::lens::{COLUMN_US, FORGET, History, Keyframe, Lens, SPAN, Strip, column_of};
+use crate::pipeline::{Change, Piece, UNKNOWN};
+use crate::recording::{Ending, Header, NOTHING_LOST, Place, Reader, Remarks, Topic};
+use crate::{Error, Result};
+
+/// How far back a live view may look, us ...
+const REACH_US: i64 = 60_000_000;
+/// ... and what that may cost, bytes.
+const REACH_BYTES: usize = 512 << 20;
+
+/// What the keyframes of a recording may cost, bytes; and its raster and curves.
+const KEYFRAME_BYTES: usize = 128 << 20;
+const STRIP_BYTES: usize = 256 << 20;
+
+/// From keyframe to keyframe at least, bytes of the file.
+const SPACING: u64 = 1 << 16;
+
+/// How much of a `.lsa` is read at once.
+const LSA_PIECE: u64 = 1 << 16;
+
+/// Bins of the rate over time at most, before two become one.
+const BINS: usize = 1000;
+
+/// Changes that may be read for the history of a taxel alone.
+const HISTORY_CHANGES: u64 = 2_000_000;
+
+/// How far behind the latest a change may come and be in the raster, columns of time.
+const LATE: i64 = 30;
+
+/// What comes next of a film.
+#[derive(Debug)]
+pub enum Next {
+    /// Changes were appended.
+    Changes,
+    /// Changes are missing; the taxels hold this then, and so many events have come.
+    Held(Vec<u16>, u64),
+    /// Nothing more, as yet.
+    End,
+}
+
+/// Reads on from a keyframe.
+pub trait Reel: Send {
+    /// Appends the next changes.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the file cannot be read.
+    fn next(&mut self, out: &mut Vec<Change>) -> Result<Next>;
+}
+
+/// See the module.
+pub trait Film: Send + Sync {
+    /// The sensor.
+    fn array(&self) -> &Array;
+
+    /// Changes up to it are none, ticks.
+    fn floor(&self) -> u16;
+
+    /// First and last time that can be shown, us; `None` where nothing came.
+    fn range(&self) -> Option<(i64, i64)>;
+
+    /// The last keyframe at or before a time, or the first, and what reads on from it.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where there is none.
+    fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn Reel>)>;
+
+    /// The keyframe before this one: its time, if there is one.
+    fn earlier(&self, t: i64) -> Option<i64>;
+
+    /// Raster and curves of all of it, where they are kept.
+    fn strip(&self) -> Option<&Strip>;
+
+    /// Events up to about a time.
+    fn events_before(&self, t: i64) -> u64;
+}
+
+// ---------------------------------------------------------------------------------------------- live
+
+/// A piece in the ring.
+#[derive(Debug)]
+pub struct Kept {
+    /// What came.
+    pub piece: Piece,
+    rest: Option<Arc<Vec<u16>>>,
+    bytes: usize,
+}
+
+/// The last minute of what came, or what 512 MB hold.
+#[derive(Debug)]
+pub struct Ring {
+    pieces: VecDeque<Arc<Kept>>,
+    /// The number of the first.
+    first: u64,
+    bytes: usize,
+    latest: Option<i64>,
+    rest: Option<(u64, Arc<Vec<u16>>)>,
+}
+
+/// The same, to be looked at.
+#[derive(Debug, Clone)]
+pub struct RingFilm {
+    ring: Arc<Mutex<Ring>>,
+    array: Array,
+    floor: u16,
+}
+
+impl RingFilm {
+    /// An empty one.
+    #[must_use]
+    pub fn new(array: Array, floor: u16) -> Self {
+        let ring = Ring { pieces: VecDeque::new(), first: 0, bytes: 0, latest: None, rest: None };
+        Self { ring: Arc::new(Mutex::new(ring)), array, floor }
+    }
+
+    fn ring(&self) -> MutexGuard<'_, Ring> {
+        self.ring.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Keeps a piece; `lens` is as it was before it.
+    pub fn keep(&self, piece: Piece, lens: &Lens) -> Arc<Kept> {
+        let mut ring = self.ring();
+        let rest = piece.held.is_some().then(|| {
+            if ring.rest.as_ref().is_none_or(|(rests, _)| *rests != lens.rests()) {
+                ring.rest = Some((lens.rests(), Arc::new(lens.rest().to_vec())));
+            }
+            Arc::clone(&ring.rest.as_ref().expect("it was put there").1)
+        });
+        let held = piece.held.as_ref().map_or(0, Vec::len);
+        let bytes = piece.changes.len() * size_of::<Change>() + 4 * held + size_of::<Kept>();
+        ring.latest = ring.latest.max(piece.changes.iter().map(|c| c.t).max());
+        ring.bytes += bytes;
+        let kept = Arc::new(Kept { piece, rest, bytes });
+        ring.pieces.push_back(Arc::clone(&kept));
+        let latest = ring.latest;
+        // The first is always one to begin with.
+        loop {
+            let second = ring.pieces.iter().skip(1).position(|kept| kept.piece.held.is_some()).map(|k| k + 1);
+            let Some(second) = second else { break };
+            let old = ring.pieces[second].piece.since.zip(latest).is_some_and(|(since, now)| now - since > REACH_US);
+            if !old && ring.bytes <= REACH_BYTES {
+                break;
+            }
+            for _ in 0..second {
+                let gone = ring.pieces.pop_front().map_or(0, |kept| kept.bytes);
+                ring.bytes -= gone;
+                ring.first += 1;
+            }
+        }
+        kept
+    }
+
+    /// How many pieces have come; [`RingFilm::changes_from`] goes on there.
+    #[must_use]
+    pub fn come_to(&self) -> u64 {
+        let ring = self.ring();
+        ring.first + ring.pieces.len() as u64
+    }
+
+    /// Hands out the changes of the pieces from a number on; gives the next number.
+    pub fn changes_from(&self, number: u64, mut take: impl FnMut(&[Change])) -> u64 {
+        let mut number = number;
+        loop {
+            let kept = {
+                let ring = self.ring();
+                number = number.max(ring.first);
+                #[allow(clippy::cast_possible_truncation)]
+                ring.pieces.get((number - ring.first) as usize).cloned()
+            };
+            let Some(kept) = kept else { return number };
+            take(&kept.piece.changes);
+            number += 1;
+        }
+    }
+
+    /// The history of a taxel up to now, and where to go on.
+    #[must_use]
+    pub fn history(&self, taxel: u32) -> (History, u64) {
+        let from = self.range().map_or(0, |(_, latest)| latest - SPAN * COLUMN_US);
+        let (number, held) = {
+            let ring = self.ring();
+            let place = ring.begin(from).unwrap_or(0);
+            let held = ring.pieces.get(place).and_then(|kept| kept.piece.held.as_ref());
+            (ring.first + place as u64, held.map_or(UNKNOWN, |held| held[taxel as usize]))
+        };
+        let mut history = History::new(taxel, held);
+        let number = self.changes_from(number, |changes| changes.iter().for_each(|change| history.take(change)));
+        (history, number)
+    }
+
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.ring().bytes
+    }
+
+    /// Events by bin from the first time on: step us, counts.
+    #[must_use]
+    pub fn rate(&self) -> (i64, i64, Vec<u64>) {
+        let mut rate = Rate::default();
+        let first = self.ring().first;
+        self.changes_from(first, |changes| changes.iter().for_each(|change| rate.take(change.t)));
+        rate.said()
+    }
+}
+
+impl Ring {
+    /// The place of the last keyframe at or before a time, or of the first.
+    fn begin(&self, t: i64) -> Option<usize> {
+        let whole = |kept: &Arc<Kept>| kept.piece.held.is_some();
+        let last = self.pieces.iter().rposition(|kept| whole(kept) && kept.piece.since.is_none_or(|since| since <= t));
+        last.or_else(|| self.pieces.iter().position(whole))
+    }
+}
+
+struct RingReel {
+    film: RingFilm,
+    number: u64,
+    /// The piece whose held values were told.
+    told: Option<u64>,
+}
+
+impl Reel for RingReel {
+    fn next(&mut self, out: &mut Vec<Change>) -> Result<Next> {
+        let ring = self.film.ring();
+        let lost = self.number < ring.first;
+        self.number = self.number.max(ring.first);
+        #[allow(clippy::cast_possible_truncation)]
+        let Some(kept) = ring.pieces.get((self.number - ring.first) as usize).cloned() else { return Ok(Next::End) };
+        drop(ring);
+        if (lost || kept.piece.missing > 0)
+            && self.told != Some(self.number)
+            && let Some(held) = &kept.piece.held
+        {
+            self.told = Some(self.number);
+            return Ok(Next::Held(held.clone(), kept.piece.before));
+        }
+        out.extend_from_slice(&kept.piece.changes);
+        self.number += 1;
+        Ok(Next::Changes)
+    }
+}
+
+impl Film for RingFilm {
+    fn array(&self) -> &Array {
+        &self.array
+    }
+
+    fn floor(&self) -> u16 {
+        self.floor
+    }
+
+    fn range(&self) -> Option<(i64, i64)> {
+        let ring = self.ring();
+        let latest = ring.latest?;
+        let first = ring.pieces.front()?;
+        let since = first.piece.since.or(first.piece.changes.first().map(|c| c.t));
+        Some((since.unwrap_or(latest), latest))
+    }
+
+    fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn Reel>)> {
+        let ring = self.ring();
+        let place = ring.begin(t).ok_or_else(|| problem!("nothing came yet"))?;
+        let kept = &ring.pieces[place];
+        let held = kept.piece.held.clone().unwrap_or_default();
+        let rest = kept.rest.as_ref().map_or_else(|| held.clone(), |rest| rest.to_vec());
+        let frame = Keyframe { latest: kept.piece.since, events: kept.piece.before, held, rest };
+        let number = ring.first + place as u64;
+        drop(ring);
+        Ok((frame, Box::new(RingReel { film: self.clone(), number, told: Some(number) })))
+    }
+
+    fn earlier(&self, t: i64) -> Option<i64> {
+        let ring = self.ring();
+        ring.pieces.iter().rev().filter(|kept| kept.piece.held.is_some()).filter_map(|k| k.piece.since).find(|&s| s < t)
+    }
+
+    fn strip(&self) -> Option<&Strip> {
+        None
+    }
+
+    fn events_before(&self, t: i64) -> u64 {
+        let ring = self.ring();
+        ring.begin(t).map_or(0, |place| ring.pieces[place].piece.before)
+    }
+}
+
+// ---------------------------------------------------------------------------------------------- recordings
+
+/// Events over time in bins that grow with it.
+#[derive(Debug, Default)]
+struct Rate {
+    first: Option<i64>,
+    step: i64,
+    bins: Vec<u64>,
+}
+
+impl Rate {
+    fn take(&mut self, t: i64) {
+        let first = *self.first.get_or_insert(t);
+        self.step = self.step.max(COLUMN_US);
+        loop {
+            #[allow(clippy::cast_possible_truncation)]
+            let bin = (t.saturating_sub(first).max(0) / self.step).unsigned_abs() as usize;
+            if bin < BINS {
+                if bin >= self.bins.len() {
+                    self.bins.resize(bin + 1, 0);
+                }
+                self.bins[bin] += 1;
+                return;
+            }
+            self.bins = self.bins.chunks(2).map(|two| two.iter().sum()).collect();
+            self.step = self.step.saturating_mul(2);
+        }
+    }
+
+    fn said(self) -> (i64, i64, Vec<u64>) {
+        (self.first.unwrap_or(0), self.step.max(COLUMN_US), self.bins)
+    }
+}
+
+/// What each taxel did: events, and whether it showed more than one value.
+#[derive(Debug, Clone)]
+pub struct Activity {
+    /// Events at each taxel.
+    pub events: Vec<u32>,
+    /// Different values that it showed: 0, 1, or 2 for more.
+    pub values: Vec<u8>,
+    first: Vec<u16>,
+}
+
+impl Activity {
+    /// Of so many taxels that have done nothing.
+    #[must_use]
+    pub fn new(taxels: usize) -> Self {
+        Self { events: vec![0; taxels], values: vec![0; taxels], first: vec![UNKNOWN; taxels] }
+    }
+
+    /// Takes a change.
+    pub fn take(&mut self, change: &Change) {
+        let taxel = change.taxel as usize;
+        self.events[taxel] = self.events[taxel].saturating_add(1);
+        if change.ticks == UNKNOWN {
+            return;
+        }
+        if self.values[taxel] == 0 {
+            (self.values[taxel], self.first[taxel]) = (1, change.ticks);
+        } else if self.first[taxel] != change.ticks {
+            self.values[taxel] = 2;
+        }
+    }
+}
+
+#[derive(Debug)]
+enum Source {
+    Mcap(Box<Reader>),
+    Lsa(File, u64),
+}
+
+/// What decodes it.
+#[derive(Debug, Clone)]
+enum Ear {
+    Datagrams(Box<wire::Receiver>),
+    Bytes(Box<Decoder>),
+}
+
+#[derive(Debug)]
+struct Key {
+    block: usize,
+    place: Place,
+    ear: Ear,
+    frame: Keyframe,
+}
+
+/// A recording, indexed.
+#[derive(Debug)]
+pub struct FileFilm {
+    path: PathBuf,
+    source: Source,
+    header: Header,
+    keys: Vec<Key>,
+    strip: Option<Strip>,
+    range: Option<(i64, i64)>,
+    /// Bytes of the file.
+    pub bytes: u64,
+    /// Events in all.
+    pub events: u64,
+    /// Events over time: first time, step (us), counts.
+    pub rate: (i64, i64, Vec<u64>),
+    /// What each taxel did.
+    pub activity: Activity,
+    /// Notes, markers, detections, registers.
+    pub remarks: Remarks,
+    /// What was lost, in a line.
+    pub verdict: String,
+    /// Whether it lacks its end.
+    pub unfinished: bool,
+}
+
+impl FileFilm {
+    /// Reads a recording (`.mcap`, `.lsa`) once, and keeps where to begin.
+    ///
+    /// # Errors
+    ///
+    /// `File` where it cannot be read, `Core` where it is no recording.
+    pub fn open(path: &Path) -> Result<Arc<Self>> {
+        let bytes = std::fs::metadata(path).map_err(Error::file(path))?.len();
+        let (source, header, verdict, unfinished) = match path.extension().and_then(|e| e.to_str()) {
+            Some("mcap") => {
+                let reader = Reader::open(path)?;
+                let verdict = match reader.ending() {
+                    Some(Ending::Finished { verdict, .. }) => verdict.clone(),
+                    Some(Ending::Stopped(why)) => format!("stopped by an error ({why}): what came last is missing"),
+                    None => "not finished: what came last is missing".to_owned(),
+                };
+                let (header, unfinished) = (reader.header().clone(), reader.rebuilt().unfinished);
+                (Source::Mcap(Box::new(reader)), header, verdict, unfinished)
+            }
+            Some("lsa") => {
+                let file = File::open(path).map_err(Error::file(path))?;
+                let header = Header {
+                    array: Array::thesis(),
+                    registers: None,
+                    difference: false,
+                    origin_us: 0,
+                    source: path.display().to_string(),
+                    started_ns: 0,
+                };
+                let complete = path.with_extension("lss").exists();
+                let verdict =
+                    if complete { NOTHING_LOST.to_owned() } else { "no .lss: perhaps not complete".to_owned() };
+                (Source::Lsa(file, bytes), header, verdict, !complete)
+            }
+            _ => {
+                let name = path.display();
+                return Err(problem!("{name}: the panel shows .mcap and .lsa; taxel convert makes a .mcap").into());
+            }
+        };
+        let taxels = header.array.len();
+        let mut film = Self {
+            path: path.to_owned(),
+            source,
+            header,
+            keys: vec![],
+            strip: None,
+            range: None,
+            bytes,
+            events: 0,
+            rate: (0, COLUMN_US, vec![]),
+            activity: Activity::new(taxels),
+            remarks: Remarks::default(),
+            verdict,
+            unfinished,
+        };
+        film.index()?;
+        Ok(Arc::new(film))
+    }
+
+    /// What the file says of itself.
+    #[must_use]
+    pub fn header(&self) -> &Header {
+        &self.header
+    }
+
+    /// Where it is.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    fn blocks(&self) -> usize {
+        match &self.source {
+            Source::Mcap(reader) => reader.blocks(),
+            Source::Lsa(_, length) => usize::try_from(length.div_ceil(LSA_PIECE)).unwrap_or(usize::MAX),
+        }
+    }
+
+    fn ear(&self) -> Ear {
+        let decoder = Decoder::new(self.header.array.clone()).differences(self.header.difference);
+        match &self.source {
+            Source::Mcap(_) => Ear::Datagrams(Box::new(wire::Receiver::new(decoder, 1))),
+            Source::Lsa(..) => Ear::Bytes(Box::new(decoder)),
+        }
+    }
+
+    /// Decodes a block; the last gives what waits as well. Gives the bytes that it held.
+    fn block(
+        &self,
+        k: usize,
+        place: &mut Place,
+        ear: &mut Ear,
+        events: &mut Events,
+        mut remarks: Option<&mut Remarks>,
+    ) -> Result<u64> {
+        let (mut repaired, mut bytes) = (vec![], 0);
+        match (&self.source, &mut *ear) {
+            (Source::Mcap(reader), Ear::Datagrams(receiver)) => {
+                reader.block(k, place, |message| {
+                    if message.topic == Topic::Datagrams {
+                        receiver.push(message.data, Some(message.at_ns / 1000), events, &mut repaired);
+                        bytes += message.data.len() as u64;
+                    } else if message.topic == Topic::Pressure {
+                        return Ok(());
+                    }
+                    if let Some(remarks) = &mut remarks {
+                        remarks.take(&message);
+                    }
+                    Ok(())
+                })?;
+            }
+            (Source::Lsa(file, length), Ear::Bytes(decoder)) => {
+                let offset = k as u64 * LSA_PIECE;
+                bytes = LSA_PIECE.min(length - offset);
+                let mut piece = vec![0; usize::try_from(bytes).unwrap_or(0)];
+                file.read_exact_at(&mut piece, offset).map_err(Error::file(&self.path))?;
+                decoder.push_into(&piece, None, events);
+            }
+            _ => {}
+        }
+        if k + 1 == self.blocks() {
+            match ear {
+                Ear::Datagrams(receiver) => receiver.finish_into(events, &mut repaired),
+                Ear::Bytes(decoder) => decoder.finish_into(events),
+            }
+        }
+        Ok(bytes)
+    }
+
+    fn changes(&self, events: &Events, out: &mut Vec<Change>) {
+        let columns = usize::from(self.header.array.columns);
+        out.extend((0..events.len()).map(|k| {
+            let ticks = match &events.intensity {
+                Some(intensity) if intensity.present[k] => intensity.ticks[k],
+                _ => UNKNOWN,
+            };
+            // A sensor has 2^22 taxels at most (recording's limits).
+            #[allow(clippy::cast_possible_truncation)]
+            let taxel = (usize::from(events.y[k]) * columns + usize::from(events.x[k])) as u32;
+            Change { t: events.t[k] + self.header.origin_us, taxel, ticks, up: events.p[k] }
+        }));
+    }
+
+    fn index(&mut self) -> Result<()> {
+        let taxels = self.header.array.len();
+        let blank = Keyframe { latest: None, events: 0, held: vec![UNKNOWN; taxels], rest: vec![UNKNOWN; taxels] };
+        let mut lens = Lens::new(self.header.array.columns, self.floor(), &blank, STRIP_BYTES);
+        let (mut ear, mut place) = (self.ear(), Place::default());
+        // Of version 2 a decoder remembers the last 65 536 numbers.
+        let each = 4 * taxels + (80 << 10);
+        let (mut spacing, mut since) = (SPACING, u64::MAX);
+        let (mut events, mut changes) = (Events::empty(self.header.array.clone()), vec![]);
+        let (mut rate, mut remarks, mut first) = (Rate::default(), Remarks::default(), None);
+        for k in 0..self.blocks() {
+            if since >= spacing {
+                since = 0;
+                let frame = lens.keyframe();
+                self.keys.push(Key { block: k, place: place.kept(), ear: ear.clone(), frame });
+                if self.keys.len() * each > KEYFRAME_BYTES {
+                    let mut odd = false;
+                    self.keys.retain(|_| {
+                        odd = !odd;
+                        odd
+                    });
+                    spacing *= 2;
+                }
+            }
+            events.clear();
+            let told = remarks.held.is_some();
+            since = since.saturating_add(self.block(k, &mut place, &mut ear, &mut events, Some(&mut remarks))?);
+            if !told && let Some(held) = remarks.held.as_ref().filter(|held| held.len() == taxels && lens.events() == 0)
+            {
+                // A recording begun in mid-stream says what was held; it stands before all datagrams, in the first block.
+                lens.hold(held, 0);
+                if let Some(key) = self.keys.first_mut() {
+                    key.frame = lens.keyframe();
+                }
+            }
+            changes.clear();
+            self.changes(&events, &mut changes);
+            for change in &changes {
+                first = Some(first.map_or(change.t, |first: i64| first.min(change.t)));
+                lens.take(change);
+                self.activity.take(change);
+                rate.take(change.t);
+            }
+        }
+        self.events = lens.events();
+        self.range = first.zip(lens.latest());
+        self.rate = rate.said();
+        self.remarks = remarks;
+        let strip = lens.strip().clone();
+        let whole = strip.reach().zip(first).is_none_or(|((begin, _), first)| begin <= column_of(first));
+        self.strip = whole.then_some(strip);
+        Ok(())
+    }
+}
+
+struct FileReel {
+    film: Arc<FileFilm>,
+    block: usize,
+    place: Place,
+    ear: Ear,
+    events: Events,
+}
+
+impl Reel for FileReel {
+    fn next(&mut self, out: &mut Vec<Change>) -> Result<Next> {
+        if self.block >= self.film.blocks() {
+            return Ok(Next::End);
+        }
+        self.events.clear();
+        self.film.block(self.block, &mut self.place, &mut self.ear, &mut self.events, None)?;
+        self.block += 1;
+        self.film.changes(&self.events, out);
+        Ok(Next::Changes)
+    }
+}
+
+impl Film for Arc<FileFilm> {
+    fn array(&self) -> &Array {
+        &self.header.array
+    }
+
+    fn floor(&self) -> u16 {
+        FileFilm::floor(self)
+    }
+
+    fn range(&self) -> Option<(i64, i64)> {
+        self.range
+    }
+
+    fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn Reel>)> {
+        let place = self.keys.partition_point(|key| key.frame.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
+        let Some(Key { block, place, ear, frame }) = self.keys.get(place) else {
+            return Err(problem!("{}: holds no events", self.path.display()).into());
+        };
+        let reel = FileReel {
+            film: Arc::clone(self),
+            block: *block,
+            place: place.clone(),
+            ear: ear.clone(),
+            events: Events::empty(self.header.array.clone()),
+        };
+        Ok((frame.clone(), Box::new(reel)))
+    }
+
+    fn earlier(&self, t: i64) -> Option<i64> {
+        self.keys.iter().rev().filter_map(|key| key.frame.latest).find(|&latest| latest < t)
+    }
+
+    fn strip(&self) -> Option<&Strip> {
+        self.strip.as_ref()
+    }
+
+    fn events_before(&self, t: i64) -> u64 {
+        let place = self.keys.partition_point(|key| key.frame.latest.is_none_or(|latest| latest <= t)).max(1) - 1;
+        self.keys.get(place).map_or(0, |key| key.frame.events)
+    }
+}
+
+impl FileFilm {
+    fn floor(&self) -> u16 {
+        self.header.registers.map_or(0, |registers| registers.noise_floor.into())
+    }
+}
+
+// ---------------------------------------------------------------------------------------------- a view
+
+/// A film at a time.
+pub struct Player {
+    film: Arc<dyn Film>,
+    reel: Box<dyn Reel>,
+    lens: Lens,
+    /// From this column on the lens' own strip holds; before it the film's.
+    own: i64,
+    waiting: Vec<Change>,
+    place: usize,
+    t: i64,
+    history: Option<(History, u16)>,
+}
+
+impl Player {
+    /// Shows a time (us), cut to what there is, and the history of a taxel.
+    ///
+    /// # Errors
+    ///
+    /// As [`Film::open`] and [`Reel::next`].
+    pub fn open(film: Arc<dyn Film>, t: i64, watch: Option<u32>) -> Result<Self> {
+        let (first, last) = film.range().ok_or_else(|| problem!("nothing to show: it holds no events"))?;
+        let t = t.clamp(first, last);
+        let span = SPAN * COLUMN_US;
+        let kept = film.strip().is_some();
+        let dense = film.events_before(t).saturating_sub(film.events_before(t - span)) > HISTORY_CHANGES;
+        let back =
+            if kept && (watch.is_none() || dense) { (FORGET + LATE) * COLUMN_US } else { span + LATE * COLUMN_US };
+        let (frame, reel) = film.open(t.saturating_sub(back))?;
+        let columns = film.array().columns;
+        let lens = Lens::new(columns, film.floor(), &frame, 0);
+        let own = frame.latest.map_or(i64::MIN, |latest| column_of(latest) + LATE);
+        let history = watch.map(|taxel| {
+            let held = frame.held.get(taxel as usize).copied().unwrap_or(UNKNOWN);
+            (History::new(taxel, held), held)
+        });
+        let mut player = Self { film, reel, lens, own, waiting: vec![], place: 0, t, history };
+        player.advance(t)?;
+        Ok(player)
+    }
+
+    /// Moves on to a later time, at most to the end; gives whether there is more.
+    ///
+    /// # Errors
+    ///
+    /// As [`Reel::next`].
+    pub fn advance(&mut self, t: i64) -> Result<bool> {
+        let last = self.film.range().map_or(t, |(_, last)| last);
+        let more = t < last;
+        let t = t.min(last);
+        loop {
+            while let Some(change) = self.waiting.get(self.place) {
+                if change.t > t {
+                    self.lens.advance(t);
+                    self.t = self.t.max(t);
+                    return Ok(more);
+                }
+                self.lens.take(change);
+                if let Some((history, _)) = &mut self.history {
+                    history.take(change);
+                }
+                self.place += 1;
+            }
+            self.waiting.clear();
+            self.place = 0;
+            match self.reel.next(&mut self.waiting)? {
+                Next::Changes => {}
+                Next::Held(held, events) => self.lens.hold(&held, events),
+                Next::End => {
+                    self.lens.advance(t);
+                    self.t = self.t.max(t);
+                    return Ok(more);
+                }
+            }
+        }
+    }
+
+    /// The time of the next stamp that has events, us.
+    ///
+    /// # Errors
+    ///
+    /// As [`Reel::next`].
+    pub fn next_stamp(&mut self) -> Result<Option<i64>> {
+        loop {
+            if let Some(change) = self.waiting.get(self.place) {
+                return Ok(Some(change.t.max(self.t)));
+            }
+            self.waiting.clear();
+            self.place = 0;
+            match self.reel.next(&mut self.waiting)? {
+                Next::Changes => {}
+                Next::Held(held, events) => self.lens.hold(&held, events),
+                Next::End => return Ok(None),
+            }
+        }
+    }
+
+    /// The time of the last stamp before this one that has events, us.
+    ///
+    /// # Errors
+    ///
+    /// As [`Film::open`] and [`Reel::next`].
+    pub fn last_stamp(&self) -> Result<Option<i64>> {
+        let mut from = self.t;
+        loop {
+            let (_, mut reel) = self.film.open(from.saturating_sub(1))?;
+            let (mut changes, mut found) = (vec![], None);
+            'reading: loop {
+                changes.clear();
+                match reel.next(&mut changes)? {
+                    Next::Changes => {}
+                    Next::Held(..) => continue,
+                    Next::End => break,
+                }
+                for change in &changes {
+                    if change.t >= self.t {
+                        break 'reading;
+                    }
+                    found = found.max(Some(change.t));
+                }
+            }
+            if found.is_some() {
+                return Ok(found);
+            }
+            match self.film.earlier(from.saturating_sub(1)) {
+                Some(earlier) => from = earlier,
+                None => return Ok(None),
+            }
+        }
+    }
+
+    /// The time shown, us.
+    #[must_use]
+    pub fn t(&self) -> i64 {
+        self.t
+    }
+
+    /// What it shows.
+    #[must_use]
+    pub fn lens(&self) -> &Lens {
+        &self.lens
+    }
+
+    /// The film.
+    #[must_use]
+    pub fn film(&self) -> &Arc<dyn Film> {
+        &self.film
+    }
+
+    /// What is watched: the history, and what it held before.
+    #[must_use]
+    pub fn history(&self) -> Option<&(History, u16)> {
+        self.history.as_ref()
+    }
+
+    /// The lens' strip, and from which column on it holds; before that the film's.
+    #[must_use]
+    pub fn strips(&mut self) -> (&Strip, i64, Option<&Strip>) {
+        let own = self.own;
+        (self.lens.strip(), own, self.film.strip())
+    }
+}

@@ -1,0 +1,571 @@
+//! What a moment looks like: held values, what changed lately, the last seconds by column of time.
+//!
+//! The same for live events and for recordings: a lens that was begun earlier and one that was begun from a keyframe show
+//! the same, as soon as [`FORGET`] columns of time have passed.
+
+use std::collections::BTreeMap;
+
+use crate::pipeline::{Change, UNKNOWN};
+
+/// A column of time, us.
+pub const COLUMN_US: i64 = 4000;
+
+/// Columns of time that a picture shows: 5 s.
+pub const SPAN: i64 = 1250;
+
+/// After so many columns of time no change is seen any more: 127 less a sixteenth each time is 0.
+pub const FORGET: i64 = 64;
+
+/// What a change without a value counts.
+const UNVALUED: i8 = 16;
+
+/// Columns of time in a block of a [`Strip`].
+const BLOCK: i64 = 250;
+
+/// What all taxels do together at the end of a column of time.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Curve {
+    /// Ticks above rest.
+    pub sum: u32,
+    /// Taxels above rest.
+    pub area: u32,
+    /// Centre; NaN where nothing is pressed.
+    pub x: f32,
+    /// The same of rows.
+    pub y: f32,
+}
+
+/// The column of time in which a moment lies.
+#[must_use]
+pub fn column_of(t: i64) -> i64 {
+    t.div_euclid(COLUMN_US)
+}
+
+#[derive(Debug, Clone)]
+struct Block {
+    raster: Vec<u8>,
+    curves: Vec<Curve>,
+}
+
+/// Raster and curves by column of time; stretches in which nothing was heard cost nothing.
+#[derive(Debug, Clone)]
+pub struct Strip {
+    rows: usize,
+    blocks: BTreeMap<i64, Block>,
+    /// The columns that are known: first and last.
+    reach: Option<(i64, i64)>,
+    /// Blocks kept at most.
+    most: usize,
+}
+
+impl Strip {
+    /// A strip of an array of so many rows that keeps so many bytes at most: the oldest go.
+    #[must_use]
+    pub fn new(rows: usize, bytes: usize) -> Self {
+        let block = Self::block_bytes(rows);
+        Self {
+            rows,
+            blocks: BTreeMap::new(),
+            reach: None,
+            most: (bytes / block).max(SPAN.unsigned_abs() as usize / BLOCK.unsigned_abs() as usize + 2),
+        }
+    }
+
+    fn block_bytes(rows: usize) -> usize {
+        BLOCK.unsigned_abs() as usize * (rows + std::mem::size_of::<Curve>())
+    }
+
+    /// First and last column that it knows.
+    #[must_use]
+    pub fn reach(&self) -> Option<(i64, i64)> {
+        self.reach
+    }
+
+    fn block(&mut self, column: i64) -> (&mut Block, usize) {
+        let (key, rows) = (column.div_euclid(BLOCK), self.rows);
+        if !self.blocks.contains_key(&key) {
+            if self.blocks.len() >= self.most
+                && let Some((oldest, _)) = self.blocks.pop_first()
+                && let Some(reach) = &mut self.reach
+            {
+                reach.0 = reach.0.max((oldest + 1) * BLOCK);
+            }
+            let n = BLOCK.unsigned_abs() as usize;
+            let held = self.blocks.range(..key).next_back().map_or(NOTHING, |(_, block)| block.curves[n - 1]);
+            self.blocks.insert(key, Block { raster: vec![0; n * rows], curves: vec![held; n] });
+        }
+        let block = self.blocks.get_mut(&key).expect("it was put there");
+        (block, column.rem_euclid(BLOCK).unsigned_abs() as usize)
+    }
+
+    /// Says that time has come into this column.
+    fn come_to(&mut self, column: i64) {
+        match &mut self.reach {
+            None => self.reach = Some((column, column)),
+            Some(reach) => reach.1 = reach.1.max(column),
+        }
+    }
+
+    fn mark(&mut self, column: i64, row: usize, up: bool) {
+        if self.reach.is_some_and(|(first, _)| column < first) {
+            return;
+        }
+        let rows = self.rows;
+        let (block, k) = self.block(column);
+        let cell = &mut block.raster[k * rows + row];
+        let (ups, downs) = (*cell & 15, *cell >> 4);
+        *cell = if up { (ups + 1).min(15) | downs << 4 } else { ups | (downs + 1).min(15) << 4 };
+    }
+
+    /// From this column on to the end of its block the curves are these.
+    fn set_curve(&mut self, column: i64, curve: Curve) {
+        let before = self.curve(column);
+        let same = before.sum == curve.sum
+            && before.x.to_bits() == curve.x.to_bits()
+            && before.y.to_bits() == curve.y.to_bits();
+        // A silent stretch takes what came before it.
+        if !same {
+            let (block, k) = self.block(column);
+            block.curves[k..].fill(curve);
+        }
+    }
+
+    /// The curves at the end of a column.
+    #[must_use]
+    pub fn curve(&self, column: i64) -> Curve {
+        let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
+        match self.blocks.range(..=key).next_back() {
+            Some((&there, block)) if there == key => block.curves[k],
+            Some((_, block)) => block.curves.last().copied().unwrap_or(NOTHING),
+            None => NOTHING,
+        }
+    }
+
+    /// Appends the raster of a column, a byte a row.
+    pub fn raster(&self, column: i64, out: &mut Vec<u8>) {
+        let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
+        match self.blocks.get(&key) {
+            Some(block) => out.extend_from_slice(&block.raster[k * self.rows..(k + 1) * self.rows]),
+            None => out.resize(out.len() + self.rows, 0),
+        }
+    }
+
+    /// Bytes of memory.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.blocks.len() * Self::block_bytes(self.rows)
+    }
+}
+
+/// Of nothing that is pressed.
+pub const NOTHING: Curve = Curve { sum: 0, area: 0, x: f32::NAN, y: f32::NAN };
+
+/// What a lens begins with.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Keyframe {
+    /// The board's time come to, us; `None` before anything came.
+    pub latest: Option<i64>,
+    /// Events up to there.
+    pub events: u64,
+    /// What each taxel holds; [`UNKNOWN`] where it was never heard of.
+    pub held: Vec<u16>,
+    /// What each taxel reads at rest.
+    pub rest: Vec<u16>,
+}
+
+/// See the module.
+#[derive(Debug, Clone)]
+pub struct Lens {
+    columns: usize,
+    floor: u16,
+    held: Vec<u16>,
+    rest: Vec<u16>,
+    /// Whether the rest is the lowest so far; else it was set.
+    lowest: bool,
+    /// How often the rest has changed.
+    rests: u64,
+    change: Vec<i8>,
+    strip: Strip,
+    /// The column that is not over.
+    column: Option<i64>,
+    latest: Option<i64>,
+    events: u64,
+    sum: u64,
+    sum_x: u64,
+    sum_y: u64,
+    area: u32,
+}
+
+impl Lens {
+    /// A lens on an array of so many columns that begins with a keyframe.
+    #[must_use]
+    pub fn new(columns: u16, floor: u16, from: &Keyframe, strip_bytes: usize) -> Self {
+        let columns = usize::from(columns);
+        let mut lens = Self {
+            columns,
+            floor,
+            held: from.held.clone(),
+            rest: from.rest.clone(),
+            lowest: true,
+            rests: 1,
+            change: vec![0; from.held.len()],
+            strip: Strip::new(from.held.len() / columns.max(1), strip_bytes),
+            column: None,
+            latest: from.latest,
+            events: from.events,
+            sum: 0,
+            sum_x: 0,
+            sum_y: 0,
+            area: 0,
+        };
+        lens.reckon();
+        if let Some(t) = from.latest {
+            lens.advance(t);
+        }
+        lens
+    }
+
+    /// A keyframe of now.
+    #[must_use]
+    pub fn keyframe(&self) -> Keyframe {
+        Keyframe { latest: self.latest, events: self.events, held: self.held.clone(), rest: self.rest.clone() }
+    }
+
+    /// Sums anew.
+    fn reckon(&mut self) {
+        (self.sum, self.sum_x, self.sum_y, self.area) = (0, 0, 0, 0);
+        for taxel in 0..self.held.len() {
+            self.weigh(taxel, true);
+        }
+    }
+
+    /// Ticks above rest, 0 up to the noise floor.
+    fn above(&self, taxel: usize) -> u16 {
+        let (held, rest) = (self.held[taxel], self.rest[taxel]);
+        if held == UNKNOWN || rest == UNKNOWN {
+            return 0;
+        }
+        let above = held.saturating_sub(rest);
+        if above > self.floor { above } else { 0 }
+    }
+
+    fn weigh(&mut self, taxel: usize, on: bool) {
+        let above = u64::from(self.above(taxel));
+        if above == 0 {
+            return;
+        }
+        let (x, y) = ((taxel % self.columns) as u64 * above, (taxel / self.columns) as u64 * above);
+        if on {
+            (self.sum, self.sum_x, self.sum_y, self.area) =
+                (self.sum + above, self.sum_x + x, self.sum_y + y, self.area + 1);
+        } else {
+            (self.sum, self.sum_x, self.sum_y, self.area) =
+                (self.sum - above, self.sum_x - x, self.sum_y - y, self.area - 1);
+        }
+    }
+
+    #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
+    fn curve(&self) -> Curve {
+        if self.sum == 0 {
+            return NOTHING;
+        }
+        let (x, y) = (self.sum_x as f64 / self.sum as f64, self.sum_y as f64 / self.sum as f64);
+        Curve { sum: self.sum.min(u64::from(u32::MAX)) as u32, area: self.area, x: x as f32, y: y as f32 }
+    }
+
+    /// Takes a change.
+    pub fn take(&mut self, change: &Change) {
+        self.advance(change.t);
+        self.events += 1;
+        let taxel = change.taxel as usize;
+        let sign = if change.up { 1 } else { -1 };
+        let mut size = UNVALUED * sign;
+        if change.ticks == UNKNOWN {
+            self.change[taxel] = self.change[taxel].saturating_add(size).max(-127);
+        } else {
+            let before = self.held[taxel];
+            if before != UNKNOWN {
+                let moved = (i32::from(change.ticks) - i32::from(before)).clamp(-127, 127);
+                #[allow(clippy::cast_possible_truncation)]
+                {
+                    size = moved as i8;
+                }
+            }
+            if size.unsigned_abs() >= self.change[taxel].unsigned_abs() {
+                self.change[taxel] = size;
+            }
+            self.weigh(taxel, false);
+            self.held[taxel] = change.ticks;
+            if self.lowest && change.ticks < self.rest[taxel] {
+                self.rest[taxel] = change.ticks;
+                self.rests += 1;
+            } else if self.rest[taxel] == UNKNOWN {
+                self.rest[taxel] = change.ticks;
+                self.rests += 1;
+            }
+            self.weigh(taxel, true);
+        }
+        self.strip.mark(column_of(change.t), taxel / self.columns, change.up);
+    }
+
+    /// Moves time on; back does nothing.
+    pub fn advance(&mut self, t: i64) {
+        if self.latest.is_some_and(|latest| t < latest) {
+            return;
+        }
+        self.latest = Some(t);
+        let column = column_of(t);
+        let Some(now) = self.column else {
+            self.column = Some(column);
+            self.strip.come_to(column);
+            return;
+        };
+        if column == now {
+            return;
+        }
+        let curve = self.curve();
+        self.strip.set_curve(now, curve);
+        for _ in 0..(column - now).min(FORGET) {
+            for change in &mut self.change {
+                // Towards 0, so that 1 becomes 0.
+                #[allow(clippy::cast_possible_truncation)]
+                {
+                    *change = (i16::from(*change) * 15 / 16) as i8;
+                }
+            }
+        }
+        if column > now + 1 {
+            self.strip.set_curve(now + 1, curve);
+        }
+        self.column = Some(column);
+        self.strip.come_to(column);
+    }
+
+    /// Events were missing: what the taxels hold now.
+    pub fn hold(&mut self, held: &[u16], events: u64) {
+        self.held.copy_from_slice(held);
+        self.events = events;
+        for (rest, &held) in self.rest.iter_mut().zip(held) {
+            if held != UNKNOWN && (*rest == UNKNOWN || self.lowest && held < *rest) {
+                *rest = held;
+                self.rests += 1;
+            }
+        }
+        self.reckon();
+    }
+
+    /// What is held now is the rest from here on.
+    pub fn rest_now(&mut self) {
+        self.rest.copy_from_slice(&self.held);
+        (self.lowest, self.rests) = (false, self.rests + 1);
+        self.reckon();
+    }
+
+    /// The rest is the lowest from here on.
+    pub fn rest_lowest(&mut self) {
+        self.rest.copy_from_slice(&self.held);
+        (self.lowest, self.rests) = (true, self.rests + 1);
+        self.reckon();
+    }
+
+    /// Changes up to the noise floor are none.
+    pub fn set_floor(&mut self, floor: u16) {
+        self.floor = floor;
+        self.reckon();
+    }
+
+    /// What the taxels hold.
+    #[must_use]
+    pub fn held(&self) -> &[u16] {
+        &self.held
+    }
+
+    /// What they read at rest.
+    #[must_use]
+    pub fn rest(&self) -> &[u16] {
+        &self.rest
+    }
+
+    /// How often the rest has changed.
+    #[must_use]
+    pub fn rests(&self) -> u64 {
+        self.rests
+    }
+
+    /// The largest changes lately.
+    #[must_use]
+    pub fn change(&self) -> &[i8] {
+        &self.change
+    }
+
+    /// The board's time come to, us.
+    #[must_use]
+    pub fn latest(&self) -> Option<i64> {
+        self.latest
+    }
+
+    /// Events up to now.
+    #[must_use]
+    pub fn events(&self) -> u64 {
+        self.events
+    }
+
+    /// Raster and curves; of the column that is not over the curves of now.
+    #[must_use]
+    pub fn strip(&mut self) -> &Strip {
+        if let Some(now) = self.column {
+            let curve = self.curve();
+            self.strip.set_curve(now, curve);
+        }
+        &self.strip
+    }
+}
+
+/// The watched taxel's least, greatest and last value in each column of time.
+#[derive(Debug, Clone)]
+pub struct History {
+    /// Its index.
+    pub taxel: u32,
+    last: u16,
+    columns: std::collections::VecDeque<(i64, [u16; 3])>,
+}
+
+impl History {
+    /// Begins to watch a taxel that holds this value.
+    #[must_use]
+    pub fn new(taxel: u32, held: u16) -> Self {
+        Self { taxel, last: held, columns: std::collections::VecDeque::new() }
+    }
+
+    /// Takes a change, of any taxel.
+    pub fn take(&mut self, change: &Change) {
+        if change.taxel != self.taxel || change.ticks == UNKNOWN {
+            return;
+        }
+        let column = column_of(change.t);
+        let before = self.last;
+        self.last = change.ticks;
+        match self.columns.back_mut() {
+            Some((there, [least, greatest, last])) if *there >= column => {
+                (*least, *greatest, *last) = ((*least).min(change.ticks), (*greatest).max(change.ticks), change.ticks);
+            }
+            _ => {
+                let (least, greatest) = if before == UNKNOWN {
+                    (change.ticks, change.ticks)
+                } else {
+                    (before.min(change.ticks), before.max(change.ticks))
+                };
+                self.columns.push_back((column, [least, greatest, change.ticks]));
+            }
+        }
+        while self.columns.len() > 1 && self.columns[1].0 <= column - SPAN {
+            self.columns.pop_front();
+        }
+    }
+
+    /// Appends least, greatest and last of these columns; `held` is what it held before all that is known.
+    pub fn write(&self, columns: std::ops::Range<i64>, held: u16, out: &mut Vec<u8>) {
+        let mut place = self.columns.partition_point(|(column, _)| *column < columns.start);
+        let mut last = if place == 0 { held } else { self.columns[place - 1].1[2] };
+        for column in columns {
+            let three = match self.columns.get(place) {
+                Some((there, three)) if *there == column => {
+                    place += 1;
+                    *three
+                }
+                _ => [last; 3],
+            };
+            last = three[2];
+            three.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blank(taxels: usize) -> Keyframe {
+        Keyframe { latest: None, events: 0, held: vec![UNKNOWN; taxels], rest: vec![UNKNOWN; taxels] }
+    }
+
+    fn change(t: i64, taxel: u32, ticks: u16) -> Change {
+        Change { t, taxel, ticks, up: true }
+    }
+
+    #[test]
+    fn a_lens_from_a_keyframe_shows_what_one_from_the_beginning_shows() {
+        use rand::{Rng, SeedableRng, rngs::StdRng};
+        let mut random = StdRng::seed_from_u64(18);
+        let (taxels, mut t) = (12, 0_i64);
+        let mut changes = vec![];
+        for _ in 0..5000 {
+            // Pauses of an hour too.
+            t += if random.random_range(0..500) == 0 { 3_600_000_000 } else { random.random_range(0..3000) };
+            // Some come late.
+            let back = if random.random_range(0..9) == 0 { random.random_range(0..9000) } else { 0 };
+            changes.push(change(t - back, random.random_range(0..taxels), random.random_range(0..300)));
+        }
+        let mut whole = Lens::new(4, 3, &blank(taxels as usize), 1 << 20);
+        let mut keyframes = vec![];
+        for (k, one) in changes.iter().enumerate() {
+            if k % 100 == 0 {
+                keyframes.push((k, whole.keyframe()));
+            }
+            whole.take(one);
+        }
+        for (k, keyframe) in keyframes {
+            let mut fresh = Lens::new(4, 3, &keyframe, 1 << 20);
+            changes[k..].iter().for_each(|one| fresh.take(one));
+            assert_eq!(fresh.held(), whole.held());
+            assert_eq!(fresh.rest(), whole.rest());
+            assert_eq!((fresh.events(), fresh.latest()), (whole.events(), whole.latest()));
+            let begun = keyframe.latest.map_or(0, column_of);
+            let now = column_of(whole.latest().unwrap());
+            if now - begun > FORGET {
+                assert_eq!(fresh.change(), whole.change());
+            }
+            let (one, other) = (fresh.strip().clone(), whole.strip().clone());
+            for column in (begun + 30).max(now - SPAN)..=now {
+                let (mut a, mut b) = (vec![], vec![]);
+                one.raster(column, &mut a);
+                other.raster(column, &mut b);
+                assert_eq!(a, b, "column {column}");
+                assert_eq!(format!("{:?}", one.curve(column)), format!("{:?}", other.curve(column)), "column {column}");
+            }
+        }
+    }
+
+    #[test]
+    fn above_rest_is_more_than_the_floor_and_its_centre_is_known() {
+        let mut lens = Lens::new(2, 3, &blank(4), 1 << 20);
+        for taxel in 0..4 {
+            lens.take(&change(0, taxel, 48));
+        }
+        lens.take(&change(100, 0, 51));
+        assert_eq!(lens.strip().curve(0).sum, 0, "the floor is no touch");
+        lens.take(&change(200, 0, 58));
+        lens.take(&change(300, 3, 78));
+        let curve = lens.strip().curve(0);
+        assert_eq!((curve.sum, curve.area, curve.x, curve.y), (40, 2, 0.75, 0.75));
+        assert_eq!(lens.change(), [10, 0, 0, 30], "the larger of two changes");
+        lens.rest_now();
+        assert_eq!(lens.strip().curve(0).sum, 0);
+        lens.advance(FORGET * COLUMN_US);
+        assert_eq!(lens.change(), [0; 4]);
+    }
+
+    #[test]
+    fn a_history_has_every_extreme_and_goes_on_through_silence() {
+        let mut history = History::new(1, 40);
+        for (t, ticks) in [(0, 50), (1000, 20), (2000, 45), (12_000, 60)] {
+            history.take(&change(t, 1, ticks));
+            history.take(&change(t, 0, 999));
+        }
+        let mut bytes = vec![];
+        history.write(-1..5, 40, &mut bytes);
+        let values: Vec<u16> = bytes.chunks(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+        let expected = [[40, 40, 40], [20, 50, 45], [45, 45, 45], [45, 45, 45], [45, 60, 60], [60, 60, 60]];
+        assert_eq!(values, expected.concat());
+    }
+}

@@ -1,0 +1,144 @@
+//! What others may do with a pipeline while it runs: look on, record, tell it of the board.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use crossbeam_channel as channel;
+use taxel_core::wire::Registers;
+
+use super::counters::Counters;
+use super::options::{LiveOptions, Record};
+use super::recorder::Recorder;
+use super::said::Said;
+use super::shared::{Shared, Wish, lock};
+use super::tap::Outlet;
+use crate::Result;
+
+/// What others may do with a [`Live`](super::Live) while it runs, and after.
+#[derive(Clone)]
+pub struct Handle {
+    pub(super) shared: Arc<Shared>,
+}
+
+impl Handle {
+    /// How the [`Live`](super::Live) was begun.
+    #[must_use]
+    pub fn options(&self) -> &LiveOptions {
+        &self.shared.options
+    }
+
+    /// Where it listens.
+    #[must_use]
+    pub fn address(&self) -> SocketAddr {
+        self.shared.receiver.address()
+    }
+
+    /// As [`Live::counters`](super::Live::counters).
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        self.shared.counters()
+    }
+
+    /// As [`Live::is_over`](super::Live::is_over).
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.shared.ended.load(Ordering::Acquire)
+    }
+
+    /// What the registers hold, as far as it was told.
+    #[must_use]
+    pub fn registers(&self) -> Registers {
+        *lock(&self.shared.registers)
+    }
+
+    /// Tells what was written to the board's registers: the recording keeps it, and the version of the wire is expected.
+    pub fn wrote(&self, registers: Registers) {
+        *lock(&self.shared.registers) = registers;
+        self.shared.wish(Wish::Registers(registers));
+    }
+
+    /// Lets somebody look on, from the next batch on.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where all is over.
+    pub fn look(&self) -> Result<Outlet> {
+        let (give, outlet) = channel::bounded(1);
+        self.shared.wish(Wish::Look(give));
+        self.wait(&outlet)
+    }
+
+    /// Hears detections as they are said; so many may wait, and who is too slow misses some.
+    #[must_use]
+    pub fn hear(&self, waiting: usize) -> channel::Receiver<Said> {
+        let (say, said) = channel::bounded(waiting);
+        lock(&self.shared.listeners).push(say);
+        said
+    }
+
+    /// Begins to record what comes from here on, beginning with the registers and what the taxels hold.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where something is recorded already, `File` where the file exists or cannot be created.
+    pub fn record(&self, record: &Record) -> Result<()> {
+        if lock(&self.shared.recorder).is_some() {
+            return Err(taxel_core::problem!("a recording runs already: stop it first").into());
+        }
+        let header = LiveOptions { registers: self.registers(), ..self.shared.options.clone() };
+        let recorder = Recorder::reserve(record, &header, self.address())?;
+        lock(&self.shared.broken).take();
+        self.shared.records.store(true, Ordering::Release);
+        self.shared.wish(Wish::Begin(Box::new(recorder)));
+        Ok(())
+    }
+
+    /// Ends the recording that [`Handle::record`] began. Gives the file, where anything came, and what was lost, in a line.
+    ///
+    /// # Errors
+    ///
+    /// What ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
+    pub fn end_recording(&self) -> Result<(Option<PathBuf>, String)> {
+        let (give, recorder) = channel::bounded(1);
+        self.shared.wish(Wish::End(give));
+        let (recorder, counters) = self.wait(&recorder)?;
+        if let Some(error) = lock(&self.shared.broken).take() {
+            return Err(error);
+        }
+        let Some(recorder) = recorder else {
+            return Err(taxel_core::problem!("nothing is recorded").into());
+        };
+        let verdict = recorder.verdict(&counters);
+        Ok((recorder.finish(&counters)?, verdict))
+    }
+
+    /// Whether a recording runs, and has not been ended by an error.
+    #[must_use]
+    pub fn records(&self) -> bool {
+        self.shared.records.load(Ordering::Acquire)
+    }
+
+    /// As [`Live::note`](super::Live::note).
+    ///
+    /// # Errors
+    ///
+    /// As [`Live::note`](super::Live::note).
+    pub fn note(&self, text: &str) -> Result<()> {
+        self.shared.note(text)
+    }
+
+    fn wait<T>(&self, from: &channel::Receiver<T>) -> Result<T> {
+        loop {
+            match from.recv_timeout(Duration::from_millis(50)) {
+                Ok(given) => return Ok(given),
+                Err(_) if self.is_over() => {
+                    return Err(taxel_core::problem!("live: has ended").into());
+                }
+                Err(_) => {}
+            }
+        }
+    }
+}

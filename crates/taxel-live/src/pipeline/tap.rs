@@ -1,0 +1,221 @@
+//! What those who look on get of the events: packed pieces, sixty a second while somebody looks.
+//!
+//! The decoding thread fills a piece of bounded size and hands it over where there is room; it never waits. What finds no
+//! room is counted, and the next piece begins with the held values, so that a picture is right again within 0.1 s.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
+use std::sync::Arc;
+use taxel_core::{Array, Events, Marker};
+
+/// A taxel that was never heard of, and a change without a value.
+pub const UNKNOWN: u16 = u16::MAX;
+
+/// From piece to piece while somebody looks ...
+const LOOKED_AT: Duration = Duration::from_micros(16_000);
+/// ... and while nobody does: looking back begins where a piece does.
+const UNSEEN: Duration = Duration::from_millis(100);
+
+/// How often a piece begins with the held values.
+const HELD_EVERY: Duration = Duration::from_millis(100);
+
+/// Changes that a piece holds at most: 4 MiB.
+const MOST: usize = 1 << 18;
+
+/// Markers that a piece holds at most.
+const MARKERS: usize = 1 << 10;
+
+/// Pieces that wait at most.
+const WAITING: usize = 16;
+
+/// A change at a taxel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Change {
+    /// us.
+    pub t: i64,
+    /// Its index.
+    pub taxel: u32,
+    /// The value that came with it, ticks; [`UNKNOWN`] where none did.
+    pub ticks: u16,
+    /// More pressure.
+    pub up: bool,
+}
+
+/// Changes in the order in which they came.
+#[derive(Debug, Clone, Default)]
+pub struct Piece {
+    /// The changes.
+    pub changes: Vec<Change>,
+    /// What the taxels held before the first of them, where it is told.
+    pub held: Option<Vec<u16>>,
+    /// The board's time before the first of them; `None` before anything came.
+    pub since: Option<i64>,
+    /// Events that came before them, those included that are missing.
+    pub before: u64,
+    /// Events that are missing between the last piece and this one.
+    pub missing: u64,
+    /// Starts and stops of the board.
+    pub markers: Vec<Marker>,
+}
+
+/// Where pieces come out.
+#[derive(Debug)]
+pub struct Outlet {
+    pieces: Receiver<Piece>,
+    looked_at: Arc<AtomicBool>,
+}
+
+impl Outlet {
+    /// The next piece, where one waits.
+    #[must_use]
+    pub fn next(&self) -> Option<Piece> {
+        self.pieces.try_recv().ok()
+    }
+
+    /// Says whether somebody looks: then pieces come sixty times a second, else ten.
+    pub fn look(&self, somebody: bool) {
+        self.looked_at.store(somebody, Ordering::Relaxed);
+    }
+}
+
+/// The decoding thread's end.
+#[derive(Debug)]
+pub(super) struct Tap {
+    pieces: Sender<Piece>,
+    looked_at: Arc<AtomicBool>,
+    piece: Piece,
+    held: Vec<u16>,
+    latest: Option<i64>,
+    events: u64,
+    /// Whether what waits to be sent begins with the held values.
+    told: Instant,
+    sent: Instant,
+    columns: usize,
+}
+
+/// A tap for an array whose taxels hold these values, as far as they are known, and where it comes out.
+pub(super) fn tap(array: &Array, held: Vec<u16>, latest: Option<i64>, events: u64) -> (Tap, Outlet) {
+    let (sender, pieces) = bounded(WAITING);
+    let looked_at = Arc::new(AtomicBool::new(true));
+    let now = Instant::now();
+    let first = Piece { held: Some(held.clone()), since: latest, before: events, ..Piece::default() };
+    let tap = Tap {
+        pieces: sender,
+        looked_at: Arc::clone(&looked_at),
+        piece: first,
+        held,
+        latest,
+        events,
+        told: now,
+        sent: now,
+        columns: usize::from(array.columns),
+    };
+    (tap, Outlet { pieces, looked_at })
+}
+
+impl Tap {
+    /// Takes the next events.
+    pub(super) fn take(&mut self, events: &Events) {
+        let room = MOST - self.piece.changes.len().min(MOST);
+        let taken = events.len().min(room);
+        for k in 0..events.len() {
+            let taxel = usize::from(events.y[k]) * self.columns + usize::from(events.x[k]);
+            let ticks = match &events.intensity {
+                Some(intensity) if intensity.present[k] => intensity.ticks[k],
+                _ => UNKNOWN,
+            };
+            if ticks != UNKNOWN {
+                self.held[taxel] = ticks;
+            }
+            self.latest = self.latest.max(Some(events.t[k]));
+            if k < taken {
+                // An array has 65 536 positions at most where it is live; files have 2^22.
+                #[allow(clippy::cast_possible_truncation)]
+                let taxel = taxel as u32;
+                self.piece.changes.push(Change { t: events.t[k], taxel, ticks, up: events.p[k] });
+            }
+        }
+        self.events += events.len() as u64;
+        let room = MARKERS.saturating_sub(self.piece.markers.len());
+        self.piece.markers.extend(events.markers.iter().take(room));
+        if taken < events.len() {
+            // Too much waits: what is there is given up, and the next piece begins anew with what is held.
+            let missing = self.piece.missing + (self.piece.changes.len() + events.len() - taken) as u64;
+            self.begin(true);
+            self.piece.missing = missing;
+        }
+    }
+
+    /// Hands over what waits, where it is time; false where nobody listens any more.
+    pub(super) fn tick(&mut self) -> bool {
+        let every = if self.looked_at.load(Ordering::Relaxed) { LOOKED_AT } else { UNSEEN };
+        let nothing = self.piece.changes.is_empty() && self.piece.held.is_none() && self.piece.markers.is_empty();
+        if nothing || self.sent.elapsed() < every {
+            return true;
+        }
+        match self.pieces.try_send(std::mem::take(&mut self.piece)) {
+            Ok(()) => {
+                self.sent = Instant::now();
+                self.begin(self.told.elapsed() >= HELD_EVERY);
+                true
+            }
+            Err(TrySendError::Full(piece)) => {
+                self.piece = piece;
+                true
+            }
+            Err(TrySendError::Disconnected(_)) => false,
+        }
+    }
+
+    fn begin(&mut self, with_held: bool) {
+        let held = with_held.then(|| self.held.clone());
+        if with_held {
+            self.told = Instant::now();
+        }
+        self.piece = Piece { held, since: self.latest, before: self.events, ..Piece::default() };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use taxel_core::Intensities;
+
+    fn events(t: &[i64], ticks: u16) -> Events {
+        let n = t.len();
+        let intensity = Some(Intensities { ticks: vec![ticks; n], present: vec![true; n] });
+        Events {
+            t: t.to_vec(),
+            x: vec![1; n],
+            y: vec![2; n],
+            p: vec![true; n],
+            intensity,
+            ..Events::empty(Array::thesis())
+        }
+    }
+
+    #[test]
+    fn who_does_not_read_loses_events_and_not_the_picture() {
+        let array = Array::thesis();
+        let (mut tap, outlet) = tap(&array, vec![UNKNOWN; array.len()], None, 0);
+        let many: Vec<i64> = (0..1000).collect();
+        let mut sent = 0_u64;
+        while sent < 3 * MOST as u64 {
+            tap.take(&events(&many, 7));
+            sent += 1000;
+        }
+        tap.sent = Instant::now() - UNSEEN;
+        assert!(tap.tick());
+        let piece = outlet.next().expect("one waits");
+        assert_eq!(piece.missing + piece.changes.len() as u64, sent);
+        assert_eq!(piece.before + piece.changes.len() as u64, sent);
+        assert_eq!(piece.held.expect("begins anew")[array.index(1, 2)], 7);
+        assert!(piece.changes.len() <= MOST);
+        drop(outlet);
+        tap.take(&events(&[2000], 7));
+        tap.sent = Instant::now() - UNSEEN;
+        assert!(!tap.tick(), "nobody listens any more");
+    }
+}
