@@ -19,7 +19,7 @@ from taxel.frames import Frames
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Health", "health"]
+__all__ = ["Health", "health", "judged"]
 
 #: Reading: a taxel is called dead where it was silent while its neighbours spoke so often (median of them) ...
 DEAD_BELOW = 10
@@ -114,18 +114,35 @@ def health(recorded: Events | Frames | Recorded) -> Health:
         values = activity + 1
     else:
         raise ProblemError(f"recorded is {shown(recorded)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
-    array = held.array
-    exists = np.ones(array.shape, bool) if array.exists is None else array.exists
+    found = judged(held.array, activity, values)
+    if isinstance(held, Frames) and len(held):
+        loaded = held.values[0] > held.values.reshape(len(held), -1).min()
+        return Health(held.array, activity, found.dead & ~loaded, found.dead & loaded, found.noisy)
+    return found
+
+
+def judged(array: Array, activity: NDArray[np.int64], values: NDArray[np.int64] | None) -> Health:
+    """Tell it from what each taxel did, by the rules of `health`.
+
+    Parameters
+    ----------
+    array : Array
+    activity : int64, shape (rows, columns)
+        Events at each taxel.
+    values : int64, shape (rows, columns), optional
+        How many different intensities each taxel showed: 0, 1, or 2 and more.
+
+    Returns
+    -------
+    Health
+    """
+    exists = np.ones(array.shape, bool) if array.exists is None else np.asarray(array.exists).reshape(array.shape)
     around = _median_around(np.where(exists, activity, np.nan))
     dead = exists & (activity == 0) & (around >= DEAD_BELOW)
     stuck = np.zeros(array.shape, bool)
     if values is not None:
         varied = _median_around(np.where(exists & (activity > 0), values, np.nan)) > 1
         stuck = exists & (activity >= STUCK_FROM) & (values == 1) & varied
-    if isinstance(held, Frames) and len(held):
-        loaded = held.values[0] > held.values.reshape(len(held), -1).min()
-        stuck = dead & loaded
-        dead = dead & ~loaded
     noisy = exists & (activity >= NOISY_FROM) & (activity > NOISY_TIMES * np.fmax(around, 0))
     return Health(array, activity, dead, stuck, noisy)
 

@@ -10,6 +10,7 @@ import socket
 import termios
 import time
 import tty
+from collections import deque
 from collections.abc import Iterator
 from types import TracebackType
 
@@ -21,6 +22,9 @@ __all__ = ["Cable"]
 
 #: Where the noise floor stands: REG5[15:8] (Table 5.5).
 _FLOOR_REGISTER, _FLOOR_MASK = 5, 0xFF00
+
+#: Lines that are kept for `Cable.said`.
+_KEPT = 256
 
 _SPEEDS = {
     9600: termios.B9600,
@@ -64,6 +68,7 @@ class Cable:
         if whole("baud", baud) not in _SPEEDS:
             raise ProblemError(f"baud is {baud}: must be one of {', '.join(map(str, _SPEEDS))}")
         self._waiting = b""
+        self._said: deque[str] = deque(maxlen=_KEPT)
         server = re.fullmatch(r"\[?(.+?)\]?:(\d{1,5})", place)
         if place.startswith("/"):
             self._file = os.open(place, os.O_RDWR | os.O_NOCTTY)
@@ -111,6 +116,21 @@ class Cable:
         """
         return self.command(Command(6, whole("register", register, 0, 7)))
 
+    def said(self) -> list[str]:
+        """Return the board's lines since this was asked last, answers to commands included; the last 256 of them.
+
+        Raises
+        ------
+        DeviceError : the board has hung up
+        """
+        while select.select([self._file], [], [], 0)[0]:
+            self._read()
+        *lines, self._waiting = self._waiting.split(b"\n")
+        self._said.extend(line.decode("ascii", "replace").strip() for line in lines)
+        said = list(self._said)
+        self._said.clear()
+        return said
+
     @contextlib.contextmanager
     def floor(self, ticks: int) -> Iterator[None]:
         """Set the noise floor for a while, as for a tare; the old one comes back at the end.
@@ -151,9 +171,15 @@ class Cable:
             line, end, rest = self._waiting.partition(b"\n")
             if end:
                 self._waiting = rest
-                yield line.decode("ascii", "replace").strip()
+                said = line.decode("ascii", "replace").strip()
+                self._said.append(said)
+                yield said
             elif select.select([self._file], [], [], left)[0]:
-                said = os.read(self._file, 4096)
-                if not said:
-                    raise DeviceError(f"{self.place}: the board has hung up")
-                self._waiting += said
+                self._read()
+
+    def _read(self) -> None:
+        """Take what has come."""
+        said = os.read(self._file, 4096)
+        if not said:
+            raise DeviceError(f"{self.place}: the board has hung up")
+        self._waiting += said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -13,8 +14,9 @@ from numpy.typing import NDArray
 from taxel._arguments import path as checked_path
 from taxel._arguments import shown
 from taxel._core import FormatError, ProblemError
+from taxel._files import whole_file
 
-__all__ = ["Label", "Labels"]
+__all__ = ["Label", "Labels", "beside", "write_labels"]
 
 #: A whole turn of the board's 16-bit clock of 100 us, us.
 TURN_US = 6_553_600
@@ -149,6 +151,40 @@ class Labels:
 
     def __repr__(self) -> str:
         return f"Labels({len(self.rows)} events of {', '.join(self.recordings) or 'one recording'}, {self.path})"
+
+
+def beside(recording: str | os.PathLike[str]) -> Path:
+    """Return where the labels lie that people set on one recording: `walk.notes.csv` of `walk.mcap`.
+
+    Examples
+    --------
+    >>> beside("walk.mcap").name
+    'walk.notes.csv'
+    """
+    place = Path(checked_path("recording", recording))
+    return place.with_name(f"{place.stem}.notes.csv")
+
+
+def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int]]) -> None:
+    r"""Write a table `label,t_us`, in the order of time; one that is there is replaced, as a whole or not at all.
+
+    Raises
+    ------
+    OSError : the disk is full, the table is write-protected
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> place = Path(tempfile.mkdtemp()) / "walk.notes.csv"
+    >>> write_labels(place, [("lift", 900), ("contact", 400)])
+    >>> place.read_text()
+    'label,t_us\ncontact,400\nlift,900\n'
+    """
+    rows = sorted(labels, key=lambda row: row[1])
+    with whole_file(path, overwrite=True) as part, part.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(_WANTED)
+        table.writerows(rows)
 
 
 def _row(place: str, header: list[str], cells: list[str]) -> Label:

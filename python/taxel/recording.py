@@ -25,6 +25,7 @@ from taxel.calibration import Calibration
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.labels import Labels, beside
 from taxel.tare import Tare
 from taxel.wire import Registers
 
@@ -294,8 +295,13 @@ class Recording:
 
     @cached_property
     def notes(self) -> tuple[Note, ...]:
-        """What people wrote down, in the order of the file; then the labels of its folder."""
-        notes = self._source.notes + self._noted
+        """What people wrote down, in the order of the file; then the labels of its folder and of `NAME.notes.csv`.
+
+        Raises
+        ------
+        FormatError : a table of labels that is none (names the line)
+        """
+        notes = self._source.notes + self._noted + _beside(self.path, self.kind)
         if self._window is None:
             return notes
         start, stop = self._window
@@ -392,6 +398,17 @@ class Recording:
         more += ["truncated"] * self.truncated
         size = f"{self.array.rows} x {self.array.columns} taxels"
         return f"Recording({self.name}: {', '.join([f'{len(what)} {noun}', time, size, *more])})"
+
+
+def _beside(path: Path, kind: str) -> tuple[Note, ...]:
+    """Return the labels that people set on a finished recording, from the table beside it."""
+    table = beside(path)
+    if kind not in ENDINGS.values() or not table.is_file():
+        return ()
+    labels = Labels(table)
+    name = labels.named(path)
+    rows = sorted((row for row in labels.rows if row.recording == name), key=lambda row: row.t_us)
+    return tuple(Note(row.label, row.t_us, row.host_ns or 0) for row in rows)
 
 
 def open_recording(

@@ -14,7 +14,7 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
 use taxel_live::capture::{self, Sender};
-use taxel_live::pipeline::{Ear, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink};
+use taxel_live::pipeline::{Ear, Handle, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink};
 
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
@@ -54,12 +54,17 @@ fn said_parts(said: Said) -> SaidParts {
 
 /// Datagrams to detections, as they come.
 #[pyclass(frozen)]
-struct Live {
+pub(crate) struct Live {
     /// Never waited for while the GIL is held: whoever holds it may be asking for the GIL to look for Ctrl-C.
     pipeline: RwLock<Option<Pipeline>>,
 }
 
 impl Live {
+    /// What the panel does with it.
+    pub(crate) fn handle(&self, py: Python<'_>) -> PyResult<Handle> {
+        self.with(py, |pipeline| Ok(pipeline.handle()))
+    }
+
     fn held(&self) -> RwLockReadGuard<'_, Option<Pipeline>> {
         self.pipeline.read().unwrap_or_else(PoisonError::into_inner)
     }

@@ -18,8 +18,9 @@ from taxel.cable import Cable
 from taxel.cli._app import app
 from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, exit_code, geometry, outside
 from taxel.cli._listening import new_report
+from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.detect import Readout
-from taxel.live import Live, Said, Summary, delays
+from taxel.live import Live, Panel, Said, Summary, delays
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -34,7 +35,9 @@ _SHOWN = 12
 
 @app.command()
 def live(
-    readout: Annotated[Path, typer.Option(help="A trained readout (JSON), as taxel train writes it.")],
+    readout: Annotated[
+        Path | None, typer.Option(help="A trained readout (JSON), as taxel train writes it; the panel needs none.")
+    ] = None,
     port: PortOption = 5208,
     host: HostOption = "0.0.0.0",
     array: Annotated[str | None, typer.Option(help="Rows x columns; the readout's own where left out.")] = None,
@@ -44,7 +47,9 @@ def live(
     ] = None,
     control: Annotated[
         str | None,
-        typer.Option(help="The board's serial line (/dev/ttyUSB0, host:port): floor 0 while the tare is taken."),
+        typer.Option(
+            help="The board's serial line (/dev/ttyUSB0, host:port): for the panel, and floor 0 while a tare is taken."
+        ),
     ] = None,
     save_tare: Annotated[Path | None, typer.Option(help="Keep the fresh tare in a new file (JSON).")] = None,
     record: Annotated[Path | None, typer.Option(help="Keep everything in a new file (.mcap or .lsa).")] = None,
@@ -54,33 +59,35 @@ def live(
         Path | None,
         typer.Option(help="With --record: a folder for a page: potential, weights, errors, the worst events."),
     ] = None,
+    panel: Annotated[bool, typer.Option("--panel", help="Show the board in a browser.")] = False,
+    panel_host: PanelHostOption = "127.0.0.1",
+    panel_port: PanelPortOption = 0,
+    folder: Annotated[Path | None, typer.Option(help="With --panel: where recordings are, and go; else here.")] = None,
+    opens: OpenOption = False,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a line of JSON a detection, and nothing else.")
     ] = False,
 ) -> None:
-    """Listen to a board and say what a readout detects, while it happens.
+    """Listen to a board and say what a readout detects, while it happens; with --panel, show it in a browser.
 
     Shows rates, losses and latency. With --json each detection is one line, written by the thread that made it: label;
     t_us, known_us and said_us of the board's clock; slope_mv_per_ms; said_ns by this computer's. Exit code 3 where
     nothing came or something was lost after it had arrived, 2 where the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
+    Example: taxel live --panel --control 127.0.0.1:5209
     """
-    heard = Readout.load(readout)
+    _together(readout, panel=panel, of_a_readout=tare is not None or report is not None, of_a_panel=folder is not None)
+    heard = None if readout is None else Readout.load(readout)
     rest = _tare(tare)
-    if save_tare is not None and not isinstance(rest, float):
-        raise ProblemError("--save-tare without a fresh tare: give --tare SECONDS")
-    if save_tare is not None:
-        try_whole(save_tare)
+    _fresh(rest, save_tare, None if panel else control)
     if report is not None:
         if record is None or record.suffix != ".mcap":
             raise ProblemError("--report is made from the recording: give --record FILE.mcap")
         try_whole(new_report(report))
-    if control is not None and not isinstance(rest, float):
-        raise ProblemError("--control without a fresh tare: give --tare SECONDS")
     console = Console(stderr=True, quiet=as_json)
     with contextlib.ExitStack() as at_rest:
-        if control is not None:
+        if control is not None and isinstance(rest, float):
             at_rest.enter_context(at_rest.enter_context(Cable(control)).floor(0))
         with Live(
             port,
@@ -94,14 +101,24 @@ def live(
             lines=as_json,
         ) as pipeline:
             # Whoever reads our lines and has enough is as good an end as Ctrl-C.
-            with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
-                _watch(pipeline, seconds, console, at_rest)
-            taken = pipeline.tare
-            summary = pipeline.stop()
+            shows: Panel | None = None
+            with contextlib.ExitStack() as shown, contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
+                if panel:
+                    if isinstance(rest, float):
+                        # One line has one user: the tare first.
+                        _tared(pipeline, at_rest, console)
+                    shows = shown.enter_context(
+                        Panel(pipeline, control=control, folder=folder, host=panel_host, port=panel_port)
+                    )
+                    announce(shows, opens, console)
+                _watch(pipeline, shows, seconds, console, at_rest)
+            last = pipeline if shows is None or shows.live is None else shows.live
+            taken = last.tare
+            summary = last.stop()
     if save_tare is not None and taken is not None:
         taken.save(save_tare)
         console.print(f"tare written to {save_tare}")
-    if report is not None and summary.path is not None:
+    if report is not None and heard is not None and summary.path is not None:
         _report(report, heard, summary.path, taken if taken is not None else rest)
         console.print(f"report: {report / 'report.html'}", soft_wrap=True)
     if not as_json:
@@ -142,13 +159,48 @@ def _say(summary: Summary, guard_frames: float) -> None:
     typer.echo(summary.verdict)
 
 
-def _watch(pipeline: Live, seconds: float | None, console: Console, at_rest: contextlib.ExitStack) -> None:
+def _together(readout: Path | None, *, panel: bool, of_a_readout: bool, of_a_panel: bool) -> None:
+    """Refuse options that nothing would use."""
+    if readout is None and not panel:
+        raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to look")
+    if readout is None and of_a_readout:
+        raise ProblemError("--tare and --report belong to a readout: give --readout FILE")
+    if of_a_panel and not panel:
+        raise ProblemError("--folder belongs to the panel: give --panel")
+
+
+def _fresh(rest: Tare | float | None, save_tare: Path | None, control: str | None) -> None:
+    """Refuse what only a fresh tare could use."""
+    if isinstance(rest, float):
+        if save_tare is not None:
+            try_whole(save_tare)
+    elif save_tare is not None:
+        raise ProblemError("--save-tare without a fresh tare: give --tare SECONDS")
+    elif control is not None:
+        raise ProblemError("--control without a fresh tare: give --tare SECONDS, or --panel")
+
+
+def _tared(pipeline: Live, at_rest: contextlib.ExitStack, console: Console) -> None:
+    """Wait for the tare: one serial line has one user, so the panel gets it afterwards."""
+    console.print("taking a tare: leave the sensor at rest")
+    while pipeline.counters["taring"] and not pipeline._core.is_over():
+        pipeline.next(_REDRAW)
+    at_rest.close()
+
+
+def _watch(
+    pipeline: Live, panel: Panel | None, seconds: float | None, console: Console, at_rest: contextlib.ExitStack
+) -> None:
     """Show what comes and what is said until the time is over; what holds `at_rest` ends with the tare."""
     shown: deque[Said] = deque(maxlen=_SHOWN)
     console.print(f"listening on UDP {pipeline.address[0]}:{pipeline.address[1]}; Ctrl-C ends")
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
         before, told = pipeline.counters, False
         while seconds is None or before["seconds"] < seconds:
+            if panel is not None and panel.live is not None and panel.live is not pipeline:
+                # A page chose another address.
+                pipeline = panel.live
+                before = pipeline.counters
             said = pipeline.next(_REDRAW)
             while said is not None:
                 shown.append(said)

@@ -165,12 +165,15 @@ impl Work<'_> {
         let wishes = std::mem::take(&mut *lock(&self.shared.wishes));
         for wish in wishes {
             match wish {
-                Wish::Begin(mut recorder) => {
-                    let now = self.shared.counters();
-                    recorder.begin(&now, &self.held)?;
-                    let decoder = Decoder::new(self.options.array.clone()).differences(self.options.differences);
-                    self.fresh = Some(Box::new(Receiver::new(decoder, 1)));
-                    *lock(&self.shared.recorder) = Some(*recorder);
+                Wish::Begin(mut recorder, give) => {
+                    let begun = recorder.begin(&self.shared.counters(), &self.held);
+                    if begun.is_ok() {
+                        let decoder = Decoder::new(self.options.array.clone()).differences(self.options.differences);
+                        self.fresh = Some(Box::new(Receiver::new(decoder, 1)));
+                        *lock(&self.shared.recorder) = Some(*recorder);
+                    }
+                    // Who asked may have gone.
+                    let _ = give.send(begun);
                 }
                 Wish::End(give) => {
                     self.fresh = None;

@@ -92,8 +92,13 @@ impl Handle {
         let recorder = Recorder::reserve(record, &header, self.address())?;
         lock(&self.shared.broken).take();
         self.shared.records.store(true, Ordering::Release);
-        self.shared.wish(Wish::Begin(Box::new(recorder)));
-        Ok(())
+        let (give, begun) = channel::bounded(1);
+        self.shared.wish(Wish::Begin(Box::new(recorder), give));
+        let begun = self.wait(&begun).and_then(std::convert::identity);
+        if begun.is_err() {
+            self.shared.records.store(false, Ordering::Release);
+        }
+        begun
     }
 
     /// Ends the recording that [`Handle::record`] began. Gives the file, where anything came, and what was lost, in a line.

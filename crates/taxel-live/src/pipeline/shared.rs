@@ -55,8 +55,8 @@ pub(super) struct Shared {
 
 /// What the decoding thread does between two batches.
 pub(super) enum Wish {
-    /// Record from here on.
-    Begin(Box<Recorder>),
+    /// Record from here on, and say when.
+    Begin(Box<Recorder>, channel::Sender<Result<()>>),
     /// End the recording: the recorder and the counters of its last datagram go where they are waited for.
     End(channel::Sender<(Option<Recorder>, Counters)>),
     /// Let somebody look on.

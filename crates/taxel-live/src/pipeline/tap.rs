@@ -1,4 +1,4 @@
-//! What those who look on get of the events: packed pieces, sixty a second while somebody looks.
+//! What those who look on get of the events: packed pieces, twice as often as pictures while somebody looks.
 //!
 //! The decoding thread fills a piece of bounded size and hands it over where there is room; it never waits. What finds no
 //! room is counted, and the next piece begins with the held values, so that a picture is right again within 0.1 s.
@@ -14,7 +14,7 @@ use taxel_core::{Array, Events, Marker};
 pub const UNKNOWN: u16 = u16::MAX;
 
 /// From piece to piece while somebody looks ...
-const LOOKED_AT: Duration = Duration::from_micros(16_000);
+const LOOKED_AT: Duration = Duration::from_millis(8);
 /// ... and while nobody does: looking back begins where a piece does.
 const UNSEEN: Duration = Duration::from_millis(100);
 
@@ -74,7 +74,7 @@ impl Outlet {
         self.pieces.try_recv().ok()
     }
 
-    /// Says whether somebody looks: then pieces come sixty times a second, else ten.
+    /// Says whether somebody looks: then pieces come often enough for sixty pictures a second, else ten times.
     pub fn look(&self, somebody: bool) {
         self.looked_at.store(somebody, Ordering::Relaxed);
     }

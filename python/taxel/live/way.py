@@ -192,6 +192,14 @@ class Live:
             "gro": None if gro is None else flag("gro", gro),
             **{name: None if size is None else whole(name, size, 0, 2**31 - 1) for name, size in sizes.items()},
         }
+        #: What is needed to begin again on another address.
+        self._how: dict[str, Any] = {
+            "array": self.array, "registers": registers, "differences": differences, "readout": readout, "tare": tare,
+            "record": record, "compression": compression, "overwrite": overwrite, "guard_frames": guard_frames,
+            "say": say, "lines": lines, "kernel_buffer_bytes": kernel_buffer_bytes, "queue_bytes": queue_bytes,
+            "readout_events": readout_events, "gro": gro,
+        }  # fmt: skip
+        self._labels = None if readout is None else list(json.loads(readout.to_json())["neurons"])
         if say is not None and not callable(say):
             raise ProblemError(f"say is {shown(say)}: must be a function of a Said")
         if readout is None and tare is not None:

@@ -1,0 +1,123 @@
+"""What the panel's server asks of Python: the board's serial line, health, cutting, labels, presets."""
+
+from __future__ import annotations
+
+import json
+import os
+import threading
+import tomllib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taxel._convert import convert
+from taxel._core import ProblemError
+from taxel._files import whole_file
+from taxel._health import judged
+from taxel._parts import cut
+from taxel._remarks import array_of
+from taxel.cable import Cable
+from taxel.labels import Labels, write_labels
+from taxel.recording import open_recording
+from taxel.wire import Command
+
+__all__ = ["Office", "presets_path"]
+
+
+def presets_path() -> Path:
+    """Return the file of one's own presets: taxel/presets.toml where the user's settings are."""
+    return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "taxel" / "presets.toml"
+
+
+class Office:
+    """Answer the server's questions, from whichever thread asks."""
+
+    def __init__(self, listen: Callable[[str, int], None], cable: Cable | None) -> None:
+        self._listen_on, self._cable = listen, cable
+        self._at_cable, self._at_files = threading.Lock(), threading.Lock()
+
+    def answer(self, what: str, asked: str) -> str:
+        """Return the answer to a question, both JSON; what is raised, a person reads."""
+        try:
+            return json.dumps(getattr(self, f"_{what}")(json.loads(asked)))
+        except (FileExistsError, FileNotFoundError, PermissionError) as error:
+            said = {FileExistsError: "exists already", FileNotFoundError: "no such file or device"}
+            raise ProblemError(f"{error.filename}: {said.get(type(error), 'permission denied')}") from None
+        except OSError as error:
+            where = "" if error.filename is None else f"{error.filename}: "
+            raise ProblemError(f"{where}{error.strerror or error}") from None
+
+    def close(self) -> None:
+        """Let go of the serial line."""
+        with self._at_cable:
+            if self._cable is not None:
+                self._cable.close()
+                self._cable = None
+
+    def _command(self, asked: Mapping[str, Any]) -> object:
+        with self._at_cable:
+            if self._cable is None:
+                raise ProblemError("the board's serial line is not connected")
+            return {"value": self._cable.command(Command(asked["register"], asked["value"]))}
+
+    def _lines(self, _: Mapping[str, Any]) -> object:
+        with self._at_cable:
+            return [] if self._cable is None else self._cable.said()
+
+    def _control(self, asked: Mapping[str, Any]) -> object:
+        self.close()
+        if asked["place"] is not None:
+            cable = Cable(asked["place"])
+            with self._at_cable:
+                self._cable = cable
+        return {}
+
+    def _listen(self, asked: Mapping[str, Any]) -> object:
+        self._listen_on(asked["host"], asked["port"])
+        return {}
+
+    def _health(self, asked: Mapping[str, Any]) -> object:
+        said = dict(asked["array"])
+        if said.get("exists") is not None:
+            said["exists"] = [digit == "1" for digit in said["exists"]]
+        array = array_of(said)
+        values = asked["values"]
+        activity = np.array(asked["activity"], np.int64).reshape(array.shape)
+        shown = None if values is None else np.array(values, np.int64).reshape(array.shape)
+        return judged(array, activity, shown).named()
+
+    def _cut(self, asked: Mapping[str, Any]) -> object:
+        recording = open_recording(asked["path"])
+        (part,) = cut(recording, start_us=asked["start_us"], stop_us=asked["stop_us"])
+        return {"lost": convert(part, asked["out"])}
+
+    def _labels_read(self, asked: Mapping[str, Any]) -> object:
+        labels = Labels(asked["path"])
+        name = labels.named(asked["recording"])
+        return [{"label": row.label, "t_us": row.t_us} for row in labels.rows if row.recording == name]
+
+    def _labels_write(self, asked: Mapping[str, Any]) -> object:
+        with self._at_files:
+            write_labels(asked["path"], [(row["label"], row["t_us"]) for row in asked["rows"]])
+        return {}
+
+    def _presets_read(self, _: Mapping[str, Any]) -> object:
+        place = presets_path()
+        try:
+            own = tomllib.loads(place.read_text("utf-8")) if place.exists() else {}
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise ProblemError(f"{place}: no table of presets: {error}") from None
+        return {"path": str(place), "own": {name: held for name, held in own.items() if isinstance(held, dict)}}
+
+    def _presets_write(self, asked: Mapping[str, Any]) -> object:
+        place = presets_path()
+        place.parent.mkdir(parents=True, exist_ok=True)
+        lines = ["# Presets of the panel: a table each, every register in its own unit (taxel's docs, registers)."]
+        for name, held in sorted(asked["own"].items()):
+            # A basic string of TOML takes JSON's escapes.
+            lines += ["", f"[{json.dumps(name)}]", *(f"{field} = {json.dumps(value)}" for field, value in held.items())]
+        with self._at_files, whole_file(place, overwrite=True) as part:
+            part.write_text("\n".join(lines) + "\n", "utf-8")
+        return {}

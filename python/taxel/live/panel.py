@@ -1,0 +1,158 @@
+"""The live panel: a server on this machine for pages that look at a board, or at recordings."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from types import TracebackType
+
+from taxel import _core
+from taxel._arguments import path as checked_path
+from taxel._arguments import text, whole
+from taxel._core import ProblemError
+from taxel.cable import Cable
+from taxel.live._office import Office
+from taxel.live.way import Live
+
+__all__ = ["Panel"]
+
+
+class Panel:
+    """Serve the live panel, until it is stopped. A context manager.
+
+    A thread of its own serves all who look. A page that reads slowly, or never, slows neither the others nor what is
+    received and recorded. The protocol is written down in the documentation, so any program may be a page.
+
+    Parameters
+    ----------
+    shows : Live or path
+        A board that is listened to, or a recording (`.mcap`, `.lsa`) to show first; its folder's others can be opened.
+    control : str, optional
+        The board's serial line ("/dev/ttyUSB0", host:port), with which the page reads and sets registers.
+    folder : path, optional
+        Where recordings are, and new ones go: the recording's own, or the current one.
+    port : int
+        TCP; 0 finds a free one, see `url`.
+    host : str
+        The address of this machine on which to listen. On any but loopback everybody who learns the token from the
+        address may look and set registers, over a connection that is not encrypted.
+
+    Raises
+    ------
+    OSError : the port is taken, the folder or the recording is not there, the serial line cannot be opened
+    ProblemError : arguments that make no sense
+
+    Examples
+    --------
+    >>> with Live(0, host="127.0.0.1") as live, Panel(live) as panel:
+    ...     panel.url.startswith("http://127.0.0.1:"), panel.viewers
+    (True, 0)
+    """
+
+    def __init__(
+        self,
+        shows: Live | str | os.PathLike[str],
+        *,
+        control: str | None = None,
+        folder: str | os.PathLike[str] | None = None,
+        port: int = 0,
+        host: str = "127.0.0.1",
+    ) -> None:
+        self._live = shows if isinstance(shows, Live) else None
+        opened = None
+        if self._live is None:
+            place = Path(checked_path("shows", shows))
+            if control is not None:
+                raise ProblemError("control: a recording has no board; give a taxel.live.Live")
+            if folder is not None:
+                raise ProblemError("folder: is the recording's own")
+            if not place.is_file():
+                raise FileNotFoundError(2, "no such recording", str(place))
+            if place.suffix not in (".mcap", ".lsa"):
+                raise ProblemError(f"{place}: the panel shows .mcap and .lsa; taxel convert makes a .mcap")
+            if place.suffix == ".mcap":
+                # Indexed by the server when a page asks for it; a file that is none is refused now.
+                _core.RecordingReader(place)
+            folder, opened = place.resolve().parent, place.resolve().name
+        self._office = Office(self.listen, None if control is None else Cable(text("control", control)))
+        readout = None if self._live is None else self._live._labels
+        try:
+            self._core = _core.Panel(
+                text("host", host),
+                whole("port", port, 0, 65_535),
+                Path.cwd() if folder is None else Path(checked_path("folder", folder)),
+                opened,
+                control,
+                readout,
+                None if self._live is None else self._live._core,
+                self._office.answer,
+            )
+        except BaseException:
+            self._office.close()
+            raise
+        self._first, self._stopped = self._live, False
+        self._url = self._core.url()
+
+    @property
+    def url(self) -> str:
+        """What a person opens in a browser; the part behind # is the token that opens the panel."""
+        return self._url
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Host and port that it listens on."""
+        return self._core.address()
+
+    @property
+    def token(self) -> str:
+        """What a client of one's own brings (see the protocol)."""
+        return self._core.token()
+
+    @property
+    def viewers(self) -> int:
+        """How many look."""
+        return self._core.viewers()
+
+    @property
+    def live(self) -> Live | None:
+        """The board that is listened to; another one after a page chose another address."""
+        return self._live
+
+    def listen(self, host: str, port: int) -> None:
+        """Listen on another address, with everything else as it was.
+
+        Raises
+        ------
+        ProblemError : no board is listened to, or to a file, which has to be ended first
+        OSError : the port is taken; then it listens where it did
+        """
+        before = self._live
+        if before is None:
+            raise ProblemError("listen: this panel shows recordings only")
+        if before._how.get("record") is not None:
+            raise ProblemError("listen: a recording was begun with this address; end it first")
+        after = Live(port, host=host, **before._how)
+        self._core.attach(after._core)
+        self._live = after
+        before.stop()
+
+    def stop(self) -> None:
+        """End the server; pages hear of it. What `listen` began is ended as well."""
+        if not self._stopped:
+            self._stopped = True
+            self._core.stop()
+            self._office.close()
+            if self._live is not None and self._live is not self._first:
+                self._live.stop()
+
+    def __enter__(self) -> Panel:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def __repr__(self) -> str:
+        # Not the token: what is printed may be kept.
+        return f"Panel({'ended' if self._stopped else self._url.partition('#')[0]})"
