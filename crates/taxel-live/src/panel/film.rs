@@ -842,3 +842,190 @@ impl Player {
         (self.lens.strip(), own, self.film.strip())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng, rngs::StdRng};
+    use taxel_core::board::Board;
+    use taxel_core::wire::{Command, Registers};
+
+    use super::*;
+    use crate::recording::{Writer, WriterOptions};
+
+    /// A board at play for a while, with pauses longer than its clock's turn, as a recording; its versions change.
+    fn recorded(name: &str, ending: &str, seed: u64) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("taxel-{name}-{}.{ending}", std::process::id()));
+        let array = Array::thesis();
+        let mut random = StdRng::seed_from_u64(seed);
+        let mut board = Board::new(Registers::default(), &array).unwrap();
+        let header = Header {
+            array: array.clone(),
+            registers: Some(Registers::default()),
+            difference: false,
+            origin_us: 0,
+            source: String::new(),
+            started_ns: 0,
+        };
+        let how = WriterOptions { overwrite: true, ..WriterOptions::default() };
+        let writer = (ending == "mcap").then(|| Writer::create(&path, &header, how).unwrap());
+        let (mut ticks, mut bytes, mut number) = (vec![48_u16; array.len()], vec![], 0);
+        for part in 0..6 {
+            if part % 2 == 1 && ending == "mcap" {
+                let version = if part % 4 == 1 { 2 } else { 1 };
+                let registers = Registers { wire_version: version, ..*board.registers() };
+                board.command(&Command { register: 0, value: registers.word(0) }.to_bytes());
+            }
+            for frame in 0..4000 {
+                // Now and then a pause.
+                if !(1500..2000).contains(&frame) && random.random_range(0..3) == 0 {
+                    for _ in 0..random.random_range(1..300) {
+                        let taxel = random.random_range(0..array.len());
+                        ticks[taxel] = random.random_range(20..140);
+                    }
+                }
+                let now_ns = (board.time_us() * 1000.0) as i64 + 1_000_000_000;
+                board
+                    .frame(&ticks, |datagram| {
+                        if let Some(writer) = &writer {
+                            writer.datagram(now_ns, number, datagram).unwrap();
+                            number += 1;
+                        } else {
+                            bytes.extend_from_slice(datagram);
+                        }
+                        true
+                    })
+                    .unwrap();
+            }
+        }
+        match writer {
+            Some(writer) => drop(writer.finish(crate::recording::Counts::default()).unwrap()),
+            None => std::fs::write(&path, bytes).unwrap(),
+        }
+        path
+    }
+
+    /// What a full decode knows at a time: held values by their own rule, without lens or keyframe.
+    fn held_at(changes: &[Change], t: i64, taxels: usize) -> (Vec<u16>, u64) {
+        let (mut held, mut events) = (vec![UNKNOWN; taxels], 0);
+        for change in changes.iter().take_while(|change| change.t <= t) {
+            if change.ticks != UNKNOWN {
+                held[change.taxel as usize] = change.ticks;
+            }
+            events += 1;
+        }
+        (held, events)
+    }
+
+    fn whole(film: &Arc<FileFilm>) -> Vec<Change> {
+        let mut events = Events::empty(film.header.array.clone());
+        match &film.source {
+            Source::Mcap(reader) => {
+                events = reader.decode(wire::Pairing::Direct, taxel_core::Stop::never()).unwrap().events;
+            }
+            Source::Lsa(..) => {
+                let (bytes, _) = crate::recording::read_lsa(&film.path).unwrap();
+                let mut decoder = Decoder::new(film.header.array.clone());
+                decoder.push_into(&bytes, None, &mut events);
+                decoder.finish_into(&mut events);
+            }
+        }
+        let mut changes = vec![];
+        film.changes(&events, &mut changes);
+        changes
+    }
+
+    fn shown(player: &mut Player) -> (Vec<u8>, Vec<String>) {
+        let last = column_of(player.t());
+        let (own, from, kept) = player.strips();
+        let (mut raster, mut curves) = (vec![], vec![]);
+        for column in last - SPAN + 1..=last {
+            let strip = if column < from { kept.unwrap_or(own) } else { own };
+            strip.raster(column, &mut raster);
+            curves.push(format!("{:?}", strip.curve(column)));
+        }
+        (raster, curves)
+    }
+
+    #[test]
+    fn any_time_of_a_recording_looks_as_after_a_full_decode() {
+        for (ending, seed) in [("mcap", 1), ("lsa", 2)] {
+            let path = recorded("any-time", ending, seed);
+            let film = FileFilm::open(&path).unwrap();
+            let changes = whole(&film);
+            assert_eq!(film.events, changes.len() as u64);
+            assert!(film.keys.len() > 10, "{} keyframes", film.keys.len());
+            let (first, last) = film.range.unwrap();
+            let mut random = StdRng::seed_from_u64(7);
+            for _ in 0..25 {
+                let t = random.random_range(first..=last);
+                let mut player = Player::open(Arc::new(Arc::clone(&film)), t, Some(2080)).unwrap();
+                let (held, events) = held_at(&changes, t, film.header.array.len());
+                assert_eq!((player.lens().held(), player.lens().events()), (&held[..], events), "{ending} at {t} us");
+                // From the beginning on, without a keyframe: raster, curves, changes too.
+                let mut slow = Player::open(Arc::new(Arc::clone(&film)), first, None).unwrap();
+                slow.advance(t).unwrap();
+                assert_eq!(player.lens().change(), slow.lens().change(), "{ending} at {t} us");
+                assert!(shown(&mut player) == shown(&mut slow), "{ending}: raster or curves at {t} us");
+            }
+            std::fs::remove_file(&path).unwrap();
+        }
+    }
+
+    #[test]
+    fn steps_go_from_stamp_to_stamp_both_ways_and_through_silence() {
+        let path = recorded("steps", "mcap", 3);
+        let film = FileFilm::open(&path).unwrap();
+        let mut stamps: Vec<i64> = whole(&film).iter().map(|change| change.t).collect();
+        stamps.dedup();
+        let mut random = StdRng::seed_from_u64(8);
+        for _ in 0..20 {
+            let place = random.random_range(1..stamps.len() - 1);
+            let mut player = Player::open(Arc::new(Arc::clone(&film)), stamps[place], None).unwrap();
+            assert_eq!(player.last_stamp().unwrap(), Some(stamps[place - 1]));
+            assert_eq!(player.next_stamp().unwrap(), Some(stamps[place + 1]));
+        }
+        std::fs::remove_file(&path).unwrap();
+    }
+
+    #[test]
+    fn the_ring_keeps_a_minute_and_a_view_back_sees_what_was() {
+        let array = Array::thesis();
+        let film = RingFilm::new(array.clone(), 3);
+        let blank = vec![UNKNOWN; array.len()];
+        let start = Keyframe { latest: None, events: 0, held: blank.clone(), rest: blank.clone() };
+        let mut lens = Lens::new(array.columns, 3, &start, 0);
+        let (mut held, mut all, mut random) = (blank, vec![], StdRng::seed_from_u64(9));
+        for n in 0..900_i64 {
+            let changes: Vec<Change> = (0..40)
+                .map(|k| Change {
+                    t: n * 100_000 + k * 2000,
+                    taxel: random.random_range(0..4096),
+                    ticks: random.random_range(20..140),
+                    up: true,
+                })
+                .collect();
+            let since = all.last().map(|change: &Change| change.t);
+            let piece = Piece {
+                held: Some(held.clone()),
+                since,
+                before: all.len() as u64,
+                changes: changes.clone(),
+                ..Piece::default()
+            };
+            film.keep(piece, &lens);
+            for change in changes {
+                held[change.taxel as usize] = change.ticks;
+                lens.take(&change);
+                all.push(change);
+            }
+        }
+        let (first, last) = film.range().unwrap();
+        assert!((REACH_US..REACH_US + 1_000_000).contains(&(last - first)), "{} us", last - first);
+        for _ in 0..20 {
+            let t = random.random_range(first + 6_000_000..=last);
+            let player = Player::open(Arc::new(film.clone()), t, None).unwrap();
+            assert_eq!(player.lens().held(), held_at(&all, t, array.len()).0, "at {t} us");
+        }
+        assert!(film.bytes() < 16 << 20);
+    }
+}

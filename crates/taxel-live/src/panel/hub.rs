@@ -392,7 +392,7 @@ impl Hub {
                 json!({ "name": name, "bytes": about.len(), "modified_ns": modified, "labels": labels }),
             ));
         }
-        files.sort_by(|a, b| b.0.cmp(&a.0));
+        files.sort_by_key(|(modified, _)| std::cmp::Reverse(*modified));
         let files: Vec<_> = files.into_iter().take(1000).map(|(_, said)| said).collect();
         json!({ "type": "recordings", "folder": self.options.folder, "files": files })
     }

@@ -278,28 +278,21 @@ impl Lens {
         self.advance(change.t);
         self.events += 1;
         let taxel = change.taxel as usize;
-        let sign = if change.up { 1 } else { -1 };
-        let mut size = UNVALUED * sign;
         if change.ticks == UNKNOWN {
+            let size = if change.up { UNVALUED } else { -UNVALUED };
             self.change[taxel] = self.change[taxel].saturating_add(size).max(-127);
         } else {
             let before = self.held[taxel];
-            if before != UNKNOWN {
-                let moved = (i32::from(change.ticks) - i32::from(before)).clamp(-127, 127);
-                #[allow(clippy::cast_possible_truncation)]
-                {
-                    size = moved as i8;
-                }
-            }
+            // What is heard for the first time has not changed.
+            let moved = if before == UNKNOWN { 0 } else { i32::from(change.ticks) - i32::from(before) };
+            #[allow(clippy::cast_possible_truncation)]
+            let size = moved.clamp(-127, 127) as i8;
             if size.unsigned_abs() >= self.change[taxel].unsigned_abs() {
                 self.change[taxel] = size;
             }
             self.weigh(taxel, false);
             self.held[taxel] = change.ticks;
-            if self.lowest && change.ticks < self.rest[taxel] {
-                self.rest[taxel] = change.ticks;
-                self.rests += 1;
-            } else if self.rest[taxel] == UNKNOWN {
+            if self.rest[taxel] == UNKNOWN || self.lowest && change.ticks < self.rest[taxel] {
                 self.rest[taxel] = change.ticks;
                 self.rests += 1;
             }
