@@ -157,6 +157,11 @@ def listen(**arguments: Any) -> None:
     taxel.live.Live(**arguments).stop()
 
 
+def panel(**arguments: Any) -> None:
+    """Begin to show a recording, and stop."""
+    taxel.live.Panel(**arguments).stop()
+
+
 def read_out() -> taxel.detect.ReadoutStream:
     return READOUT.stream()
 
@@ -568,6 +573,7 @@ SOUND: dict[str, Sound] = {
         readout_events=1000,
         gro=False,
     ),
+    "taxel.live.Panel": plain(panel, shows="here_panel.mcap", control=None, folder=None, port=0, host="127.0.0.1"),
     "taxel.live.send": plain(
         taxel.live.send,
         datagrams=[BYTES],
@@ -820,6 +826,7 @@ LEFT_OUT = {
     "taxel.live.Said": "a result",
     "taxel.live.Summary": "a result",
     "taxel.live.heard": "takes what Live said",
+    "taxel.live.Panel.listen": "begins a Live, which checks",
     "taxel.live.Live.next": "waits",
     "taxel.live.Live.note": "tried with Live's own tests",
     "taxel.simulate.Contact": "a result",
@@ -897,6 +904,7 @@ def somewhere(tmp_path, monkeypatch):
     TRAINS.to_nwb("here.nwb")
     taxel.convert(EVENTS, "here_events.npz")
     (tmp_path / "here.toml").write_text('[encoder]\nname = "fa1"\n')
+    taxel.convert(EVENTS, tmp_path / "here_panel.mcap")
     (tmp_path / "here_labels.csv").write_text("label,t_us\na,5\n")
     (tmp_path / "here_trials.csv").write_text("recording,t_us,label\nhere_events,0,a\n")
     (tmp_path / "pdb").mkdir()

@@ -100,5 +100,6 @@ for _command in (
     "record",
     "study",
     "train",
+    "view",
 ):
     import_module(f"taxel.cli.{_command}")

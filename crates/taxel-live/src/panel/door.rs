@@ -257,8 +257,9 @@ async fn socket(door: &Arc<Door>, host: &str, request: Request) -> Response {
             let (hub, end) = (Arc::clone(&door.hub), door.end.clone());
             upgrade
                 .protocols([PROTOCOL])
-                .max_message_size(MOST_BYTES)
-                .max_frame_size(MOST_BYTES)
+                // What is a little too long is answered; of what is far too long not even the beginning is kept.
+                .max_message_size(4 * MOST_BYTES)
+                .max_frame_size(4 * MOST_BYTES)
                 .write_buffer_size(0)
                 .on_upgrade(move |socket| session::run(socket, hub, end, seat))
         }

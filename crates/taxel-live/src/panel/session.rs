@@ -9,6 +9,7 @@ use taxel_core::encode::{Encoder, Stream};
 use taxel_core::{Events, Intensities, Spike};
 use tokio::sync::{broadcast, mpsc, watch};
 
+use super::door::MOST_BYTES;
 use super::film::{FileFilm, Film, Player};
 use super::hub::{Hub, LiveSide, Seat, Told, lock, said_of};
 use super::lens::{History, SPAN};
@@ -44,6 +45,7 @@ const AT_WORK: usize = 8;
 const GOING_AWAY: u16 = 1001;
 const UNSUPPORTED: u16 = 1003;
 const POLICY: u16 = 1008;
+const TOO_BIG: u16 = 1009;
 
 /// Why a session ends.
 enum End {
@@ -160,6 +162,9 @@ impl Session {
                 message = self.socket.recv() => {
                     heard = Instant::now();
                     match message {
+                        Some(Ok(Message::Text(text))) if text.len() > MOST_BYTES => {
+                            return Err(End::Close(TOO_BIG, "a message of more than 65536 bytes"));
+                        }
                         Some(Ok(Message::Text(text))) => self.hear(&text).await?,
                         Some(Ok(Message::Binary(_))) => return Err(End::Close(UNSUPPORTED, "text only")),
                         Some(Ok(Message::Ping(_) | Message::Pong(_))) => {}

@@ -1,0 +1,362 @@
+"""The panel's server, by a client that is written from docs/panel-protocol.md alone."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import struct
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel.cli import main
+from taxel.live import Live, Panel, send
+
+websockets = pytest.importorskip("websockets", reason="the test extra brings websockets")
+client = pytest.importorskip("websockets.sync.client")
+
+#: How long what must happen may take on a busy machine, s.
+SOON = 60.0
+
+
+class Client:
+    """Somebody else's page."""
+
+    def __init__(self, panel, **changed):
+        self.host = "{}:{}".format(*panel.address)
+        how = {"origin": f"http://{self.host}", "subprotocols": ["taxel.panel.1", f"token.{panel.token}"], **changed}
+        self.door = client.connect(f"ws://{self.host}/socket", max_size=None, open_timeout=SOON, **how)
+        self.socket = self.door.__enter__()
+        self.pictures, self.said, self.ids = [], [], 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *raised):
+        self.door.__exit__(*raised)
+
+    def send(self, **message):
+        self.socket.send(json.dumps(message))
+
+    def next(self):
+        message = self.socket.recv(timeout=SOON)
+        if isinstance(message, bytes):
+            self.pictures.append(message)
+            self.send(type="credit", n=1)
+            return message
+        self.said.append(json.loads(message))
+        return self.said[-1]
+
+    def until(self, kind, **wanted):
+        until = time.monotonic() + SOON
+        while time.monotonic() < until:
+            message = self.next()
+            if isinstance(message, bytes):
+                if kind == "picture":
+                    return message
+            elif message["type"] == kind and all(message[key] == value for key, value in wanted.items()):
+                return message
+        raise AssertionError(f"no {kind} {wanted}; the last were {[m['type'] for m in self.said[-20:]]}")
+
+    def ask(self, kind, **message):
+        self.ids += 1
+        self.send(type=kind, id=self.ids, **message)
+        while True:
+            answer = self.next()
+            if not isinstance(answer, bytes) and answer["type"] in ("done", "refused") and answer["id"] == self.ids:
+                return answer
+
+
+def head(picture):
+    names = ("magic", "bytes", "flags", "number", "rows", "columns", "t_us", "made_ns", "events", "watched")
+    names += ("column_us", "first", "count", "none")
+    values = struct.unpack_from("<4sHHIHHqqQIIqII", picture)
+    sections = struct.unpack_from("<16I", picture, 64)
+    return dict(zip(names, values, strict=True)), list(zip(sections[::2], sections[1::2], strict=True))
+
+
+def section(picture, k, dtype):
+    start, size = head(picture)[1][k]
+    return np.frombuffer(picture, dtype, count=size // np.dtype(dtype).itemsize, offset=start)
+
+
+def word(t_us, x, y, ticks, more=True):
+    """A change and its intensity, version 1 of the wire (docs/wire.md)."""
+    t = t_us // 100 % 65_536
+    first = [0x80 | more << 6, t]
+    second = [0xA0 | more << 6, ticks]
+    return b"".join(bytes([a | b >> 14, b >> 7 & 127, b & 127, x, y]) for a, b in (first, second))
+
+
+@pytest.fixture
+def live():
+    with Live(0, host="127.0.0.1") as live:
+        yield live
+
+
+@pytest.fixture
+def panel(live, tmp_path):
+    with Panel(live, folder=tmp_path) as panel:
+        yield panel
+
+
+def heard(live, events):
+    until = time.monotonic() + SOON
+    while live.counters["events"] < events:
+        assert time.monotonic() < until, live.counters
+        time.sleep(0.01)
+
+
+def test_a_picture_shows_what_came(live, panel):
+    with Client(panel) as page:
+        assert page.until("hello")["protocol"] == 1
+        page.send(type="credit", n=2)
+        assert np.all(section(page.until("picture"), 0, "<u2") == 65_535)
+        frame = b"".join(word(4000, x, 5, 48) for x in range(64))
+        send([frame, word(9000, 3, 5, 90)], *live.address, seconds=0.001)
+        heard(live, 65)
+        while head(page.until("picture"))[0]["events"] < 65:
+            pass
+        picture = page.pictures[-1]
+        about, sections = head(picture)
+        assert (about["magic"], about["bytes"], about["rows"], about["columns"]) == (b"TXP1", 128, 64, 64)
+        assert all(start % 8 == 0 for start, _ in sections)
+        pressure = section(picture, 0, "<u2").reshape(64, 64)
+        assert pressure[5, 3] == 90
+        assert np.all(np.delete(pressure[5], 3) == 48)
+        assert np.all(np.delete(pressure, 5, axis=0) == 65_535)
+        while not (rest := section(page.until("picture"), 5, "<u2")).size or rest[5 * 64 + 3] != 48:
+            pass
+        assert page.ask("watch", taxel=[3, 5])["type"] == "done"
+        while head(page.until("picture"))[0]["watched"] != 5 * 64 + 3:
+            pass
+        assert 90 in section(page.pictures[-1], 4, "<u2").reshape(-1, 3)[:, 1]
+
+
+def test_a_foreign_or_nameless_visitor_is_not_let_in(panel):
+    host = "{}:{}".format(*panel.address)
+    foreign = "http://evil.example"
+    for how in (
+        {"subprotocols": ["taxel.panel.1", f"token.{'0' * 64}"]},
+        {"subprotocols": ["taxel.panel.1"]},
+        {"subprotocols": [f"token.{panel.token}"]},
+        {"origin": foreign},
+        {"origin": None},
+        {"origin": "null"},
+        {"origin": f"https://{host}"},
+    ):
+        with pytest.raises(websockets.exceptions.InvalidStatus) as refused:
+            Client(panel, **how)
+        assert refused.value.response.status_code == (401 if "subprotocols" in how else 403), how
+    upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13"}
+    for path, headers, status in (
+        ("/", {}, 200),
+        ("/", {"Host": "evil.example"}, 421),
+        ("/", {"Host": f"localhost:{panel.address[1]}"}, 200),
+        ("/", {"Host": "localhost:1"}, 421),
+        ("/socket", {"Origin": f"http://{host}", **upgrade}, 401),
+        ("/../Cargo.toml", {}, 404),
+        ("/%2e%2e/Cargo.toml", {}, 404),
+        ("//etc/passwd", {}, 404),
+        ("/vendor", {}, 404),
+        ("/index.html/", {}, 404),
+    ):
+        line = http.client.HTTPConnection(*panel.address, timeout=SOON)
+        line.putrequest("GET", path, skip_host="Host" in headers)
+        for name, value in headers.items():
+            line.putheader(name, value)
+        line.endheaders()
+        answer = line.getresponse()
+        assert answer.status == status, (path, headers)
+        assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
+        line.close()
+    line = http.client.HTTPConnection(*panel.address, timeout=SOON)
+    line.request("POST", "/", b"")
+    assert line.getresponse().status == 405
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "nonsense",
+        "[]",
+        "{}",
+        '{"type":7}',
+        '{"type":"fly"}',
+        '{"type":"credit","n":-1}',
+        '{"type":"watch","taxel":[64,0]}',
+        '{"type":"open","name":"../secret.mcap"}',
+        '{"type":"open","name":"/etc/passwd"}',
+        '{"type":"open","name":"not there.mcap"}',
+        '{"type":"record","name":"../x"}',
+        '{"type":"seek","t_us":1e300}',
+        '{"type":"set","values":{"noise_floor":5}}',
+        '{"type":"set","values":{"speed":5}}',
+        '{"type":"play","speed":NaN}',
+        '{"type":"encode","encoder":{"name":"none"}}',
+        '{"type":"mark","label":"a","t_us":5}',
+        '{"type":"stop"}',
+        '{"type":"cut","start_us":0,"stop_us":1,"name":"x.mcap"}',
+        '{"type":"credit","n":1,"id":[1]}',
+        "[" * 20_000,
+    ],
+)
+def test_what_makes_no_sense_is_refused_and_the_next_is_heard(panel, message):
+    with Client(panel) as page:
+        page.socket.send(message)
+        assert page.until("refused")["reason"]
+        assert page.ask("recordings")["type"] == "done"
+
+
+@pytest.mark.parametrize(("message", "code"), [("x" * 70_000, 1009), (b"bytes", 1003)])
+def test_what_no_page_sends_ends_the_connection(panel, message, code):
+    with Client(panel) as page:
+        page.socket.send(message)
+        with pytest.raises(websockets.exceptions.ConnectionClosed) as closed:
+            page.until("nothing")
+    assert closed.value.rcvd.code == code
+
+
+def test_who_is_refused_over_and_over_is_let_go(panel):
+    with Client(panel) as page:
+        for _ in range(150):
+            page.socket.send("nonsense")
+        with pytest.raises(websockets.exceptions.ConnectionClosed) as closed:
+            page.until("nothing")
+    assert closed.value.rcvd.code == 1008
+
+
+def test_a_hundred_visitors_half_of_whom_never_read_cost_no_event_and_no_picture_of_another(live, panel):
+    visitors = [Client(panel) for _ in range(99)]
+    try:
+        for k, visitor in enumerate(visitors):
+            visitor.send(type="credit", n=8)
+            if k % 2:
+                for _ in range(20):
+                    visitor.send(type="credit", n=8)
+        frames = [b"".join(word(t * 200, x, t % 64, 48 + (t + x) % 60) for x in range(60)) for t in range(200)]
+        sent = {}
+        sender = threading.Thread(
+            target=lambda: sent.update(send(frames, *live.address, each=1, period_us=500.0, seconds=3.0))
+        )
+        with Client(panel) as page:
+            page.send(type="credit", n=2)
+            sender.start()
+            before = len(page.pictures)
+            while sender.is_alive():
+                page.until("picture")
+            sender.join()
+            assert len(page.pictures) - before >= 10, "a page that reads goes on being shown pictures"
+            heard(live, sent["datagrams"] * 60)
+            counters = page.until("counters")
+            assert counters["viewers"] == 100
+            assert counters["lost"]["kernel"] == counters["lost"]["queue"] == 0
+            assert counters["reach_bytes"] < 512 << 20
+    finally:
+        for visitor in visitors:
+            visitor.socket.socket.close()
+    assert live.counters["events"] == sent["datagrams"] * 60
+
+
+def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # noqa: PLR0915  one story
+    playing = threading.Event()
+    clock = {"t": 7_000_000}
+
+    def play():
+        # Beyond one turn of the board's clock, so that a recording begun now has to find its place.
+        while not playing.is_set():
+            t = clock["t"] = clock["t"] + 1000
+            send([word(t, t // 1000 % 64, 7, 40 + t // 1000 % 50)], *live.address, seconds=0.0005)
+            time.sleep(0.001)
+
+    board = threading.Thread(target=play)
+    with Client(panel) as page:
+        send([word(3_000_000, 9, 9, 77)], *live.address, seconds=0.0005)
+        heard(live, 1)
+        board.start()
+        try:
+            assert page.ask("record", name="step", index=1, length_s=0.5, label="heel")["type"] == "done"
+            assert page.ask("record", name="other")["type"] == "refused"
+            last = page.until("recorder", state="idle")
+        finally:
+            playing.set()
+            board.join()
+        assert last["last"]["file"] == "step1.mcap"
+        assert last["index"] == 2
+        again = page.ask("record", name="step", index=1)
+        assert again["type"] == "refused"
+        assert "exists" in again["reason"]
+        recording = taxel.open(tmp_path / "step1.mcap")
+        assert recording.verdict.startswith("nothing lost")
+        assert [note.text for note in recording.notes] == ["heel"]
+        # On the clock that the board was heard on, not from its own first stamp.
+        assert recording.events.t[0] > 6_553_600
+        page.send(type="credit", n=2)
+        assert page.ask("open", name="step1.mcap")["type"] == "done"
+        opened = next(m for m in page.said if m["type"] == "opened")
+        assert (opened["events"], opened["start_us"]) == (len(recording.events), recording.events.t[0])
+        middle = int(recording.events.t[len(recording.events) // 2])
+        assert page.ask("seek", t_us=middle)["type"] == "done"
+        while head(page.until("picture"))[0]["t_us"] != middle:
+            pass
+        picture = section(page.pictures[-1], 0, "<u2").reshape(64, 64)
+        seen = recording.events.t <= middle
+        for x in range(64):
+            here = seen & (recording.events.x == x)
+            if here.any():
+                assert picture[7, x] == recording.events.intensity[here][-1]
+        assert picture[9, 9] == 77, "what was held when it began"
+        assert page.ask("mark", label="contact", t_us=middle)["type"] == "done"
+        labels = next(m for m in reversed(page.said) if m["type"] == "labels")["labels"]
+        before = (tmp_path / "step1.mcap").read_bytes()
+        assert page.ask("rename", label_id=labels[0]["label_id"], label="lift")["type"] == "done"
+        assert page.ask("move", label_id=labels[0]["label_id"], t_us=middle + 5)["type"] == "done"
+        assert (tmp_path / "step1.notes.csv").read_text() == f"label,t_us\nlift,{middle + 5}\n"
+        assert (tmp_path / "step1.mcap").read_bytes() == before
+        notes = taxel.open(tmp_path / "step1.mcap").notes
+        assert [(n.text, n.t) for n in notes][1:] == [("lift", middle + 5)]
+        assert page.ask("cut", start_us=opened["start_us"], stop_us=middle, name="half.mcap")["type"] == "done"
+        assert len(taxel.open(tmp_path / "half.mcap").events) == int((recording.events.t < middle).sum())
+        assert page.ask("delete", label_id=labels[0]["label_id"])["type"] == "done"
+        assert page.ask("step", frames=-1)["type"] == "done"
+        earlier = recording.events.t[recording.events.t < middle].max()
+        assert next(m for m in reversed(page.said) if m["type"] == "transport")["t_us"] == earlier
+
+
+def test_health_of_what_is_shown_is_that_of_taxel_health(live, panel):
+    frames = [b"".join(word(t * 1000, x, y, 40 + t) for x in range(5) for y in range(5) if (x, y) != (2, 2))
+              for t in range(20)]  # fmt: skip
+    sent = send(frames, *live.address, each=20, seconds=0.001)
+    heard(live, sent["datagrams"] * 24)
+    with Client(panel) as page:
+        page.send(type="credit", n=1)
+        while head(page.until("picture"))[0]["events"] < 480:
+            pass
+        assert page.ask("health")["type"] == "done"
+        assert next(m for m in page.said if m["type"] == "health")["dead"] == [[2, 2]]
+
+
+def test_a_recording_alone_is_viewed_and_the_address_names_it(tmp_path):
+    events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    taxel.convert(events, tmp_path / "two.mcap")
+    with Panel(tmp_path / "two.mcap") as panel:
+        assert panel.url.endswith("&open=two.mcap")
+        with Client(panel) as page:
+            hello = page.until("hello")
+            assert (hello["live"], hello["open"]) == (False, "two.mcap")
+            assert page.ask("open", name="two.mcap")["type"] == "done"
+            assert page.ask("record", name="x")["type"] == "refused"
+    with pytest.raises(FileNotFoundError):
+        Panel(tmp_path / "none.mcap")
+
+
+def test_the_command_shows_a_recording_and_says_where(tmp_path, capsys):
+    events = taxel.Events([0, 200], [3, 4], [5, 5], [True, False], array=taxel.Array(8, 8))
+    taxel.convert(events, tmp_path / "two.mcap")
+    with pytest.raises(SystemExit) as ended:
+        main(["view", str(tmp_path / "two.mcap"), "--no-open", "--seconds", "0.2", "--json"])
+    assert ended.value.code in (0, None)
+    assert json.loads(capsys.readouterr().out)["url"].startswith("http://127.0.0.1:")
