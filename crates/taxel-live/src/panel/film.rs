@@ -923,7 +923,7 @@ mod tests {
                 events = reader.decode(wire::Pairing::Direct, taxel_core::Stop::never()).unwrap().events;
             }
             Source::Lsa(..) => {
-                let (bytes, _) = crate::recording::read_lsa(&film.path).unwrap();
+                let bytes = std::fs::read(&film.path).unwrap();
                 let mut decoder = Decoder::new(film.header.array.clone());
                 decoder.push_into(&bytes, None, &mut events);
                 decoder.finish_into(&mut events);

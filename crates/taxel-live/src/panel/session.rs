@@ -381,7 +381,7 @@ impl Session {
         let (stream, waiting) = (&mut spikes.stream, &mut spikes.waiting);
         spikes.next = live.film.changes_from(spikes.next, |changes| {
             if failed.is_none() && !changes.is_empty() {
-                failed = stream.push_events(&events_of(changes, &array), waiting).err();
+                failed = stream.push_events(events_of(changes, &array).view(), waiting).err();
             }
         });
         let more = spikes.waiting.len().saturating_sub(MOST_SPIKES);
