@@ -116,7 +116,7 @@ def test_a_picture_shows_what_came(live, panel):
         page.send(type="credit", n=2)
         assert np.all(section(page.until("picture"), 0, "<u2") == 65_535)
         frame = b"".join(word(4000, x, 5, 48) for x in range(64))
-        send([frame, word(9000, 3, 5, 90)], *live.address, seconds=0.001)
+        send([frame, word(9000, 3, 5, 90)], *live.address, each=2, seconds=1e-4)
         heard(live, 65)
         while head(page.until("picture"))[0]["events"] < 65:
             pass
