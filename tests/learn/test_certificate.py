@@ -158,3 +158,35 @@ def test_a_row_that_the_problem_does_not_have_is_one_clear_error():
         refuted(time="grid").problem_.slope(0, 0)
     with pytest.raises(ProblemError, match="no point of the grid"):
         refuted(time="grid").problem_.silence(0, 0.25)
+
+
+@pytest.mark.parametrize("options", [{}, {"after_spike": "reset"}, {"first_threshold": "printed"}])
+def test_the_same_inputs_asked_to_fire_and_to_be_silent_are_refuted_for_any_margin(options):
+    by_them_alone = 0
+    for seed in range(6):
+        patterns, targets = examples(seed, trains=30, patterns=4, targets=2)
+        if seed % 2:  # the same up to its second target, where the first holds; then other inputs
+            shared = [train[train <= targets[1][1]] for train in patterns[1]]
+            patterns.append(
+                SpikeTrains.from_lists([np.append(t, patterns[1].stop) for t in shared], stop=patterns[1].stop)
+            )
+            targets.append(targets[1][:1])
+        else:
+            patterns.append(patterns[1])
+            targets.append([])
+        cone = made(ConeX, lb=-3, ub=3, **options).fit(patterns, targets)
+        assert cone.status_ == "infeasible"
+        assert check_certificate(cone.problem_, cone.certificate_)
+        assert check_certificate(cone.problem_, cone.certificate_, margin=False)
+        assert cone.certificate_.at_all
+        said = str(cone.certificate_)
+        assert "pattern 1 shall fire" in said
+        assert "Impossible at all" in said
+        by_them_alone += "pattern 4, with the same inputs up to there, shall be silent" in said
+        # With another input in time there is nothing to refute: the neuron can tell them apart.
+        apart = [*patterns[4]]
+        apart[3] = np.sort(np.append(apart[3], targets[1][0] - 6.0))
+        patterns[4] = SpikeTrains.from_lists(apart, stop=patterns[4].stop)
+        cone = made(ConeX, lb=-3, ub=3, **options).fit(patterns, targets)
+        assert cone.status_ != "infeasible" or "with the same inputs" not in str(cone.certificate_)
+    assert by_them_alone > 1

@@ -314,8 +314,7 @@ def test_a_start_in_another_unit_of_potential_is_a_start_too():
     options = {"tau": 12.0, "theta_0": 15.0, "theta_plus": 10.0, "lb": -15.0, "ub": 15.0}
     cone = fitted(made(ConeR, **options), patterns, targets)
     again = fitted(made(ConeR, **options), patterns, targets, start=cone)
-    # The weights were moved onto the targets that they meet: the multipliers settle anew.
-    assert again.rounds_ <= cone.rounds_ / 2
+    assert again.rounds_ <= 1
     assert again.objective_ == pytest.approx(cone.objective_, rel=1e-6)
 
 
@@ -407,10 +406,7 @@ def test_progress_is_told_round_by_round_and_may_stop_the_fit_by_raising():
     told = []
     cone = fitted(ConeR(neuron=Neuron(tau=12.0)), patterns, targets, progress=lambda *round: told.append(round))
     assert [r[0] for r in told] == list(range(1, cone.rounds_ + 1))
-    assert told[-1][:2] == (cone.rounds_, cone.rows_)
-    # The last step, onto what is met, moves the objective by less than the tolerance.
-    assert told[-1][2] == pytest.approx(cone.objective_, rel=1e-6)
-    assert max(told[-1][3], cone.gap_) <= 1e-6
+    assert told[-1] == (cone.rounds_, cone.rows_, cone.objective_, cone.gap_)
     with pytest.raises(ZeroDivisionError):
         fitted(ConeR(neuron=Neuron(tau=12.0)), patterns, targets, progress=lambda *_: 1 / 0)
 

@@ -146,9 +146,9 @@ macro_rules! rules {
                 pattern: &SpikeTrains,
                 targets: &[f64],
             ) -> Result<(Vec<f64>, Vec<f64>)> {
-                Ok(match self {
+                match self {
                     $($(Self::$law(law) => change_of(&law.rule(neuron)?, neuron, weights, pattern, targets),)+)*
-                })
+                }
             }
         }
     };

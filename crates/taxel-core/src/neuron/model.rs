@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::kernel::{Kernel, Shape};
+use super::points::{MOST_LAID_OUT, check_points, points_between};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};
@@ -85,9 +86,6 @@ pub(crate) const ROUNDING_MS: f64 = 1e-9;
 /// How far below the threshold a potential may end and still count as reaching it, mV where `theta_0` is 0.3 mV and in
 /// proportion elsewhere: rounding of a potential that was trained to touch the threshold.
 const TOUCH: f64 = 1e-12;
-/// So many grid points are laid out at most (some GB), and so many stepped through (some ten seconds).
-const MOST_LAID_OUT: f64 = 2e7;
-pub(super) const MOST_STEPPED: f64 = 1e9;
 
 impl Default for Neuron {
     fn default() -> Self {
@@ -197,23 +195,12 @@ impl Neuron {
 
     /// How many points of the grid lie from `start` to `end`.
     pub(crate) fn points(&self, start: f64, end: f64) -> f64 {
-        (((end - start) / self.step_ms + 1e-9).floor() + 1.0).max(0.0)
+        points_between(start, end, self.step_ms)
     }
 
     /// Refuses more grid points than can be laid out, before memory is asked for.
     pub(crate) fn check_rows(&self, points: f64) -> Result<()> {
-        self.check_points(points, MOST_LAID_OUT)
-    }
-
-    pub(super) fn check_points(&self, points: f64, most: f64) -> Result<()> {
-        if points <= most {
-            return Ok(());
-        }
-        Err(problem!(
-            "step_ms is {} ms: makes {points:.1e} grid points, at most {most:.0e} can be had; take a larger step, or fewer or \
-             shorter patterns (times are in ms)",
-            self.step_ms
-        ))
+        check_points(points, MOST_LAID_OUT, self.step_ms)
     }
 
     /// How far below the threshold a potential may end and still count as reaching it, mV.

@@ -1,7 +1,8 @@
 //! A neuron on whole trains: its spikes, and its potential where they are given.
 
 use super::kernel::KernelSum;
-use super::model::{AfterSpike, MOST_STEPPED, Neuron, Time};
+use super::model::{AfterSpike, Neuron, Time};
+use super::points::{MOST_STEPPED, check_points};
 use super::streaming::NeuronStream;
 use super::threshold::OutputSpike;
 use crate::allowed::one_weight_a_train;
@@ -34,7 +35,7 @@ impl Neuron {
     ) -> Result<Vec<OutputSpike>> {
         self.check_inputs(weights, trains)?;
         if self.time == Time::Grid {
-            self.check_points(self.points(trains.start, trains.stop), MOST_STEPPED)?;
+            check_points(self.points(trains.start, trains.stop), MOST_STEPPED, self.step_ms)?;
         }
         let mut stream = self.stream(weights, threshold, trains.start)?;
         let mut out = Vec::new();

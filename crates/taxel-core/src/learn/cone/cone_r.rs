@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::learn::engines::Start;
-use crate::learn::fit::{Engine, Fit, Round, Status};
+use crate::learn::fit::{Engine, Fit, Left, Round, Status};
 use crate::learn::statement::{
     Bound, Choice, Divisor, Margin, Norm, Objective, Relaxed, Statement, bounds_of, check_bounds, check_examples,
     check_trains, end_of,
@@ -301,7 +301,11 @@ impl ConeRProblem {
         let start = self.start_from(&objective, start)?;
         let mut found =
             self.rows.minimise(&objective, parameters.tolerance, parameters.engine, start, progress, stop)?;
-        self.rows.meet(&objective, parameters.tolerance, &mut found, stop)?;
+        if self.rows.meet(&objective, parameters.tolerance, &mut found, stop)? {
+            found.rounds += 1;
+            let (round, left) = (found.rounds, Left::Gap(found.gap));
+            progress(Round { round, rows: found.rows, objective: found.objective, left });
+        }
         let weights: Vec<f64> = found.weights.iter().map(|w| w * unit).collect();
         let kept = || found.shares.iter().enumerate().filter(|s| *s.1 != 0.0);
         Ok(ConeRFit {

@@ -323,6 +323,13 @@ impl ConeXProblem {
         let mut found = self.exact.solve(&start, progress, stop)?;
         let (first, mut rounds) = (self.exact.statement.margin, found.fit.rounds);
         let not_at_all = |found: &ConeXFit| found.certificate.as_ref().is_some_and(|proof| !proof.at_all);
+        if self.free_margin
+            && not_at_all(&found)
+            && let Some(proof) =
+                Certificate::of_same_inputs(&self.exact.statement, &self.exact.objective.bounds)?.filter(|p| p.at_all)
+        {
+            found = self.exact.refuted(proof, rounds);
+        }
         while self.free_margin && not_at_all(&found) {
             let margin = found.asked.times(SMALLER);
             if margin.height < (0.99 * LEAST_SHARE * first.height).max(LEAST_MARGIN) {

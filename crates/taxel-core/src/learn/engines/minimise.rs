@@ -3,7 +3,8 @@
 use super::augmented::Start;
 use super::rounds::Rounds;
 use crate::learn::fit::{Engine, Left, Round};
-use crate::learn::statement::{Objective, Parts, Point, Relaxed};
+use crate::learn::statement::{Objective, Parts, Point, Relaxed, Tangents};
+use crate::vectors::dot;
 use crate::{Result, Stop};
 
 /// What was found, and who proved it.
@@ -81,6 +82,22 @@ impl Relaxed {
         })
     }
 
+    /// What these shares of the multipliers' ranges prove, with the weights that they are of.
+    fn proven_by(&self, objective: &Objective, point: &Point, shares: &[f64]) -> f64 {
+        let silent = self.silent.len();
+        let times = |(row, share): (usize, &f64)| share * if row < silent { objective.d } else { 2.0 * objective.c };
+        let length = dot(&point.weights, &point.weights).sqrt();
+        let pull = if length > 0.0 { objective.l2 / length } else { 0.0 };
+        let at = Tangents {
+            weights: &point.weights,
+            excess: &point.excess,
+            behind: &point.behind,
+            multipliers: &shares.iter().enumerate().map(times).collect::<Vec<_>>(),
+            pull: &point.weights.iter().map(|w| pull * w).collect::<Vec<_>>(),
+        };
+        self.bound(objective, &at, point.parts.sum())
+    }
+
     /// From a fit nearby: only rows that are near threshold there, written out, until none of the others matters.
     ///
     /// Rows left out add nothing below 0, so what bounds the rest bounds the whole. Gives the start back, moved on as far as it
@@ -100,7 +117,13 @@ impl Relaxed {
         let near = NEAR * self.theta_0;
         let mut best = self.point(objective, weights);
         let mut at = best.excess.clone();
-        let (mut bound, mut rounds) = (0.0_f64, 0);
+        // Multipliers of a fit to these very rows may prove it as it is.
+        let (mut bound, mut rounds) = (self.proven_by(objective, &best, &shares).max(0.0), 0);
+        if best.gap(bound) <= tolerance {
+            let rows = shares.iter().filter(|share| **share != 0.0).count();
+            progress(1, rows, best.parts.sum(), best.gap(bound));
+            return Ok(Rounds { best, bound, rounds: 1, rows, shares, stopped: false });
+        }
         for _ in 0..ATTEMPTS {
             let live: Vec<usize> = (0..silent).filter(|&row| at[row] > -near || shares[row] != 0.0).collect();
             if live.len() > MOST_ROWS {

@@ -21,11 +21,17 @@ impl Relaxed {
     /// Moves the weights onto what they miss by no more than the solver's rounding: a neuron fires where it is touched.
     ///
     /// At the optimum a target whose multiplier lies within its range is met exactly, and so is a silent row; a silent row
-    /// is kept a hair below its limit. Taken back where the objective would leave the tolerance.
-    pub(crate) fn meet(&self, objective: &Objective, tolerance: f64, found: &mut Found, stop: Stop<'_>) -> Result<()> {
+    /// is kept a hair below its limit. Taken back where the objective would leave the tolerance; says whether they were moved.
+    pub(crate) fn meet(
+        &self,
+        objective: &Objective,
+        tolerance: f64,
+        found: &mut Found,
+        stop: Stop<'_>,
+    ) -> Result<bool> {
         let (silent, theta) = (self.silent.len(), self.theta_0);
         if found.gap > tolerance || found.shares.len() != silent + self.targets.len() {
-            return Ok(());
+            return Ok(false);
         }
         let excess = self.point(objective, found.weights.clone()).excess;
         let within = |row: usize, low: f64| {
@@ -36,8 +42,9 @@ impl Relaxed {
         let touched = |row: &usize| within(*row, 0.0) || (-BELOW..WITHIN).contains(&(excess[*row] / theta));
         let rows: Vec<usize> = (0..silent).filter(touched).collect();
         let met = targets.iter().all(|k| excess[silent + k].abs() <= 0.1 * self.touch);
-        if (met && rows.is_empty()) || targets.len() + rows.len() > MOST_TOUCHED * self.trains {
-            return Ok(());
+        let off = rows.iter().all(|row| excess[*row] <= -0.5 * BELOW * theta);
+        if met && off || targets.len() + rows.len() > MOST_TOUCHED * self.trains {
+            return Ok(false);
         }
         let equal: Vec<f64> = targets.iter().flat_map(|k| self.targets.row(*k).at.iter().copied()).collect();
         let equal_to: Vec<f64> = targets.iter().map(|k| self.targets.thresholds[*k]).collect();
@@ -45,7 +52,8 @@ impl Relaxed {
         let limit: Vec<f64> = rows.iter().map(|row| self.silent.limit[*row] - BELOW * theta).collect();
         let all = HardRows { equal: &equal, equal_to: &equal_to, below: &below, limit: &limit };
         let least = found.objective * (1.0 - found.gap);
-        for rows in [all, HardRows { below: &[], limit: &[], ..all }] {
+        let targets_alone = HardRows { below: &[], limit: &[], ..all };
+        for rows in [all, targets_alone].into_iter().take(if met { 1 } else { 2 }) {
             let Some(weights) = nearest(&found.weights, &rows, &objective.bounds.lower, &objective.bounds.upper, stop)?
             else {
                 continue;
@@ -55,9 +63,9 @@ impl Relaxed {
             let gap = relative_gap(sum, least);
             if gap <= SPARED * tolerance {
                 (found.weights, found.parts, found.objective, found.gap) = (point.weights, point.parts, sum, gap);
-                break;
+                return Ok(true);
             }
         }
-        Ok(())
+        Ok(false)
     }
 }

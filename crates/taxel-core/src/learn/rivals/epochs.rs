@@ -153,14 +153,14 @@ pub(super) fn change_of(
     weights: &[f64],
     pattern: &SpikeTrains,
     targets: &[f64],
-) -> (Vec<f64>, Vec<f64>) {
-    let laid = neuron.lay_out(pattern);
+) -> Result<(Vec<f64>, Vec<f64>)> {
+    let laid = neuron.lay_out(pattern)?;
     let of = Presented { neuron, laid: &laid, trains: pattern, targets };
     let (mut fired, mut corrections, mut change) = (Vec::new(), Vec::new(), vec![0.0; weights.len()]);
     neuron.fire(weights, &laid, &mut fired);
     rule.correct(&of, weights, &fired, &mut corrections);
     add_up(rule, &of, weights, &corrections, &mut vec![None; targets.len()], &mut change);
-    (change, fired)
+    Ok((change, fired))
 }
 
 /// Adds corrections up, synapse by synapse. Factors at targets are reckoned once and kept.
@@ -252,7 +252,7 @@ impl Training {
                 (0..trains).map(|_| low + (high - low) * random.random::<f64>()).collect()
             }
         };
-        let laid: Vec<Laid> = patterns.iter().map(|p| neuron.lay_out(p)).collect();
+        let laid = patterns.iter().map(|p| neuron.lay_out(p)).collect::<Result<Vec<Laid>>>()?;
         let shown = |p: usize| Presented { neuron, laid: &laid[p], trains: &patterns[p], targets: &targets[p] };
         let mut at_targets: Vec<Vec<Option<Vec<f64>>>> = targets.iter().map(|t| vec![None; t.len()]).collect();
         let mut order: Vec<usize> = (0..patterns.len()).collect();

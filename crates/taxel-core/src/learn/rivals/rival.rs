@@ -168,7 +168,7 @@ impl SteppedNeuron {
         crate::learn::statement::check_heard(pattern)?;
         one_weight_a_train(weights, pattern.len())?;
         let mut fired = Vec::new();
-        self.fire(weights, &self.lay_out(pattern), &mut fired);
+        self.fire(weights, &self.lay_out(pattern)?, &mut fired);
         Ok(fired)
     }
 }

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::batch::{BatchRule, Learnt};
 use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::metrics::matching::matched;
-use crate::neuron::{Kernel, Shape, KernelSum};
+use crate::neuron::{Kernel, KernelSum, MOST_LAID_OUT, Shape, check_points, points_between};
 use crate::parameters::Described;
 use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
@@ -242,7 +242,9 @@ impl Skim {
         let step = shape.step(self.step_ms);
         let compress = self.branches.is_some() && self.nonlinearity == Nonlinearity::Tanh;
         let mut branches = self.branches(pattern);
-        let rows = ((pattern.stop - pattern.start) / self.step_ms + 1e-9).floor() as usize + 1;
+        let points = points_between(pattern.start, pattern.stop, self.step_ms);
+        check_points(points, MOST_LAID_OUT, self.step_ms)?;
+        let rows = points as usize;
         let mut block: Vec<Vec<f64>> = vec![Vec::with_capacity(BLOCK); branches.len()];
         for first in (0..rows).step_by(BLOCK) {
             stop.check()?;

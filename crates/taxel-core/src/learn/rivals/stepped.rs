@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::{Parameter, Range, ranges};
+use crate::neuron::{MOST_LAID_OUT, check_points, points_between};
 use crate::{Result, SpikeTrains, problem};
 
 /// What drives the membrane after an input.
@@ -200,9 +201,15 @@ impl SteppedNeuron {
     }
 
     /// Lays a pattern out: inputs by time, each with what it brings at its first grid point.
-    pub(super) fn lay_out(&self, trains: &SpikeTrains) -> Laid {
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where its grid has too many points.
+    pub(super) fn lay_out(&self, trains: &SpikeTrains) -> Result<Laid> {
         let shape = self.shape();
-        let steps = ((trains.stop - trains.start) / self.step_ms + 1e-9).floor() as usize;
+        let points = points_between(trains.start, trains.stop, self.step_ms);
+        check_points(points, MOST_LAID_OUT, self.step_ms)?;
+        let steps = points as usize - 1;
         let inputs = trains
             .by_time()
             .into_iter()
@@ -220,7 +227,7 @@ impl SteppedNeuron {
                 }
             })
             .collect();
-        Laid { inputs, start: trains.start, steps }
+        Ok(Laid { inputs, start: trains.start, steps })
     }
 
     /// The output spikes (ms, on the grid) that these weights make.

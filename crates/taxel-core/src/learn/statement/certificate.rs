@@ -9,6 +9,7 @@ use std::collections::BTreeMap;
 use super::bounds::Bounds;
 use super::rows::{Margin, Row, Statement};
 use crate::Result;
+use crate::neuron::Time;
 use crate::vectors::dot;
 
 /// Multipliers that prove a problem infeasible, and what they say in words.
@@ -36,6 +37,20 @@ impl Certificate {
         Ok(Some(Self { rows, gap: proven, at_all, text }))
     }
 
+    /// Looks for a time at which a pattern shall fire and another one, the same up to there, be silent: a proof of two rows,
+    /// for any margin.
+    pub(crate) fn of_same_inputs(statement: &Statement, bounds: &Bounds) -> Result<Option<Self>> {
+        for (pattern, target) in statement.targets() {
+            let t = statement.sheets[pattern].targets[target];
+            let same = |&q: &usize| statement.is_asked(q, t) && statement.is_same_before(t, pattern, q);
+            if let Some(silent) = (0..statement.sheets.len()).find(same) {
+                let rows = vec![(Row::Target { pattern, target }, -1.0), (Row::Silence { pattern: silent, t }, 1.0)];
+                return Self::check(statement, bounds, rows);
+            }
+        }
+        Ok(None)
+    }
+
     /// Looks for a target that no weights reach, or that all exceed: a proof of one row.
     pub(crate) fn of_one_target(statement: &Statement, bounds: &Bounds) -> Result<Option<Self>> {
         for (pattern, target) in statement.targets() {
@@ -52,6 +67,8 @@ impl Certificate {
 
 /// By how much the least of `g.w` within the bounds exceeds what the rows (`bare`: without margin and slope) allow; nothing if
 /// rounding could explain it.
+///
+/// In continuous time a margin is above 0: rows that cancel without it and hold one of silence prove it for any.
 fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) -> Result<Option<f64>> {
     let trains = statement.trains;
     let (mut sum, mut size, mut row) = (vec![0.0; trains], vec![0.0; trains], vec![0.0; trains]);
@@ -74,7 +91,10 @@ fn gap(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], bare: bool) 
     let gap = bounds.range(&sum).0 - allowed;
     // Each term is rounded once when made and once for each sum that it enters.
     let rounding = (rows.len() + trains) as f64 * f64::EPSILON * most;
-    Ok((gap > rounding).then_some(gap))
+    let strict = bare && statement.neuron.time == Time::Continuous;
+    let cancels = strict && allowed == 0.0 && sum.iter().all(|&g| g == 0.0);
+    let asks = |&(name, multiplier): &(Row, f64)| multiplier > 0.0 && matches!(name, Row::Silence { .. });
+    Ok((gap > rounding || cancels && rows.iter().any(asks)).then_some(gap))
 }
 
 fn read(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: bool) -> Result<String> {
@@ -92,6 +112,15 @@ fn read(statement: &Statement, bounds: &Bounds, rows: &[(Row, f64)], at_all: boo
                 format!("the least weights come to {} mV there, the threshold is {} mV", mv(least), mv(stated.limit))
             };
             format!("no weights within the bounds fire at pattern {pattern} target {target} ({} ms): {why}", short(t))
+        }
+        [(Row::Target { pattern, target }, fires), (Row::Silence { pattern: silent, t }, rests)]
+            if -fires == *rests && statement.is_same_before(*t, *pattern, *silent) =>
+        {
+            format!(
+                "pattern {pattern} shall fire at target {target} ({} ms), where pattern {silent}, with the same inputs up to \
+                 there, shall be silent",
+                short(*t)
+            )
         }
         _ => format!("no weights within the bounds meet these together: {}", list(statement, rows)?),
     };

@@ -349,6 +349,14 @@ impl Statement {
         Ok(())
     }
 
+    /// Whether two patterns hold the same up to `t`: inputs, and targets that the neuron fires at.
+    pub(crate) fn is_same_before(&self, t: f64, pattern: usize, other: usize) -> bool {
+        let [a, b] = [pattern, other].map(|p| &self.sheets[p]);
+        let fired = |sheet: &'_ Sheet| sheet.targets.partition_point(|&target| target < t);
+        let raised = self.neuron.first_threshold == FirstThreshold::Base || a.start == b.start;
+        raised && a.before(t) == b.before(t) && a.targets[..fired(a)] == b.targets[..fired(b)]
+    }
+
     /// Whether silence is asked for at this time.
     pub(crate) fn is_asked(&self, pattern: usize, t: f64) -> bool {
         self.check_silent(pattern, t).is_ok()
