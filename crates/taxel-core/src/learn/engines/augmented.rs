@@ -42,7 +42,7 @@ pub(crate) struct Start {
     pub(crate) shares: Option<Vec<f64>>,
 }
 
-struct Engine<'a> {
+struct Lagrangian<'a> {
     /// Whether weights were given to start from.
     started: bool,
     problem: &'a Relaxed,
@@ -100,7 +100,7 @@ impl Relaxed {
             .map(|(&low, &high)| 0.0_f64.clamp(low, high))
             .collect();
         let mut best = self.point(objective, zero);
-        let mut engine = Engine::new(self, objective, start, &best);
+        let mut engine = Lagrangian::new(self, objective, start, &best);
         let mut bound = engine.bound_at_zero(&best).max(0.0);
         engine.most = best.parts.sum();
         if engine.started {
@@ -150,7 +150,7 @@ impl Relaxed {
     }
 }
 
-impl<'a> Engine<'a> {
+impl<'a> Lagrangian<'a> {
     fn new(problem: &'a Relaxed, objective: &'a Objective, start: Start, zero: &Point) -> Self {
         let n = problem.trains;
         let silent = problem.silent.len();

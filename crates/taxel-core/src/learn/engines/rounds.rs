@@ -38,7 +38,7 @@ pub(crate) struct Rounds {
 
 /// The state of a hinge.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum State {
+enum HingeState {
     Off,
     On,
     Kept,
@@ -178,7 +178,7 @@ impl Relaxed {
     }
 
     /// The state of each hinge at these weights.
-    fn states(&self, point: &Point, near: f64) -> Vec<State> {
+    fn states(&self, point: &Point, near: f64) -> Vec<HingeState> {
         let mut distances: Vec<f64> = point.excess.iter().map(|x| x.abs()).filter(|&x| x <= near).collect();
         let near = if distances.len() > MOST_ROWS {
             *distances.select_nth_unstable_by(MOST_ROWS, f64::total_cmp).1
@@ -186,16 +186,16 @@ impl Relaxed {
             near
         };
         let state = |&x: &f64| match x {
-            x if x > near => State::On,
-            x if x >= -near => State::Kept,
-            _ => State::Off,
+            x if x > near => HingeState::On,
+            x if x >= -near => HingeState::Kept,
+            _ => HingeState::Off,
         };
         point.excess.iter().map(state).collect()
     }
 
     /// The slope of each hinge that is not kept.
-    fn slopes(&self, objective: &Objective, states: &[State]) -> Vec<f64> {
-        let slope = |(row, &state)| if state == State::On { self.hinge_weight(objective, row) } else { 0.0 };
+    fn slopes(&self, objective: &Objective, states: &[HingeState]) -> Vec<f64> {
+        let slope = |(row, &state)| if state == HingeState::On { self.hinge_weight(objective, row) } else { 0.0 };
         states.iter().enumerate().map(slope).collect()
     }
 
@@ -204,8 +204,8 @@ impl Relaxed {
         if row < self.silent.len() { objective.d } else { 2.0 * objective.c }
     }
 
-    fn kept(&self, objective: &Objective, states: &[State]) -> Kept {
-        let rows: Vec<usize> = (0..states.len()).filter(|&row| states[row] == State::Kept).collect();
+    fn kept(&self, objective: &Objective, states: &[HingeState]) -> Kept {
+        let rows: Vec<usize> = (0..states.len()).filter(|&row| states[row] == HingeState::Kept).collect();
         let slopes = self.slopes(objective, states);
         let mut linear = vec![0.0; self.trains];
         self.silent.add_sum(&slopes[..self.silent.len()], &mut linear);

@@ -1,7 +1,7 @@
 //! The best weights and the best bound so far, from whatever solver.
 
 use super::dense::times;
-use super::interior::State;
+use super::interior::PrimalDual;
 use super::polish::polish;
 use super::program::{Guess, Point, Program, retain};
 use crate::learn::engines::nearest;
@@ -12,7 +12,7 @@ use crate::{Result, Stop};
 /// Where a later call with more rows can go on.
 #[derive(Debug, Clone)]
 pub(crate) struct Start {
-    pub(super) state: State,
+    pub(super) state: PrimalDual,
     /// The last polished point, in the program's units, and what binds there.
     pub(super) exact: Option<(Point, Guess)>,
 }
@@ -113,7 +113,7 @@ impl<'a> Best<'a> {
         }
     }
 
-    pub(super) fn found(self, engine: Engine, stopped: bool, state: State) -> Found {
+    pub(super) fn found(self, engine: Engine, stopped: bool, state: PrimalDual) -> Found {
         let program = self.program;
         let multipliers = self.point.inequality.iter().zip(&program.of_below);
         Found {

@@ -46,7 +46,7 @@ struct Part {
 
 /// The variables: parts `x` with the multipliers of their two ends, rows' slacks and multipliers, the cone of the norm.
 #[derive(Debug, Clone)]
-pub(super) struct State {
+pub(super) struct PrimalDual {
     x: Vec<f64>,
     low: Vec<f64>,
     high: Vec<f64>,
@@ -71,7 +71,7 @@ struct Step {
     dual: (f64, Vec<f64>),
 }
 
-impl State {
+impl PrimalDual {
     /// Forgets the rows that are not kept.
     pub(super) fn retain(&mut self, keep: &[bool]) {
         retain(&mut self.slack, keep);
@@ -179,7 +179,7 @@ struct Room {
 /// What a factored Newton matrix needs to solve for a direction.
 struct Newton<'a> {
     inner: &'a Interior<'a>,
-    state: &'a State,
+    state: &'a PrimalDual,
     diagonal: Vec<f64>,
     of_part: Vec<f64>,
     ratio: Vec<f64>,
@@ -237,14 +237,14 @@ impl<'a> Interior<'a> {
     }
 
     /// The middle of the box, or of what a weight may well be where that is less; all multipliers 1.
-    pub(super) fn start(&self) -> State {
+    pub(super) fn start(&self) -> PrimalDual {
         let (n, program) = (self.program.width(), self.program);
         let split = |p: &Part| self.base[p.synapse] == 0.0;
         let x: Vec<f64> =
             self.parts.iter().map(|p| if split(p) { (0.5 * p.range).min(1.0) } else { 0.5 * p.range }).collect();
         let w = self.weights(&x);
         let below = times(&program.below, &w);
-        State {
+        PrimalDual {
             low: vec![1.0; x.len()],
             high: vec![1.0; x.len()],
             equality: vec![0.0; program.equal_to.len()],
@@ -257,7 +257,7 @@ impl<'a> Interior<'a> {
     }
 
     /// Goes on from where an earlier call ended, rows having been added since; all that is too near a wall is moved off.
-    pub(super) fn resume(&self, start: &State) -> State {
+    pub(super) fn resume(&self, start: &PrimalDual) -> PrimalDual {
         let program = self.program;
         let mut state = start.clone();
         let w = self.weights(&state.x);
@@ -303,7 +303,7 @@ impl<'a> Interior<'a> {
         w
     }
 
-    fn residual(&self, state: &State) -> Residual {
+    fn residual(&self, state: &PrimalDual) -> Residual {
         let program = self.program;
         let w = self.weights(&state.x);
         let mut gradient = program.slope(&w);
@@ -325,7 +325,7 @@ impl<'a> Interior<'a> {
         Residual { w, gradient, dual, equality, inequality, length: program.l2 - state.dual.0 }
     }
 
-    fn complementarity(&self, state: &State, w: &[f64]) -> f64 {
+    fn complementarity(&self, state: &PrimalDual, w: &[f64]) -> f64 {
         let high: f64 =
             self.parts.iter().zip(state.x.iter().zip(&state.high)).map(|(p, (x, high))| (p.range - x) * high).sum();
         let mut sum = dot(&state.x, &state.low) + high + dot(&state.slack, &state.inequality);
@@ -337,7 +337,7 @@ impl<'a> Interior<'a> {
         sum / count as f64
     }
 
-    fn newton<'b>(&'b self, state: &'b State, w: &[f64], room: &mut Room) -> Option<Newton<'b>> {
+    fn newton<'b>(&'b self, state: &'b PrimalDual, w: &[f64], room: &mut Room) -> Option<Newton<'b>> {
         let n = self.program.width();
         let of_part: Vec<f64> = self
             .parts
@@ -385,7 +385,7 @@ impl<'a> Interior<'a> {
     }
 
     /// Goes on from `state` to a relative gap of about `tolerance`, or as far as rounding and `stop` let it.
-    pub(super) fn solve(&self, state: &mut State, tolerance: f64, stop: Stop<'_>) -> Iterate {
+    pub(super) fn solve(&self, state: &mut PrimalDual, tolerance: f64, stop: Stop<'_>) -> Iterate {
         let program = self.program;
         let (mut best, mut merit, mut least) = (state.clone(), f64::INFINITY, f64::INFINITY);
         let (mut idle, mut iterations) = (0, 0);
@@ -441,7 +441,7 @@ impl<'a> Interior<'a> {
     }
 
     /// The least value over the box of what the multipliers leave, up to rounding.
-    fn bound(&self, state: &State, r: &Residual) -> f64 {
+    fn bound(&self, state: &PrimalDual, r: &Residual) -> f64 {
         let program = self.program;
         let mut sum = -dot(&state.equality, &program.equal_to) - dot(&state.inequality, &program.limit);
         for (j, &g) in r.gradient.iter().enumerate() {
@@ -450,7 +450,7 @@ impl<'a> Interior<'a> {
         sum - program.tangent(&r.w)
     }
 
-    fn complement(&self, state: &State, newton: &Newton<'_>, mu: f64, affine: Option<&Step>) -> Complement {
+    fn complement(&self, state: &PrimalDual, newton: &Newton<'_>, mu: f64, affine: Option<&Step>) -> Complement {
         let mut out = Complement {
             low: state.x.iter().zip(&state.low).map(|(x, l)| mu - x * l).collect(),
             high: self
@@ -491,7 +491,7 @@ impl<'a> Interior<'a> {
     }
 
     /// Gondzio's corrector: products that a longer step would bring far from `mu` are pulled back.
-    fn correct(&self, state: &State, step: &Step, reach: f64, mu: f64, aim: &Complement) -> Complement {
+    fn correct(&self, state: &PrimalDual, step: &Step, reach: f64, mu: f64, aim: &Complement) -> Complement {
         let pull = |product: f64| {
             if product < 0.1 * mu {
                 0.1 * mu - product
@@ -514,7 +514,7 @@ impl<'a> Interior<'a> {
         out
     }
 
-    fn reach(&self, state: &State, w: &[f64], step: &Step) -> f64 {
+    fn reach(&self, state: &PrimalDual, w: &[f64], step: &Step) -> f64 {
         let mut most = wall(&state.x, &step.x).min(wall(&state.low, &step.low)).min(wall(&state.high, &step.high));
         for ((p, x), dx) in self.parts.iter().zip(&state.x).zip(&step.x) {
             if *dx > 0.0 {
@@ -529,7 +529,7 @@ impl<'a> Interior<'a> {
         most
     }
 
-    fn finish(&self, state: &State) -> Iterate {
+    fn finish(&self, state: &PrimalDual) -> Iterate {
         let program = self.program;
         let weights = self.weights(&state.x);
         let n = program.width();
