@@ -57,9 +57,11 @@ def study(section: dict[str, Any]) -> list[str]:
     name, title = section["name"], f"{section['title'][0].upper()}{section['title'][1:]}"
     where = "../benchmarks/results/figures"
     made = f"({section['date']}, {section['cpu_seconds']:.0f} s of CPU)"
+    options = "" if section["size"] == "full" else f" --size {section['size']}"
+    options += "".join(f" --set {name}={json.dumps(section['parameters'][name])}" for name in section["changed"])
     lines = [
         *heading(f"{name}: {title}"),
-        f"*{section['where']}.* Made by ``taxel study {name} --report figures`` {made};",
+        f"*{section['where']}.* Made by ``taxel study {name}{options} --report figures`` {made};",
         f"numbers: :download:`{name}.json <{where}/{name}.json>`.",
     ]
     for picture in section["pictures"]:
