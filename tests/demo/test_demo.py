@@ -156,6 +156,7 @@ def test_in_real_time_the_board_is_a_process_of_its_own_and_its_recording_says_t
     values = json.loads(ended.stdout)
     folder = Path(values["report"]).parent
     assert {path.name for path in (tmp_path / folder).iterdir()} == {"recording.mcap", "report.html", "report.json"}
+    assert "taxel view recording.mcap" in (tmp_path / folder / "report.html").read_text()
     host, board = values["host"], values["board"]
     assert board["bytes"] == host["wire"]["bytes"]
     assert host["events"] == host["read_out"] + host["events_dropped"]

@@ -361,6 +361,7 @@ def test_a_report_shows_potential_weights_and_the_worst(folder: Path, trained: P
     assert (code, f"report: {tmp_path / 'with' / 'report.html'}" in out) == (0, True)
     assert page.count('<div class="charts">') == 2 * 3, "potential, errors, weights of each label"
     assert "<h2>contact</h2>" in page
+    assert "taxel view" not in page, "a .npz cannot be viewed"
     assert "The worst" in page
     assert call(capsys, *arguments, tmp_path / "without")[0] == 0
     page = (tmp_path / "without" / "report.html").read_text()

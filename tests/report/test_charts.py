@@ -174,6 +174,7 @@ def page(*figures):
         drawn=charts,
         rows=[],
         worst=[],
+        viewed=["'a walk.mcap'"],
         scored=False,
     )
 
@@ -198,6 +199,7 @@ def test_a_page_needs_nothing_but_itself():
     assert "Leon Sorokin" in text, "uPlot's licence goes with it"
     assert "export {" not in text
     assert "prefers-color-scheme: dark" in text
+    assert "<code>taxel view &#39;a walk.mcap&#39;</code>." in text
 
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import matplotlib as mpl
@@ -35,6 +36,8 @@ __all__ = ["Listened", "write_listening"]
 
 #: How many moments are drawn a label, and how much around each in time constants of the neuron.
 _MOMENTS, _AROUND = 4, 6.0
+#: What `taxel view` shows, and how many recordings are named for it.
+_VIEWED, _MOST_VIEWED = (".mcap", ".lsa"), 4
 #: Maps of weights that are drawn a label, those with the largest weights first.
 _MAPS = 8
 _SAID, _TRUE, _POTENTIAL = "#b5423c", "#2f6690", INK
@@ -114,6 +117,7 @@ def write_listening(
         drawn=drawn,
         rows=[_row(one, label) for one in listened for label in readout.labels],
         worst=[(listened[m.recording].name, m) for label in readout.labels for m in moments[label] if m.badness > 0],
+        viewed=[quote(one.name) for one in listened if one.name.endswith(_VIEWED)][:_MOST_VIEWED],
         scored=any(one.score is not None for one in listened),
     )
     return write_whole(place / "report.html", lambda file: file.write(text.encode()))
