@@ -10,5 +10,5 @@ settings.load_profile("taxel")
 # A shell that starts the tests in the background has them ignore Ctrl-C, which some of them send.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-#: Scripts that made kept data are no tests: they need what made it.
-collect_ignore_glob = ["data/*"]
+#: Scripts that made kept data, or that other programs run, are no tests: they need what is not here.
+collect_ignore_glob = ["data/*", "simulate/press_by_getfem.py"]
