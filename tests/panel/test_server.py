@@ -222,7 +222,7 @@ def test_what_no_page_sends_ends_the_connection(panel, message, code):
 
 def test_who_is_refused_over_and_over_is_let_go(panel):
     with Client(panel) as page:
-        for _ in range(150):
+        for _ in range(101):
             page.socket.send("nonsense")
         with pytest.raises(websockets.exceptions.ConnectionClosed) as closed:
             page.until("nothing")
