@@ -414,6 +414,7 @@ class ConeXProblem:
 
 # panel: the files of its page, by their names below crates/taxel-live/web
 
+@final
 class Panel:
     def __new__(
         cls,
