@@ -1,8 +1,7 @@
 // The board: where it is, what it says, its registers as sliders, presets, counters of losses.
 
 import { make, part, write } from "./dom.js";
-import { FIELDS, refused, warned } from "./registers.js";
-import { PRESETS } from "./registers.js";
+import { FIELDS, PRESETS, refused, warned } from "./registers.js";
 import { RefusedError } from "./server.js";
 import { whole } from "./words.js";
 
@@ -61,7 +60,7 @@ class Control {
       this.row.append(this.input, this.reason);
       this.input.addEventListener("change", () => this.want(Number(this.input.checked)));
     } else {
-      this.input = make("input", { type: "text", inputmode: "decimal", id, autocomplete: "off", "aria-describedby": this.reason.id });
+      this.input = make("input", { type: "text", inputmode: "decimal", id, autocomplete: "off", "aria-describedby": `${id}-unit ${this.reason.id}` });
       if (TIMING.includes(field.name)) {
         this.slider = make("input", { type: "range", min: 0, max: SLIDER, step: 1, "aria-label": `${SPOKEN[field.name]}, slider` });
         this.row.append(this.slider);
@@ -71,7 +70,7 @@ class Control {
         });
         this.slider.addEventListener("change", () => this.tell());
       }
-      this.row.append(this.input, make("span", { class: "unit" }, this.unit.name === "flag" ? "" : shortUnit(this.unit.name)), this.reason);
+      this.row.append(this.input, make("span", { class: "unit", id: `${id}-unit` }, shortUnit(this.unit.name)), this.reason);
       this.input.addEventListener("change", () => this.want(this.read()));
       this.input.addEventListener("keydown", (event) => this.key(event));
     }

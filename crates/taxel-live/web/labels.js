@@ -138,6 +138,7 @@ export class Labels {
     const { labels } = this;
     const told = this.file ? this.files.get(this.file) : undefined;
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
+    this.lane.dataset.hint = this.file ? "Labels: click here to mark one" : "Labels: open a recording, or start one";
     const place = told ? `Kept in ${told.path}` : "Open a recording, or start one, and mark what happens in it.";
     write(part("label-place", HTMLElement), place);
     part("train-line", HTMLElement).hidden = !labels.length;

@@ -337,8 +337,8 @@ function showState() {
   const recording = recorder.told?.state === "recording" ? recorder.told : null;
   const [kind, word] = !connected
     ? ["lost", why ? "No connection" : "Connecting"]
-    : source !== null
-      ? ["replay", "Replay"]
+    : source !== null || !hello?.live
+      ? ["replay", source === null ? "No recording" : "Replay"]
       : state === "following"
         ? ["live", "Live"]
         : ["held", state === "playing" ? "Earlier" : "Held"];
@@ -407,7 +407,10 @@ function writeLanes() {
   write(part("force-sum", HTMLElement), `${whole(timeline.sum[place])} ticks`);
   write(part("force-area", HTMLElement), counted(timeline.area[place], "taxel"));
   const [x, y] = [timeline.x[place], timeline.y[place]];
-  write(part("centre-now", HTMLElement), Number.isNaN(x) ? "nothing pressed" : `column ${x.toFixed(1)}, row ${y.toFixed(1)}`);
+  const centre = Number.isNaN(x) ? "nothing pressed" : `column ${x.toFixed(1)}, row ${y.toFixed(1)}`;
+  write(part("centre-now", HTMLElement), centre);
+  const force = `${whole(timeline.sum[place])} ticks over ${counted(timeline.area[place], "taxel")}`;
+  write(part("picture-said", HTMLElement), `${force}, centre: ${centre}`);
 }
 
 /** Puts cursor, picture's time and detections where they belong over the lanes. */
@@ -591,6 +594,11 @@ function picture() {
   );
 }
 
+function health() {
+  showTab("view");
+  view.look();
+}
+
 const help = part("help", HTMLDialogElement);
 const here = () => timeline?.cursor_us ?? player.t_us;
 view.cutHere = (/** @type {0 | 1} */ end) => view.setCut(end, here());
@@ -621,10 +629,7 @@ hearKeys(
     open: () => part("files", HTMLSelectElement).focus(),
     crosshair: () => part("pressure-frame", HTMLElement).focus(),
     rest: () => view.rest("now"),
-    health: () => {
-      showTab("view");
-      view.look();
-    },
+    health,
     picture,
     tabBoard: () => showTab("board"),
     tabRecord: () => showTab("record"),
@@ -650,6 +655,7 @@ part("theme-button", HTMLButtonElement).onclick = theme;
 part("help-button", HTMLButtonElement).onclick = () => help.showModal();
 part("help-close", HTMLButtonElement).onclick = () => help.close();
 part("picture", HTMLButtonElement).onclick = picture;
+part("health", HTMLButtonElement).onclick = health;
 part("said-close", HTMLButtonElement).onclick = () => {
   part("said", HTMLElement).hidden = true;
 };

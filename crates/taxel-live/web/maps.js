@@ -49,6 +49,8 @@ class Map2D {
   size(rows, columns) {
     [this.canvas.width, this.canvas.height] = [columns, rows];
     this.frame.style.aspectRatio = `${columns} / ${rows}`;
+    // A sensor much longer than wide keeps within the page.
+    this.frame.parentElement?.style.setProperty("--aspect", String(Math.max(0.25, Math.min(3, columns / rows))));
     this.image = new ImageData(columns, rows);
     this.pixels = new Uint32Array(this.image.data.buffer);
   }

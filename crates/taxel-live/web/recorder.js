@@ -66,8 +66,10 @@ export class Recorder {
       this.server.ask({ type: "stop" }).catch(this.failed);
       return;
     }
-    const refuse = part("record-reason", HTMLElement);
-    refuse.hidden = true;
+    part("record-reason", HTMLElement).hidden = true;
+    for (const [id, what] of /** @type {const} */ ([["record-index", "index"], ["record-countdown", "countdown"], ["record-length", "length"]])) {
+      if (Number.isNaN(this.number(id))) return this.refuse(`${what}: ${part(id, HTMLInputElement).value.trim()} is no number`);
+    }
     const label = part("record-label", HTMLInputElement).value.trim();
     const format = part("record-format", HTMLSelectElement).value;
     const message = {
@@ -80,11 +82,15 @@ export class Recorder {
       label: label || null,
       format,
     };
-    this.server.ask(message).catch((error) => {
-      this.shown();
-      refuse.hidden = false;
-      write(refuse, error.message);
-    });
+    this.server.ask(message).catch((error) => this.refuse(error.message));
+  }
+
+  /** @param {string} reason why nothing is recorded */
+  refuse(reason) {
+    this.shown();
+    const place = part("record-reason", HTMLElement);
+    place.hidden = false;
+    write(place, reason);
   }
 
   /** @param {Told} told */

@@ -54,12 +54,12 @@ export class View {
     }
     settings.watch(() => {
       part("theme", HTMLSelectElement).value = settings.values.theme;
+      part("raster-what", HTMLSelectElement).value = settings.values.raster;
     });
     part("encoder", HTMLSelectElement).onchange = ({ target }) => {
       const name = /** @type {HTMLSelectElement} */ (target).value;
       this.server.ask({ type: "encode", encoder: name ? { name } : null }).then(() => {
         settings.set("raster", name ? "spikes" : "changes");
-        part("raster-what", HTMLSelectElement).value = settings.values.raster;
       }, failed);
     };
     part("rest-now", HTMLButtonElement).onclick = () => this.rest("now");
@@ -104,6 +104,7 @@ export class View {
     const now = encoder.value;
     encoder.replaceChildren(make("option", { value: "" }, "none"), ...hello.encoders.map((name) => make("option", { value: name }, name.replaceAll("_", " "))));
     encoder.value = hello.encoders.includes(now) ? now : "";
+    if (!encoder.value) this.settings.set("raster", "changes");
     part("live-view", HTMLElement).hidden = !hello.live;
     part("delta-row", HTMLElement).hidden = hello.delta_intensity === undefined;
     part("delta-intensity", HTMLInputElement).checked = hello.delta_intensity ?? false;
