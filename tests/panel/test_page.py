@@ -1,4 +1,4 @@
-"""The panel's page: what the extension hands out."""
+"""The panel's page: what the extension hands out, and what its documentation says of it."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from taxel import _core
 
 ROOT = Path(__file__).resolve().parents[2]
 WEB = ROOT / "crates/taxel-live/web"
+PAGE = (ROOT / "docs/panel.md").read_text()
 SERVED = sorted(
     str(file.relative_to(WEB))
     for file in WEB.rglob("*")
@@ -50,6 +51,15 @@ def test_the_page_asks_nobody_else_for_anything() -> None:
     html = (WEB / "index.html").read_text()
     # The content security policy has no place for these.
     assert not re.search(r"\bstyle=|\bon[a-z]+=|<style|<script(?![^>]*\bsrc=)", html)
+
+
+def test_the_documentation_names_every_key_and_no_other() -> None:
+    source = (WEB / "keys.js").read_text()
+    keys = re.findall(r'shown: "([^"]+)", text: "([^"]+)"', source)
+    assert len(keys) == source.count('action: "')
+    table = PAGE.split("## Keys")[1].split("## ")[0]
+    rows = [tuple(cell.strip().strip("`") for cell in row.split("|")[1:3]) for row in table.splitlines() if "|" in row]
+    assert rows[2:] == keys
 
 
 @pytest.mark.parametrize("theme", ["dark", "light"])

@@ -1,0 +1,104 @@
+"""A browser, an emulated board and a panel as processes, for the tests that look at the page."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from queue import Empty, Queue
+
+import pytest
+
+#: How long anything may take on a machine at load 20, s.
+PATIENCE = 90
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--autoplay-policy=no-user-gesture-required",
+]
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+def free_port() -> int:
+    """Find a UDP port of loopback that nobody has."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])
+
+
+class Process:
+    """`taxel` with some arguments, and what it prints."""
+
+    def __init__(self, *arguments: str, folder: Path) -> None:
+        environment = {**os.environ, "PYTHONUNBUFFERED": "1", "XDG_CONFIG_HOME": str(folder / "config")}
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "taxel", *arguments],
+            cwd=folder,
+            env=environment,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self.lines: Queue[str] = Queue()
+        self.said: list[str] = []
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.lines.put(line)
+
+    def wait_for(self, pattern: str) -> str:
+        """Return the first group of the first line that matches."""
+        while True:
+            try:
+                line = self.lines.get(timeout=PATIENCE)
+            except Empty:
+                raise AssertionError(f"{pattern!r} was not said:\n{''.join(self.said)}") from None
+            self.said.append(line)
+            if found := re.search(pattern, line):
+                return found.group(1)
+
+    def end(self) -> int:
+        """Send Ctrl-C and wait."""
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+        try:
+            return self.process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+            raise
+
+
+@contextmanager
+def running(*arguments: str, folder: Path) -> Iterator[Process]:
+    """Run `taxel` for a while."""
+    process = Process(*arguments, folder=folder)
+    try:
+        yield process
+    finally:
+        process.end()
+
+
+@pytest.fixture(scope="session")
+def chromium():  # type: ignore[no-untyped-def]  # Playwright may be absent
+    """Start the browser once for all tests; skip where there is none."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="no Playwright: pip install playwright")
+    if CHROMIUM is None:
+        pytest.skip("no Chromium: on Debian, apt install chromium")
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield browser
+        browser.close()
