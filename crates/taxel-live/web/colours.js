@@ -43,8 +43,8 @@ const CHANGE = {
 /** What a taxel looks like that was never heard of: a chequered ground, two tones. */
 /** @type {Record<Theme, [Colour, Colour]>} */
 export const UNKNOWN = {
-  dark: [[44, 49, 60], [60, 66, 79]],
-  light: [[214, 218, 226], [196, 201, 211]],
+  dark: [[29, 33, 42], [41, 46, 57]],
+  light: [[226, 229, 235], [210, 214, 222]],
 };
 
 /**

@@ -216,7 +216,7 @@ function greet(told) {
   recorder.able = told.live;
   for (const id of ["record", "record-start"]) part(id, HTMLButtonElement).disabled = !told.live;
   part("live-counters", HTMLElement).hidden = !told.live;
-  part("detections-none", HTMLElement).textContent = told.readout ? "None yet." : told.live ? "No readout runs: give taxel live one to see what it says." : "None in this recording.";
+  showDetections(detections);
   document.title = told.live ? "taxel · live" : "taxel · view";
   if (!maps.taxel) maps.point([told.array.columns >> 1, told.array.rows >> 1]);
   else watch(maps.taxel);
@@ -298,7 +298,9 @@ function move(told) {
 function showDetections(heard) {
   detections = heard;
   write(part("detection-count", HTMLElement), heard.length ? whole(heard.length) : "");
-  part("detections-none", HTMLElement).hidden = heard.length > 0;
+  const none = part("detections-none", HTMLElement);
+  none.hidden = heard.length > 0;
+  write(none, opened ? "None in this recording." : hello?.readout ? "None yet." : "No readout runs: give taxel live one to see what it says.");
   listed = -1;
 }
 

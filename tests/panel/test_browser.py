@@ -1,0 +1,421 @@
+"""The panel as a person has it: a real browser, an emulated board, recordings on disk."""
+
+from __future__ import annotations
+
+import csv
+import re
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.panel.browser import PATIENCE, chromium, free_port, running
+
+import taxel
+
+__all__ = ["chromium"]
+
+pytestmark = pytest.mark.timeout(600)
+
+#: Pixels of a map, as a text that changes when the picture does.
+PIXELS = "name => document.getElementById(name).toDataURL()"
+
+
+def until(true: Callable[[], Any], what: str) -> Any:
+    """Wait for something outside of the page."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        if found := true():
+            return found
+        time.sleep(0.05)
+    raise AssertionError(f"not within {PATIENCE} s: {what}")
+
+
+def opened(browser: Any, url: str, **how: Any) -> Any:
+    """Open the panel in a context of its own; any error of the page is kept in `errors`."""
+    context = browser.new_context(**{"viewport": {"width": 1300, "height": 900}, **how})
+    context.set_default_timeout(PATIENCE * 1000)
+    page = context.new_page()
+    errors: list[str] = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+    page.goto(url)
+    page.errors = errors
+    return page
+
+
+def shows(page: Any, name: str, pattern: str) -> None:
+    """Wait until a part of the page has a text."""
+    from playwright.sync_api import expect
+
+    expect(page.locator(f"#{name}")).to_have_text(re.compile(pattern), timeout=PATIENCE * 1000)
+
+
+def clock(page: Any) -> float:
+    """Return the time that the page shows, s."""
+    return float(page.locator("#clock").inner_text().split()[0])
+
+
+@pytest.fixture(scope="module")
+def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
+    """An emulated board with a control line, and a panel that listens to it."""
+    pytest.importorskip("playwright", reason="no Playwright: pip install playwright")
+    folder = tmp_path_factory.mktemp("live")
+    port = str(free_port())
+    with running("emulate", "--port", port, "--scenes", "400", "--seed", "1", "--control", "0", folder=folder) as board:
+        control = board.wait_for(r"commands are taken at (\S+)")
+        panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
+        with running(*panel, "--folder", str(folder), folder=folder) as server:
+            url = server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")
+            yield SimpleNamespace(url=url, folder=folder)
+
+
+@pytest.fixture
+def page(chromium: Any, live: SimpleNamespace) -> Iterator[Any]:
+    """The panel in a browser, following the board; it may not have complained in the end."""
+    page = opened(chromium, live.url)
+    shows(page, "state-word", "^Live$")
+    shows(page, "events", r"^[1-9]")
+    yield page
+    assert not page.errors
+    page.context.close()
+
+
+def press(page: Any, *keys: str) -> None:
+    """Press keys with nothing in focus that would take them."""
+    page.evaluate("document.activeElement.blur()")
+    for key in keys:
+        page.keyboard.press(key)
+
+
+def record_form(page: Any, **values: Any) -> None:
+    """Fill in the tab Record."""
+    press(page, "2")
+    for name, value in values.items():
+        if isinstance(value, bool):
+            page.locator(f"#record-{name}").set_checked(value)
+        else:
+            page.locator(f"#record-{name}").fill(str(value))
+
+
+def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live: SimpleNamespace) -> None:
+    before = page.evaluate(PIXELS, "pressure-map")
+    floor = page.get_by_label("Noise floor", exact=True)
+    floor.fill("5")
+    floor.press("Tab")
+    # What the board says counts, not what was typed.
+    page.locator("#read-back").click()
+    shows(page, "registers-why", "^$")
+    until(lambda: floor.input_value() == "5", "the board holds the floor")
+    until(lambda: page.evaluate(PIXELS, "pressure-map") != before, "the map moves")
+    record_form(page, name="walk", index="7", label="heel", length="", countdown="0")
+    press(page, "r")
+    shows(page, "state-word", r"Recording walk7\.mcap")
+    page.locator("#label-name").evaluate(
+        "input => { input.value = 'contact'; input.dispatchEvent(new Event('input')) }"
+    )
+    press(page, "m")
+    shows(page, "label-count", "^1 label")
+    until(lambda: float((page.locator("#record-state").inner_text().split() or ["0"])[0]) >= 2, "two seconds of it")
+    press(page, "r")
+    shows(page, "record-last-file", r"^walk7\.mcap$")
+    page.locator("#files").select_option("walk7.mcap")
+    shows(page, "state-word", "^Replay$")
+    shows(page, "label-count", "^1 label")
+    start = clock(page)
+    press(page, "Space")
+    until(lambda: clock(page) > start + 1, "it plays")
+    file = taxel.open(live.folder / "walk7.mcap")
+    assert len(file.events.t) > 0
+    assert file.registers is not None
+    assert file.registers.noise_floor == 5
+    rows = list(csv.DictReader((live.folder / "walk7.notes.csv").open()))
+    assert [row["label"] for row in rows] == ["contact"]
+    assert file.events.start <= int(rows[0]["t_us"]) <= file.events.stop
+    assert {"heel", "contact"} <= {note.text for note in file.notes}
+
+
+def test_a_refused_value_stays_typed_with_its_reason_until_escape(page: Any) -> None:
+    period = page.get_by_label("Step period", exact=True)
+    period.fill("4")
+    period.press("Enter")
+    shows(page, "register-step_period-reason", r"4 x step_period 4\.00 us is longer than line_read 3\.00 us \(rule 2\)")
+    assert period.input_value() == "4"
+    assert period.get_attribute("aria-invalid") == "true"
+    # A slower line makes it right: both are written together.
+    for name, value in (("Line period", "20"), ("Line read", "20")):
+        page.get_by_label(name, exact=True).fill(value)
+        page.get_by_label(name, exact=True).press("Enter")
+    until(lambda: period.get_attribute("aria-invalid") == "false" and period.input_value() == "4.00", "all are written")
+    period.fill("nonsense")
+    period.press("Enter")
+    shows(page, "register-step_period-reason", "nonsense is no number")
+    period.press("Escape")
+    assert period.input_value() == "4.00"
+    page.locator("#preset").select_option("5.2 kHz")
+    until(lambda: period.input_value() == "0.75", "the preset is back")
+
+
+def test_presets_of_ones_own_are_kept_applied_and_deleted(page: Any) -> None:
+    page.locator("#preset-path").click()
+    floor = page.get_by_label("Noise floor", exact=True)
+    floor.fill("9")
+    floor.press("Enter")
+    until(lambda: page.locator("#preset").input_value() == "", "no preset is this")
+    page.locator("#preset-name").fill("quiet")
+    page.locator("#preset-name").press("Enter")
+    until(lambda: page.locator("#preset").input_value() == "quiet", "it is kept")
+    page.locator("#preset").select_option("5.2 kHz")
+    until(lambda: floor.input_value() == "3", "another is applied")
+    page.locator("#preset").select_option("quiet")
+    until(lambda: floor.input_value() == "9", "and ours again")
+    page.locator("#preset-delete").click()
+    until(lambda: page.locator("#preset option[value=quiet]").count() == 0, "it is gone")
+    page.locator("#preset").select_option("5.2 kHz")
+    until(lambda: floor.input_value() == "3", "the preset is back")
+
+
+def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: Any, live: SimpleNamespace) -> None:
+    record_form(page, name="auto", index="1", countdown="1", length="1", advance=True)
+    press(page, "r")
+    shows(page, "record-word", "^Cancel$")
+    shows(page, "record-word", "^Stop$")
+    until((live.folder / "auto2.mcap").exists, "the second begins by itself")
+    press(page, "r")
+    shows(page, "record-word", "^Record$")
+    before = (live.folder / "auto1.mcap").read_bytes()
+    record_form(page, name="auto", index="1", countdown="0", length="1", advance=False)
+    press(page, "r")
+    shows(page, "record-reason", r"auto1\.mcap.*exists")
+    for name in ("../away", ".hidden", ""):
+        record_form(page, name=name, index="")
+        press(page, "r")
+        until(lambda: page.locator("#record-reason").is_visible(), f"{name!r} is refused")
+    assert (live.folder / "auto1.mcap").read_bytes() == before
+    record_form(page, name="auto", index="one")
+    press(page, "r")
+    shows(page, "record-reason", "index: one is no number")
+
+
+def test_looking_back_while_live_holds_the_view_and_not_the_board(page: Any) -> None:
+    until(lambda: clock(page) > 2, "there is something to look back at")
+    press(page, "Space")
+    shows(page, "state-word", "^Held$")
+    page.wait_for_timeout(300)
+    held = clock(page)
+    press(page, "ArrowLeft")
+    until(lambda: clock(page) == pytest.approx(held - 0.1, abs=0.002), "a tenth of a second back")
+    back = clock(page)
+    press(page, ".")
+    until(lambda: clock(page) > back, "a step on")
+    press(page, ",", ",")
+    until(lambda: clock(page) < back, "two steps back")
+    events = page.locator("#events").inner_text()
+    until(lambda: page.locator("#events").inner_text() != events, "the board goes on")
+    press(page, "l")
+    shows(page, "state-word", "^Live$")
+    until(lambda: clock(page) > held + 0.1, "it follows again")
+
+
+def test_the_crosshair_goes_by_keys_and_names_its_taxel(page: Any) -> None:
+    press(page, "c")
+    page.keyboard.press("Escape")
+    shows(page, "taxel-name", "^none")
+    for key in ("ArrowUp", "ArrowLeft", "Shift+ArrowUp"):
+        page.keyboard.press(key)
+    shows(page, "taxel-name", r"row 24, column 31 · sense line 24, driven line 31")
+    page.locator("#tab-view").click()
+    page.locator("#flip-x").check()
+    box = page.locator("#pressure-frame").bounding_box()
+    page.mouse.click(box["x"] + 3, box["y"] + 3)
+    shows(page, "taxel-name", "row 0, column 63")
+    page.locator("#flip-x").uncheck()
+
+
+def test_the_page_fits_a_phone_and_its_foot_hides_nothing(chromium: Any, live: SimpleNamespace) -> None:
+    page = opened(chromium, live.url, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    shows(page, "state-word", "^Live$")
+    for tab in ("board", "record", "labels", "view"):
+        page.locator(f"#tab-{tab}").click()
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390, tab
+    page.evaluate("window.scrollTo(0, document.body.scrollHeight)")
+    foot = page.locator("footer").bounding_box()
+    low = page.locator("aside").bounding_box()
+    assert low["y"] + low["height"] <= foot["y"]
+    for button in page.locator("footer button:visible, header button:visible").all():
+        assert min(button.bounding_box()["height"], button.bounding_box()["width"]) >= 44, button.inner_text()
+    page.context.close()
+
+
+@pytest.mark.parametrize("motion", ["reduce", "no-preference"])
+def test_nothing_moves_by_itself_where_less_motion_is_wanted(chromium: Any, live: SimpleNamespace, motion: str) -> None:
+    page = opened(chromium, live.url, reduced_motion=motion)
+    shows(page, "state-word", "^Live$")
+    record_form(page, name=f"motion-{motion}", index="")
+    press(page, "r")
+    shows(page, "record-word", "^Stop$")
+    assert bool(page.evaluate("document.getAnimations().length")) is (motion == "no-preference")
+    press(page, "r")
+    shows(page, "record-word", "^Record$")
+    page.context.close()
+
+
+def test_every_control_has_a_name_and_every_id_is_one(page: Any) -> None:
+    nameless = page.evaluate(
+        """() => [...document.querySelectorAll("button, input, select, canvas[role], [role=application]")]
+            .filter(e => !(e.getAttribute("aria-label") || e.labels?.length || e.textContent.trim() || e.closest("[role=img]")))
+            .map(e => e.outerHTML.slice(0, 80))"""
+    )
+    assert nameless == []
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Ten footfalls with silence between them, on an array of 16 x 24."""
+    folder = tmp_path_factory.mktemp("view")
+    rows, columns, t, x, y, p, intensity = 16, 24, [], [], [], [], []
+    for fall in range(10):
+        for step in range(40):
+            t += [1_000_000 * fall + 200_000 + 192 * step] * 3
+            x += [fall + 3, fall + 4, fall + 5]
+            y += [step % rows] * 3
+            p += [step < 20] * 3
+            intensity += [40 + min(step, 40 - step)] * 3
+    events = taxel.Events(
+        np.array(t), np.array(x), np.array(y), np.array(p), np.array(intensity), array=taxel.Array(rows, columns)
+    )
+    taxel.convert(events, folder / "walk.mcap")
+    return folder / "walk.mcap"
+
+
+@pytest.fixture
+def replay(chromium: Any, recording: Path) -> Iterator[Any]:
+    """The recording in a browser, without a board."""
+    with running("view", str(recording), "--no-open", folder=recording.parent) as server:
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "state-word", "^Replay$")
+        yield page
+        assert not page.errors
+        page.context.close()
+
+
+def test_steps_leap_over_silence_both_ways(replay: Any) -> None:
+    press(replay, "End")
+    until(lambda: clock(replay) > 9, "the end")
+    press(replay, "Home")
+    until(lambda: clock(replay) < 0.3, "the beginning")
+    replay.locator("#strip").focus()
+    for _ in range(3):
+        at = clock(replay)
+        replay.keyboard.press("Shift+ArrowRight")
+        until(lambda at=at: clock(replay) > at + 0.9, "a second on")
+    at = clock(replay)
+    press(replay, ",")
+    until(lambda: clock(replay) < at - 0.1, "back over the silence")
+    press(replay, ".")
+    until(lambda: clock(replay) > at, "on over the silence")
+
+
+def test_ten_footfalls_are_labelled_moved_named_and_deleted(replay: Any, recording: Path) -> None:
+    table = recording.with_suffix("").with_suffix(".notes.csv")
+    press(replay, "3")
+    replay.locator("#label-name").fill("contact")
+    for fall in range(10):
+        t_us = 1_000_000 * fall + 200_000
+        replay.evaluate("document.activeElement.blur()")
+        replay.locator("#strip").focus()
+        replay.keyboard.press("Home")
+        for _ in range(fall):
+            replay.keyboard.press("Shift+ArrowRight")
+        until(lambda t_us=t_us: abs(clock(replay) * 1e6 - t_us) < 20_000, f"fall {fall}")
+        press(replay, "m")
+        shows(replay, "label-count", f"^{fall + 1} label")
+    first = replay.locator("#label-list li").first
+    first.locator("input").first.fill("heel")
+    first.locator("input").first.press("Enter")
+    until(lambda: "heel" in table.read_text(), "the name is kept")
+    press(replay, "End", "p")
+    flag = replay.locator(".flag.chosen")
+    flag.focus()
+    before = [int(row["t_us"]) for row in csv.DictReader(table.open())]
+    flag.press("Shift+ArrowLeft")
+    until(lambda: sum(int(row["t_us"]) for row in csv.DictReader(table.open())) == sum(before) - 100_000, "moved")
+    replay.locator(".flag.chosen").focus()
+    replay.keyboard.press("Delete")
+    shows(replay, "label-count", "^9 label")
+    rows = list(csv.DictReader(table.open()))
+    assert sorted(row["label"] for row in rows) == ["contact"] * 8 + ["heel"]
+    assert sorted(note.text for note in taxel.open(recording).notes) == ["contact"] * 8 + ["heel"]
+
+
+def test_a_flag_is_set_by_a_click_and_moved_by_a_drag(replay: Any) -> None:
+    press(replay, "End", "3")
+    until(lambda: clock(replay) > 9, "the end")
+    replay.locator("#label-name").fill("toe")
+    count = replay.locator("#label-list li").count()
+    lane = replay.locator("#label-lane").bounding_box()
+    replay.mouse.click(lane["x"] + lane["width"] * 0.3, lane["y"] + lane["height"] / 2)
+    shows(replay, "label-count", f"^{count + 1} label")
+    flag = replay.locator(".flag", has_text="toe")
+    said = flag.get_attribute("aria-label")
+    at = flag.bounding_box()
+    replay.mouse.move(at["x"] + 4, at["y"] + 5)
+    replay.mouse.down()
+    replay.mouse.move(at["x"] + 4 + lane["width"] / 5, at["y"] + 5, steps=5)
+    replay.mouse.up()
+    until(lambda: flag.get_attribute("aria-label") != said, "it moves")
+    seconds = [float(re.findall(r"at ([\d.]+) s", text)[0]) for text in (said, flag.get_attribute("aria-label"))]
+    assert seconds[1] - seconds[0] == pytest.approx(1.0, abs=0.05)  # a fifth of five seconds
+
+
+def test_a_stretch_is_cut_out_and_the_picture_saved(replay: Any, recording: Path, tmp_path: Path) -> None:
+    press(replay, "Home", "4", "[")
+    press(replay, "Shift+ArrowRight")
+    until(lambda: clock(replay) > 1.1, "a second on")
+    press(replay, "]")
+    replay.locator("#cut-name").fill("piece.mcap")
+    replay.locator("#cut-write").click()
+    shows(replay, "said-text", r"wrote piece\.mcap")
+    whole, piece = taxel.open(recording).events, taxel.open(recording.parent / "piece.mcap").events
+    assert 0 < len(piece.t) < len(whole.t)
+    with replay.expect_download() as download:
+        press(replay, "s")
+    download.value.save_as(tmp_path / "picture.png")
+    assert (tmp_path / "picture.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_colours_are_those_of_their_makers_and_grow_lighter_all_the_way(replay: Any) -> None:
+    """Oracle: Matplotlib's tables; the law: lightness tells the order, which is what colour-blind eyes need."""
+    import matplotlib
+
+    for name in ("lipari", "batlow", "cividis", "viridis", "grey"):
+        words = replay.evaluate("name => import('/colours.js').then(c => [...c.pressureWords(name, 'dark', 1)])", name)
+        colours = np.array([[w & 255, w >> 8 & 255, w >> 16 & 255] for w in words])
+        if name in ("cividis", "viridis"):
+            ours = np.array(matplotlib.colormaps[name].colors) * 255
+            assert np.abs(colours - ours).max() <= 2, name
+        linear = np.where(colours / 255 <= 0.04045, colours / 255 / 12.92, ((colours / 255 + 0.055) / 1.055) ** 2.4)
+        luminance = linear @ [0.2126, 0.7152, 0.0722]
+        assert (np.diff(luminance) > -1e-3).all(), name
+        light = replay.evaluate("name => import('/colours.js').then(c => [...c.pressureWords(name, 'light', 1)])", name)
+        assert light == words[::-1], name
+
+
+def test_tones_have_their_pitch_and_fade(replay: Any) -> None:
+    for hz, length in ((440, 0.12), (880, 0.35), (330, 0.2)):
+        samples = replay.evaluate(
+            """([hz, length]) => import('/tones.js').then(async ({ sound }) => {
+                const context = new OfflineAudioContext(1, 24000, 48000);
+                sound(context, hz, length);
+                return [...(await context.startRendering()).getChannelData(0)];
+            })""",
+            [hz, length],
+        )
+        wave = np.array(samples)
+        spectrum = np.abs(np.fft.rfft(wave * np.hanning(len(wave))))
+        assert abs(np.argmax(spectrum) * 2 - hz) <= 4
+        assert np.abs(wave[int(48_000 * length) + 10 :]).max() == 0
+        assert np.abs(np.diff(wave)).max() < 0.2 * 2 * np.pi * 880 / 48_000 * 1.1
