@@ -58,6 +58,7 @@ class Process:
         assert self.process.stdout is not None
         for line in self.process.stdout:
             self.lines.put(line)
+        self.lines.put("")
 
     def wait_for(self, pattern: str) -> str:
         """Return the first group of the first line that matches."""
@@ -67,6 +68,7 @@ class Process:
             except Empty:
                 raise AssertionError(f"{pattern!r} was not said:\n{''.join(self.said)}") from None
             self.said.append(line)
+            assert line, f"it ended before it said {pattern!r}:\n{''.join(self.said)}"
             if found := re.search(pattern, line):
                 return found.group(1)
 

@@ -254,7 +254,7 @@ export class Board {
 
   /** @param {Hello} hello */
   greet(hello) {
-    this.array = hello.array;
+    this.array = hello.array ?? this.array;
     this.writable = hello.live && hello.control !== null;
     part("where", HTMLElement).hidden = !hello.live;
     part("losses", HTMLElement).hidden = !hello.live;

@@ -209,7 +209,7 @@ function greet(told) {
   const first = hello === null;
   hello = told;
   player.live = told.live;
-  if (player.transport.source === null) size(told.array);
+  if (told.array && player.transport.source === null) size(told.array);
   board.greet(told);
   view.greet(told);
   labels.offer(told.readout ?? []);
@@ -218,10 +218,10 @@ function greet(told) {
   part("live-counters", HTMLElement).hidden = !told.live;
   showDetections(detections);
   document.title = told.live ? "taxel · live" : "taxel · view";
-  if (!maps.taxel) maps.point([told.array.columns >> 1, told.array.rows >> 1]);
-  else watch(maps.taxel);
+  if (maps.taxel) watch(maps.taxel);
+  else if (told.array) maps.point([told.array.columns >> 1, told.array.rows >> 1]);
   server.say({ type: "recordings" });
-  server.say({ type: "overview" });
+  if (told.live) server.say({ type: "overview" });
   const asked = fragment.get("open") ?? told.open;
   if (asked && (first || !told.live)) server.ask({ type: "open", name: asked }).catch(failed);
   player.show();
@@ -234,7 +234,7 @@ function showRegisters() {
   maps.floor = Number(values?.noise_floor ?? 0);
   if (opened) {
     if (!hello?.live) board.show(opened.registers ?? {}, frameOf(opened.registers), null, true);
-  } else if (registers) board.take(registers);
+  } else if (registers && hello?.live) board.take(registers);
 }
 
 /** @param {Record<string, number | boolean> | null} values @returns {number | null} us of a frame: lines x line period */
@@ -251,6 +251,8 @@ function open(told) {
   player.t_us = told.start_us;
   strip.overview = null;
   size(told.array);
+  if (!maps.taxel) maps.point([told.array.columns >> 1, told.array.rows >> 1]);
+  board.array = told.array;
   maps.health = null;
   maps.mark();
   part("files", HTMLSelectElement).value = told.name;
@@ -279,7 +281,7 @@ function move(told) {
     opened = null;
     anew = true;
     strip.overview = null;
-    if (hello) size(hello.array);
+    if (hello?.array) size(hello.array);
     maps.health = null;
     maps.mark();
     part("files", HTMLSelectElement).value = "";
@@ -606,7 +608,7 @@ const here = () => timeline?.cursor_us ?? player.t_us;
 view.cutHere = (/** @type {0 | 1} */ end) => view.setCut(end, here());
 const shift = (/** @type {KeyboardEvent} */ event) => (event.shiftKey ? 1e6 : 1e5);
 const by = (/** @type {number} */ us) => {
-  if (player.t_us !== null) player.seek(player.t_us + us);
+  if (player.goal !== null) player.seek(player.goal + us);
 };
 
 hearKeys(

@@ -25,6 +25,8 @@ export class Player {
     this.seeking = false;
     /** @type {number | null} */
     this.wanted = null;
+    /** @type {number | null} */
+    this.asked = null;
     this.speed = part("speed", HTMLSelectElement);
     part("play", HTMLButtonElement).onclick = () => this.toggle();
     part("step-back", HTMLButtonElement).onclick = () => this.step(-1);
@@ -59,8 +61,9 @@ export class Player {
 
   /** Writes the clock. */
   write() {
-    write(part("clock", HTMLElement), seconds(this.t_us));
     const { state, source, speed } = this.transport;
+    // At rest to the microsecond, as stamps of the board are less than a millisecond apart.
+    write(part("clock", HTMLElement), seconds(this.t_us, state === "paused" ? 6 : 3));
     let said = "";
     if (source === null && state !== "following" && this.reach && this.t_us !== null) said = `${short(Math.max(0, this.reach[1] - this.t_us))} behind`;
     else if (source !== null && this.reach) said = `of ${seconds(this.reach[1])}`;
@@ -101,10 +104,15 @@ export class Player {
     this.speed.dispatchEvent(new Event("change"));
   }
 
+  /** @returns {number | null} us: where the view will be when what was asked for is done */
+  get goal() {
+    return this.seeking ? this.asked : this.t_us;
+  }
+
   /** @param {number} t_us */
   seek(t_us) {
     const [from, to] = this.reach ?? [t_us, t_us];
-    this.wanted = Math.round(Math.max(from, Math.min(to, t_us)));
+    this.asked = this.wanted = Math.round(Math.max(from, Math.min(to, t_us)));
     if (!this.seeking) this.seekNext();
   }
 

@@ -7,7 +7,7 @@ export const UNKNOWN_VALUE = 65535;
 
 /**
  * @typedef {{ rows: number, columns: number, pitch_mm: number, name: string, exists: string | null }} ArrayTold
- * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayTold, udp: string | null, control: string | null,
+ * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayTold | null, udp: string | null, control: string | null,
  *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, time_columns: number,
  *   delta_intensity?: boolean }} Hello
  * @typedef {{ type: "registers", known: boolean, values: Record<string, number | boolean>, preset: string | null, frame_us: number,
@@ -23,7 +23,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "recorder", state: "idle" | "countdown" | "recording" | "finishing", name: string | null, index: number | null,
  *   file: string | null, label: string | null, advance: boolean, left_s: number | null, seconds: number | null, length_s: number | null,
  *   last: { file: string, verdict: string } | null, error: string | null }} Recorder
- * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number }} FileTold
+ * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number | null }} FileTold
  * @typedef {{ type: "recordings", folder: string, files: FileTold[] }} Recordings
  * @typedef {{ type: "opened", name: string, array: ArrayTold, start_us: number, stop_us: number, events: number, bytes: number,
  *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null, markers: { t_us: number, start: boolean }[],

@@ -1,7 +1,7 @@
 // Numbers as people read them.
 
-/** @param {number | null} us @returns {string} seconds with three places */
-export const seconds = (us) => (us === null ? "–" : `${(us / 1e6).toFixed(3)} s`);
+/** @param {number | null} us @param {number} [places] @returns {string} seconds */
+export const seconds = (us, places = 3) => (us === null ? "–" : `${(us / 1e6).toFixed(places)} s`);
 
 /** @param {number} value @returns {string} a whole number, in groups of three */
 export const whole = (value) => Math.round(value).toLocaleString("en");
