@@ -100,10 +100,7 @@ export class Maps {
     this.told = { unknown: 0, value: /** @type {number | null} */ (null), rest: /** @type {number | null} */ (null) };
     this.colour();
     for (const map of [this.pressure, this.change]) {
-      map.frame.addEventListener("pointerdown", (event) => {
-        map.frame.focus({ preventScroll: true });
-        this.point(this.at(map, event));
-      });
+      map.frame.addEventListener("pointerdown", (event) => this.point(this.at(map, event)));
       map.frame.addEventListener("pointermove", (event) => {
         if (event.buttons & 1) this.point(this.at(map, event));
       });
