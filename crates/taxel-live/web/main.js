@@ -247,7 +247,7 @@ function open(told) {
   opened = told;
   anew = true;
   player.transport = { ...player.transport, source: told.name, state: "paused" };
-  player.reach = [told.start_us, told.stop_us];
+  player.reach = told.start_us === null || told.stop_us === null ? null : [told.start_us, told.stop_us];
   player.t_us = told.start_us;
   strip.overview = null;
   size(told.array);

@@ -82,8 +82,6 @@ export class Player {
   }
 
   play() {
-    // A recording at its end begins anew.
-    if (this.transport.source !== null && this.reach && this.t_us !== null && this.t_us >= this.reach[1]) this.ask({ type: "seek", t_us: this.reach[0] });
     this.ask({ type: "play", speed: Number(this.speed.value) });
   }
 

@@ -25,7 +25,7 @@ export const UNKNOWN_VALUE = 65535;
  *   last: { file: string, verdict: string } | null, error: string | null }} Recorder
  * @typedef {{ name: string, bytes: number, modified_ns: number, labels: number | null }} FileTold
  * @typedef {{ type: "recordings", folder: string, files: FileTold[] }} Recordings
- * @typedef {{ type: "opened", name: string, array: ArrayTold, start_us: number, stop_us: number, events: number, bytes: number,
+ * @typedef {{ type: "opened", name: string, array: ArrayTold, start_us: number | null, stop_us: number | null, events: number, bytes: number,
  *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null, markers: { t_us: number, start: boolean }[],
  *   notes: { t_us: number, text: string }[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
  * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[] }} Overview
