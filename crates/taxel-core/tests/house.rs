@@ -28,7 +28,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
     (
         "taxel-live",
         &[
-            &["error", "clock", "latency"],
+            &["error", "clock", "latency", "locked"],
             &["address"],
             &["recording"],
             &["capture"],
@@ -52,13 +52,13 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "metrics",
                 "neuron",
                 "nouns",
-                "panel",
                 "recording",
                 "rivals",
                 "simulate",
                 "wire",
                 "wire_v2",
             ],
+            &["panel"],
             &["described"],
         ],
     ),

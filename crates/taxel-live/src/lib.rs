@@ -4,6 +4,7 @@ pub mod address;
 pub mod clock;
 pub mod error;
 pub mod latency;
+mod locked;
 
 pub mod capture;
 pub mod emulate;

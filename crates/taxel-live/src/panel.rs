@@ -9,10 +9,14 @@ mod door;
 pub mod film;
 mod hub;
 pub mod lens;
+mod limits;
+mod options;
 mod picture;
 mod recorder;
 mod requests;
 mod session;
+mod take;
 
-pub use door::{Panel, PanelOptions};
+pub use door::Panel;
 pub use hub::Office;
+pub use options::PanelOptions;

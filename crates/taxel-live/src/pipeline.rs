@@ -29,6 +29,7 @@ use taxel_core::wire::{self, Decoder};
 use taxel_core::{Marker, Stop};
 
 use crate::capture::Receiver;
+use crate::locked::lock;
 use crate::{Error, Result};
 pub use counters::{Counters, Summary};
 pub use handle::Handle;
@@ -37,7 +38,7 @@ pub use options::{LiveOptions, Record};
 pub use read::Ear;
 use recorder::Recorder;
 pub use said::{Lines, Said, Sink};
-use shared::{Shared, Shown, lock};
+use shared::{Shared, Shown};
 pub use tap::{Change, Outlet, Piece, UNKNOWN};
 
 /// How long a wait lasts before it is asked whether to stop.

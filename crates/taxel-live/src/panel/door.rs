@@ -1,7 +1,6 @@
 //! Who may come in: the page's files for everybody on this machine, the socket for who has the token.
 
 use std::net::{IpAddr, SocketAddr};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -15,6 +14,8 @@ use tokio::sync::watch;
 
 use super::assets::ASSETS;
 use super::hub::{Hub, Office};
+use super::limits::MOST_BYTES;
+use super::options::PanelOptions;
 use super::session;
 use crate::pipeline::Handle;
 use crate::{Error, Result};
@@ -23,30 +24,12 @@ use crate::{Error, Result};
 const PROTOCOL: &str = "taxel.panel.1";
 const TOKEN: &str = "token.";
 
-/// The longest message that is taken, bytes.
-pub(super) const MOST_BYTES: usize = 1 << 16;
-
 /// Who may look at a time.
 const MOST_VIEWERS: usize = 128;
 
 /// Scripts and styles from here, nothing from elsewhere; pictures may be made in the page (PNG).
 const POLICY: &str = "default-src 'self'; img-src 'self' blob: data:; object-src 'none'; base-uri 'none'; \
                       form-action 'none'; frame-ancestors 'none'";
-
-/// How a [`Panel`] works.
-#[derive(Debug, Clone)]
-pub struct PanelOptions {
-    /// Where it listens; port 0 finds a free one.
-    pub address: SocketAddr,
-    /// Where recordings are, and new ones go.
-    pub folder: PathBuf,
-    /// The recording of the folder to show first.
-    pub open: Option<String>,
-    /// The board's serial line, which the office has connected.
-    pub control: Option<String>,
-    /// The labels of the readout that listens, if one does.
-    pub readout: Option<Vec<String>>,
-}
 
 /// The server, from [`Panel::start`] until it is dropped.
 pub struct Panel {

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use crossbeam_channel as channel;
@@ -13,12 +13,12 @@ use taxel_core::wire::registers::PRESETS;
 use taxel_core::{encode, problem};
 use tokio::sync::{broadcast, watch};
 
-use super::PanelOptions;
-use super::door::MOST_BYTES;
 use super::film::{Activity, FileFilm, Film, RingFilm};
 use super::lens::{COLUMN_US, Keyframe, Lens, SPAN};
+use super::limits::{MOST_BYTES, MOST_CREDITS};
+use super::options::PanelOptions;
 use super::recorder::Recorder;
-use super::session::MOST_CREDITS;
+use crate::locked::lock;
 use crate::pipeline::{Counters, Handle, Outlet, Said, UNKNOWN};
 use crate::recording::now_ns;
 use crate::{Error, Result};
@@ -109,10 +109,6 @@ impl Drop for Seat {
     fn drop(&mut self) {
         self.0.viewers.fetch_sub(1, Ordering::Relaxed);
     }
-}
-
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Hub {

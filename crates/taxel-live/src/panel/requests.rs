@@ -9,6 +9,8 @@ use taxel_core::wire::{Command, Registers};
 
 use super::hub::{Hub, Label, said_of};
 use super::recorder::Plan;
+use super::take;
+use crate::locked::lock;
 use crate::pipeline::UNKNOWN;
 
 /// Why not, and which register or key is at fault.
@@ -134,7 +136,7 @@ fn took(hub: &Hub, registers: Registers, known: bool) {
     }
     if let Some(live) = hub.live() {
         live.handle.wrote(registers);
-        super::hub::lock(&live.lens).set_floor(registers.noise_floor.into());
+        lock(&live.lens).set_floor(registers.noise_floor.into());
     }
     hub.tell_all(&hub.registers());
 }
@@ -267,7 +269,7 @@ fn record(hub: &Arc<Hub>, asked: &Asked<'_>) -> Answer {
         advance,
         label: if asked.has("label") { Some(asked.text("label", 200)?.to_owned()) } else { None },
     };
-    hub.recorder.start(hub, plan).map_err(|reason| Refused { reason, field: Some("name".to_owned()) })
+    take::start(hub, plan).map_err(|reason| Refused { reason, field: Some("name".to_owned()) })
 }
 
 /// Which recording a label is of.
@@ -304,7 +306,7 @@ async fn health(hub: &Hub, name: Option<&str>) -> Answer<Value> {
         }
         None => {
             let live = hub.live().ok_or("nothing is shown")?;
-            let activity = super::hub::lock(&live.activity).clone();
+            let activity = lock(&live.activity).clone();
             (live.handle.options().array.clone(), activity)
         }
     };
@@ -375,7 +377,7 @@ pub(super) async fn carry_out(
         "recordings" => return Ok(Some(hub.recordings())),
         "rest" => {
             let live = hub.live().ok_or("no board is listened to")?;
-            let mut lens = super::hub::lock(&live.lens);
+            let mut lens = lock(&live.lens);
             match asked.0.get("how").and_then(Value::as_str) {
                 Some("now") if lens.held().iter().all(|&held| held == UNKNOWN) => return Err("nothing came yet".into()),
                 Some("now") => lens.rest_now(),

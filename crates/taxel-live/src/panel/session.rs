@@ -9,16 +9,14 @@ use taxel_core::encode::{Encoder, Stream};
 use taxel_core::{Events, Intensities, Spike};
 use tokio::sync::{broadcast, mpsc, watch};
 
-use super::door::MOST_BYTES;
 use super::film::{FileFilm, Film, Player};
-use super::hub::{Hub, LiveSide, Seat, Told, lock, said_of};
+use super::hub::{Hub, LiveSide, Seat, Told, said_of};
 use super::lens::{History, SPAN};
+use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::picture::{self, About, FOLLOWS, LIVE, MOVES, RECORDS, RESTART};
 use super::requests::{Answer, Asked, Refused, carry_out, prepare};
+use crate::locked::lock;
 use crate::pipeline::{Change, UNKNOWN};
-
-/// Credits that are kept at most.
-pub(super) const MOST_CREDITS: u32 = 8;
 
 /// From picture to picture at least.
 const FRAME: Duration = Duration::from_micros(16_000);

@@ -9,11 +9,12 @@ use taxel_core::wire::{Decoder, Receiver, Took};
 use super::handover;
 use super::options::LiveOptions;
 use super::recorder::Recorder;
-use super::shared::{Shared, Wish, lock};
+use super::shared::{Shared, Wish};
 use super::tap::{Tap, UNKNOWN, tap};
 use crate::Result;
 use crate::capture::Batch;
 use crate::clock::BoardClock;
+use crate::locked::lock;
 use crate::recording::now_ns;
 
 /// How often those who look on get a new picture, the recording too.

@@ -13,9 +13,10 @@ use super::counters::Counters;
 use super::options::{LiveOptions, Record};
 use super::recorder::Recorder;
 use super::said::Said;
-use super::shared::{Shared, Wish, lock};
+use super::shared::{Shared, Wish};
 use super::tap::Outlet;
 use crate::Result;
+use crate::locked::lock;
 
 /// What others may do with a [`Live`](super::Live) while it runs, and after.
 #[derive(Clone)]

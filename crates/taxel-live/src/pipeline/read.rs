@@ -12,8 +12,9 @@ use super::handover::Taken;
 use super::options::LiveOptions;
 use super::rest::Rest;
 use super::said::{Said, Sink};
-use super::shared::{Shared, lock};
+use super::shared::Shared;
 use crate::Error;
+use crate::locked::lock;
 use crate::recording::now_ns;
 
 /// Who listens to the events.

@@ -13,8 +13,8 @@ use taxel_core::{Marker, problem};
 use super::counters::Counters;
 use super::options::{LiveOptions, Record};
 use super::said::Said;
-use super::shared::lock;
 use crate::capture::Batch;
+use crate::locked::lock;
 use crate::recording::{self, Header, LsaWriter, Writer, now_ns};
 use crate::{Error, Result};
 

@@ -1,7 +1,7 @@
 //! What the threads of a pipeline share, and what they show to those who look on.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 use std::time::Instant;
 
 use crossbeam_channel as channel;
@@ -17,6 +17,7 @@ use super::said::Said;
 use super::tap::Outlet;
 use crate::capture::Receiver;
 use crate::latency::Latencies;
+use crate::locked::lock;
 use crate::{Error, Result};
 
 /// What the threads tell those who look on.
@@ -63,11 +64,6 @@ pub(super) enum Wish {
     Look(channel::Sender<Outlet>),
     /// The registers were written.
     Registers(Registers),
-}
-
-/// No holder of these locks can panic half-way through a change, so a poisoned lock still guards a sound state.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Shared {
