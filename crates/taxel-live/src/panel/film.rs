@@ -953,7 +953,7 @@ mod tests {
             let film = FileFilm::open(&path).unwrap();
             let changes = whole(&film);
             assert_eq!(film.events, changes.len() as u64);
-            assert!(film.keys.len() > 10, "{} keyframes", film.keys.len());
+            assert!(film.keys.len() >= 5, "{ending}: {} keyframes", film.keys.len());
             let (first, last) = film.range.unwrap();
             let mut random = StdRng::seed_from_u64(7);
             for _ in 0..25 {

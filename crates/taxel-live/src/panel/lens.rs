@@ -541,7 +541,7 @@ mod tests {
         lens.take(&change(300, 3, 78));
         let curve = lens.strip().curve(0);
         assert_eq!((curve.sum, curve.area, curve.x, curve.y), (40, 2, 0.75, 0.75));
-        assert_eq!(lens.change(), [10, 0, 0, 30], "the larger of two changes");
+        assert_eq!(lens.change(), [7, 0, 0, 30], "the larger of two changes, 3 and 7");
         lens.rest_now();
         assert_eq!(lens.strip().curve(0).sum, 0);
         lens.advance(FORGET * COLUMN_US);
