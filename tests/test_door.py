@@ -105,7 +105,7 @@ def test_a_decoder_may_be_used_from_several_threads():
 
 
 def test_a_board_may_be_used_from_several_threads():
-    board = taxel.device.Board()
+    board = taxel.simulate.Board()
     ticks = np.full((64, 64), 100, np.uint16)
 
     def scan(_):

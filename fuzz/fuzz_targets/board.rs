@@ -16,7 +16,7 @@ fuzz_target!(|input: &[u8]| {
     let (serial, touch) = rest.split_at(rest.len().min(commands.into()));
     assert!(board.command(serial).lines().all(|line| line.starts_with("ok REG") || line.starts_with("bad REG")));
     let mut decoder = Decoder::new(array.clone());
-    let (mut second, mut other, mut repaired) = (v2::Decoder::new(array.clone()), Events::empty(array.clone()), Vec::new());
+    let (mut second, mut other) = (v2::Decoder::new(array.clone()), Events::empty(array.clone()));
     let mut ticks = vec![0; array.len()];
     for (frame, values) in touch.chunks(64).enumerate() {
         for (k, &value) in values.iter().enumerate() {
@@ -30,7 +30,7 @@ fuzz_target!(|input: &[u8]| {
                 if datagram[0] == v2::MAGIC {
                     assert!(datagram.len() <= DATAGRAM_BYTES && Header::read(datagram).is_ok());
                     if takes {
-                        second.push(datagram, None, &mut other, &mut repaired);
+                        second.push(datagram, None, &mut other);
                     }
                     return takes;
                 }

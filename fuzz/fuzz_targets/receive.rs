@@ -11,7 +11,7 @@ fuzz_target!(|input: &[u8]| {
     let Some((&[way, rows, columns], mut rest)) = input.split_first_chunk::<3>() else { return };
     let array = Array::new(u16::from(rows).max(1), u16::from(columns).max(1), 1.0, "fuzz").unwrap();
     let mut receiver = Receiver::new(Decoder::new(array.clone()), 1 + (way & 1));
-    let (mut events, mut repaired) = (Events::empty(array), Vec::new());
+    let mut events = Events::empty(array);
     let (mut first, mut bytes, mut took) = (Vec::new(), 0, 0u64);
     while let Some((&[kind, length, wait], after)) = rest.split_first_chunk::<3>() {
         let (piece, after) = after.split_at(after.len().min(usize::from(length)));
@@ -24,17 +24,17 @@ fuzz_target!(|input: &[u8]| {
         took += i64::from(wait) as u64;
         let arrived = (way & 2 != 0).then_some((took as i64) << (way >> 2));
         bytes += datagram.len() as u64;
-        receiver.push(&datagram, arrived, &mut events, &mut repaired);
+        receiver.push(&datagram, arrived, &mut events);
         // The same again, when its version is certain: of version 2 it gives nothing.
         if kind & 2 != 0 && Header::read(&datagram).is_ok() {
             let (heard, counts) = (events.len(), receiver.two().counts());
             bytes += datagram.len() as u64;
-            receiver.push(&datagram, arrived, &mut events, &mut repaired);
+            receiver.push(&datagram, arrived, &mut events);
             assert_eq!((events.len(), receiver.two().counts().intact), (heard, counts.intact));
         }
         first.push(datagram);
     }
-    receiver.finish_into(&mut events, &mut repaired);
+    receiver.finish_into(&mut events);
     events.check().unwrap();
     let (one, two) = (*receiver.counts(), receiver.two().counts());
     assert_eq!(two.datagrams, two.intact + two.repeated + two.old + two.short + two.foreign + two.checksum);

@@ -18,7 +18,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Label, Labels
 from taxel.neuron import Neuron
-from taxel.recording import Clock, Datagrams, Note, Recording
+from taxel.recording import BoardChange, Clock, Datagrams, Note, Recording
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
@@ -29,6 +29,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Array",
+    "BoardChange",
     "Calibration",
     "Clock",
     "Datagrams",

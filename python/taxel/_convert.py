@@ -112,6 +112,10 @@ def convert(
     # Of a slice the bytes are not known: they are made of its events.
     origin = None if recording is None or recording.is_slice else recording._source
     if kind == ".lsa":
+        if origin is not None and origin.speaks_version_2:
+            raise ProblemError(
+                f"{place}: a .lsa holds wire version 1; write what a board of version 2 sent to .mcap or .npz"
+            )
         raw = None if origin is None else origin.payload
         payload, lost = (raw.tobytes(), []) if raw is not None else _encoded(table)
         _core.write_lsa(place, payload, overwrite)
@@ -178,6 +182,7 @@ def _encoded(events: Events) -> tuple[bytes, list[str]]:
     """Return events as the board's bytes, and what those cannot hold."""
     times = np.concatenate([events.t, np.array([at for at, _ in events.markers], np.int64)])
     lost = ["times finer than 100 us"] if (times % _STAMP_US).any() else []
+    lost += ["which events are repaired"] if events.repaired is not None else []
     return wire.encode(events), lost
 
 
@@ -210,7 +215,14 @@ def _write_mcap(
         "started_ns": int(arrived[0]) if len(arrived) else 0,
     }
     writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
-    writer.datagrams(arrived, datagrams.number, datagrams.offsets, datagrams.payload)
+    done = 0
+    # What the host told the board stands between the datagrams before and after it, as decoding asks for it.
+    for change in () if origin is None else origin.board_changes:
+        upto = int(np.searchsorted(datagrams.arrived_ns, change.at_ns, side="left"))
+        _add_datagrams(writer, datagrams, arrived, done, max(done, upto))
+        writer.board_change(max(0, change.at_ns), change._json())
+        done = max(done, upto)
+    _add_datagrams(writer, datagrams, arrived, done, len(arrived))
     _add_remarks(writer, events, recording)
     writer.finish(json.dumps(_counts(recording, len(datagrams))))
     again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)
@@ -219,6 +231,13 @@ def _write_mcap(
     elif ((again.t != events.t // _STAMP_US * _STAMP_US) & (again.t != events.t)).any():
         lost.append("the order of times that step back by more than 0.1 s")
     return lost
+
+
+def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64], first: int, last: int) -> None:
+    if last > first:
+        writer.datagrams(
+            arrived[first:last], datagrams.number[first:last], datagrams.offsets[first : last + 1], datagrams.payload
+        )
 
 
 def _pictures(events: Events) -> Iterator[tuple[int, NDArray[np.uint16]]]:
@@ -254,8 +273,8 @@ def _add_remarks(writer: Any, events: Events, recording: Recording | None) -> No
     for at, values in recording._source.register_changes:
         writer.registers(at, json.dumps(values))
     found = recording.detections
-    for label, t, known, slope in zip(found.label, found.t.tolist(), found.known.tolist(), found.slope, strict=True):
-        writer.detection(max(0, at_ns(known)), str(label), t, known, float(slope))
+    for d in found:
+        writer.detection(max(0, at_ns(d.known)), d.label, d.t, d.known, d.slope, d.repaired)
 
 
 def _counts(recording: Recording | None, datagrams: int) -> dict[str, Any]:

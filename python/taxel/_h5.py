@@ -1,9 +1,10 @@
 """Events or pictures in a .h5: a data set a column, as `taxel convert` writes them.
 
 The root has the attribute ``taxel`` (1, the layout's version). Events are the data sets ``t`` (int64, us), ``x``, ``y``
-(uint16), ``p`` (bool) and where they came ``intensity`` (uint16, ticks) and ``present`` (bool), with ``markers``
-(int64, two columns: us, whether a start); pictures are ``values`` (float32, pictures x rows x columns) with ``t`` and
-``unit`` (text). ``about`` is JSON: the sensor, where it came from, registers, notes, detections and what was lost.
+(uint16), ``p`` (bool) and where they came ``intensity`` (uint16, ticks), ``present`` and ``repaired`` (bool), with
+``markers`` (int64, two columns: us, whether a start); pictures are ``values`` (float32, pictures x rows x columns)
+with ``t`` and ``unit`` (text). ``about`` is JSON: the sensor, where it came from, registers, notes, detections and
+what was lost.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from taxel._core import ProblemError
 from taxel._remarks import Note, Remarks
 from taxel.array import Array
 from taxel.detections import Detections
-from taxel.events import Events
+from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 from taxel.recording import Recording, in_memory
 
@@ -122,9 +122,10 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
         notes.append(Note(part.name, begin, 0))
         notes += [Note(n.text, None if n.t is None else n.t + shift, n.at_ns) for n in part.notes]
         d = part.detections
-        found += list(zip(d.label, d.t + shift, d.known + shift, d.slope, strict=True))
+        found += list(zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True))
     found.sort(key=lambda row: int(row[2]))
-    detections = Detections(*([row[k] for row in found] for k in range(4)))
+    label, t, known, slope, repaired = ([row[k] for row in found] for k in range(5))
+    detections = Detections(label, t, known, slope, repaired=repaired)
     notes.sort(key=lambda note: (note.t is None, note.t or 0))
     source = ", ".join(part.name for part in parts)
     remarks = Remarks(array=array, source=f"merged of {source}", notes=tuple(notes), detections=detections)
@@ -145,11 +146,12 @@ def _region(recording: Recording, columns: slice | None, rows: slice | None) -> 
     table: Events | Frames
     if recording.has_events:
         inside = recording.events.region(across, down)
-        ticks: dict[str, Any] = {}
+        more: dict[str, Any] = {}
         if inside.intensity is not None:
-            ticks = {"intensity": inside.intensity, "present": inside.present}
+            more = {"intensity": inside.intensity, "present": inside.present}
+        more["repaired"] = inside.repaired
         x, y = inside.x.astype(np.int64) - left, inside.y.astype(np.int64) - top
-        table = Events(inside.t, x, y, inside.p, array=small, markers=inside.markers, **ticks)
+        table = Events(inside.t, x, y, inside.p, array=small, markers=inside.markers, **more)
     else:
         table = recording.frames().region(across, down)
     remarks = Remarks(array=small, source=recording.source, notes=recording.notes, detections=recording.detections)
@@ -199,7 +201,7 @@ def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[i
     order = np.argsort(t, kind="stable")
     x = np.concatenate([table.x.astype(np.int64) + left for table, left in zip(tables, lefts, strict=True)])
     y, p = (np.concatenate([getattr(table, name) for table in tables]) for name in ("y", "p"))
-    ticks: dict[str, Any] = {}
+    more: dict[str, Any] = {}
     if any(table.intensity is not None for table in tables):
         none = [np.zeros(len(table), np.uint16) for table in tables]
         held = [table.intensity if table.intensity is not None else z for table, z in zip(tables, none, strict=True)]
@@ -207,11 +209,14 @@ def _events(tables: list[Events], shifts: list[int], array: Array, lefts: list[i
             table.present if table.present is not None else z.astype(bool)
             for table, z in zip(tables, none, strict=True)
         ]
-        ticks = {"intensity": np.concatenate(held)[order], "present": np.concatenate(there)[order]}
+        more = {"intensity": np.concatenate(held)[order], "present": np.concatenate(there)[order]}
+    repaired = repaired_of(tables)
+    if repaired is not None:
+        more["repaired"] = repaired[order]
     markers = sorted(
         (at + shift, start) for table, shift in zip(tables, shifts, strict=True) for at, start in table.markers
     )
-    return Events(t[order], x[order], y[order], p[order], array=array, markers=markers, **ticks)
+    return Events(t[order], x[order], y[order], p[order], array=array, markers=markers, **more)
 
 
 def _frames(tables: list[Frames], shifts: list[int], array: Array, beside: bool) -> Frames:

@@ -74,8 +74,7 @@ class Remarks:
             "registers": self.registers,
             "notes": [{"text": n.text, "t_us": n.t, "at_ns": n.at_ns} for n in self.notes],
             "detections": [
-                [0, str(label), int(t), int(known), None if np.isnan(slope) else float(slope)]
-                for label, t, known, slope in zip(found.label, found.t, found.known, found.slope, strict=True)
+                [0, d.label, d.t, d.known, None if np.isnan(d.slope) else d.slope, d.repaired] for d in found
             ],
             "counts": dict(self.counts),
             "verdict": self.verdict,
@@ -141,10 +140,12 @@ def notes_of(said: Any) -> tuple[Note, ...]:
 
 
 def detections_of(said: Any) -> Detections:
-    """Return detections from records of (host ns, label, t, known, slope); JSON has no NaN."""
+    """Return detections from records of (host ns, label, t, known, slope[, repaired]); JSON has no NaN."""
     rows = list(said)
     slopes = [float("nan") if row[4] is None else float(row[4]) for row in rows]
-    return Detections([row[1] for row in rows], [row[2] for row in rows], [row[3] for row in rows], slopes)
+    repaired = [row[5] if len(row) > 5 else False for row in rows]
+    label, t, known = ([row[k] for row in rows] for k in (1, 2, 3))
+    return Detections(label, t, known, slopes, repaired=repaired)
 
 
 def _counts(said: Any, depth: int = 0) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """Tables of events or pictures: .csv and .npz.
 
-A .csv is either ``t_us,x,y,p[,intensity]`` (an empty intensity is one that did not come), or ``t_us`` and a column a
-taxel, named ``x3y5``. A .npz holds the same columns as arrays, and beside them, as JSON in ``about``, what a .csv
-cannot hold: the sensor, registers, notes, detections and what was lost.
+A .csv is either ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is one that did not come), or ``t_us`` and
+a column a taxel, named ``x3y5``. A .npz holds the same columns as arrays, and beside them, as JSON in ``about``, what
+a .csv cannot hold: the sensor, registers, notes, detections and what was lost.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ from taxel.frames import Frames
 __all__ = ["columns_of", "read_csv", "read_npz", "table_of", "write_csv", "write_npz"]
 
 _EVENTS = ("t_us", "x", "y", "p")
-_COLUMNS = ("t", "x", "y", "p", "intensity", "present", "markers", "values", "unit", "about")
+_MORE = ("intensity", "repaired")
+_COLUMNS = ("t", "x", "y", "p", "intensity", "present", "repaired", "markers", "values", "unit", "about")
 _TAXEL = re.compile(r"x(\d{1,5})y(\d{1,5})")
 
 
@@ -43,6 +44,8 @@ def columns_of(table: Events | Frames) -> dict[str, NDArray[Any]]:
     columns: dict[str, Any] = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
     if table.intensity is not None:
         columns |= {"intensity": table.intensity, "present": table.present}
+    if table.repaired is not None:
+        columns["repaired"] = table.repaired
     return {**columns, "markers": np.array(table.markers, np.int64).reshape(-1, 2)}
 
 
@@ -81,7 +84,7 @@ def table_of(path: Path, columns: dict[str, NDArray[Any]], array: Array | None) 
             )
         t, x, y, p = (columns[name] for name in _COLUMNS[:4])
         markers = [(int(at), bool(start)) for at, start in columns.get("markers", np.empty((0, 2)))]
-        extra = {name: columns[name] for name in ("intensity", "present") if name in columns}
+        extra = {name: columns[name] for name in ("intensity", "present", "repaired") if name in columns}
         return limited(path, Events(t, x, y, p, array=sensor or _around(x, y), markers=markers, **extra)), remarks
     except (ProblemError, ValueError, TypeError, OverflowError) as error:
         raise FormatError(f"{path}: {_line(error)}") from None
@@ -140,13 +143,16 @@ def write_csv(file: BinaryIO, table: Events | Frames) -> None:
             file.write(",".join([str(t), *values]).encode() + b"\n")
         return
     columns: list[NDArray[Any]] = [table.t, table.x, table.y, table.p.astype(np.uint8)]
-    file.write(b"t_us,x,y,p" + b",intensity" * (table.intensity is not None) + b"\n")
+    more = [name for name in _MORE if getattr(table, name) is not None]
+    file.write(",".join([*_EVENTS, *more]).encode() + b"\n")
     block = 1 << 16
     for k in range(0, len(table), block):
         rows = [column[k : k + block].astype(str) for column in columns]
         if table.intensity is not None and table.present is not None:
             ticks = table.intensity[k : k + block].astype(str)
             rows.append(np.where(table.present[k : k + block], ticks, ""))
+        if table.repaired is not None:
+            rows.append(table.repaired[k : k + block].astype(np.uint8).astype(str))
         file.write("\n".join(map(",".join, zip(*(r.tolist() for r in rows), strict=True))).encode() + b"\n")
 
 
@@ -163,10 +169,14 @@ def read_csv(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]
         names = []
     if not names or names[0] != "t_us" or len(names) < 2:
         said = repr(head[:40].decode("utf-8", "replace"))
-        raise FormatError(f"{path}, line 1: {said}: must be t_us,x,y,p[,intensity], or t_us and a column a taxel")
+        raise FormatError(
+            f"{path}, line 1: {said}: must be t_us,x,y,p[,intensity][,repaired], or t_us and a column a taxel"
+        )
     if tuple(names[:4]) == _EVENTS:
-        if names[4:] not in ([], ["intensity"]):
-            raise FormatError(f"{path}, line 1: {shown(names[4])} after p: only intensity may follow")
+        if names[4:] != [name for name in _MORE if name in names[4:]]:
+            raise FormatError(
+                f"{path}, line 1: {shown(','.join(names[4:]))} after p: only intensity and repaired may follow"
+            )
         return limited(path, _csv_events(path, names, body, array)), Remarks()
     repeated = next((name for name, n in Counter(names).items() if n > 1), None)
     if repeated is not None:
@@ -175,19 +185,23 @@ def read_csv(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]
 
 
 def _csv_events(path: Path, names: list[str], body: bytes, array: Array | None) -> Events:
-    if len(names) == 5:
+    if "intensity" in names:
         # An empty intensity is one that did not come; -1 stands for it while numbers are read.
-        body = re.sub(rb",[ \t]*(?=\n|$)", b",-1", body)
+        body = re.sub(rb",[ \t]*(?=,|\n|$)", b",-1", body)
     table = _numbers(path, names, body, np.int64)
     t, x, y, p = table[:, :4].T
     _within(path, "p", p, 0, 1)
     for name, column in (("x", x), ("y", y)):
         _within(path, name, column, 0, 65_535)
     extra: dict[str, Any] = {}
-    if len(names) == 5:
-        ticks = table[:, 4]
+    if "intensity" in names:
+        ticks = table[:, names.index("intensity")]
         _within(path, "intensity", ticks, -1, 65_535)
         extra = {"intensity": np.maximum(ticks, 0), "present": ticks >= 0}
+    if "repaired" in names:
+        repaired = table[:, names.index("repaired")]
+        _within(path, "repaired", repaired, 0, 1)
+        extra["repaired"] = repaired.astype(bool)
     try:
         return Events(t, x, y, p.astype(bool), array=array or _around(x, y), **extra)
     except ProblemError as error:

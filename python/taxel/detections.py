@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["Detections"]
 
 _CSV = ("label", "t_us", "known_us", "slope_mv_per_ms")
-_SAID = "said_us"
+_SAID, _REPAIRED = "said_us", "repaired"
 
 
 class Detection(NamedTuple):
@@ -42,6 +42,8 @@ class Detection(NamedTuple):
         How steeply the potential rose above its threshold; NaN where that is not known.
     said : int, us, or None
         When it was said, where that is known.
+    repaired : bool
+        Whether it may rest on values that states repaired after a loss.
     """
 
     label: str
@@ -49,6 +51,7 @@ class Detection(NamedTuple):
     known: int
     slope: float
     said: int | None
+    repaired: bool = False
 
 
 class Detections(Columns):
@@ -67,6 +70,9 @@ class Detections(Columns):
         How steeply the potential rose above its threshold, as a measure of how sure; NaN where it is left out.
     said : int64, shape (n,), us, optional
         When it was said, by the host's clock less the estimated offset.
+    repaired : bool, shape (n,), optional
+        Whether it may rest on values that states of wire version 2 repaired after a loss: what it tells may have
+        happened before `t`. None where it is left out.
 
     Raises
     ------
@@ -94,6 +100,7 @@ class Detections(Columns):
         known: ArrayLike,
         slope: ArrayLike | None = None,
         said: ArrayLike | None = None,
+        repaired: ArrayLike | None = None,
     ) -> None:
         try:
             labels = np.asarray(label)
@@ -110,6 +117,8 @@ class Detections(Columns):
         self.said: NDArray[np.int64] | None = None if said is None else kept("said", said, np.int64, "us")
         if self.said is not None and len(self.said) != len(labels):
             raise ProblemError(f"said has {len(self.said)} entries: must be {len(labels)}, one a detection")
+        marks = frozen(np.zeros(len(labels), np.bool_)) if repaired is None else repaired
+        self.repaired: NDArray[np.bool_] = kept("repaired", marks, np.bool_)
         _core.check_detections(self._parts())
 
     def __len__(self) -> int:
@@ -123,7 +132,7 @@ class Detections(Columns):
     def __iter__(self) -> Iterator[Detection]:
         said = [None] * len(self) if self.said is None else self.said.tolist()
         columns = (self.label, self.t, self.known, self.slope)
-        return map(Detection, *(column.tolist() for column in columns), said)
+        return map(Detection, *(column.tolist() for column in columns), said, self.repaired.tolist())
 
     @overload
     def __getitem__(self, chosen: int) -> Detection: ...
@@ -142,7 +151,8 @@ class Detections(Columns):
         if places.ndim != 1:
             raise ProblemError(f"detections: {shown(chosen)} has {places.ndim} dimensions, must have one")
         said = None if self.said is None else self.said[places]
-        return Detections(self.label[places], self.t[places], self.known[places], self.slope[places], said)
+        label, t, known, slope = self.label[places], self.t[places], self.known[places], self.slope[places]
+        return Detections(label, t, known, slope, said, self.repaired[places])
 
     def between(self, start: float, stop: float) -> Detections:
         """Return the detections of ``start <= t < stop`` (us)."""
@@ -161,11 +171,12 @@ class Detections(Columns):
         if (self.said is None) != (other.said is None):
             raise ProblemError("detections with `said` and without: only alike ones are merged")
         order = np.argsort(np.concatenate([self.t, other.t]), kind="stable")
-        names = ["label", "t", "known", "slope"] + ([] if self.said is None else ["said"])
-        return Detections(*(np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names))
+        names = ["label", "t", "known", "slope", "repaired"] + ([] if self.said is None else ["said"])
+        columns = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}
+        return Detections(**columns)
 
     def to_pandas(self) -> Any:
-        """Return a table ``label t_us known_us slope_mv_per_ms``, and ``said_us`` where it is known.
+        """Return a table ``label t_us known_us slope_mv_per_ms``; ``said_us`` where known, ``repaired`` where any is.
 
         Raises
         ------
@@ -177,14 +188,18 @@ class Detections(Columns):
         names = list(_CSV)
         if self.said is not None:
             columns, names = [*columns, self.said], [*names, _SAID]
+        if self.repaired.any():
+            columns, names = [*columns, self.repaired], [*names, _REPAIRED]
         return pandas.DataFrame(dict(zip(names, columns, strict=True)))
 
     def to_numpy(self) -> NDArray[np.void]:
-        """Return one record a detection with the fields ``label t known slope``, and ``said`` where it is known."""
+        """Return one record a detection: ``label t known slope``; ``said`` where known, ``repaired`` where any is."""
         width = max(1, self.label.dtype.itemsize // 4)
         fields: list[tuple[str, Any]] = [("label", f"U{width}"), ("t", "<i8"), ("known", "<i8"), ("slope", "<f8")]
         if self.said is not None:
             fields.append(("said", "<i8"))
+        if self.repaired.any():
+            fields.append((_REPAIRED, "?"))
         records = np.empty(len(self), np.dtype(fields))
         for name, _ in fields:
             records[name] = getattr(self, name)
@@ -192,18 +207,18 @@ class Detections(Columns):
 
     @classmethod
     def from_numpy(cls, records: NDArray[np.void]) -> Detections:
-        """Build detections from records with the fields ``label t known slope``, and ``said`` where it is there.
+        """Build detections from records with the fields ``label t known slope``, and ``said``, ``repaired`` if there.
 
         Raises
         ------
         ProblemError : a field is missing (names it)
         """
         names = fields(records, ("label", "t", "known", "slope"))
-        said = records["said"] if "said" in names else None
-        return cls(records["label"], records["t"], records["known"], records["slope"], said)
+        said, repaired = (records[name] if name in names else None for name in ("said", _REPAIRED))
+        return cls(records["label"], records["t"], records["known"], records["slope"], said, repaired)
 
     def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write a table ``label,t_us,known_us,slope_mv_per_ms[,said_us]`` and return its path.
+        """Write a table ``label,t_us,known_us,slope_mv_per_ms[,said_us][,repaired]`` and return its path.
 
         Raises
         ------
@@ -212,12 +227,16 @@ class Detections(Columns):
         text = self._csv().encode()
         return write_whole(path, lambda file: file.write(text), overwrite=overwrite)
 
-    def _csv(self) -> str:
+    def _csv(self, repaired: bool | None = None) -> str:
+        """Return the table; with the column of repaired ones where any is, or where it is asked for."""
         text = io.StringIO()
         table = csv.writer(text, lineterminator="\n")
-        table.writerow([*_CSV, _SAID] if self.said is not None else _CSV)
+        more = {} if self.said is None else {_SAID: self.said.tolist()}
+        shown = self.repaired.any() if repaired is None else repaired
+        more |= {_REPAIRED: self.repaired.astype(int).tolist()} if shown else {}
+        table.writerow([*_CSV, *more])
         columns = [self.label.tolist(), self.t.tolist(), self.known.tolist(), map(repr, self.slope.tolist())]
-        table.writerows(zip(*columns, *([] if self.said is None else [self.said.tolist()]), strict=True))
+        table.writerows(zip(*columns, *more.values(), strict=True))
         return text.getvalue()
 
     @classmethod
@@ -229,25 +248,29 @@ class Detections(Columns):
         FormatError : another header, or a value that makes no sense (names the line)
         FileNotFoundError : no such file
         """
-        rows: list[tuple[str, int, int, float, int]] = []
+        rows: list[tuple[str, int, int, float]] = []
+        more: dict[str, list[int]] = {}
         try:
             with open(checked_path("path", path), newline="", encoding="utf-8") as file:
                 table = csv.reader(file)
                 header = tuple(next(table, ()))
-                if header not in (_CSV, (*_CSV, _SAID)):
+                more = {name: [] for name in (_SAID, _REPAIRED) if name in header}
+                if header != (*_CSV, *more):
                     raise FormatError(f"{path}, line 1: {','.join(header) or 'nothing'}; must be {','.join(_CSV)}")
                 for row in table:
                     if len(row) != len(header):
                         raise FormatError(f"{path}, line {table.line_num}: {len(row)} values; must be {len(header)}")
                     try:
-                        numbers = int(row[1]), int(row[2]), float(row[3]), int(row[4]) if len(row) > 4 else 0
+                        rows.append((row[0], int(row[1]), int(row[2]), float(row[3])))
+                        for name, value in zip(more, row[4:], strict=True):
+                            more[name].append(int(value))
                     except ValueError as error:
                         raise FormatError(f"{path}, line {table.line_num}: {error}") from None
-                    rows.append((row[0], *numbers))
         except (UnicodeDecodeError, csv.Error) as error:
             raise FormatError(f"{path}: not a table of text: {error}") from None
-        label, t, known, slope, said = zip(*rows, strict=True) if rows else ((), (), (), (), ())
-        return cls(label, t, known, slope, said if _SAID in header else None)
+        label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())
+        repaired = [value != 0 for value in more[_REPAIRED]] if _REPAIRED in more else None
+        return cls(label, t, known, slope, more.get(_SAID), repaired)
 
     def to_neo(self) -> Any:
         """Return a ``neo.Event`` at `t`, with the label of each, and `known` (us) and `slope` as array annotations.
@@ -258,9 +281,11 @@ class Detections(Columns):
         """
         from neo import Event  # noqa: PLC0415  heavy, and an extra
 
-        notes = {"known": self.known, "slope": self.slope}
+        notes: dict[str, NDArray[Any]] = {"known": self.known, "slope": self.slope}
         if self.said is not None:
             notes["said"] = self.said
+        if self.repaired.any():
+            notes[_REPAIRED] = self.repaired
         return Event(self.t, labels=self.label, units="us", array_annotations=notes)
 
     @classmethod
@@ -275,7 +300,7 @@ class Detections(Columns):
         if notes is None or "known" not in notes:
             raise ProblemError(f"events is {shown(events)}: must be a neo.Event with the array annotation known (us)")
         t = np.rint(events.rescale("us").magnitude).astype(np.int64)
-        return cls(events.labels, t, notes["known"], notes.get("slope"), notes.get("said"))
+        return cls(events.labels, t, notes["known"], notes.get("slope"), notes.get("said"), notes.get(_REPAIRED))
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw each label's detections as marks over time (s)."""
@@ -288,20 +313,23 @@ class Detections(Columns):
 
         return html(self)
 
-    def _parts(self) -> tuple[list[str], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-        return self.label.tolist(), self.t, self.known, self.slope
+    def _parts(
+        self,
+    ) -> tuple[list[str], NDArray[np.int64], NDArray[np.int64], NDArray[np.float64], NDArray[np.bool_]]:
+        return self.label.tolist(), self.t, self.known, self.slope, self.repaired
 
     @classmethod
     def _from_parts(cls, parts: tuple[Any, ...]) -> Detections:
         label, *columns = parts
-        return cls(label, *map(frozen, columns))
+        t, known, slope, repaired = map(frozen, columns)
+        return cls(label, t, known, slope, repaired=repaired)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Detections):
             return NotImplemented
         if (self.said is None) != (other.said is None):
             return False
-        names = ["label", "t", "known"] + ([] if self.said is None else ["said"])
+        names = ["label", "t", "known", "repaired"] + ([] if self.said is None else ["said"])
         same = all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
         return same and np.array_equal(self.slope, other.slope, equal_nan=True)
 

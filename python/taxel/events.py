@@ -17,7 +17,7 @@ from taxel.array import Array
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["Events"]
+__all__ = ["Events", "repaired_of"]
 
 
 class Event(NamedTuple):
@@ -32,6 +32,8 @@ class Event(NamedTuple):
         Polarity: more pressure (true) or less.
     intensity : int, ticks, or None
         The held value that came with the change, where one came.
+    repaired : bool
+        Whether a state told it after a loss: it happened some time before `t`.
     """
 
     t: int
@@ -39,6 +41,7 @@ class Event(NamedTuple):
     y: int
     p: bool
     intensity: int | None
+    repaired: bool = False
 
 
 class Events(Columns):
@@ -58,6 +61,9 @@ class Events(Columns):
         The held value that came with each change (1/300 us of the board's counter).
     present : bool, shape (events,), optional
         Which events came with an intensity; all where it is left out.
+    repaired : bool, shape (events,), optional
+        Which events a state of wire version 2 gave, because it differed from the held value: what they tell happened
+        some time before `t`. None where no event is of that kind.
     markers : sequence of (t us, start), optional
         Starts (true) and stops (false) of a recording, as the board marked them.
 
@@ -78,7 +84,7 @@ class Events(Columns):
     >>> len(events.between(0, 100))
     1
     >>> events[0]
-    Event(t=0, x=3, y=5, p=True, intensity=None)
+    Event(t=0, x=3, y=5, p=True, intensity=None, repaired=False)
     """
 
     def __init__(
@@ -91,6 +97,7 @@ class Events(Columns):
         array: Array,
         intensity: ArrayLike | None = None,
         present: ArrayLike | None = None,
+        repaired: ArrayLike | None = None,
         markers: Sequence[tuple[int, bool]] = (),
     ) -> None:
         self.array = instance("array", array, Array)
@@ -109,6 +116,7 @@ class Events(Columns):
                 self.intensity = frozen(np.where(self.present, self.intensity, np.uint16(0)))
         elif present is not None:
             raise ProblemError("present without intensity: give both or neither")
+        self.repaired = None if repaired is None else _where_any(kept("repaired", repaired, np.bool_))
         self.markers = _markers(markers)
         _core.check_events(self._parts())
 
@@ -148,7 +156,8 @@ class Events(Columns):
             pairs = zip(self.intensity.tolist(), self.present.tolist(), strict=True)
             ticks = [value if there else None for value, there in pairs]
         columns = (self.t, self.x, self.y, self.p)
-        return map(Event, *(column.tolist() for column in columns), ticks)
+        repaired = [False] * len(self) if self.repaired is None else self.repaired.tolist()
+        return map(Event, *(column.tolist() for column in columns), ticks, repaired)
 
     @overload
     def __getitem__(self, chosen: int) -> Event: ...
@@ -176,6 +185,7 @@ class Events(Columns):
             self.array,
             None if self.intensity is None else self.intensity[places],
             None if self.present is None else self.present[places],
+            None if self.repaired is None else self.repaired[places],
             self._markers_of(places),
         )
 
@@ -213,10 +223,11 @@ class Events(Columns):
                 [z > 0 if e.present is None else e.present for e, z in zip(both, none, strict=True)]
             )
         t, x, y, p = (np.concatenate([getattr(e, name) for e in both]) for name in ("t", "x", "y", "p"))
-        return self._unchecked(t, x, y, p, self.array, ticks, present, self.markers + other.markers).sorted()
+        repaired = repaired_of(both)
+        return self._unchecked(t, x, y, p, self.array, ticks, present, repaired, self.markers + other.markers).sorted()
 
     def to_pandas(self) -> Any:
-        """Return a table ``t_us x y p``, and ``intensity`` where there are any (missing where none came).
+        """Return a table ``t_us x y p``, ``intensity`` where there are any (missing where none came), ``repaired`` too.
 
         Raises
         ------
@@ -228,13 +239,17 @@ class Events(Columns):
         if self.intensity is not None and self.present is not None:
             table["intensity"] = pandas.array(self.intensity, "UInt16").copy()
             table.loc[~self.present, "intensity"] = pandas.NA
+        if self.repaired is not None:
+            table["repaired"] = self.repaired
         return table
 
     def to_numpy(self) -> NDArray[np.void]:
-        """Return one record an event with the fields ``t x y p``, and ``intensity present`` where there are any."""
+        """Return one record an event: ``t x y p``; ``intensity present`` and ``repaired`` where there are any."""
         fields: list[tuple[str, Any]] = [("t", "<i8"), ("x", "<u2"), ("y", "<u2"), ("p", "?")]
         if self.intensity is not None:
             fields += [("intensity", "<u2"), ("present", "?")]
+        if self.repaired is not None:
+            fields.append(("repaired", "?"))
         records = np.empty(len(self), np.dtype(fields))
         for name, _ in fields:
             records[name] = getattr(self, name)
@@ -242,17 +257,15 @@ class Events(Columns):
 
     @classmethod
     def from_numpy(cls, records: NDArray[np.void], array: Array) -> Events:
-        """Build events from records with the fields ``t x y p``, and ``intensity``, ``present`` where they are there.
+        """Build events from records with the fields ``t x y p``, and ``intensity present repaired`` if there.
 
         Raises
         ------
         ProblemError : a field is missing (names it)
         """
         names = fields(records, ("t", "x", "y", "p"))
-        intensity, present = (records[name] if name in names else None for name in ("intensity", "present"))
-        return cls(
-            records["t"], records["x"], records["y"], records["p"], array=array, intensity=intensity, present=present
-        )
+        extra: dict[str, Any] = {n: records[n] for n in ("intensity", "present", "repaired") if n in names}
+        return cls(records["t"], records["x"], records["y"], records["p"], array=array, **extra)
 
     def to_tonic(self) -> NDArray[np.void]:
         """Return tonic's event array: records of ``x y t p`` (int16, int16, int64 us, bool).
@@ -316,6 +329,7 @@ class Events(Columns):
         array: Array,
         intensity: NDArray[np.uint16] | None,
         present: NDArray[np.bool_] | None,
+        repaired: NDArray[np.bool_] | None,
         markers: tuple[tuple[int, bool], ...],
     ) -> Events:
         """Build events from columns of our own that the compiled part or another `Events` has checked already."""
@@ -324,6 +338,7 @@ class Events(Columns):
         events.t, events.x, events.y, events.p = frozen(t), frozen(x), frozen(y), frozen(p)
         events.intensity = None if intensity is None else frozen(intensity)
         events.present = None if present is None else frozen(present)
+        events.repaired = None if repaired is None else _where_any(frozen(repaired))
         return events
 
     def _parts(self) -> tuple[Any, ...]:
@@ -331,22 +346,25 @@ class Events(Columns):
         if self.intensity is not None:
             intensity = (np.ascontiguousarray(self.intensity), np.ascontiguousarray(self.present))
         columns = (np.ascontiguousarray(c) for c in (self.t, self.x, self.y, self.p))
-        return self.array._parts(), *columns, intensity, list(self.markers)
+        repaired = None if self.repaired is None else np.ascontiguousarray(self.repaired)
+        return self.array._parts(), *columns, intensity, repaired, list(self.markers)
 
     @classmethod
     def _from_parts(cls, parts: tuple[Any, ...], array: Array | None = None) -> Events:
-        geometry, t, x, y, p, intensity, markers = parts
+        geometry, t, x, y, p, intensity, repaired, markers = parts
         ticks, present = intensity if intensity is not None else (None, None)
-        return cls._unchecked(t, x, y, p, array or Array._from_parts(geometry), ticks, present, tuple(markers))
+        sensor = array or Array._from_parts(geometry)
+        return cls._unchecked(t, x, y, p, sensor, ticks, present, repaired, tuple(markers))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Events):
             return NotImplemented
         if self.array != other.array or self.markers != other.markers:
             return False
-        if (self.intensity is None) != (other.intensity is None):
+        if (self.intensity is None, self.repaired is None) != (other.intensity is None, other.repaired is None):
             return False
         names = ["t", "x", "y", "p"] + ([] if self.intensity is None else ["intensity", "present"])
+        names += [] if self.repaired is None else ["repaired"]
         return all(np.array_equal(getattr(self, name), getattr(other, name)) for name in names)
 
     __hash__ = None  # type: ignore[assignment]
@@ -354,7 +372,8 @@ class Events(Columns):
     def __repr__(self) -> str:
         time = f"{int(self.t.min())} to {int(self.t.max())} us" if len(self) else "no time"
         said = "no intensities" if self.present is None else f"{int(self.present.sum())} intensities"
-        marks = f", {len(self.markers)} markers" if self.markers else ""
+        marks = "" if self.repaired is None else f", {int(self.repaired.sum())} repaired"
+        marks += f", {len(self.markers)} markers" if self.markers else ""
         return f"Events({len(self)} events, {time}, {self.array.rows} x {self.array.columns} taxels, {said}{marks})"
 
 
@@ -368,3 +387,16 @@ def _markers(markers: Sequence[tuple[int, bool]]) -> tuple[tuple[int, bool], ...
             f"markers is {shown(markers)}: must be pairs of a time (us) and start (True) or stop"
         ) from None
     return tuple(zip(t.tolist(), starts.tolist(), strict=True))
+
+
+def _where_any(repaired: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+    """Return the mask, or None where it marks nothing, so that equal events have equal columns."""
+    return repaired if repaired.any() else None
+
+
+def repaired_of(tables: Sequence[Events]) -> NDArray[np.bool_] | None:
+    """Return which events of tables one after the other are repaired; None where none is."""
+    if all(table.repaired is None for table in tables):
+        return None
+    none = (np.zeros(len(table), np.bool_) for table in tables)
+    return np.concatenate([z if e.repaired is None else e.repaired for e, z in zip(tables, none, strict=True)])

@@ -32,7 +32,7 @@ from taxel.wire import Registers
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["ENDINGS", "Clock", "Datagrams", "Note", "Recording", "in_memory", "open_recording"]
+__all__ = ["ENDINGS", "BoardChange", "Clock", "Datagrams", "Note", "Recording", "in_memory", "open_recording"]
 
 #: Pictures a second where a recording of events is asked for frames without a rate.
 FRAMES_HZ = 100.0
@@ -57,6 +57,38 @@ _STRANGERS = {
     b"\x93NUMPY": "a single NumPy array; save its columns t, x, y, p with numpy.savez",
 }
 ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": "h5"}
+
+
+@dataclass(frozen=True)
+class BoardChange:
+    """Say what became of the board while recording.
+
+    Attributes
+    ----------
+    t : int, us, or None
+        The board's time, which goes on over the change; None where it was not known.
+    at_ns : int, ns since 1970
+        When it was noticed.
+    change : str
+        "reset": the board was reset, so its taxels hold nothing until they are heard again. "wire": it speaks another
+        version of the wire.
+    version : int or None
+        Of the wire from here on.
+    asked : bool
+        Whether the host told it to change that; else its datagrams showed it.
+    """
+
+    t: int | None
+    at_ns: int
+    change: str
+    version: int | None = None
+    asked: bool = False
+
+    def _json(self) -> str:
+        said: dict[str, Any] = {"t_us": self.t, "change": self.change}
+        if self.version is not None:
+            said |= {"version": self.version, "asked": self.asked}
+        return json.dumps(said)
 
 
 @dataclass(frozen=True, eq=False)
@@ -324,6 +356,11 @@ class Recording:
         """The registers as they were set while recording, each with the host's time (ns since 1970)."""
         return tuple((at, Registers._of(held, self.array)) for at, held in self._source.register_changes)
 
+    @property
+    def board_changes(self) -> tuple[BoardChange, ...]:
+        """Resets of the board and changes of its version of the wire, as they were noticed live."""
+        return self._source.board_changes
+
     @cached_property
     def clock(self) -> Clock | None:
         """Arrival times against board time; None where the file has no arrival times."""
@@ -531,6 +568,15 @@ class _Source:
         return ()
 
     @property
+    def board_changes(self) -> tuple[BoardChange, ...]:
+        return ()
+
+    @property
+    def speaks_version_2(self) -> bool:
+        """Whether the board's bytes are datagrams of wire version 2."""
+        return False
+
+    @property
     def notes(self) -> tuple[Note, ...]:
         return ()
 
@@ -690,6 +736,17 @@ class _Mcap(_Source):
         return tuple((at, values) for at, values in self._remarks["registers"])
 
     @property
+    def board_changes(self) -> tuple[BoardChange, ...]:
+        return tuple(
+            BoardChange(said["t_us"], at, said["change"], said.get("version"), said.get("asked", False))
+            for at, said in self._remarks["board"]
+        )
+
+    @property
+    def speaks_version_2(self) -> bool:
+        return bool(json.loads(self._decoded[6])["intact"])
+
+    @property
     def notes(self) -> tuple[Note, ...]:
         return notes_of(self._remarks["notes"])
 
@@ -699,7 +756,7 @@ class _Mcap(_Source):
 
     @property
     def clock(self) -> Clock:
-        events, _, _, arrived, _, first = self._decoded
+        events, _, _, arrived, _, first, _ = self._decoded
         last = np.append(first[1:], len(events)).astype(np.int64) - 1
         has = last >= first.astype(np.int64)
         return Clock(np.ascontiguousarray(events.t[last[has]]), np.ascontiguousarray(arrived[has]))
@@ -732,7 +789,7 @@ class _Mcap(_Source):
     @property
     def counts(self) -> dict[str, Any]:
         said = self._ending.get("finished", {}).get("counts") or self._remarks["counts"] or {}
-        _, decoder, _, _, number, _ = self._decoded
+        _, decoder, _, _, number, *_ = self._decoded
         missing = int(number[-1]) - int(number[0]) + 1 - len(number) if len(number) else 0
         return {
             "datagrams": self._remarks["datagrams"],

@@ -17,7 +17,18 @@ from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 
-__all__ = ["FRAME_US", "PRESETS", "Columns", "Command", "Counts", "Decoder", "Registers", "decode", "encode"]
+__all__ = [
+    "FRAME_US",
+    "PRESETS",
+    "Columns",
+    "Command",
+    "Counts",
+    "Decoder",
+    "Registers",
+    "decode",
+    "described",
+    "encode",
+]
 
 #: The names that `Registers.preset` knows.
 PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
@@ -328,6 +339,7 @@ class Decoder:
             self.array,
             columns.intensity[:rows] if paired else None,
             columns.present[:rows] if paired else None,
+            None,
             tuple(markers),
         )
 
@@ -485,6 +497,30 @@ class Registers:
         registers._set(held, {}, array)
         return registers
 
+    @classmethod
+    def from_words(cls, words: Sequence[int], *, array: Array | None = None, channels: int = 16) -> Registers:
+        """Return the set that eight 32-bit registers hold, REG0 first; of REG6 nothing is looked at.
+
+        Raises
+        ------
+        DeviceError : they break a rule
+        ProblemError : not eight numbers of 32 bits
+
+        Examples
+        --------
+        >>> fast = Registers.preset("5.2 kHz")
+        >>> Registers.from_words(fast.words) == fast
+        True
+        """
+        held: dict[str, Any] = {"channels": whole("channels", channels, 0, 255)}
+        eight = [whole(f"words[{n}]", word, 0, 2**32 - 1) for n, word in enumerate(words)]
+        if len(eight) != 8:
+            raise ProblemError(f"words: {len(eight)}, must be 8")
+        for name, field in _FIELDS.items():
+            value = (eight[field["register"]] >> field["shift"] & field["mask"]) + field["offset"]
+            held[name] = bool(value) if name in _FLAGS else value
+        return cls._of(held, Array._of(array))
+
     def replace(self, **fields: float) -> Registers:
         """Return a set with some fields changed, by taxel's names or the manual's.
 
@@ -547,6 +583,23 @@ class Registers:
     def __repr__(self) -> str:
         fields = (f"{name}={getattr(self, name)}" for name in self._held)
         return f"Registers({', '.join(fields)})"
+
+
+def described(registers: Registers) -> list[tuple[str, float, str, str, str]]:
+    """Return each field of a set: its name, value, unit, place in the registers, and what it is for.
+
+    Examples
+    --------
+    >>> described(Registers())[9][:4]
+    ('step_read', 0.55, 'us', 'REG3[31:16]')
+    """
+    rows = []
+    for name, field in _FIELDS.items():
+        low, high = field["shift"], field["shift"] + int(field["mask"]).bit_length() - 1
+        bits = f"{high}:{low}" if high > low else f"{low}"
+        unit = {"10 ns": "us", "flag": ""}.get(field["unit"], field["unit"])
+        rows.append((name, float(getattr(registers, name)), unit, f"REG{field['register']}[{bits}]", field["text"]))
+    return rows
 
 
 def _raw(name: str, value: object) -> int:

@@ -15,7 +15,7 @@ from taxel.array import Array
 from taxel.events import Events
 from taxel.wire import _bytes
 
-__all__ = ["Counts", "Decoder", "Heard", "Status", "StreamReader"]
+__all__ = ["Counts", "Decoder", "Heard", "Status", "StreamReader", "decode"]
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,6 @@ class Heard:
     Parameters
     ----------
     events : Events
-    repaired : bool, shape (events,)
-        Whether an event is one that a state gave, because its value differed from the held one.
     until : int, us, or None
         Nothing before this comes any more with a higher sequence number; None where nothing is promised.
     intact : bool
@@ -95,7 +93,6 @@ class Heard:
     """
 
     events: Events
-    repaired: NDArray[np.bool_]
     until: int | None
     intact: bool
 
@@ -116,7 +113,7 @@ class Decoder:
 
     Examples
     --------
-    >>> from taxel.device import Board
+    >>> from taxel.simulate import Board
     >>> from taxel.wire import Registers
     >>> board, decoder = Board(Registers(wire_version=2)), Decoder()
     >>> ticks = np.zeros(4096, np.uint16)
@@ -146,8 +143,8 @@ class Decoder:
         ProblemError : `datagram` is not bytes, or `arrived` not a whole number
         """
         when = None if arrived is None else whole("arrived", arrived)
-        parts, repaired, until, intact = self._core.push(_bytes(datagram), when)
-        return Heard(Events._from_parts(parts, self.array), repaired, until, intact)
+        parts, until, intact = self._core.push(_bytes(datagram), when)
+        return Heard(Events._from_parts(parts, self.array), until, intact)
 
     @property
     def counts(self) -> Counts:
@@ -170,6 +167,37 @@ class Decoder:
         return f"Decoder({self.array.rows} x {self.array.columns} taxels, {c.intact} datagrams, {c.missing} missing)"
 
 
+def decode(data: Any, *, array: Array | None = None) -> tuple[Events, Counts, int]:
+    """Decode a whole stream of one board's datagrams, each of which has its length before it (16 bits, little-endian).
+
+    Parameters
+    ----------
+    data : bytes, or anything with a contiguous buffer
+    array : Array, optional
+        The sensor; the thesis' 64 x 64 where it is left out.
+
+    Returns
+    -------
+    Events, Counts, and how many bytes belonged to no datagram
+
+    Raises
+    ------
+    ProblemError : `data` is not bytes
+
+    Examples
+    --------
+    >>> from taxel.simulate import Board
+    >>> from taxel.wire import Registers
+    >>> sent = Board(Registers(wire_version=2)).frame(np.full(4096, 40, np.uint16))
+    >>> events, counts, skipped = decode(b"".join(len(d).to_bytes(2, "little") + d for d in sent))
+    >>> len(events), counts.intact == len(sent), skipped
+    (4096, True, 0)
+    """
+    sensor = Array._of(array)
+    parts, counts, skipped = _core.decode_datagrams(_bytes(data), sensor._parts())
+    return Events._from_parts(parts, sensor), Counts(**json.loads(counts)), skipped
+
+
 class StreamReader:
     """Cut a file or stream into datagrams, each of which has its length before it (16 bits, little-endian).
 
@@ -177,7 +205,7 @@ class StreamReader:
 
     Examples
     --------
-    >>> from taxel.device import Board
+    >>> from taxel.simulate import Board
     >>> from taxel.wire import Registers
     >>> sent = Board(Registers(wire_version=2)).frame(np.full(4096, 40, np.uint16))
     >>> data = b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent)

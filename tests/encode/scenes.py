@@ -28,22 +28,22 @@ def wander(rng, samples=300, channels=5, ticks=True):
     return values if ticks else values * 0.731
 
 
-def touch(rng, array, n=300, absent=0.3, late=0.0):
-    """Events of taxels that go up and down: several a stamp, silences, some without an intensity, some late."""
+def touch(rng, array, n=300, absent=0.3, late=0.0, repaired=0.0):
+    """Events of taxels that go up and down: several a stamp, silences, some without intensity, late, or repaired."""
     steps = rng.choice([0, 100, 200, 1500, 30_000], n, p=[0.6, 0.2, 0.14, 0.05, 0.01])
     t = 1_234_500 + np.cumsum(steps)
     behind = rng.random(n) < late
     t[behind] -= 100 * rng.integers(1, 20, behind.sum())
     x, y = rng.integers(0, array.columns, n), rng.integers(0, array.rows, n)
     ticks = np.clip(rng.normal(60, 12, n), 0, 150).astype(np.uint16)
-    return Events(t, x, y, rng.random(n) > 0.5, array=array, intensity=ticks, present=rng.random(n) > absent)
+    more = {"intensity": ticks, "present": rng.random(n) > absent, "repaired": rng.random(n) < repaired}
+    return Events(t, x, y, rng.random(n) > 0.5, array=array, **more)
 
 
 def at_times(events, t):
     """The same events at other times."""
-    return Events(
-        t, events.x, events.y, events.p, array=events.array, intensity=events.intensity, present=events.present
-    )
+    more = {"intensity": events.intensity, "present": events.present, "repaired": events.repaired}
+    return Events(t, events.x, events.y, events.p, array=events.array, **more)
 
 
 def rest(array, ticks=55):

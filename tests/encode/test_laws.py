@@ -77,10 +77,15 @@ def in_pieces(encoder, pieces, moves):
 
 @each_encoder
 @settings(max_examples=25, deadline=None)
-@given(seed=seeds, cuts=st.sets(st.integers(1, 299), max_size=12), late=st.sampled_from([0.0, 0.1]))
-def test_events_in_pieces_give_the_spikes_of_the_whole(encoder, seed, cuts, late):
+@given(
+    seed=seeds,
+    cuts=st.sets(st.integers(1, 299), max_size=12),
+    late=st.sampled_from([0.0, 0.1]),
+    repaired=st.sampled_from([0.0, 0.02, 0.3]),
+)
+def test_events_in_pieces_give_the_spikes_of_the_whole(encoder, seed, cuts, late, repaired):
     rng = np.random.default_rng(seed)
-    events = touch(rng, ARRAY, late=late)
+    events = touch(rng, ARRAY, late=late, repaired=repaired)
     edges = [0, *sorted(cuts), len(events)]
     pieces = [events[a:b] for a, b in pairwise(edges)]
     latest = np.maximum.accumulate(events.t)
@@ -122,6 +127,60 @@ def test_events_out_of_order_are_heard_as_a_stream_hears_them_or_refused(encoder
     else:
         assert spikes_of(encoder.encode(events)) == wanted
     encoder.encode(events.sorted())
+
+
+#: They tell changes, and of a value that a state repaired nobody knows when it changed.
+OF_CHANGE = {label: encoder for label, encoder in ENCODERS.items() if encoder.name in ("change_events", "fa1")}
+
+
+@pytest.mark.parametrize("encoder", [e for e in ENCODERS.values() if e not in OF_CHANGE.values()], ids=lambda e: e.name)
+def test_what_reads_values_takes_a_repaired_one_as_any_other(encoder):
+    events = touch(np.random.default_rng(5), ARRAY, repaired=0.5)
+    assert events.repaired is not None
+    plain = Events(
+        events.t, events.x, events.y, events.p, array=ARRAY, intensity=events.intensity, present=events.present
+    )
+    spikes = spikes_of(encoder.encode(plain))
+    assert spikes_of(encoder.encode(events)) == spikes
+    assert spikes
+
+
+@pytest.mark.parametrize("encoder", OF_CHANGE.values(), ids=OF_CHANGE)
+@settings(max_examples=20, deadline=None)
+@given(seed=seeds)
+def test_what_tells_changes_tells_none_of_a_repaired_value(encoder, seed):
+    rng = np.random.default_rng(seed)
+    events = touch(rng, ARRAY, absent=0.0)
+    places = events.y * ARRAY.columns + events.x
+    # What a taxel first reads is no change; from then on all is repaired. (In its own stamp: so it is sampled before.)
+    first = np.unique(places, return_index=True)[1]
+    start = np.zeros(len(first), np.int64)
+    t = np.concatenate([start, events.t])
+    x, y, p = (np.concatenate([c[first], c]) for c in (events.x, events.y, events.p))
+    ticks = np.concatenate([events.intensity[first], events.intensity])
+    mask = np.arange(len(t)) >= len(first)
+    assert spikes_of(encoder.encode(Events(t, x, y, p, array=ARRAY, intensity=ticks, repaired=mask))) == []
+    assert spikes_of(encoder.encode(Events(t, x, y, p, array=ARRAY, intensity=ticks)))
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=seeds, share=st.sampled_from([0.05, 0.5]))
+def test_change_events_after_a_repair_are_those_of_a_way_that_loses_nothing(seed, share):
+    """A change is lost, a state tells it 50 us later: its spike is missing, all others are as they would have been."""
+    rng = np.random.default_rng(seed)
+    n = 200
+    t = 1000 + 300 * np.arange(n)
+    x, y = rng.integers(0, ARRAY.columns, n), rng.integers(0, ARRAY.rows, n)
+    ticks = rng.permutation(np.arange(n)) + 1
+    p = np.ones(n, bool)
+    encoder = ChangeEvents(noise_floor=0.5, bits=10)
+    whole = spikes_of(encoder.encode(Events(t, x, y, p, array=ARRAY, intensity=ticks)))
+    lost = rng.random(n) < share
+    lost[0] = False
+    when = np.where(lost, t + 50, t)
+    heard = Events(when, x, y, p, array=ARRAY, intensity=ticks, repaired=lost)
+    gone = set(t[lost].tolist())
+    assert spikes_of(encoder.encode(heard)) == [s for s in whole if s[0] not in gone]
 
 
 @each_encoder

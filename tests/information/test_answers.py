@@ -176,7 +176,7 @@ def test_what_a_setting_costs_on_the_wire():
 
 def test_a_datagram_of_the_board_has_the_bytes_that_are_reckoned():
     """24 bytes of its own, two an event; the board sends kind 1, whose words are as long as kind 0's."""
-    board = taxel.device.Board(taxel.wire.Registers(wire_version=2))
+    board = taxel.simulate.Board(taxel.wire.Registers(wire_version=2))
     ticks = np.zeros(4096, np.uint16)
     ticks[:100] = 40
     sent = [datagram for datagram in board.frame(ticks) if datagram[1] & 15 == 1]

@@ -1,7 +1,15 @@
 """A board of version 2, heard live and read again: nothing lost, and said so."""
 
+import socket as udp
+import time
+
+import numpy as np
+import pytest
+
 import taxel
-from taxel.simulate import Scene, Silence, emulate, play
+from taxel.encode import ChangeEvents
+from taxel.simulate import Board, Scene, Silence, Version2, emulate, play
+from taxel.wire import Command, Registers
 
 
 def test_a_recording_of_version_2_says_that_nothing_was_lost(tmp_path):
@@ -21,3 +29,96 @@ def test_a_recording_of_version_2_says_that_nothing_was_lost(tmp_path):
     # Version 1 tells the same changes, its times cut to 100 us.
     assert len(one) == report.changes
     assert [start for _, start in events.markers] == [True, False]
+
+
+def test_raw_bytes_of_version_2_are_refused_and_nothing_is_left(tmp_path):
+    path = tmp_path / "two.lsa"
+    live = taxel.live.Live(0, host="127.0.0.1", record=path)
+    emulate("{}:{}".format(*live.address), [Silence(20.0)], tare_ms=5.0, wire=2)
+    with pytest.raises(taxel.ProblemError, match=r"two\.lsa: a \.lsa holds wire version 1"):
+        live.stop()
+    assert not path.exists()
+    assert not path.with_suffix(".lss").exists()
+    board = Board(Registers(wire_version=2))
+    sent = board.frame(np.full(4096, 40, np.uint16))
+    for data in (b"".join(sent), b"".join(len(d).to_bytes(2, "little") + d for d in sent)):
+        path.write_bytes(data)
+        with pytest.raises(taxel.FormatError, match=r"wire version 2; a \.lsa holds version 1"):
+            _ = taxel.open(path).events
+    with taxel.live.Live(0, host="127.0.0.1", record=tmp_path / "two.mcap") as live:
+        taxel.live.send(sent, *live.address, seconds=0.01)
+    with pytest.raises(taxel.ProblemError, match="holds wire version 1"):
+        taxel.convert(tmp_path / "two.mcap", tmp_path / "again.lsa")
+
+
+def test_resets_and_changes_of_version_are_marked_in_the_recording(tmp_path):
+    board, frames = (
+        Board(Registers(), version_2=Version2(states_us=0)),
+        [np.full(4096, 20 + 10 * k, np.uint16) for k in (0, 1)],
+    )
+    path, again = tmp_path / "board.mcap", tmp_path / "again.mcap"
+
+    def play(n):
+        for k in range(n):
+            for datagram in board.frame(frames[k % 2]):
+                socket.sendto(datagram, live.address)
+
+    def speak(version):
+        registers = board.registers.replace(wire_version=version)
+        board.command(Command(0, registers.words[0]).to_bytes())
+
+    with udp.socket(udp.AF_INET, udp.SOCK_DGRAM) as socket, taxel.live.Live(0, host="127.0.0.1", record=path) as live:
+        play(2)
+        speak(2)
+        play(2)
+        wait_for(lambda: live.counters["wire_version"] == 2)
+        board.reset()
+        speak(2)
+        play(3)
+        wait_for(lambda: live.counters["wire_v2"]["resets"] == 1)
+        speak(1)
+        live.expect_version(1)
+        wait_for(lambda: live.counters["decoded"] and live.next(0.05) is None)
+        play(3)
+        wait_for(lambda: live.counters["wire"]["changes"] == 4 * 4096)
+        summary = live.stop()
+    assert summary.counters["wire_refused"] == 0
+    recording = taxel.open(path)
+    changes = [(c.change, c.version, c.asked) for c in recording.board_changes]
+    assert changes == [("wire", 2, False), ("reset", None, False), ("wire", 1, True)]
+    events = recording.events
+    assert len(events) == summary.counters["events"] == 9 * 4096
+    assert (np.diff(events.t) >= 0).all()
+    assert [c.t for c in recording.board_changes] == sorted(c.t for c in recording.board_changes)
+    taxel.convert(path, again)
+    assert taxel.open(again).events == events
+    assert taxel.open(again).board_changes == recording.board_changes
+
+
+def wait_for(done):
+    until = time.monotonic() + 30
+    while not done():
+        assert time.monotonic() < until
+        time.sleep(0.002)
+
+
+def test_what_comes_after_time_went_on_is_counted_late():
+    board, decoder = Board(Registers(wire_version=2), version_2=Version2(states_us=0)), taxel.wire_v2.Decoder()
+    with udp.socket(udp.AF_INET, udp.SOCK_DGRAM) as socket:
+        for gap, late in ((1.0, True), (1e7, False)):
+            readout = taxel.Readout(ChangeEvents(), {"a": (taxel.Neuron(), np.zeros(8192))})
+            with taxel.live.Live(0, host="127.0.0.1", readout=readout, gap_frames=gap) as live:
+                sent = [d for k in range(20) for d in board.frame(np.full(4096, 20 + 10 * (k % 2), np.uint16))]
+                kept = sent.pop(len(sent) // 2)
+                in_it = len(decoder.push(kept).events)
+                for datagram in sent[:-1]:
+                    socket.sendto(datagram, live.address)
+                wait_for(lambda: live.counters["decoded"] == len(sent) - 1)  # noqa: B023
+                time.sleep(0.02)
+                socket.sendto(sent[-1], live.address)
+                wait_for(lambda: live.counters["decoded"] == len(sent))  # noqa: B023
+                socket.sendto(kept, live.address)
+                wait_for(lambda: live.counters["decoded"] == len(sent) + 1)  # noqa: B023
+                counters = live.stop().counters
+            assert counters["wire_late"] == (in_it if late else 0)
+            assert counters["wire_v2"]["missing"] == 0

@@ -26,6 +26,8 @@ def some(draw: st.DrawFn, first: int = -(10**6)) -> Events:
     ticks = {}
     if draw(st.booleans()):
         ticks = {"intensity": rng.integers(0, 65_536, n), "present": rng.random(n) < 0.5}
+    if draw(st.booleans()):
+        ticks["repaired"] = rng.random(n) < draw(st.sampled_from([0.05, 0.5]))
     markers = [(int(t), bool(t % 2)) for t in np.sort(rng.integers(first, 10**6, draw(st.integers(0, 3))))]
     t = rng.integers(first, 10**6, n)
     x, y, p = rng.integers(0, 12, n), rng.integers(0, 8, n), rng.random(n) < 0.5
@@ -58,6 +60,28 @@ def test_tonic_makes_the_same_pictures_of_our_events() -> None:
     assert np.array_equal(picture, expected)
     cropped = tonic.transforms.CenterCrop(sensor_size=(12, 8, 2), size=(4, 4))(events.to_tonic())
     assert len(cropped) == len(events.region(slice(4, 8), slice(2, 6)))
+
+
+@given(some(), some())
+def test_what_is_repaired_stays_so_through_slices_order_and_merging(a: Events, b: Events) -> None:
+    def marked(events: Events) -> list[tuple[object, ...]]:
+        return [(e.t, e.x, e.y, e.p, e.intensity, e.repaired) for e in events]
+
+    assert marked(a[::-1]) == marked(a)[::-1]
+    assert sorted(marked(a.sorted()), key=repr) == sorted(marked(a), key=repr)
+    assert sorted(marked(a + b), key=repr) == sorted(marked(a) + marked(b), key=repr)
+    inside = a.between(-1000, 1000)
+    assert marked(inside) == [e for e in marked(a) if -1000 <= e[0] < 1000]
+    none = a[np.zeros(len(a), bool)]
+    assert none.repaired is None
+
+
+def test_a_mask_that_marks_nothing_is_none() -> None:
+    a = Events([1], [2], [3], [True], array=GRID)
+    assert Events([1], [2], [3], [True], array=GRID, repaired=[False]) == a
+    assert Events([1], [2], [3], [True], array=GRID, repaired=[True]) != a
+    with pytest.raises(ProblemError, match="repaired has 2 entries, t has 1"):
+        Events([1], [2], [3], [True], array=GRID, repaired=[True, False])
 
 
 @given(some(first=0))

@@ -38,6 +38,22 @@ def test_events_survive_any_two_conversions(tmp_path: Path, first: str, second: 
         assert taxel.open(two).events == events
 
 
+@pytest.mark.parametrize("kind", [".npz", ".csv", ".h5"])
+def test_what_is_repaired_stays_so_in_tables(tmp_path: Path, kind: str) -> None:
+    events = some_events()
+    for intensity in (True, False):
+        marked = taxel.Events(
+            events.t, events.x, events.y, events.p, array=THESIS, repaired=np.arange(len(events)) % 7 == 0,
+            **({"intensity": events.intensity, "present": events.present} if intensity else {}),
+        )  # fmt: skip
+        path = tmp_path / f"{intensity}{kind}"
+        taxel.convert(marked, path)
+        assert taxel.open(path).events == marked
+        [cut] = taxel.cut(taxel.open(path), columns=slice(0, 40))
+        assert np.array_equal(cut.events.repaired, marked[marked.x < 40].repaired)
+    assert "which events are repaired" in taxel.convert(marked, tmp_path / f"{kind[1:]}.mcap")
+
+
 @pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
 def test_a_recording_copied_to_mcap_keeps_every_message(tmp_path: Path, compression: str) -> None:
     one, two = tmp_path / "one.mcap", tmp_path / "two.mcap"

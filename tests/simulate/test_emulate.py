@@ -1,6 +1,8 @@
 """The emulated board over UDP on loopback."""
 
+import itertools
 import json
+import os
 import socket
 import subprocess
 import sys
@@ -12,8 +14,9 @@ import pytest
 
 import taxel
 from taxel import ProblemError, wire
-from taxel.demo.script import script
-from taxel.simulate import Silence, emulate, play, truth
+from taxel.demo.script import endless, script
+from taxel.simulate import Board, Faults, Flaws, Pipe, Replay, Silence, Version2, emulate, play, truth
+from taxel.wire import Registers
 
 
 @pytest.fixture
@@ -130,3 +133,204 @@ def test_the_truth_is_written_as_it_happens_by_both_clocks(listener, tmp_path):
     again = subprocess.run([*command, "--truth", str(labels)], capture_output=True, text=True, timeout=60, check=False)
     assert (again.returncode, again.stdout) == (2, "")
     assert str(labels) in again.stderr
+
+
+class Heard:
+    """Everything that a board sends, until it has been silent for a second."""
+
+    def __init__(self, listener):
+        self.port, self.datagrams, hear = listener
+        self.thread = threading.Thread(target=hear)
+        self.thread.start()
+        self.to = f"127.0.0.1:{self.port}"
+
+    def all(self):
+        self.thread.join()
+        return self.datagrams
+
+
+def test_scenes_without_an_end_begin_at_once(listener):
+    """Each act is made ready while those before it are played: datagrams come though the list never ends."""
+    heard, drawn = Heard(listener), itertools.count()
+
+    def stop(report):
+        if heard.datagrams and report.frames > 100:
+            raise KeyboardInterrupt
+
+    def acts():
+        for act in endless(3, tare_ms=2.0):
+            next(drawn)
+            yield act
+
+    with pytest.raises(KeyboardInterrupt):
+        emulate(heard.to, acts(), seed=3, tare_ms=2.0, watch=stop)
+    events = wire.decode(b"".join(heard.all()))
+    assert [start for _, start in events.markers] == [True, False], "stopped, it marks its stop"
+    assert next(drawn) < 30
+
+
+def test_what_an_act_is_that_comes_late_is_said(listener):
+    with pytest.raises(ProblemError, match="act 1 is 'ball'"):
+        emulate(f"127.0.0.1:{listener[0]}", iter([Silence(10.0), "ball"]), seed=1, tare_ms=2.0)
+
+
+def test_a_recording_is_played_again_as_it_was(listener):
+    """The same taxels and values in the same order, at the frames' times, twice as fast."""
+    first = play([Silence(60.0)], seed=4, tare_ms=20.0).events
+    heard = Heard(listener)
+    emulate(heard.to, Replay(first, speed=2.0), registers=Registers(noise_floor=0, wire_version=2))
+    decoder = taxel.wire_v2.Decoder()
+    pieces = [decoder.push(datagram).events for datagram in heard.all()]
+    again = sum(pieces[1:], pieces[0])
+    again = again if again.repaired is None else again[~again.repaired]
+    # Of several events of a taxel within a frame the last is played, and one that changes nothing is none.
+    frame = np.ceil((first.t - first.t[0]) / 2.0 / 192.0).astype(int)
+    held, expected = {}, []
+    for k in sorted(set(frame.tolist())):
+        now = {}
+        for e in np.flatnonzero(frame == k):
+            now[int(first.x[e]), int(first.y[e])] = int(first.intensity[e])
+        changed = {place: value for place, value in now.items() if held.get(place, 0) != value}
+        held |= now
+        expected += sorted((x, y, value) for (x, y), value in changed.items())
+    assert list(zip(again.x.tolist(), again.y.tolist(), again.intensity.tolist(), strict=True)) == expected
+    assert again.duration_us == pytest.approx(first.duration_us / 2.0, abs=400)
+
+
+def test_pictures_are_played_by_the_boards_rules(listener):
+    values = np.zeros((20, 64, 64), np.float32)
+    values[5:, 3, 4], values[10:, 3, 4] = 5.0, 10.0
+    frames = taxel.Frames(values, np.arange(20) * 1000, unit="N")
+    heard = Heard(listener)
+    emulate(heard.to, Replay(frames), preset="5.2 kHz")
+    events = wire.decode(b"".join(heard.all()))
+    assert [(e.x, e.y, e.intensity) for e in events] == [(4, 3, 75), (4, 3, 150)]
+    assert events.t.tolist() == pytest.approx([5000, 10_000], abs=600)
+
+
+def test_another_sensors_frames_come_through_a_pipe(listener, tmp_path):
+    heard = Heard(listener)
+    read, write = os.pipe()
+    rng = np.random.default_rng(2)
+    frames = rng.integers(0, 4096, (30, 5, 3)).astype("<u2")
+    with os.fdopen(read, "rb") as source, os.fdopen(write, "wb") as sink:
+        about = {"rows": 5, "columns": 3, "rate": 100, "bits": 12, "name": "five"}
+        sink.write(json.dumps(about).encode() + b"\n")
+        sink.flush()
+        pipe = Pipe(source, noise_floor=0)
+        assert (pipe.array.shape, pipe.array.name, pipe.shift) == ((5, 3), "five", 0)
+        threading.Thread(target=lambda: (sink.write(frames.tobytes()), sink.close())).start()
+        report = emulate(heard.to, pipe, version_2=Version2(states_us=0))
+    assert report.frames == 30
+    decoder = taxel.wire_v2.Decoder(array=pipe.array)
+    shown = []
+    for datagram in heard.all():
+        events = decoder.push(datagram).events
+        shown += list(events)
+    times = sorted({e.t for e in shown})
+    assert np.allclose(np.diff(times), 10_000, atol=2)
+    assert (decoder.held == frames[-1]).all()
+    for bad in (b"rows 5\n", b'{"rows": 5}\n', b""):
+        path = tmp_path / "bad"
+        path.write_bytes(bad)
+        with path.open("rb") as source, pytest.raises(taxel.FormatError, match="standard input, line 1"):
+            Pipe(source)
+    with path.open("wb") as sink:
+        sink.write(json.dumps(about).encode() + b"\n" + frames.tobytes()[:-3])
+    with path.open("rb") as source, pytest.raises(taxel.FormatError, match="frame 29: ends after 27 bytes, must be 30"):
+        emulate(heard.to, Pipe(source))
+
+
+def test_the_sync_line_says_its_edges(listener, tmp_path):
+    heard, path = Heard(listener), tmp_path / "sync.txt"
+    emulate(heard.to, [Silence(40.0)], seed=4, tare_ms=2.0, sync=path)
+    edges = [line.split() for line in path.read_text().splitlines()]
+    assert [level for _, level, _ in edges] == ["0", "1", "0"]
+    events = wire.decode(b"".join(heard.all()))
+    assert [float(t) // 100 * 100 for t, _, _ in edges[1:]] == [float(t) for t, _ in events.markers]
+    host = [int(ns) for _, _, ns in edges]
+    assert host == sorted(host)
+    with pytest.raises(FileExistsError):
+        emulate(heard.to, [Silence(40.0)], seed=4, tare_ms=2.0, sync=path)
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with open(os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)) as reader:
+        emulate("127.0.0.1:9", [Silence(40.0)], seed=4, tare_ms=2.0, sync=pipe)
+        assert [line.split()[1] for line in reader.read().splitlines()] == ["0", "1", "0"]
+
+
+def test_a_network_with_faults_is_noticed_by_the_host(listener):
+    heard = Heard(listener)
+    faults = Faults(lost=0.1, repeated=0.1, reordered=0.1, cut=0.1, corrupted=0.1, seed=5)
+    report = emulate(heard.to, [Silence(60.0)], seed=4, tare_ms=50.0, wire=2, faults=faults)
+    decoder = taxel.wire_v2.Decoder()
+    for datagram in heard.all():
+        decoder.push(datagram)
+    network, counts = report.network, decoder.counts
+    assert network is not None
+    assert counts.repeated == network["repeated"] > 10
+    assert counts.checksum + counts.short + counts.foreign >= network["corrupted"] > 10
+    lost = network["lost"] + network["cut"] + network["corrupted"]
+    assert counts.intact == network["given"] - lost
+    assert lost - 20 <= counts.missing <= lost
+
+
+def test_resets_and_a_drifting_clock(listener):
+    heard = Heard(listener)
+    report = emulate(
+        heard.to, [Silence(300.0)], tare_ms=2.0, wire=2, reset_every_s=0.1, drift_ppm=50_000.0,
+        version_2=Version2(board=7, seed=90, states_us=0),
+    )  # fmt: skip
+    assert report.resets == 2
+    assert report.board_seconds == pytest.approx(0.3, rel=0.01)
+    assert report.seconds >= 0.3 / 1.05 * 0.99
+    sessions = [int.from_bytes(d[14:16], "little") for d in heard.all()]
+    assert sorted(set(sessions)) == [90, 91, 92]
+    assert {int.from_bytes(d[2:4], "little") for d in heard.datagrams} == {7}
+    decoder = taxel.wire_v2.Decoder()
+    for datagram in heard.datagrams:
+        decoder.push(datagram)
+    assert decoder.counts.resets == 2
+    assert decoder.counts.missing == 0
+
+
+def test_taxels_have_flaws_by_their_own_seeds(listener):
+    heard = Heard(listener)
+    still = taxel.Frames(np.full((3, 64, 64), 100.0), [0, 1000, 2000], unit="ticks")
+    flaws = Flaws(dead=0.1, stuck=0.05, seeds={"dead": 3, "stuck": 4})
+    emulate(heard.to, Replay(still), wire=2, flaws=flaws)
+    decoder = taxel.wire_v2.Decoder()
+    for datagram in heard.all():
+        decoder.push(datagram)
+    held = decoder.held
+    assert 250 < (held <= 0).sum() < 600, "dead ones say nothing"
+    assert 100 < ((held > 0) & (held != 100)).sum() < 300
+    for nonsense in (Flaws(dead=2.0), Flaws(gain=-1.0)):
+        with pytest.raises(ProblemError, match=r"flaw (dead|gain)"):
+            emulate(heard.to, Replay(still), flaws=nonsense)
+    with pytest.raises(ProblemError, match="no flaw"):
+        Flaws(seeds={"cold": 1})
+
+
+def test_a_source_of_frames_is_heard_as_a_board_is(tmp_path):
+    array = taxel.Array(4, 6, name="small")
+    rng = np.random.default_rng(1)
+    frames = rng.integers(0, 1000, (50, 4, 6))
+    path = tmp_path / "source.mcap"
+    with taxel.live.Live(0, host="127.0.0.1", array=array, record=path) as live:
+        host, port = live.address
+        source = taxel.live.Source(array, 200.0, bits=10, noise_floor=2, to=f"{host}:{port}", board=3)
+        made = [source.push(frame) for frame in frames]
+        until = time.monotonic() + 30
+        while live.counters["events"] < sum(made):
+            assert time.monotonic() < until
+            time.sleep(0.01)
+        summary = live.stop()
+    assert summary.verdict == "nothing lost"
+    board = Board(source.registers, array)
+    expected = taxel.wire_v2.Decoder(array=array)
+    straight = [expected.push(d).events for frame in frames for d in board.frame(frame.astype(np.uint16))]
+    assert taxel.open(path).events == sum(straight[1:], straight[0])
+    for wrong in (np.full((4, 6), -1), np.full((4, 6), 70_000), np.zeros(23)):
+        with pytest.raises(ProblemError):
+            source.push(wrong)

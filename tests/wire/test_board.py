@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import wire
-from taxel.device import NOT_RETURNED, Board
+from taxel.simulate import NOT_RETURNED, Board
 from taxel.wire import Command, Registers
 
 from . import oracle

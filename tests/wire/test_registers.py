@@ -57,14 +57,14 @@ def test_a_command_is_table_5_1_and_comes_back(register, value):
 )
 def test_writes_lead_to_the_target_and_none_is_refused_on_the_way(names, floor):
     start, target = Registers.preset(names[0]), Registers.preset(names[1]).replace(noise_floor=floor)
-    board = taxel.device.Board(start)
+    board = taxel.simulate.Board(start)
     for command in start.commands_to(target):
         assert board.command(command.to_bytes()) == f"ok REG{command.register}=0x{command.value:08X}\n"
     assert board.registers == target
 
 
 def test_a_wrong_order_is_refused_half_way():
-    board = taxel.device.Board(Registers.preset("5.2 kHz"))
+    board = taxel.simulate.Board(Registers.preset("5.2 kHz"))
     slow = Registers.preset("2 kHz")
     assert board.command(Command(4, slow.words[4]).to_bytes()) == "bad REG4 rule 3\n"
     assert board.command(Command(3, slow.words[3]).to_bytes()) == "bad REG3 rule 2\n"

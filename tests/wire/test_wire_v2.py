@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import taxel
-from taxel.device import Board
+from taxel.simulate import Board
 from taxel.wire import Registers
 from taxel.wire_v2 import Decoder, StreamReader
 
@@ -26,7 +26,8 @@ def rows(heard):
     for h in heard:
         e = h.events
         values = [None] * len(e) if e.intensity is None else np.where(e.present, e.intensity, -1).tolist()
-        yield from zip(e.t.tolist(), e.x.tolist(), e.y.tolist(), e.p.tolist(), values, h.repaired.tolist(), strict=True)
+        repaired = np.zeros(len(e), bool) if e.repaired is None else e.repaired
+        yield from zip(e.t.tolist(), e.x.tolist(), e.y.tolist(), e.p.tolist(), values, repaired.tolist(), strict=True)
 
 
 @pytest.mark.parametrize("name", VECTORS)

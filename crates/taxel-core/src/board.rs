@@ -5,6 +5,8 @@
 
 mod afferents;
 mod counts;
+mod flaws;
+mod network;
 mod outbox;
 mod play;
 mod scan;
@@ -16,8 +18,10 @@ use scan::Lfsr;
 use serde::{Deserialize, Serialize};
 
 pub use counts::BoardCounts;
+pub use flaws::{Flaw, Flawed, Flaws};
+pub use network::{Faults, Network, NetworkCounts};
 pub use play::{Armed, Play, Played};
-pub use session::session;
+pub use session::{opening, session};
 
 use crate::wire::registers::Registers;
 use crate::wire::v2::{self, Kind, Packer};
@@ -118,7 +122,8 @@ pub struct Board {
 }
 
 /// How a board speaks version 2.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Version2 {
     /// Its number.
     pub board: u16,

@@ -21,4 +21,4 @@ pub use footprint::Footprint;
 pub use motion::{Contact, Kind, Motion};
 pub use scene::{Ball, Ending, Press, Scene};
 pub use sensor::{Sensor, Taxels};
-pub use stage::{Act, Pictures, Stage};
+pub use stage::{Act, Pictures, Prepared, Stage};

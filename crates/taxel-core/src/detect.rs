@@ -25,6 +25,8 @@ pub struct Detection {
     pub known: i64,
     /// How steeply the potential rose above its threshold, mV/ms: a measure of how sure.
     pub slope: f64,
+    /// Whether it may rest on values that states of version 2 repaired: then what it tells may have happened before `t`.
+    pub repaired: bool,
 }
 
 /// An event that took place, by a reference.

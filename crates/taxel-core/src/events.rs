@@ -38,6 +38,9 @@ pub struct Events {
     pub p: Vec<bool>,
     /// The held values that came with the changes, or none at all.
     pub intensity: Option<Intensities>,
+    /// Whether a state of version 2 gave the event, because its value differed from the held one: what it tells happened
+    /// some time before. None where no event is of that kind.
+    pub repaired: Option<Vec<bool>>,
     /// Starts and stops, by time.
     pub markers: Vec<Marker>,
 }
@@ -46,7 +49,7 @@ impl Events {
     /// No event yet.
     #[must_use]
     pub fn empty(array: Array) -> Self {
-        Self { array, t: vec![], x: vec![], y: vec![], p: vec![], intensity: None, markers: vec![] }
+        Self { array, t: vec![], x: vec![], y: vec![], p: vec![], intensity: None, repaired: None, markers: vec![] }
     }
 
     /// How many events.
@@ -71,7 +74,57 @@ impl Events {
             y: &self.y,
             p: &self.p,
             intensity: self.intensity.as_ref().map(|i| IntensitiesView { ticks: &i.ticks, present: &i.present }),
+            repaired: self.repaired.as_deref(),
             markers: &self.markers,
+        }
+    }
+
+    /// Whether a state gave an event.
+    #[must_use]
+    pub fn is_repaired(&self, k: usize) -> bool {
+        self.view().is_repaired(k)
+    }
+
+    /// Says of the events from place `from` on, which were added just now, whether states gave them.
+    pub(crate) fn mark_repaired(&mut self, from: usize, repaired: bool) {
+        let n = self.len();
+        if repaired && from < n {
+            self.repaired.get_or_insert_default().resize(from, false);
+        }
+        if let Some(column) = &mut self.repaired {
+            column.resize(n, repaired);
+        }
+    }
+
+    /// Appends the first `n` events of others of the same array, and all their markers; a column that only one side has
+    /// is filled up.
+    pub fn append(&mut self, more: &Self, n: usize) {
+        let rows = self.len();
+        self.t.extend_from_slice(&more.t[..n]);
+        self.x.extend_from_slice(&more.x[..n]);
+        self.y.extend_from_slice(&more.y[..n]);
+        self.p.extend_from_slice(&more.p[..n]);
+        self.markers.extend_from_slice(&more.markers);
+        if self.intensity.is_some() || more.intensity.is_some() {
+            let none = || Intensities { ticks: vec![0; rows], present: vec![false; rows] };
+            let column = self.intensity.get_or_insert_with(none);
+            match &more.intensity {
+                Some(intensity) => {
+                    column.ticks.extend_from_slice(&intensity.ticks[..n]);
+                    column.present.extend_from_slice(&intensity.present[..n]);
+                }
+                None => {
+                    column.ticks.resize(rows + n, 0);
+                    column.present.resize(rows + n, false);
+                }
+            }
+        }
+        if self.repaired.is_some() || more.repaired.is_some() {
+            let column = self.repaired.get_or_insert_with(|| vec![false; rows]);
+            match &more.repaired {
+                Some(repaired) => column.extend_from_slice(&repaired[..n]),
+                None => column.resize(rows + n, false),
+            }
         }
     }
 
@@ -82,6 +135,7 @@ impl Events {
         self.y.clear();
         self.p.clear();
         self.markers.clear();
+        self.repaired = None;
         if let Some(intensity) = &mut self.intensity {
             intensity.ticks.clear();
             intensity.present.clear();
@@ -113,6 +167,8 @@ pub struct EventsView<'a> {
     pub p: &'a [bool],
     /// The held values that came with the changes, or none at all.
     pub intensity: Option<IntensitiesView<'a>>,
+    /// As [`Events::repaired`].
+    pub repaired: Option<&'a [bool]>,
     /// Starts and stops, by time.
     pub markers: &'a [Marker],
 }
@@ -130,6 +186,12 @@ impl<'a> EventsView<'a> {
         self.t.is_empty()
     }
 
+    /// Whether a state gave an event.
+    #[must_use]
+    pub fn is_repaired(&self, k: usize) -> bool {
+        self.repaired.is_some_and(|repaired| repaired[k])
+    }
+
     /// The events of a range of places, without markers.
     #[must_use]
     pub fn piece(&self, range: std::ops::Range<usize>) -> Self {
@@ -144,6 +206,7 @@ impl<'a> EventsView<'a> {
             y: &self.y[range.clone()],
             p: &self.p[range.clone()],
             intensity: self.intensity.map(part),
+            repaired: self.repaired.map(|repaired| &repaired[range.clone()]),
             markers: &[],
         }
     }
@@ -180,7 +243,8 @@ impl<'a> EventsView<'a> {
     /// `Problem`, naming the column or the event.
     pub fn check(&self) -> Result<()> {
         let t = self.len();
-        for (name, len) in [("x", self.x.len()), ("y", self.y.len()), ("p", self.p.len())] {
+        let repaired = self.repaired.map_or(t, <[bool]>::len);
+        for (name, len) in [("x", self.x.len()), ("y", self.y.len()), ("p", self.p.len()), ("repaired", repaired)] {
             if len != t {
                 return Err(problem!("events: {name} has {len} entries, t has {t}: they must be equal"));
             }

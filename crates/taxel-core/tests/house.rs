@@ -29,7 +29,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
         "taxel-live",
         &[
             &["error", "clock", "latency", "locked"],
-            &["address"],
+            &["address", "ports"],
             &["recording"],
             &["capture"],
             &["emulate", "pipeline"],

@@ -89,14 +89,14 @@ fn what_the_board_means_is_what_the_host_hears() {
         let count = if array.len() > 20_000 { 6 } else { 40 };
         let frames = scene(&mut random, &array, count, registers.ramp);
         let mut decoder = Decoder::new(array.clone());
-        let (mut events, mut repaired) = (Events::empty(array.clone()), vec![]);
+        let mut events = Events::empty(array.clone());
         let mut until = 0;
         for frame in &frames {
             board
                 .frame(frame, |datagram| {
                     assert!(datagram.len() <= 1400);
                     let before = events.len();
-                    let heard = decoder.push(datagram, None, &mut events, &mut repaired);
+                    let heard = decoder.push(datagram, None, &mut events);
                     assert!(events.t[before..].iter().all(|&t| t >= until), "seed {seed}: a promise was broken");
                     let Heard::Intact { until: promised, missing: 0, reset: false } = heard else {
                         panic!("{heard:?}")
@@ -121,7 +121,7 @@ fn what_the_board_means_is_what_the_host_hears() {
             assert!((0..=late).contains(&(a.0 - b.0)), "seed {seed}: {a:?} for {b:?}");
         }
         assert_eq!(decoder.counts().events, board.counts().changes);
-        assert!(repaired.iter().all(|&r| !r));
+        assert_eq!(events.repaired, None);
     }
 }
 
@@ -143,7 +143,7 @@ fn each_intact_datagram_is_decoded_once_whatever_the_network_does() {
         // Each alone tells what it holds; differences need their order, so only taxels and times are compared.
         let alone = |datagram: &[u8]| -> Vec<(i64, u16, u16, bool)> {
             let mut events = Events::empty(array.clone());
-            Decoder::new(array.clone()).push(datagram, None, &mut events, &mut vec![]);
+            Decoder::new(array.clone()).push(datagram, None, &mut events);
             rows(&events).into_iter().map(|r| (r.0, r.1, r.2, r.3)).collect()
         };
         let mut arriving: Vec<(usize, Vec<u8>)> = vec![];
@@ -171,10 +171,10 @@ fn each_intact_datagram_is_decoded_once_whatever_the_network_does() {
             chunk.shuffle(&mut random);
         }
         let mut decoder = Decoder::new(array.clone());
-        let (mut events, mut repaired) = (Events::empty(array.clone()), vec![]);
+        let mut events = Events::empty(array.clone());
         let (mut once, mut refused) = (vec![], 0);
         for (k, datagram) in &arriving {
-            match decoder.push(datagram, None, &mut events, &mut repaired) {
+            match decoder.push(datagram, None, &mut events) {
                 Heard::Intact { .. } => once.push(*k),
                 Heard::Repeated => assert!(once.contains(k)),
                 Heard::Refused(_) => refused += 1,
@@ -207,7 +207,7 @@ fn values_told_again_mend_the_picture_after_a_loss() {
         let version_2 = Version2 { states_us: 20_000, ..Version2::default() };
         let mut board = Board::new(registers, &array).unwrap().intensity(intensity).version_2(version_2).unwrap();
         let mut decoder = Decoder::new(array.clone());
-        let (mut events, mut repaired) = (Events::empty(array.clone()), vec![]);
+        let mut events = Events::empty(array.clone());
         let mut frames = scene(&mut random, &array, 200, 150);
         let last = frames[199].clone();
         frames.extend(vec![last.clone(); 500]);
@@ -216,7 +216,7 @@ fn values_told_again_mend_the_picture_after_a_loss() {
             board
                 .frame(frame, |datagram| {
                     if !(lossy && random.random_range(0..3) == 0) {
-                        decoder.push(datagram, None, &mut events, &mut repaired);
+                        decoder.push(datagram, None, &mut events);
                     }
                     true
                 })
@@ -227,7 +227,7 @@ fn values_told_again_mend_the_picture_after_a_loss() {
         assert_eq!(held, expected);
         let counts = decoder.counts();
         assert!(counts.missing > 0 && counts.repaired > 0 && counts.states > 256);
-        assert_eq!(counts.repaired, repaired.iter().filter(|&&r| r).count() as u64);
+        assert_eq!(counts.repaired, (0..events.len()).filter(|&k| events.is_repaired(k)).count() as u64);
         // The events alone, repaired ones included, lead to the same picture.
         let mut picture = vec![0_u16; 256];
         for (_, x, y, _, value) in rows(&events) {
@@ -245,14 +245,14 @@ fn a_reset_goes_on_in_time_and_is_noticed() {
     let registers = Registers { wire_version: 2, ..Registers::default() };
     let mut board = Board::new(registers, &array).unwrap();
     let mut decoder = Decoder::new(array.clone());
-    let (mut events, mut repaired) = (Events::empty(array.clone()), vec![]);
+    let mut events = Events::empty(array.clone());
     let (mut arrived, mut resets) = (1_000_000, 0);
     for round in 0..3_u16 {
         for k in 0..20_u16 {
             let frame = vec![10 * (k % 2 + 1) + round; 4096];
             board
                 .frame(&frame, |datagram| {
-                    let heard = decoder.push(datagram, Some(arrived), &mut events, &mut repaired);
+                    let heard = decoder.push(datagram, Some(arrived), &mut events);
                     resets += u64::from(matches!(heard, Heard::Intact { reset: true, .. }));
                     true
                 })
@@ -291,7 +291,7 @@ fn version_1_and_version_2_say_the_same_of_one_scene() {
     let mut one = Decoder1::new(array.clone()).push(&play(1).concat(), None);
     let (mut two, mut decoder) = (Events::empty(array.clone()), Decoder::new(array.clone()));
     for datagram in play(2) {
-        decoder.push(&datagram, None, &mut two, &mut vec![]);
+        decoder.push(&datagram, None, &mut two);
     }
     // Version 1 cuts times to 100 us.
     two.t.iter_mut().for_each(|t| *t = *t / 100 * 100);
@@ -314,7 +314,7 @@ fn a_slow_board_still_promises_and_silence_has_its_heartbeats() {
         board
             .frame(&[if k == 3 { 50 } else { 0 }; 16], |datagram| {
                 if let Heard::Intact { until: Some(u), .. } =
-                    decoder.push(datagram, None, &mut Events::empty(array.clone()), &mut vec![])
+                    decoder.push(datagram, None, &mut Events::empty(array.clone()))
                 {
                     until = until.max(u);
                 }
@@ -347,7 +347,7 @@ fn unknown_kinds_and_flags_are_counted_and_anything_is_survived() {
     let mut random = StdRng::seed_from_u64(5);
     let array = Array::new(100, 100, 1.0, "any").unwrap();
     let mut decoder = Decoder::new(array.clone());
-    let (mut events, mut repaired) = (Events::empty(array.clone()), vec![]);
+    let mut events = Events::empty(array.clone());
     let mut bytes = vec![];
     for sequence in 0..20_000_u32 {
         let body: Vec<u8> = (0..random.random_range(0..80)).map(|_| random.random()).collect();
@@ -362,11 +362,9 @@ fn unknown_kinds_and_flags_are_counted_and_anything_is_survived() {
             span: random.random(),
         };
         header.write(&body, &mut bytes);
-        decoder.push(&bytes, Some(random.random_range(i64::MIN / 4..i64::MAX / 4)), &mut events, &mut repaired);
-        assert_eq!(repaired.len(), events.len());
+        decoder.push(&bytes, Some(random.random_range(i64::MIN / 4..i64::MAX / 4)), &mut events);
         events.view().check().unwrap();
         events.clear();
-        repaired.clear();
     }
     let counts = decoder.counts();
     assert!(counts.unknown_kind > 0 && counts.unknown_flags > 0 && counts.malformed > 0 && counts.outside > 0);
@@ -438,15 +436,15 @@ fn a_vector_means_what_its_json_says() {
         let bytes = std::fs::read(path.with_extension("bin")).unwrap();
         let array = Array::new(vector.rows, vector.columns, 1.0, "vector").unwrap();
         let mut decoder = Decoder::new(array.clone());
-        let (mut events, mut repaired, mut at) = (Events::empty(array), vec![], 0);
+        let (mut events, mut at) = (Events::empty(array), 0);
         while at < bytes.len() {
             let end = at + 2 + usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
-            decoder.push(&bytes[at + 2..end], None, &mut events, &mut repaired);
+            decoder.push(&bytes[at + 2..end], None, &mut events);
             at = end;
         }
         let ticks = |k: usize| events.intensity.as_ref().and_then(|i| i.present[k].then_some(i.ticks[k]));
         let heard: Vec<Meant> = (0..events.len())
-            .map(|k| (events.t[k], events.x[k], events.y[k], events.p[k], ticks(k), repaired[k]))
+            .map(|k| (events.t[k], events.x[k], events.y[k], events.p[k], ticks(k), events.is_repaired(k)))
             .collect();
         for (k, (a, b)) in heard.iter().zip(&vector.events).enumerate() {
             assert_eq!(a, b, "{path:?}, event {k}");
@@ -466,12 +464,12 @@ fn a_vector_means_what_its_json_says() {
 #[test]
 fn a_number_drawn_twice_is_a_reset_once() {
     let mut decoder = Decoder::new(Array::thesis());
-    let (mut events, mut repaired) = (Events::empty(Array::thesis()), Vec::new());
+    let mut events = Events::empty(Array::thesis());
     let mut datagram = Vec::new();
     let mut hear = |sequence, base| {
         let header = Header { kind: 1, board: 1, sequence, base, session: 9, stride: 6, flags: 0, span: 192 };
         header.write(&[0x05, 0x80], &mut datagram);
-        decoder.push(&datagram, None, &mut events, &mut repaired)
+        decoder.push(&datagram, None, &mut events)
     };
     let intact = |heard| matches!(heard, Heard::Intact { .. });
     assert!(intact(hear(70_000, 20_000_000)));

@@ -1,12 +1,18 @@
 //! The emulated board as a process of its own: frames felt, datagrams sent, commands heard, in real time.
 
 mod control;
+mod feed;
+mod line;
+mod replay;
+mod scenes;
+mod sync;
 
 use std::net::SocketAddr;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use taxel_core::board::{Board, BoardCounts};
+use taxel_core::board::{Board, BoardCounts, Faults, Flawed, Flaws, Network, NetworkCounts};
 use taxel_core::wire::Command;
 use taxel_core::{Array, Stop};
 
@@ -15,6 +21,11 @@ use crate::capture::{SendCounts, Sender};
 use crate::latency::{Latencies, Quantiles};
 use crate::recording::now_ns;
 use control::Control;
+pub use feed::Feed;
+use line::Line;
+pub use replay::Replay;
+pub use scenes::Scenes;
+use sync::Sync;
 
 /// How often [`Emulator::run`] looks for commands, asks whether to stop, and reports.
 const LOOK_EVERY: Duration = Duration::from_millis(1);
@@ -23,14 +34,27 @@ const REPORT_EVERY: Duration = Duration::from_millis(100);
 /// What an emulated board feels: a scene, a recording played again, noise.
 pub trait Touch: Send {
     /// Writes the next frame's trip times (ticks of 1/300 us, one a taxel, by taxel index); false where there is none
-    /// any more, and the board stops.
-    fn frame(&mut self, ticks: &mut [u16]) -> bool;
+    /// any more, or the caller stops it while it waits, and the board stops.
+    ///
+    /// # Errors
+    ///
+    /// Where what is played cannot be; then the board stops too.
+    fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool>;
+
+    /// Whether the frame that was written last is the last one, where that is known.
+    ///
+    /// # Errors
+    ///
+    /// As [`Touch::frame`].
+    fn is_last(&mut self, _stop: Stop<'_>) -> Result<bool> {
+        Ok(false)
+    }
 }
 
 /// A function that writes frames is a touch.
 impl<F: FnMut(&mut [u16]) -> bool + Send> Touch for F {
-    fn frame(&mut self, ticks: &mut [u16]) -> bool {
-        self(ticks)
+    fn frame(&mut self, ticks: &mut [u16], _stop: Stop<'_>) -> Result<bool> {
+        Ok(self(ticks))
     }
 }
 
@@ -46,15 +70,48 @@ pub struct EmulatorOptions {
     /// Where the board takes its commands: TCP in place of the UART, bytes in, status lines out (`None`: nowhere). Port 0
     /// finds a free one.
     pub control: Option<SocketAddr>,
+    /// The serial line: where its name is put (a link to a pseudo-terminal), and its baud rate.
+    pub line: Option<(PathBuf, u32)>,
+    /// Where the sync line is written, and whether a file there may be replaced.
+    pub sync: Option<(PathBuf, bool)>,
     /// Commands of the schedule: before which frame, and which; ascending.
     pub commands: Vec<(u64, Command)>,
+    /// Whether the first frame is scanned for nobody ([`Board::arm`]).
+    pub arms: bool,
+    /// Whether the board marks a stop at the end, where a recording runs.
+    pub marks_stop: bool,
+    /// What the network does to datagrams.
+    pub faults: Option<Faults>,
+    /// What is wrong with the taxels.
+    pub flaws: Option<Flaws>,
+    /// The board is reset so often, s of its time.
+    pub reset_every_s: Option<f64>,
+    /// How much faster the board's clock runs than the host's, parts per million.
+    pub drift_ppm: f64,
+    /// The UDP port that the board sends from; 0: any that is free.
+    pub source_port: u16,
 }
 
 impl EmulatorOptions {
     /// In real time to `to`, without commands.
     #[must_use]
     pub fn to(to: SocketAddr) -> Self {
-        Self { to, segment: true, real_time: true, control: None, commands: vec![] }
+        Self {
+            to,
+            segment: true,
+            real_time: true,
+            control: None,
+            line: None,
+            sync: None,
+            commands: vec![],
+            arms: false,
+            marks_stop: false,
+            faults: None,
+            flaws: None,
+            reset_every_s: None,
+            drift_ppm: 0.0,
+            source_port: 0,
+        }
     }
 }
 
@@ -65,6 +122,10 @@ pub struct Report {
     pub board: BoardCounts,
     /// What was sent.
     pub sent: SendCounts,
+    /// What the network did to it, where it was asked to.
+    pub network: Option<NetworkCounts>,
+    /// How often the board was reset.
+    pub resets: u64,
     /// How long after its end each frame was sent; nothing where frames go as fast as they can.
     pub late: Quantiles,
     /// Frames that were sent more than a frame late.
@@ -83,7 +144,10 @@ pub struct Emulator {
     board: Board,
     array: Array,
     sender: Sender,
-    control: Option<Control>,
+    control: Control,
+    sync: Option<Sync>,
+    network: Option<Network>,
+    flawed: Option<Flawed>,
     options: EmulatorOptions,
 }
 
@@ -92,20 +156,31 @@ impl Emulator {
     ///
     /// # Errors
     ///
-    /// `Socket` where the control port is taken; `Core(Problem)` where the schedule does not ascend.
+    /// `Socket` where the control port is taken, `File` where line or sync line cannot be had; `Core(Problem)` where the
+    /// schedule does not ascend, or a fault, flaw, drift or reset makes no sense.
     pub fn open(board: Board, array: &Array, options: EmulatorOptions) -> Result<Self> {
         if let Some(k) = options.commands.windows(2).position(|w| w[1].0 < w[0].0) {
             return Err(taxel_core::problem!("command {}: its frame lies before that of command {k}", k + 1).into());
         }
-        let sender = Sender::open(options.to, options.segment)?;
-        let control = options.control.map(|address| Control::listen(address, &board)).transpose()?;
-        Ok(Self { board, array: array.clone(), sender, control, options })
+        if let Some(every) = options.reset_every_s.filter(|every| !(1e-3..=1e9).contains(every)) {
+            return Err(taxel_core::problem!("reset each {every} s: must be 0.001 to 1e9").into());
+        }
+        if !(-100_000.0..=100_000.0).contains(&options.drift_ppm) {
+            return Err(taxel_core::problem!("drift of {} ppm: must lie within 100000 of 0", options.drift_ppm).into());
+        }
+        let network = options.faults.map(Network::new).transpose()?;
+        let flawed = options.flaws.map(|flaws| Flawed::new(flaws, array)).transpose()?;
+        let sender = Sender::open_from(options.source_port, options.to, options.segment)?;
+        let line = options.line.as_ref().map(|(link, baud)| Line::open(link, *baud)).transpose()?;
+        let control = Control::open(options.control, line, &board)?;
+        let sync = options.sync.as_ref().map(|(path, overwrite)| Sync::open(path, *overwrite)).transpose()?;
+        Ok(Self { board, array: array.clone(), sender, control, sync, network, flawed, options })
     }
 
     /// Where commands are taken, if anywhere.
     #[must_use]
     pub fn control_address(&self) -> Option<SocketAddr> {
-        self.control.as_ref().map(Control::address)
+        self.control.address()
     }
 
     /// Plays `touch` to its end, or until `stop`, which is no error; `watch` gets a report ten times a second.
@@ -116,7 +191,12 @@ impl Emulator {
     ///
     /// `Socket` where the system refuses to send.
     #[allow(clippy::cast_possible_truncation)]
-    pub fn run(&mut self, touch: &mut dyn Touch, mut watch: impl FnMut(&Report), stop: Stop<'_>) -> Result<Report> {
+    pub fn run<T: Touch + ?Sized>(
+        &mut self,
+        touch: &mut T,
+        mut watch: impl FnMut(&Report, &mut T),
+        stop: Stop<'_>,
+    ) -> Result<Report> {
         let mut ticks = vec![0; self.array.len()];
         let mut late = Latencies::default();
         let mut schedule = std::mem::take(&mut self.options.commands).into_iter().peekable();
@@ -127,23 +207,62 @@ impl Emulator {
         let started_us = self.board.time_us();
         let began_ns = begun_ns - (started_us * 1e3) as i64;
         let mut report = Report { began_ns, ..Report::default() };
+        let host_s_per_us = 1e-6 / (1.0 + 1e-6 * self.options.drift_ppm);
         let mut due = begun;
+        // The board's time since its start, us: a reset takes the board's own back to 0.
+        let mut before_reset_us = -started_us;
         let (mut looked, mut told) = (begun, begun);
-        while !stop.asked() && touch.frame(&mut ticks) {
+        let mut last = false;
+        while !last {
+            last = stop.asked() || !touch.frame(&mut ticks, stop)? || stop.asked();
+            if last && !(self.options.marks_stop && self.board.registers().record) {
+                break;
+            }
+            if self.options.marks_stop && (last || touch.is_last(stop)?) {
+                self.board.record(false);
+            }
+            let since_us = before_reset_us + self.board.time_us();
+            if let Some(every) = self.options.reset_every_s
+                && since_us >= (report.resets + 1) as f64 * every * 1e6
+            {
+                before_reset_us = since_us;
+                report.resets += 1;
+                self.board.reset()?;
+                self.control.greet(&self.board);
+            }
             let frame = self.board.counts().frames;
             while let Some((_, command)) = schedule.next_if(|(at, _)| *at <= frame) {
                 self.board.command(&command.to_bytes());
             }
-            let sender = &mut self.sender;
+            if let Some(sync) = &mut self.sync {
+                sync.follow(since_us, self.board.registers().record);
+            }
+            if let Some(flawed) = &mut self.flawed
+                && !last
+            {
+                flawed.read(since_us, &mut ticks);
+            }
+            let (sender, network) = (&mut self.sender, &mut self.network);
             let mut sent = Ok(());
+            if frame == 0 && self.options.arms {
+                self.board.arm(&ticks)?;
+                continue;
+            }
             self.board.frame(&ticks, |datagram| {
-                sent = sender.push(datagram);
+                match network {
+                    None => sent = sender.push(datagram),
+                    Some(network) => network.pass(datagram, &mut |out| {
+                        if sent.is_ok() && !out.is_empty() {
+                            sent = sender.push(out);
+                        }
+                    }),
+                }
                 sent.is_ok()
             })?;
             sent?;
             // The board knows how long its frame was: a command may have changed that.
             let before = due;
-            due = begun + Duration::from_secs_f64((self.board.time_us() - started_us) * 1e-6);
+            due = begun + Duration::from_secs_f64((before_reset_us + self.board.time_us()) * host_s_per_us);
             let now = if self.options.real_time { wait_until(due) } else { Instant::now() };
             self.sender.flush()?;
             if self.options.real_time {
@@ -153,25 +272,39 @@ impl Emulator {
             }
             if now.duration_since(looked) >= LOOK_EVERY {
                 looked = now;
-                if let Some(control) = &mut self.control {
-                    control.serve(&mut self.board);
-                }
+                self.control.serve(&mut self.board);
             }
             if now.duration_since(told) >= REPORT_EVERY {
                 told = now;
-                self.complete(&mut report, &late, begun);
-                watch(&report);
+                self.complete(&mut report, &late, begun, started_us + before_reset_us + self.board.time_us());
+                watch(&report, touch);
             }
         }
-        self.complete(&mut report, &late, begun);
+        if let Some(network) = &mut self.network {
+            let mut sent = Ok(());
+            let sender = &mut self.sender;
+            network.flush(&mut |out| {
+                if sent.is_ok() && !out.is_empty() {
+                    sent = sender.push(out);
+                }
+            });
+            sent?;
+            self.sender.flush()?;
+        }
+        if let Some(sync) = &mut self.sync {
+            sync.follow(before_reset_us + self.board.time_us(), self.board.registers().record);
+        }
+        self.complete(&mut report, &late, begun, started_us + before_reset_us + self.board.time_us());
+        watch(&report, touch);
         Ok(report)
     }
 
-    fn complete(&self, report: &mut Report, late: &Latencies, begun: Instant) {
+    fn complete(&self, report: &mut Report, late: &Latencies, begun: Instant, board_us: f64) {
         report.board = *self.board.counts();
         report.sent = self.sender.counts();
+        report.network = self.network.as_ref().map(|network| *network.counts());
         report.late = late.quantiles();
-        report.board_seconds = self.board.time_us() * 1e-6;
+        report.board_seconds = board_us * 1e-6;
         report.seconds = begun.elapsed().as_secs_f64();
     }
 }

@@ -5,6 +5,7 @@ pub mod clock;
 pub mod error;
 pub mod latency;
 mod locked;
+pub mod ports;
 
 pub mod capture;
 pub mod emulate;

@@ -18,7 +18,7 @@ mod shared;
 mod tap;
 
 use std::net::SocketAddr;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -62,8 +62,10 @@ impl Live {
     /// `Socket` where the port is taken, `File` where the file exists or cannot be created, `Core(Problem)` for options
     /// that make no sense.
     pub fn start(address: SocketAddr, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
-        if !(options.guard_frames.is_finite() && options.guard_frames >= 0.0) {
-            return Err(taxel_core::problem!("guard_frames is {}: must be 0 or more", options.guard_frames).into());
+        for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
+            if !(frames.is_finite() && frames >= 0.0) {
+                return Err(taxel_core::problem!("{name} is {frames}: must be 0 or more").into());
+            }
         }
         if options.readout_events == 0 {
             return Err(taxel_core::problem!("readout_events is 0: must be 1 or more").into());
@@ -94,6 +96,7 @@ impl Live {
             registers: Mutex::new(options.registers),
             options: options.clone(),
             begun: Instant::now(),
+            expected: AtomicU8::new(0),
             ended: AtomicBool::new(false),
         });
         let (say, said) = channel::bounded(SAID_WAITING);
@@ -208,6 +211,20 @@ impl Live {
     /// `Core(Problem)` where nothing is recorded that can hold notes, `File` where the disk is full.
     pub fn note(&self, text: &str) -> Result<()> {
         self.shared.note(text)
+    }
+
+    /// Says that the host told the board to speak this version of the wire (a write of REG0): what comes of it is believed
+    /// at once, not after a second.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where there is no such version.
+    pub fn expect_version(&self, version: u8) -> Result<()> {
+        if !(1..=2).contains(&version) {
+            return Err(taxel_core::problem!("wire version {version}: must be 1 or 2").into());
+        }
+        self.shared.expected.store(version, Ordering::Release);
+        Ok(())
     }
 
     /// Asks all threads to end once they have worked through what came; [`Live::stop`] waits for them.

@@ -212,6 +212,34 @@ pub struct Note {
     pub text: String,
 }
 
+/// What became of the board while recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct BoardChange {
+    /// When it was noticed, by the host's clock, ns since 1970.
+    #[serde(skip)]
+    pub at_ns: i64,
+    /// The board's time, us, which goes on over it; where it was known.
+    pub t_us: Option<i64>,
+    /// What.
+    #[serde(flatten)]
+    pub change: Change,
+}
+
+/// What a [`BoardChange`] was.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(tag = "change", rename_all = "lowercase")]
+pub enum Change {
+    /// The board was reset: its taxels hold nothing until they are heard again.
+    Reset,
+    /// It speaks another version of the wire.
+    Wire {
+        /// From here on.
+        version: u8,
+        /// Whether the host told it to; else its datagrams showed it.
+        asked: bool,
+    },
+}
+
 /// The host's clock, ns since 1970.
 #[must_use]
 pub fn now_ns() -> i64 {

@@ -63,7 +63,7 @@ fn sent(frames: u64, pressed: u64) -> Events {
     let mut events = Events::empty(array.clone());
     let mut touch = presses(frames, pressed);
     let mut ticks = vec![0; array.len()];
-    while touch.frame(&mut ticks) {
+    while touch.frame(&mut ticks, Stop::never()).expect("a frame") {
         board
             .frame(&ticks, |datagram| {
                 decoder.push_into(datagram, None, &mut events);
@@ -81,7 +81,7 @@ fn emulate(to: SocketAddr, real_time: bool, mut touch: impl Touch) -> Report {
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
     let options = emulate::EmulatorOptions { real_time, ..emulate::EmulatorOptions::to(to) };
     let mut emulator = Emulator::open(board, &array, options).expect("a socket");
-    emulator.run(&mut touch, |_| {}, Stop::never()).expect("sent")
+    emulator.run(&mut touch, |_, _| {}, Stop::never()).expect("sent")
 }
 
 /// Hears every event and speaks after some forty within `tau` ms, which is how slowly its kernel rises.
@@ -234,7 +234,7 @@ fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
     let mut board = Board::new(Registers::default(), &Array::thesis()).expect("a valid preset");
     let mut touch = presses(800, 800);
     let mut ticks = vec![0; 4096];
-    while touch.frame(&mut ticks) {
+    while touch.frame(&mut ticks, Stop::never()).expect("a frame") {
         board
             .frame(&ticks, |datagram| {
                 datagrams.push(datagram.to_vec());
@@ -346,8 +346,11 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_w
     let options = emulate::EmulatorOptions { commands, ..emulate::EmulatorOptions::to(live.address()) };
     let mut emulator = Emulator::open(board, &array, options).expect("a socket");
     let (mut quiet, mut pressed) = (presses(300, 0), presses(1500, 1000));
-    let mut touch = move |ticks: &mut [u16]| quiet.frame(ticks) || pressed.frame(ticks);
-    let report = emulator.run(&mut touch, |_| {}, Stop::never()).expect("sent");
+    let mut touch = move |ticks: &mut [u16]| {
+        let never = Stop::never();
+        quiet.frame(ticks, never).expect("a frame") || pressed.frame(ticks, never).expect("a frame")
+    };
+    let report = emulator.run(&mut touch, |_, _| {}, Stop::never()).expect("sent");
     let mut said = vec![];
     while let Some(next) = live.next(Duration::from_millis(500)).expect("a sound way") {
         said.push(next.detection);
@@ -378,7 +381,7 @@ fn the_board_takes_commands_and_answers() {
     let stop = std::sync::atomic::AtomicBool::new(false);
     let asked = || stop.load(std::sync::atomic::Ordering::Relaxed);
     std::thread::scope(|scope| {
-        let board = scope.spawn(|| emulator.run(&mut presses(u64::MAX, 0), |_| {}, Stop::when(&asked)));
+        let board = scope.spawn(|| emulator.run(&mut presses(u64::MAX, 0), |_, _| {}, Stop::when(&asked)));
         let mut cable = TcpStream::connect(address).expect("the board listens");
         let mut lines = BufReader::new(cable.try_clone().expect("a handle")).lines();
         let mut answer = |command: Option<(u8, u32)>| {

@@ -79,7 +79,7 @@ fn wait_for(live: &Live, what: impl Fn(&Live) -> bool) {
 fn decoded(array: &Array, datagrams: &[Vec<u8>]) -> Events {
     let (mut events, mut decoder) = (Events::empty(array.clone()), v2::Decoder::new(array.clone()));
     for datagram in datagrams {
-        decoder.push(datagram, None, &mut events, &mut vec![]);
+        decoder.push(datagram, None, &mut events);
     }
     events
 }

@@ -47,7 +47,7 @@ fn record(path: &Path, datagrams: u64, compression: Compression) {
     }
     writer.note(1_000_000_000_500, Some(192), "left heel").unwrap();
     writer.marker(1_000_000_000_600, Marker { t: 384, start: true }).unwrap();
-    let said = Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5 };
+    let said = Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5, repaired: true };
     writer.detection(1_000_000_000_700, &said).unwrap();
     writer.registers(1_000_000_000_800, &header().registers.unwrap()).unwrap();
     writer.picture(1_000_000_000_900, 192, 64, &vec![75; 4096]).unwrap();
@@ -87,7 +87,10 @@ fn what_was_written_is_read_back_with_any_compression() {
         assert_eq!(remarks.notes[0].text, "left heel");
         assert_eq!(remarks.notes[0].t_us, Some(192));
         assert_eq!(remarks.markers, vec![Marker { t: 384, start: true }]);
-        assert_eq!(remarks.detections[0].1, Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5 });
+        assert_eq!(
+            remarks.detections[0].1,
+            Detection { label: "contact".to_owned(), t: 100, known: 192, slope: 1.5, repaired: true }
+        );
         assert_eq!(remarks.registers[0].1, header().registers.unwrap());
         assert_eq!((remarks.datagrams, remarks.datagram_bytes, remarks.pictures), (3000, 4_200_000, 1));
         let Some(Ending::Finished { counts, verdict }) = reader.ending() else { panic!("not finished") };

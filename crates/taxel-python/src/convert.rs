@@ -38,7 +38,7 @@ pub(crate) fn from_array(array: &Array) -> ArrayParts {
     (array.rows, array.columns, array.pitch_mm, array.name.clone(), array.exists.clone())
 }
 
-/// Events as Python hands them over: array, t, x, y, p, intensity, present, markers as (t, start).
+/// Events as Python hands them over: array, t, x, y, p, intensity with present, repaired, markers as (t, start).
 pub(crate) type EventsIn<'py> = (
     ArrayParts,
     PyReadonlyArray1<'py, i64>,
@@ -46,6 +46,7 @@ pub(crate) type EventsIn<'py> = (
     PyReadonlyArray1<'py, u16>,
     PyReadonlyArray1<'py, bool>,
     Option<(PyReadonlyArray1<'py, u16>, PyReadonlyArray1<'py, bool>)>,
+    Option<PyReadonlyArray1<'py, bool>>,
     Vec<(i64, bool)>,
 );
 
@@ -57,12 +58,13 @@ pub(crate) struct EventsHeld<'py> {
     y: PyReadonlyArray1<'py, u16>,
     p: PyReadonlyArray1<'py, bool>,
     intensity: Option<(PyReadonlyArray1<'py, u16>, PyReadonlyArray1<'py, bool>)>,
+    repaired: Option<PyReadonlyArray1<'py, bool>>,
     markers: Vec<Marker>,
 }
 
-pub(crate) fn to_events((parts, t, x, y, p, intensity, markers): EventsIn<'_>) -> PyResult<EventsHeld<'_>> {
+pub(crate) fn to_events((parts, t, x, y, p, intensity, repaired, markers): EventsIn<'_>) -> PyResult<EventsHeld<'_>> {
     let markers = markers.into_iter().map(|(t, start)| Marker { t, start }).collect();
-    Ok(EventsHeld { array: to_array(parts)?, t, x, y, p, intensity, markers })
+    Ok(EventsHeld { array: to_array(parts)?, t, x, y, p, intensity, repaired, markers })
 }
 
 impl EventsHeld<'_> {
@@ -80,6 +82,7 @@ impl EventsHeld<'_> {
                     Some(IntensitiesView { ticks: slice("intensity", ticks)?, present: slice("present", present)? })
                 }
             },
+            repaired: self.repaired.as_ref().map(|column| slice("repaired", column)).transpose()?,
             markers: &self.markers,
         })
     }
@@ -114,6 +117,7 @@ pub(crate) type EventsOut<'py> = (
     Bound<'py, PyArray1<u16>>,
     Bound<'py, PyArray1<bool>>,
     Option<(Bound<'py, PyArray1<u16>>, Bound<'py, PyArray1<bool>>)>,
+    Option<Bound<'py, PyArray1<bool>>>,
     Vec<(i64, bool)>,
 );
 
@@ -125,6 +129,7 @@ pub(crate) fn from_events(py: Python<'_>, events: Events) -> EventsOut<'_> {
         array(py, events.y),
         array(py, events.p),
         events.intensity.map(|i| (array(py, i.ticks), array(py, i.present))),
+        events.repaired.map(|column| array(py, column)),
         events.markers.iter().map(|m| (m.t, m.start)).collect(),
     )
 }

@@ -10,32 +10,46 @@ use crate::enter::{Shared, enter};
 use crate::errors::{ProblemError, core};
 use crate::parameters::parsed;
 
-/// Detections as Python hands them over: labels, t and known in us, slope in mV/ms.
-pub(crate) type DetectionsIn<'py> =
-    (Vec<String>, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f64>);
+/// Detections as Python hands them over: labels, t and known in us, slope in mV/ms, repaired.
+pub(crate) type DetectionsIn<'py> = (
+    Vec<String>,
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray1<'py, i64>,
+    PyReadonlyArray1<'py, f64>,
+    PyReadonlyArray1<'py, bool>,
+);
 
-pub(crate) fn to_detections((labels, t, known, slope): DetectionsIn<'_>) -> PyResult<Vec<Detection>> {
+pub(crate) fn to_detections((labels, t, known, slope, repaired): DetectionsIn<'_>) -> PyResult<Vec<Detection>> {
     let (t, known, slope) = (slice("t", &t)?, slice("known", &known)?, slice("slope", &slope)?);
-    for (name, len) in [("t", t.len()), ("known", known.len()), ("slope", slope.len())] {
+    let repaired = slice("repaired", &repaired)?;
+    for (name, len) in [("t", t.len()), ("known", known.len()), ("slope", slope.len()), ("repaired", repaired.len())] {
         if len != labels.len() {
             let text = format!("detections: {name} has {len} entries, label has {}: they must be equal", labels.len());
             return Err(ProblemError::new_err(text));
         }
     }
-    let columns = labels.into_iter().zip(t).zip(known).zip(slope);
-    Ok(columns.map(|(((label, &t), &known), &slope)| Detection { label, t, known, slope }).collect())
+    let columns = labels.into_iter().zip(t).zip(known).zip(slope).zip(repaired);
+    Ok(columns
+        .map(|((((label, &t), &known), &slope), &repaired)| Detection { label, t, known, slope, repaired })
+        .collect())
 }
 
 /// Detections as Python gets them: the same parts.
-type DetectionsOut<'py> =
-    (Vec<String>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<f64>>);
+type DetectionsOut<'py> = (
+    Vec<String>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<bool>>,
+);
 
 fn from_detections(py: Python<'_>, found: Vec<Detection>) -> DetectionsOut<'_> {
     let t = found.iter().map(|d| d.t).collect();
     let known = found.iter().map(|d| d.known).collect();
     let slope = found.iter().map(|d| d.slope).collect();
+    let repaired = found.iter().map(|d| d.repaired).collect();
     let labels = found.into_iter().map(|d| d.label).collect();
-    (labels, array(py, t), array(py, known), array(py, slope))
+    (labels, array(py, t), array(py, known), array(py, slope), array(py, repaired))
 }
 
 /// One label's tally: label, pairs as two columns, missed, false, false within a window, errors and delays in ms.

@@ -29,6 +29,7 @@ struct Chosen {
     registers: Value,
     differences: bool,
     guard_frames: f64,
+    gap_frames: f64,
     readout_events: Option<usize>,
     kernel_buffer_bytes: Option<usize>,
     queue_bytes: Option<usize>,
@@ -44,12 +45,12 @@ impl Chosen {
     }
 }
 
-/// Label, t, known, slope, said (us of the board's clock), said (ns of the host's clock).
-type SaidParts = (String, i64, i64, f64, i64, i64);
+/// Label, t, known, slope, said (us of the board's clock), said (ns of the host's clock), repaired.
+type SaidParts = (String, i64, i64, f64, i64, i64, bool);
 
 fn said_parts(said: Said) -> SaidParts {
     let d = said.detection;
-    (d.label, d.t, d.known, d.slope, said.said, said.said_ns)
+    (d.label, d.t, d.known, d.slope, said.said, said.said_ns, d.repaired)
 }
 
 /// Datagrams to detections, as they come.
@@ -114,6 +115,7 @@ impl Live {
             registers: chosen.registers(&usual.array)?,
             differences: chosen.differences,
             guard_frames: chosen.guard_frames,
+            gap_frames: chosen.gap_frames,
             readout_events: chosen.readout_events.unwrap_or(usual.readout_events),
             capture: capture::ReceiverOptions {
                 kernel_buffer_bytes: chosen.kernel_buffer_bytes.unwrap_or(usual.capture.kernel_buffer_bytes),
@@ -186,6 +188,11 @@ impl Live {
         self.with(py, |pipeline| pipeline.note(text))
     }
 
+    /// Says that the host told the board to speak this version of the wire.
+    fn expect_version(&self, py: Python<'_>, version: u8) -> PyResult<()> {
+        self.with(py, |pipeline| pipeline.expect_version(version))
+    }
+
     /// Ends; gives counters, verdict and path as JSON, or None where it had ended before.
     fn stop(&self, py: Python<'_>) -> PyResult<Option<String>> {
         enter(py, |_| {
@@ -203,6 +210,13 @@ impl Drop for Live {
         // Its threads may be about to call a Python function: they must be able to, or they never end.
         Python::attach(|py| py.detach(|| drop(pipeline)));
     }
+}
+
+/// The serial ports that the system knows, as JSON.
+#[pyfunction]
+fn serial_ports(py: Python<'_>) -> PyResult<String> {
+    let ports = enter(py, |_| taxel_live::ports::ports())?;
+    Ok(json!(ports).to_string())
 }
 
 /// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; gives what was sent as JSON.
@@ -228,5 +242,6 @@ fn send(
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Live>()?;
+    module.add_function(wrap_pyfunction!(serial_ports, module)?)?;
     module.add_function(wrap_pyfunction!(send, module)?)
 }

@@ -9,16 +9,25 @@ use serde_json::json;
 use taxel_core::detect::Detection;
 use taxel_core::{Marker, problem, wire};
 use taxel_live::clock::BoardClock;
-use taxel_live::recording::{Counts, Header, LsaWriter, Reader, Writer, WriterOptions, decode_lsa, numbered};
+use taxel_live::recording::{
+    BoardChange, Counts, Header, LsaWriter, Reader, Writer, WriterOptions, decode_lsa, numbered,
+};
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
 use crate::enter::{Shared, enter};
 use crate::errors::core;
 use crate::parameters::parsed;
 
-/// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram.
-type DecodedOut<'py> =
-    (EventsOut<'py>, String, u64, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<u64>>);
+/// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram; counts of version 2 as JSON.
+type DecodedOut<'py> = (
+    EventsOut<'py>,
+    String,
+    u64,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<u64>>,
+    String,
+);
 
 /// Arrival ns, number, where each begins, all bytes.
 type DatagramsOut<'py> =
@@ -46,10 +55,12 @@ impl RecordingReader {
     /// Registers, notes, detections, counts, sizes: JSON.
     fn remarks(&self, py: Python<'_>) -> PyResult<String> {
         let (all, bad_chunks) = enter(py, |stop| self.reader.remarks(stop))?;
-        let detections: Vec<_> = all.detections.iter().map(|(at, d)| (at, &d.label, d.t, d.known, d.slope)).collect();
+        let detections: Vec<_> =
+            all.detections.iter().map(|(at, d)| (at, &d.label, d.t, d.known, d.slope, d.repaired)).collect();
         let markers: Vec<_> = all.markers.iter().map(|m| (m.t, m.start)).collect();
         let said = json!({
             "registers": all.registers, "markers": markers, "notes": all.notes, "detections": detections,
+            "board": all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>(),
             "counts": all.counts, "datagrams": all.datagrams, "datagram_bytes": all.datagram_bytes,
             "arrivals": all.arrivals, "pictures": all.pictures, "bad_chunks": bad_chunks,
         });
@@ -67,6 +78,7 @@ impl RecordingReader {
             array(py, decoded.arrived_ns),
             array(py, decoded.number),
             array(py, decoded.first),
+            json!(decoded.version_2).to_string(),
         ))
     }
 
@@ -132,6 +144,7 @@ impl RecordingWriter {
     }
 
     /// Keeps a detection.
+    #[expect(clippy::too_many_arguments, reason = "Python names them")]
     fn detection(
         &self,
         py: Python<'_>,
@@ -140,9 +153,16 @@ impl RecordingWriter {
         t_us: i64,
         known_us: i64,
         slope: f64,
+        repaired: bool,
     ) -> PyResult<()> {
-        let said = Detection { label, t: t_us, known: known_us, slope };
+        let said = Detection { label, t: t_us, known: known_us, slope, repaired };
         self.with(py, |writer| writer.detection(at_ns, &said))
+    }
+
+    /// Keeps a reset of the board or a change of its version of the wire, given as JSON.
+    fn board_change(&self, py: Python<'_>, at_ns: i64, change: &str) -> PyResult<()> {
+        let change: BoardChange = parsed("change", change)?;
+        self.with(py, |writer| writer.board_change(&BoardChange { at_ns, ..change }))
     }
 
     /// Keeps registers, given as JSON.

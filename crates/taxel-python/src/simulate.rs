@@ -1,21 +1,28 @@
 //! Simulated touch, and the board that feels it, as fast as it goes.
 
-use numpy::{PyArray1, PyReadonlyArray1};
-use pyo3::prelude::*;
-use taxel_core::board::{Armed, Play, Played};
-use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor};
-use taxel_core::wire::Registers;
-use taxel_core::{Error, Result, reading};
-use taxel_live::address::of_text;
-use taxel_live::emulate::{Emulator, EmulatorOptions, Report};
+use std::os::fd::BorrowedFd;
+use std::path::PathBuf;
 
-use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
-use crate::enter::{enter, enter_telling};
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyStopIteration;
+use pyo3::prelude::*;
+use serde::Deserialize;
+use taxel_core::board::{Board, Faults, Flaws, IntensityWord, Play, Played, Previous, Version2, opening};
+use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor, Taxels};
+use taxel_core::wire::Registers;
+use taxel_core::{Array, Error, Result, Stop, reading};
+use taxel_live::address::of_text;
+use taxel_live::capture::Sender;
+use taxel_live::emulate::{Emulator, EmulatorOptions, Feed, Replay, Report, Scenes, Touch};
+
+use crate::convert::{ArrayParts, EventsIn, EventsOut, array, from_events, slice, to_array, to_events};
+use crate::enter::{Shared, enter, enter_telling};
 use crate::errors::core;
+use crate::parameters::parsed;
 
 /// An act as Python hands it over: silence in ms, a scene as JSON, or pictures with their period in us.
 #[derive(FromPyObject)]
-pub(crate) enum ActIn<'py> {
+enum ActIn<'py> {
     Silence(f64),
     Ball(String),
     Pictures(PyReadonlyArray1<'py, f32>, f64),
@@ -25,18 +32,18 @@ fn scene(json: &str) -> Result<Scene> {
     reading::from_text(json).map_err(|unfit| Error::Scene(unfit.of("scene")))
 }
 
+fn to_act(act: ActIn<'_>) -> PyResult<Act> {
+    Ok(match act {
+        ActIn::Silence(ms) => Act::Silence { ms },
+        ActIn::Ball(json) => Act::Ball(scene(&json).map_err(core)?),
+        ActIn::Pictures(values, period_us) => {
+            Act::Pictures(Pictures { values: slice("values", &values)?.to_vec(), period_us })
+        }
+    })
+}
+
 fn to_acts(acts: Vec<ActIn<'_>>) -> PyResult<Vec<Act>> {
-    acts.into_iter()
-        .map(|act| {
-            Ok(match act {
-                ActIn::Silence(ms) => Act::Silence { ms },
-                ActIn::Ball(json) => Act::Ball(scene(&json).map_err(core)?),
-                ActIn::Pictures(values, period_us) => {
-                    Act::Pictures(Pictures { values: slice("values", &values)?.to_vec(), period_us })
-                }
-            })
-        })
-        .collect()
+    acts.into_iter().map(to_act).collect()
 }
 
 fn to_sensor(json: &str) -> PyResult<Sensor> {
@@ -107,48 +114,197 @@ fn play<'py>(
     Ok((from_events(py, events), datagrams, words))
 }
 
-/// Plays acts to a board that arms, is tared and starts, in real time, and sends its datagrams to `to`; gives the report.
+/// What an emulated board feels, as Python hands it over.
+#[derive(FromPyObject)]
+enum TouchIn<'py> {
+    /// Events and the speed at which they are played.
+    Events(EventsIn<'py>, f64),
+    /// us, ticks, speed.
+    Pictures(PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, u16>, f64),
+    /// A descriptor to read from, bytes that were read from it already, shift, most.
+    Pipe(i32, Vec<u8>, u32, u16),
+    /// An iterator of acts.
+    Acts(Py<PyAny>),
+}
+
+/// How an emulated board works.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Chosen {
+    registers: Registers,
+    /// The board arms, is tared for so long, marks a start and at the end a stop; none where it does none of that.
+    tare_ms: Option<f64>,
+    previous: Previous,
+    intensity: IntensityWord,
+    version_2: Version2,
+    control: Option<String>,
+    line: Option<(PathBuf, u32)>,
+    sync: Option<(PathBuf, bool)>,
+    faults: Option<Faults>,
+    flaws: Option<Flaws>,
+    reset_every_s: Option<f64>,
+    drift_ppm: f64,
+    source_port: u16,
+}
+
+/// Takes acts from a Python iterator, one at a time.
+struct Acts(Py<PyAny>);
+
+impl Iterator for Acts {
+    type Item = taxel_live::Result<Act>;
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let act = Python::attach(|py| {
+            let next = self.0.bind(py).call_method0("__next__");
+            match next {
+                Err(error) if error.is_instance_of::<PyStopIteration>(py) => None,
+                Err(error) => Some(Err(error)),
+                Ok(act) => Some(act.extract::<ActIn<'_>>().map_err(PyErr::from).and_then(to_act)),
+            }
+        })?;
+        // What Python raised is raised again as it was.
+        Some(act.map_err(|error| taxel_live::Error::Sink(std::io::Error::other(error))))
+    }
+}
+
+/// A touch of any kind; of acts the touches that are known are told.
+enum Felt {
+    Scenes(Box<Scenes>),
+    Other(Box<dyn Touch>),
+}
+
+impl Touch for Felt {
+    fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> taxel_live::Result<bool> {
+        match self {
+            Self::Scenes(scenes) => scenes.frame(ticks, stop),
+            Self::Other(touch) => touch.frame(ticks, stop),
+        }
+    }
+
+    fn is_last(&mut self, stop: Stop<'_>) -> taxel_live::Result<bool> {
+        match self {
+            Self::Scenes(scenes) => scenes.is_last(stop),
+            Self::Other(touch) => touch.is_last(stop),
+        }
+    }
+}
+
+/// Lets an emulated board feel something and send its datagrams to `to`, in real time (frames of a pipe as they come); gives
+/// the report.
 ///
-/// `wire` is the version of the wire that it speaks; `control` is where the board takes commands by TCP; `begun` hears that address once the board is ready, `watch` a
-/// report, as JSON, ten times a second. What either raises ends the play.
+/// `options` is JSON. `begun` hears where commands are taken once the board is ready, `watch` a report, as JSON, and the
+/// touches that became known, ten times a second. What either raises ends the play.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 fn emulate(
     py: Python<'_>,
     to: &str,
     parts: ArrayParts,
-    preset: &str,
     sensor: &str,
     seed: u64,
-    acts: Vec<ActIn<'_>>,
-    tare_ms: f64,
-    wire: u8,
-    control: Option<&str>,
+    touch: TouchIn<'_>,
+    options: &str,
     begun: Py<PyAny>,
     watch: Py<PyAny>,
 ) -> PyResult<String> {
-    let (array, acts, sensor) = (to_array(parts)?, to_acts(acts)?, to_sensor(sensor)?);
-    let registers = Registers { wire_version: wire, ..Registers::preset(preset).map_err(core)? };
-    let (to, control) = enter(py, |_| Ok::<_, taxel_live::Error>((of_text(to)?, control.map(of_text).transpose()?)))?;
+    let array = to_array(parts)?;
+    let chosen: Chosen = parsed("options", options)?;
+    let Chosen { registers, tare_ms, version_2, previous, intensity, .. } = chosen;
+    let (frame_us, step) = (registers.frame_us(), u16::from(registers.noise_floor) + 1);
+    let real_time = !matches!(touch, TouchIn::Pipe(..));
+    let sensor = to_sensor(sensor)?;
+    let mut touch = match touch {
+        TouchIn::Acts(iterator) => {
+            let taxels = Taxels::new(&sensor, array.len(), registers.ramp, seed).map_err(core)?;
+            Felt::Scenes(Box::new(enter(py, |_| Scenes::new(&array, taxels, frame_us, Acts(iterator)))?))
+        }
+        TouchIn::Events(events, speed) => {
+            let events = to_events(events)?;
+            let events = events.view()?;
+            Felt::Other(Box::new(enter(py, |_| Replay::events(events, (frame_us, speed), step, registers.ramp))?))
+        }
+        TouchIn::Pictures(t, values, speed) => {
+            let (t, values) = (slice("t", &t)?.to_vec(), slice("values", &values)?.to_vec());
+            Felt::Other(Box::new(enter(py, |_| Replay::pictures(&array, t, values, frame_us, speed))?))
+        }
+        TouchIn::Pipe(descriptor, ahead, shift, most) => {
+            // SAFETY: Python has the descriptor open as long as this call lasts; the copy is ours.
+            let from = unsafe { BorrowedFd::borrow_raw(descriptor) }.try_clone_to_owned()?;
+            Felt::Other(Box::new(Feed::new(from.into(), ahead, shift, most)))
+        }
+    };
     enter_telling(py, |stop, teller| {
-        let Armed { board, mut stage, commands } =
-            Play { array: array.clone(), registers, sensor, seed, acts, tare_ms }.arm()?;
-        let options = EmulatorOptions { control, commands, ..EmulatorOptions::to(to) };
+        let board = Board::new(registers, &array)?.previous(previous).intensity(intensity).version_2(version_2)?;
+        let options = EmulatorOptions {
+            real_time,
+            control: chosen.control.as_deref().map(of_text).transpose()?,
+            line: chosen.line,
+            sync: chosen.sync,
+            commands: tare_ms.map_or(Ok(vec![]), |tare_ms| opening(&registers, tare_ms))?,
+            arms: tare_ms.is_some(),
+            marks_stop: tare_ms.is_some(),
+            faults: chosen.faults,
+            flaws: chosen.flaws,
+            reset_every_s: chosen.reset_every_s,
+            drift_ppm: chosen.drift_ppm,
+            source_port: chosen.source_port,
+            ..EmulatorOptions::to(of_text(to)?)
+        };
         let mut emulator = Emulator::open(board, &array, options)?;
         let control = emulator.control_address().map(|a| a.to_string());
         teller.tell(Some(&begun), |py, told| told.call1(py, (control,)));
-        let mut failed = Ok(());
-        let mut touch = |ticks: &mut [u16]| {
-            stage.frame(ticks).unwrap_or_else(|error| {
-                failed = Err(error);
-                false
-            })
-        };
-        let say = |report: &Report| teller.tell(Some(&watch), |py, told| told.call1(py, (json(report),)));
-        let report = emulator.run(&mut touch, say, stop)?;
-        failed?;
+        let report = emulator.run(
+            &mut touch,
+            |report, touch| {
+                let contacts = match touch {
+                    Felt::Scenes(scenes) => from_contacts(&scenes.take_contacts()),
+                    Felt::Other(_) => vec![],
+                };
+                teller.tell(Some(&watch), |py, told| told.call1(py, (json(report), contacts)));
+            },
+            stop,
+        )?;
         Ok::<_, taxel_live::Error>(json(&report))
     })
+}
+
+/// A board that scans frames as they are pushed, and sends what it makes of them.
+#[pyclass(frozen, module = "taxel._core")]
+struct Source(Shared<(Board, Sender)>);
+
+#[pymethods]
+impl Source {
+    /// `registers` and `version_2` are JSON.
+    #[new]
+    fn new(py: Python<'_>, to: &str, parts: ArrayParts, registers: &str, version_2: &str) -> PyResult<Self> {
+        let (array, registers): (Array, Registers) = (to_array(parts)?, parsed("registers", registers)?);
+        let version_2: Version2 = parsed("version 2", version_2)?;
+        let board = Board::new(registers, &array).map_err(core)?.version_2(version_2).map_err(core)?;
+        let sender = enter(py, |_| Sender::open(of_text(to)?, true))?;
+        Ok(Self(Shared::new((board, sender))))
+    }
+
+    /// Scans a frame and sends its events; gives how many there were.
+    fn push(&self, py: Python<'_>, ticks: PyReadonlyArray1<'_, u16>) -> PyResult<u64> {
+        let ticks = slice("ticks", &ticks)?;
+        self.0.enter(py, |(board, sender), _| {
+            let before = board.counts().changes;
+            let mut sent = Ok(());
+            board.frame(ticks, |datagram| {
+                sent = sender.push(datagram);
+                sent.is_ok()
+            })?;
+            sent?;
+            sender.flush()?;
+            Ok::<_, taxel_live::Error>(board.counts().changes - before)
+        })
+    }
+
+    /// The counts as JSON.
+    fn counts(&self, py: Python<'_>) -> PyResult<String> {
+        let counts = self.0.look(py, |(board, _)| *board.counts());
+        serde_json::to_string(&counts).map_err(|error| core(Error::Scene(error.to_string())))
+    }
 }
 
 fn json(report: &Report) -> String {
@@ -161,5 +317,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(motion, module)?)?;
     module.add_function(wrap_pyfunction!(truth, module)?)?;
     module.add_function(wrap_pyfunction!(play, module)?)?;
+    module.add_class::<Source>()?;
     module.add_function(wrap_pyfunction!(emulate, module)?)
 }

@@ -4,7 +4,7 @@ use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use taxel_core::Error;
-use taxel_core::board::{Board, IntensityWord, Previous};
+use taxel_core::board::{Board, IntensityWord, Previous, Version2};
 use taxel_core::wire::{self, Command, Counts, Decoder, Filled, Pairing, Registers, Room};
 
 use crate::convert::{ArrayParts, EventsIn, EventsOut, from_events, slice, to_array, to_events};
@@ -132,6 +132,13 @@ fn registers_at_reset(array: ArrayParts, channels: u8) -> PyResult<String> {
     to_json(&Registers::at_reset(&to_array(array)?, channels))
 }
 
+/// What a board holds that scans another sensor's frames, as JSON, and by how many bits values are shifted down.
+#[pyfunction]
+fn registers_of_source(array: ArrayParts, rate_hz: f64, bits: u32) -> PyResult<(String, u32)> {
+    let (registers, shift) = Registers::of_source(&to_array(array)?, rate_hz, bits).map_err(core)?;
+    Ok((to_json(&registers)?, shift))
+}
+
 /// Sets fields by name, in the registers' own units; returns the new set as JSON.
 ///
 /// All are set before the rules are checked, so that their order does not matter.
@@ -171,13 +178,28 @@ struct WireBoard(Shared<Board>);
 
 #[pymethods]
 impl WireBoard {
+    /// `version_2` is JSON.
     #[new]
-    fn new(registers: &str, array: ArrayParts, previous: &str, intensity: &str, queue: usize) -> PyResult<Self> {
+    fn new(
+        registers: &str,
+        array: ArrayParts,
+        previous: &str,
+        intensity: &str,
+        queue: usize,
+        version_2: &str,
+    ) -> PyResult<Self> {
+        let version_2: Version2 = parsed("version 2", version_2)?;
         let registers: Registers = parsed("registers", registers)?;
         let previous: Previous = parsed("previous", &format!("{previous:?}"))?;
         let intensity: IntensityWord = parsed("intensity", &format!("{intensity:?}"))?;
         let board = Board::new(registers, &to_array(array)?).map_err(core)?;
-        Ok(Self(Shared::new(board.previous(previous).intensity(intensity).queue(queue))))
+        let board = board.previous(previous).intensity(intensity).queue(queue);
+        Ok(Self(Shared::new(board.version_2(version_2).map_err(core)?)))
+    }
+
+    /// Resets the board.
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        self.0.enter(py, |board, _| board.reset())
     }
 
     fn greeting(&self, py: Python<'_>) -> String {
@@ -242,6 +264,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(registers_presets, module)?)?;
     module.add_function(wrap_pyfunction!(registers_fields, module)?)?;
     module.add_function(wrap_pyfunction!(registers_at_reset, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_of_source, module)?)?;
     module.add_function(wrap_pyfunction!(registers_preset, module)?)?;
     module.add_function(wrap_pyfunction!(registers_with, module)?)?;
     module.add_function(wrap_pyfunction!(registers_check, module)?)?;

@@ -7,11 +7,11 @@ use taxel_core::wire::v2::{Decoder, Heard, StreamReader};
 use taxel_core::{Error, Events};
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
-use crate::enter::Shared;
+use crate::enter::{Shared, enter};
 use crate::parameters::to_json;
 
-/// Events, whether each was repaired, and of the last datagram: until when nothing comes any more, and whether it was decoded.
-type HeardOut<'py> = (EventsOut<'py>, Bound<'py, PyArray1<bool>>, Option<i64>, bool);
+/// Events, and of the last datagram: until when nothing comes any more, and whether it was decoded.
+type HeardOut<'py> = (EventsOut<'py>, Option<i64>, bool);
 
 /// Turns one board's datagrams into events.
 #[pyclass(frozen, module = "taxel._core")]
@@ -32,16 +32,16 @@ impl DatagramDecoder {
         arrived: Option<i64>,
     ) -> PyResult<HeardOut<'py>> {
         let bytes = slice("datagram", &datagram)?;
-        let (events, repaired, heard) = self.0.enter(py, |decoder, _| {
-            let (mut events, mut repaired) = (Events::empty(decoder.array().clone()), vec![]);
-            let heard = decoder.push(bytes, arrived, &mut events, &mut repaired);
-            Ok::<_, Error>((events, repaired, heard))
+        let (events, heard) = self.0.enter(py, |decoder, _| {
+            let mut events = Events::empty(decoder.array().clone());
+            let heard = decoder.push(bytes, arrived, &mut events);
+            Ok::<_, Error>((events, heard))
         })?;
         let (until, intact) = match heard {
             Heard::Intact { until, .. } => (until, true),
             Heard::Repeated | Heard::Refused(_) => (None, false),
         };
-        Ok((from_events(py, events), array(py, repaired), until, intact))
+        Ok((from_events(py, events), until, intact))
     }
 
     /// The counts as JSON.
@@ -59,6 +59,31 @@ impl DatagramDecoder {
         let held = |decoder: &mut Decoder| decoder.held().iter().map(|held| held.map_or(-1, i32::from)).collect();
         array(py, self.0.look(py, held))
     }
+}
+
+/// Decodes a whole stream of datagrams, each behind its length; events, counts as JSON, bytes that belonged to none.
+#[pyfunction]
+fn decode_datagrams<'py>(
+    py: Python<'py>,
+    data: PyReadonlyArray1<'_, u8>,
+    sensor: ArrayParts,
+) -> PyResult<(EventsOut<'py>, String, u64)> {
+    /// Bytes between two looks at Ctrl-C: some milliseconds of work.
+    const PIECE: usize = 1 << 20;
+    let (bytes, sensor) = (slice("data", &data)?, to_array(sensor)?);
+    let (events, counts, skipped) = enter(py, |stop| {
+        let (mut reader, mut decoder) = (StreamReader::default(), Decoder::new(sensor.clone()));
+        let mut events = Events::empty(sensor);
+        for piece in bytes.chunks(PIECE) {
+            stop.check()?;
+            reader.push(piece, |datagram| {
+                decoder.push(datagram, None, &mut events);
+            });
+        }
+        reader.finish();
+        Ok::<_, Error>((events, decoder.counts(), reader.skipped()))
+    })?;
+    Ok((from_events(py, events), to_json(&counts)?, skipped))
 }
 
 /// Cuts a stream into datagrams.
@@ -90,5 +115,6 @@ impl DatagramStream {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<DatagramDecoder>()?;
-    module.add_class::<DatagramStream>()
+    module.add_class::<DatagramStream>()?;
+    module.add_function(wrap_pyfunction!(decode_datagrams, module)?)
 }

@@ -90,6 +90,7 @@ for _command in (
     "cut",
     "demo",
     "detect",
+    "device",
     "emulate",
     "encode",
     "export",

@@ -128,10 +128,8 @@ def _result(
         {
             "recording": one.name,
             "detections": [
-                {"label": str(label), "t_us": int(t), "known_us": int(known), "slope_mv_per_ms": float(slope)}
-                for label, t, known, slope in zip(
-                    one.found.label, one.found.t, one.found.known, one.found.slope, strict=True
-                )
+                {"label": d.label, "t_us": d.t, "known_us": d.known, "slope_mv_per_ms": d.slope, "repaired": d.repaired}
+                for d in one.found
             ],
         }
         | ({} if one.score is None else {"score": one.score.to_dict()})
@@ -149,8 +147,10 @@ def _table(heard: Sequence[_Heard]) -> str:
     if len(heard) == 1:
         return heard[0].found._csv()
     lines: list[str] = []
+    # One header for all.
+    repaired = any(one.found.repaired.any() for one in heard)
     for one in heard:
-        head, *rows = one.found._csv().splitlines()
+        head, *rows = one.found._csv(repaired=repaired).splitlines()
         name = '"' + Path(one.name).name.replace('"', '""') + '"'
         lines += [*([] if lines else [f"recording,{head}"]), *(f"{name},{row}" for row in rows)]
     return "\n".join(lines) + "\n"

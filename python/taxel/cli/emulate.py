@@ -1,23 +1,27 @@
-"""``taxel emulate``: the demo's board alone."""
+"""``taxel emulate``: a board without a board."""
 
 from __future__ import annotations
 
 import json
 import secrets
+import sys
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from taxel._core import ProblemError
+from taxel._opening import open_any
 from taxel.cli._app import app
-from taxel.demo.script import TRAINING_SEED, script
-from taxel.simulate import Contact, EmulatorReport, truth
+from taxel.demo.script import TRAINING_SEED, endless, script
+from taxel.simulate import Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Version2
 from taxel.simulate import emulate as run
+from taxel.wire import Registers
 
 __all__ = ["emulate"]
 
@@ -26,88 +30,229 @@ __all__ = ["emulate"]
 def emulate(
     port: Annotated[int, typer.Option(min=1, max=65_535, help="Where the datagrams go.")] = 5208,
     host: Annotated[str, typer.Option(help="To which machine, by name or address.")] = "127.0.0.1",
-    scenes: Annotated[int, typer.Option(min=0, help="How many scenes.")] = 10,
+    scenes: Annotated[int | None, typer.Option(min=0, help="How many scenes; else until Ctrl-C.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Draws scenes, taxels, noise.")] = None,
+    replay: Annotated[Path | None, typer.Option(help="Play a recording again instead of scenes.")] = None,
+    speed: Annotated[float, typer.Option(help="Of the replay: 2 in half the time.")] = 1.0,
+    pipe: Annotated[
+        bool, typer.Option("--pipe", help="Scan frames of another sensor that come on standard input.")
+    ] = False,
+    noise_floor: Annotated[int, typer.Option(min=0, max=255, help="Of a pipe: a change above it makes an event.")] = 3,
     tare: Annotated[
         float, typer.Option(min=0, max=60, help="How long the noise floor is 0 before the start marker, s.")
     ] = 0.05,
     preset: Annotated[str, typer.Option(help='The registers: "5.2 kHz", "2 kHz", "20.8 kHz".')] = "5.2 kHz",
-    wire: Annotated[int, typer.Option(min=1, max=2, help="The version of the wire that the board speaks.")] = 1,
+    wire: Annotated[
+        int | None,
+        typer.Option(min=1, max=2, help="The version of the wire that the board speaks; else its registers'."),
+    ] = None,
+    board: Annotated[int, typer.Option(min=0, max=65_535, help="Version 2: the board's number.")] = 0,
+    session: Annotated[int, typer.Option(min=0, max=65_535, help="Version 2: the number of the first session.")] = 1,
+    hold: Annotated[float, typer.Option(min=0, max=30, help="Version 2: events wait so long for company, ms.")] = 0.0,
+    heartbeat: Annotated[float, typer.Option(min=0, help="Version 2: a promise so often in silence, ms.")] = 10.0,
+    states: Annotated[
+        float, typer.Option(min=0, help="Version 2: each value told again so often, ms; 0: never.")
+    ] = 1000.0,
+    reset_every: Annotated[float | None, typer.Option(min=0.001, help="The board is reset so often, s.")] = None,
+    drift: Annotated[float, typer.Option(help="The board's clock runs faster by so much, parts per million.")] = 0.0,
+    flaw: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=SIZE[:SEED]",
+            help="Taxels: gain, threshold, hysteresis, drift, dead, stuck, loose, noise; may be repeated.",
+        ),
+    ] = None,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=SHARE", help="Datagrams: lost, repeated, reordered, cut, corrupted; may be repeated."
+        ),
+    ] = None,
     control: Annotated[
         int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")
     ] = None,
+    line: Annotated[Path | None, typer.Option(help="A serial line of this name: a link to a pseudo-terminal.")] = None,
+    baud: Annotated[int, typer.Option(min=300, max=4_000_000, help="Of the serial line.")] = 115_200,
+    sync: Annotated[
+        Path | None, typer.Option(help="The sync line as text, to a new file or a pipe: board us, 1 or 0, host ns.")
+    ] = None,
+    source_port: Annotated[int, typer.Option(min=0, max=65_535, help="The board sends from here; 0: any port.")] = 0,
     rest: Annotated[bool, typer.Option("--rest", help="Nobody catches the ball.")] = False,
     labels: Annotated[
         Path | None,
         typer.Option("--truth", help="Write what really happens when to this CSV, label,t_us,host_ns, as it happens."),
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the CSV where it exists.")] = False,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace such files where they exist.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the report as JSON, and nothing else.")] = False,
 ) -> None:
-    """Play scenes on an emulated board of 64 x 64 taxels that sends its events by UDP, in real time.
+    """Be a board that sends its events by UDP, in real time, until Ctrl-C.
 
-    A ball is dropped on foam, caught in flight, pressed by hand and lifted. The board arms after its first frame, is
-    tared with a noise floor of 0, then takes the preset's floor and marks the start. --truth is what taxel train learns
-    from: contact and lift, by the board's clock (t_us) and by this machine's (host_ns).
+    Scenes: a ball is dropped on foam over 64 x 64 taxels, caught in flight, pressed by hand and lifted. The board arms
+    after its first frame, is tared with a noise floor of 0, then takes the preset's floor and marks the start. --truth
+    is what taxel train learns from: contact and lift, by the board's clock (t_us) and by this machine's (host_ns).
+
+    --replay plays a recording again. --pipe takes any other sensor's frames from standard input: one line of JSON
+    (rows, columns, rate, bits), then uint16, little-endian, row by row.
 
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
+    if (replay is not None or pipe) and (scenes is not None or labels is not None or rest):
+        raise ProblemError("--scenes, --truth and --rest are of scenes: leave them out with --replay or --pipe")
+    if replay is not None and pipe:
+        raise ProblemError("--replay and --pipe: give one of them")
+    # Wrong ones are said before anything else is.
+    Registers.preset(preset)
     seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
-    tare_ms = 1e3 * tare
-    acts = script(seed, scenes, tare_ms=tare_ms, left_to_rest=rest)
-    # Drawn anew from the seed: what is played can be told before it is.
-    contacts, force = truth(acts, preset=preset)
+    flaws, faults = _flaws(flaw or [], seed), _faults(fault or [], seed)
     console = Console(stderr=True, quiet=as_json)
-    console.print(f"seed {seed}: {len(contacts)} touches in {scenes} scene(s), to {host}:{port} at {preset}")
+    if replay is not None:
+        touch, said = _again(replay, speed)
+    elif pipe:
+        touch, said = _piped(noise_floor)
+    else:
+        touch, said = _scenes(seed, scenes, 1e3 * tare, rest)
+    console.print(f"{said}, to {host}:{port}", soft_wrap=True)
     bar = Progress(
-        TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[said]}"), TimeRemainingColumn(),
-        console=console, transient=True, disable=as_json,
+        TextColumn("{task.description}"), BarColumn(pulse_style="bar.complete"), TextColumn("{task.fields[said]}"),
+        TimeElapsedColumn(), console=console, transient=True, disable=as_json,
     )  # fmt: skip
-    with bar, _Diary(labels, contacts, overwrite) as diary:
-        task = bar.add_task("playing", total=len(force), said="")
+    last: list[EmulatorReport] = []
+    with bar, _Diary(labels, overwrite) as diary:
+        task = bar.add_task("playing", total=None, said="")
 
         def begun(address: str | None) -> None:
             if address is not None:
                 console.print(f"commands are taken at {address}")
+            if line is not None:
+                console.print(f"the serial line is {line}", soft_wrap=True)
 
         def watch(report: EmulatorReport) -> None:
+            last[:] = [report]
             diary.write(report)
             late = report.late_us["p99"]
-            bar.update(task, completed=report.frames, said=f"{report.changes} events, frames late p99 {late:.0f} us")
+            bar.update(task, said=f"{report.board_seconds:.1f} s, {report.changes} events, late p99 {late:.0f} us")
 
-        listens = None if control is None else f"127.0.0.1:{control}"
-        report = run(
-            f"[{host}]:{port}" if ":" in host else f"{host}:{port}",
-            acts,
-            seed=seed,
-            preset=preset,
-            tare_ms=tare_ms,
-            wire=2 if wire == 2 else 1,
-            control=listens,
-            begun=begun,
-            watch=watch,
-        )
+        try:
+            last[:] = [
+                run(
+                    f"[{host}]:{port}" if ":" in host else f"{host}:{port}",
+                    touch,
+                    seed=seed,
+                    preset=preset,
+                    tare_ms=1e3 * tare,
+                    wire=None if wire is None else 2 if wire == 2 else 1,
+                    version_2=Version2(board, session, round(1e3 * hold), round(1e3 * heartbeat), round(1e3 * states)),
+                    flaws=flaws,
+                    faults=faults,
+                    reset_every_s=reset_every,
+                    drift_ppm=drift,
+                    control=None if control is None else f"127.0.0.1:{control}",
+                    line=line,
+                    baud=baud,
+                    sync=sync,
+                    overwrite=overwrite,
+                    source_port=source_port,
+                    begun=begun,
+                    watch=watch,
+                    touched=diary.take,
+                )
+            ]
+        except KeyboardInterrupt:
+            # Without an end of its own, Ctrl-C is how it ends; a board that was to end is stopped by it.
+            if not last or scenes is not None or replay is not None:
+                raise
+        report = last[0]
         diary.write(report)
     if labels is not None:
         console.print(f"truth: {labels}", soft_wrap=True)
     if as_json:
-        said = {"seed": seed, "scenes": scenes, "preset": preset, "held": report.held, "verdict": report.verdict}
-        said |= {"wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
-        typer.echo(json.dumps({**said, **asdict(report)}))
+        about: dict[str, Any] = {"seed": seed, "scenes": scenes, "preset": preset, "held": report.held}
+        about |= {"verdict": report.verdict, "wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
+        typer.echo(json.dumps({**about, **asdict(report)}))
     else:
-        typer.echo(f"{report.changes} events in {report.datagrams} datagrams, {report.bytes} bytes")
+        _say(report, in_time=not pipe)
+
+
+def _again(replay: Path, speed: float) -> tuple[Any, str]:
+    """Return a recording to play, and what that is."""
+    return Replay(open_any(replay), speed), f"{replay} again"
+
+
+def _piped(noise_floor: int) -> tuple[Any, str]:
+    """Return what comes on standard input, and what that is."""
+    pipe = Pipe(sys.stdin.buffer, noise_floor)
+    halved = f", values halved {pipe.shift} times" if pipe.shift else ""
+    rows, columns = pipe.array.shape
+    return pipe, f"{rows} x {columns} taxels from standard input, {pipe.rate_hz:g} frames/s{halved}"
+
+
+def _scenes(seed: int, scenes: int | None, tare_ms: float, rest: bool) -> tuple[Any, str]:
+    """Return scenes to play, and what they are."""
+    if scenes is None:
+        return endless(seed, tare_ms=tare_ms, left_to_rest=rest), f"seed {seed}: scenes until Ctrl-C"
+    return script(seed, scenes, tare_ms=tare_ms, left_to_rest=rest), f"seed {seed}: {scenes} scene(s)"
+
+
+def _say(report: EmulatorReport, in_time: bool) -> None:
+    typer.echo(f"{report.changes} events in {report.datagrams} datagrams, {report.bytes} bytes")
+    if report.network is not None:
+        typer.echo("network: " + ", ".join(f"{n} {name}" for name, n in report.network.items()))
+    if in_time:
         typer.echo(report.verdict)
+
+
+def _pairs(option: str, said: Iterable[str]) -> dict[str, str]:
+    """Return names and values of NAME=VALUE."""
+    pairs = {}
+    for one in said:
+        name, equals, value = one.partition("=")
+        if not equals or not value:
+            raise ProblemError(f"--{option} {one}: must be NAME=VALUE")
+        pairs[name] = value
+    return pairs
+
+
+def _number(option: str, name: str, said: str) -> float:
+    try:
+        return float(said)
+    except ValueError:
+        raise ProblemError(f"--{option} {name}={said}: must be a number") from None
+
+
+def _flaws(said: list[str], seed: int) -> Flaws | None:
+    sizes: dict[str, Any] = {}
+    seeds = {}
+    for name, value in _pairs("flaw", said).items():
+        if name not in Flaws._names():
+            raise ProblemError(f"--flaw {name}: must be one of {', '.join(Flaws._names())}")
+        size, _, own = value.partition(":")
+        sizes[name] = _number("flaw", name, size)
+        seeds[name] = int(_number("flaw", name, own)) if own else seed
+    return Flaws(**sizes, seeds=seeds) if sizes else None
+
+
+def _faults(said: list[str], seed: int) -> Faults | None:
+    names = ("lost", "repeated", "reordered", "cut", "corrupted")
+    shares = {name: _number("fault", name, value) for name, value in _pairs("fault", said).items()}
+    for name in shares:
+        if name not in names:
+            raise ProblemError(f"--fault {name}: must be one of {', '.join(names)}")
+    return Faults(**shares, seed=seed) if shares else None
 
 
 class _Diary:
     """Write what happens to a CSV, a line when it has happened."""
 
-    def __init__(self, path: Path | None, contacts: Sequence[Contact], overwrite: bool) -> None:
-        happenings = [(c.start_us, "contact") for c in contacts] + [(c.stop_us, "lift") for c in contacts]
-        self._left = deque(sorted(happenings))
+    def __init__(self, path: Path | None, overwrite: bool) -> None:
+        self._left: deque[tuple[float, str]] = deque()
         # Written as it goes, so not whole or not at all: what was written before Ctrl-C is what happened before it.
         self._file = None if path is None else path.open("w" if overwrite else "x", encoding="utf-8")
         self._put("label,t_us,host_ns")
+
+    def take(self, contacts: list[Contact]) -> None:
+        """Take touches to come, which lie behind all that were taken before."""
+        ends = [(c.start_us, "contact") for c in contacts] + [(c.stop_us, "lift") for c in contacts]
+        self._left.extend(sorted(ends))
 
     def write(self, report: EmulatorReport) -> None:
         """Write what has happened by the board's time."""

@@ -14,12 +14,12 @@ from rich.text import Text
 
 from taxel._core import ProblemError
 from taxel._files import try_whole
-from taxel.cable import Cable
 from taxel.cli._app import app
 from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, exit_code, geometry, outside
 from taxel.cli._listening import new_report
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.detect import Readout
+from taxel.device import Cable
 from taxel.live import Live, Panel, Said, Summary, delays
 from taxel.spikes import to_ms
 from taxel.tare import Tare

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import count
+
 from taxel.simulate import Act, Scene, Silence
 
-__all__ = ["TRAINING_SEED", "script"]
+__all__ = ["TRAINING_SEED", "endless", "script"]
 
 #: Silence between the tare and the first scene, ms.
 _LEAD_MS = 250.0
@@ -38,3 +41,10 @@ def script(
     if dashpot_ms is not None:
         drawn = [scene.replace(foam={"dashpot_ms": dashpot_ms}) for scene in drawn]
     return [Silence(tare_ms + _LEAD_MS), *drawn, Silence(100.0)]
+
+
+def endless(seed: int, *, tare_ms: float = 50.0, left_to_rest: bool = False) -> Iterator[Act]:
+    """Yield what `script` returns, scene after scene without an end."""
+    yield Silence(tare_ms + _LEAD_MS)
+    for index in count():
+        yield Scene.draw(seed, index, left_to_rest=left_to_rest)

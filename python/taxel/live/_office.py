@@ -18,7 +18,7 @@ from taxel._files import whole_file
 from taxel._health import judged
 from taxel._parts import cut
 from taxel._remarks import array_of
-from taxel.cable import Cable
+from taxel.device import Cable
 from taxel.labels import Labels, write_labels
 from taxel.recording import open_recording
 from taxel.wire import Command

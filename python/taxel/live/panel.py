@@ -10,7 +10,7 @@ from taxel import _core
 from taxel._arguments import path as checked_path
 from taxel._arguments import text, whole
 from taxel._core import ProblemError
-from taxel.cable import Cable
+from taxel.device import Cable
 from taxel.live._office import Office
 from taxel.live.way import Live
 

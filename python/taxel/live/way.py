@@ -12,10 +12,10 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import flag, instance, number, parameters, several, shown, text, whole
+from taxel._arguments import flag, instance, number, numbers, parameters, several, shown, text, whole
 from taxel._arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -24,10 +24,13 @@ from taxel.detections import Detections
 from taxel.tare import Tare
 from taxel.wire import FRAME_US, Registers
 
-__all__ = ["PORT", "Live", "Said", "Summary", "heard", "send"]
+__all__ = ["PORT", "Live", "Said", "Source", "Summary", "heard", "send"]
 
 #: Where the board's datagrams go (reading: the thesis names no port).
 PORT = 5208
+
+#: The largest value of a source's frames.
+_MOST = 2**16 - 1
 
 #: How long an iteration waits at a time.
 _WAIT_S = 0.5
@@ -49,6 +52,8 @@ class Said(NamedTuple):
         When it was said, by the host's clock less the estimated offset between the clocks.
     said_ns : int, ns since 1970
         The same by the host's clock.
+    repaired : bool
+        Whether it may rest on values that states of wire version 2 repaired after a loss.
     """
 
     label: str
@@ -57,6 +62,7 @@ class Said(NamedTuple):
     slope: float
     said: int
     said_ns: int
+    repaired: bool = False
 
 
 @dataclass(frozen=True)
@@ -122,6 +128,8 @@ class Live:
         Whether an existing file may be replaced.
     guard_frames : float, 0 or more
         In silence the readout's time moves on by the host's clock, so many frames behind it.
+    gap_frames : float, 0 or more
+        At a gap in the sequence of wire version 2 time waits so many frames for what may only be late.
     say : callable, optional
         Called with each `Said` in the thread that made it; what it raises ends the way and is raised by `next`.
     lines : bool
@@ -168,6 +176,7 @@ class Live:
         compression: str = "none",
         overwrite: bool = False,
         guard_frames: float = 5.0,
+        gap_frames: float = 1.0,
         say: Callable[[Said], object] | None = None,
         lines: bool = False,
         kernel_buffer_bytes: int | None = None,
@@ -189,6 +198,7 @@ class Live:
             "registers": _held(registers),
             "differences": flag("differences", differences),
             "guard_frames": number("guard_frames", guard_frames),
+            "gap_frames": number("gap_frames", gap_frames),
             "gro": None if gro is None else flag("gro", gro),
             **{name: None if size is None else whole(name, size, 0, 2**31 - 1) for name, size in sizes.items()},
         }
@@ -252,7 +262,10 @@ class Live:
         """What came, what became of it and what was lost where, up to now.
 
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
-        (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `events`, `read_out`, `events_dropped`,
+        (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
+        `taxel.wire_v2.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
+        `wire_late` (events of version 2 that came when time had gone on without them), `events`, `read_out`,
+        `events_dropped`,
         `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence
         that was none, because events came later than the guard), `detections_dropped`, `decode_latency` and
         `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
@@ -281,6 +294,15 @@ class Live:
     def take_markers(self) -> list[tuple[int, bool]]:
         """Return the markers that came since this was asked last: (t us, start)."""
         return self._core.take_markers()
+
+    def expect_version(self, version: int) -> None:
+        """Say that the board was told to speak this version of the wire: it is believed at once, not after a second.
+
+        Raises
+        ------
+        ProblemError : no such version
+        """
+        self._core.expect_version(whole("version", version, 1, 2))
 
     def note(self, said: str) -> None:
         """Write something down in the recording, with the time of now.
@@ -327,6 +349,81 @@ class Live:
         return f"Live({host}:{port}, {self.array.rows} x {self.array.columns} taxels)"
 
 
+class Source:
+    """Make any sensor that Python can read live: frames become events by the board's rules, and travel as a board's.
+
+    Whatever listens to a board listens to this: `Live`, ``taxel record``, ``taxel live``, with this array and, as
+    `registers`, these registers.
+
+    Parameters
+    ----------
+    array : Array
+    rate : float, 1/s
+        Frames a second; each push moves the source's clock on by one frame.
+    bits : int, 1 to 16
+        Of the values. More than so fast a scan can tell are halved `shift` times.
+    noise_floor : int, 0 to 255
+        A change above it makes an event.
+    to : str
+        Where the datagrams go.
+    board : int, 0 to 65535
+        Its number: sources on one address are told apart by it.
+
+    Raises
+    ------
+    ProblemError : arguments that make no sense
+    OSError : a socket cannot be had
+
+    Examples
+    --------
+    >>> array = Array(2, 3, name="six")
+    >>> with Live(0, host="127.0.0.1", array=array) as live:
+    ...     host, port = live.address
+    ...     source = Source(array, 100.0, bits=12, to=f"{host}:{port}")
+    ...     heard = [source.push(np.full((2, 3), value)) for value in (0, 700, 702, 900)]
+    >>> heard
+    [0, 6, 0, 6]
+    """
+
+    def __init__(
+        self,
+        array: Array,
+        rate: float,
+        *,
+        bits: int = 16,
+        noise_floor: int = 3,
+        to: str = f"127.0.0.1:{PORT}",
+        board: int = 0,
+    ) -> None:
+        self.array = instance("array", array, Array)
+        held, self.shift = _core.registers_of_source(array._parts(), number("rate", rate), whole("bits", bits, 1, 16))
+        floor = whole("noise_floor", noise_floor, 0, 255)
+        self.registers = Registers._of(json.loads(held), array).replace(noise_floor=floor)
+        options = parameters(
+            {"board": whole("board", board, 0, 65_535), "seed": int.from_bytes(os.urandom(2), "little")}
+        )
+        self._core = _core.Source(text("to", to), array._parts(), self.registers._json(), options)
+
+    def push(self, frame: ArrayLike) -> int:
+        """Take the next frame, shape (rows, columns) or flat, 0 or more; return how many events it made.
+
+        Raises
+        ------
+        ProblemError : not one number a taxel, or below 0
+        OSError : the system refuses to send
+        """
+        values = numbers("frame", frame, np.int64).reshape(-1)
+        if values.size and (values.min() < 0 or values.max() > _MOST):
+            wrong = values.min() if values.min() < 0 else values.max()
+            raise ProblemError(f"frame: holds {wrong}, must lie in 0 to {_MOST}")
+        ticks = np.minimum(values >> self.shift, self.registers.ramp)
+        return self._core.push(ticks.astype(np.uint16))
+
+    def __repr__(self) -> str:
+        rows, columns = self.array.shape
+        return f"Source({rows} x {columns} taxels, {1e6 / self.registers.frame_us:g} frames/s)"
+
+
 def _held(registers: str | Registers) -> object:
     return json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
 
@@ -361,6 +458,7 @@ def heard(said: Sequence[Said]) -> Detections:
         [s.known for s in said],
         [s.slope for s in said],
         [s.said for s in said],
+        [s.repaired for s in said],
     )
 
 

@@ -1,21 +1,30 @@
 """Simulated touch: a ball on foam, and the emulated board that feels it.
 
-A scene says what happens to the ball. `play` lets a board feel acts as fast as it goes,
-`emulate` in real time over UDP.
+A scene says what happens to the ball. `play` lets a board feel acts as fast as it goes, `emulate` in real time over
+UDP: acts, a recording again, or the frames of any other sensor. `Board` is the board alone, a frame at a time.
 """
 
 from taxel.simulate.acts import Act, Contact, Motion, Pictures, Scene, Silence
-from taxel.simulate.board import EmulatorReport, Played, emulate, play, truth
+from taxel.simulate.board import EmulatorReport, Pipe, Played, Replay, emulate, play, truth
+from taxel.simulate.emulated import NOT_RETURNED, Board, Version2
+from taxel.simulate.trouble import Faults, Flaws
 
 __all__ = [
+    "NOT_RETURNED",
     "Act",
+    "Board",
     "Contact",
     "EmulatorReport",
+    "Faults",
+    "Flaws",
     "Motion",
     "Pictures",
+    "Pipe",
     "Played",
+    "Replay",
     "Scene",
     "Silence",
+    "Version2",
     "emulate",
     "play",
     "truth",

@@ -1,25 +1,39 @@
-"""The emulated board that feels acts: as fast as it goes, or in real time over UDP."""
+"""The emulated board at work: it feels acts as fast as it goes, or in real time and over UDP whatever it is given."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import callback, mapping, number, parameters, several, shown, text, whole
-from taxel._core import ProblemError
+from taxel._arguments import callback, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._arguments import path as checked_path
+from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recording import Recording
 from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence
+from taxel.simulate.emulated import Version2
+from taxel.simulate.trouble import Faults, Flaws
 from taxel.spikes import to_ms
+from taxel.wire import Registers
 
-__all__ = ["EmulatorReport", "Played", "emulate", "play", "truth"]
+__all__ = ["EmulatorReport", "Pipe", "Played", "Replay", "emulate", "play", "truth"]
 
+
+#: Longer first lines of a pipe are none, bytes.
+_LONGEST_LINE = 1 << 16
+
+#: Lines that the thesis' presets are made for.
+_THESIS_LINES = 64
 
 _QUANTILES = {"p50": "median", "p99": "99 %", "max": "at most"}
 
@@ -53,7 +67,11 @@ class EmulatorReport:
     late_frames: int
     """Sent more than a frame after their end."""
     late_us: Mapping[str, float]
-    """How long after its end a frame was sent: p50, p99, max."""
+    """How long after its end a frame was sent: p50, p99, max; not measured where frames go as they come."""
+    network: Mapping[str, int] | None = None
+    """What the network did to datagrams, where asked to: given, delivered, and by fault."""
+    resets: int = 0
+    """How often the board was reset."""
 
     @property
     def wanted_hz(self) -> float:
@@ -98,8 +116,125 @@ class EmulatorReport:
             bytes=sent["bytes"],
             dropped=board["dropped"],
             late_frames=report["late_frames"],
-            late_us={name: late[f"{name}_us"] for name in ("p50", "p99", "max")},
+            late_us={name: late[f"{name}_us"] or 0.0 for name in ("p50", "p99", "max")},
+            network=report["network"],
+            resets=report["resets"],
         )
+
+
+class Replay:
+    """Let the board feel a recording again: its events as they were, or its pictures by the board's rules.
+
+    Parameters
+    ----------
+    source : Recording, Events or Frames
+    speed : float, above 0
+        2 plays it in half the time.
+
+    Raises
+    ------
+    ProblemError : neither of these, or nothing in it
+
+    Notes
+    -----
+    The board's frames quantise time: what came within one is sent at its end, of several events of a taxel the last.
+    Pictures that are not in ticks are scaled so that the largest value is the end of the ramp.
+    """
+
+    def __init__(self, source: Recording | Events | Frames, speed: float = 1.0) -> None:
+        self.speed = number("speed", speed)
+        if not 0 < self.speed < np.inf:
+            raise ProblemError(f"speed is {shown(speed)}: must be above 0")
+        self.recording = source if isinstance(source, Recording) else None
+        if isinstance(source, Recording):
+            source = source.events if source.has_events else source.frames()
+        if not isinstance(source, Events | Frames):
+            raise ProblemError(f"source is {shown(source)}: must be a Recording, Events or Frames")
+        if not len(source):
+            raise ProblemError("source: nothing to play in it")
+        self.source: Events | Frames = source
+
+    @property
+    def array(self) -> Array:
+        """The sensor."""
+        return self.source.array
+
+    def registers(self, preset: str) -> Registers:
+        """Return what the board holds that plays it: as it was recorded where that is known, else a preset."""
+        known = None if self.recording is None else self.recording.registers
+        if known is not None:
+            return known.replace(record=False)
+        return _fitting(preset, self.array)
+
+    def _touch(self, registers: Registers) -> tuple[Any, ...]:
+        if isinstance(self.source, Events):
+            return self.source.sorted()._parts(), self.speed
+        values = self.source.values
+        if self.source.unit != "ticks":
+            values = (values - min(0.0, float(values.min()))) * (registers.ramp / max(float(np.ptp(values)), 1e-30))
+        ticks = np.clip(np.rint(values), 0, registers.ramp).astype(np.uint16).reshape(-1)
+        return np.ascontiguousarray(self.source.t), np.ascontiguousarray(ticks), self.speed
+
+
+class Pipe:
+    """Let the board feel frames of any other sensor as they come: from a pipe, after a line that says what they are.
+
+    The line is JSON: ``{"rows": 16, "columns": 8, "rate": 100, "bits": 12}``, and may name ``pitch_mm`` and ``name``.
+    Behind it stand frames: uint16, little-endian, row by row. The board's clock is the pipe's: a frame is one over
+    `rate` long.
+
+    Parameters
+    ----------
+    source : binary file
+        As ``sys.stdin.buffer``; must have a descriptor.
+    noise_floor : int, ticks
+        A change above it makes an event; a tick is one unit of the values, or more where so many bits are too many for
+        so fast a scan (`shift` says how often a value is halved).
+
+    Raises
+    ------
+    FormatError : another first line
+    ProblemError : numbers in it that make no sense
+    """
+
+    def __init__(self, source: IO[bytes], noise_floor: int = 3) -> None:
+        self._descriptor, self._ahead = source.fileno(), b""
+        line = self._line()
+        try:
+            said = json.loads(line)
+            rows, columns, rate, bits = (said[name] for name in ("rows", "columns", "rate", "bits"))
+        except (ValueError, TypeError, KeyError) as error:
+            wanted = '{"rows": 16, "columns": 8, "rate": 100, "bits": 12}'
+            begin = line[:60].decode("utf-8", "replace")
+            raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be JSON like {wanted}") from None
+        self.array = Array(rows, columns, pitch_mm=said.get("pitch_mm", 1.0), name=said.get("name", "pipe"))
+        self.rate_hz, self._floor = number("rate", rate), whole("noise_floor", noise_floor, 0, 255)
+        held, self.shift = _core.registers_of_source(self.array._parts(), self.rate_hz, whole("bits", bits, 1, 16))
+        self._held = json.loads(held)
+
+    def registers(self, preset: str) -> Registers:  # noqa: ARG002  the frames say how fast they are
+        """Return what the board holds that scans such frames."""
+        return Registers._of(self._held, self.array).replace(noise_floor=self._floor)
+
+    def _line(self) -> bytes:
+        while b"\n" not in self._ahead and len(self._ahead) < _LONGEST_LINE:
+            more = os.read(self._descriptor, 4096)
+            if not more:
+                break
+            self._ahead += more
+        line, _, self._ahead = self._ahead.partition(b"\n")
+        return line
+
+    def _touch(self, registers: Registers) -> tuple[Any, ...]:
+        return self._descriptor, list(self._ahead), self.shift, registers.ramp
+
+
+def _fitting(preset: str, array: Array) -> Registers:
+    """Return a preset, fitted to an array where that has other lines."""
+    if max(array.shape) > _THESIS_LINES:
+        return Registers(array=array)
+    held = Registers.preset(preset)
+    return held if array == Array.thesis() else Registers._of({**held._held, "lines": array.columns}, array)
 
 
 def truth(
@@ -185,34 +320,76 @@ def play(
 
 def emulate(
     to: str,
-    acts: Sequence[Act],
+    touch: Iterable[Act] | Replay | Pipe,
     *,
-    seed: int,
+    seed: int = 0,
     preset: str = "5.2 kHz",
+    registers: Registers | None = None,
     tare_ms: float = 50.0,
     array: Array | None = None,
     sensor: Mapping[str, float] | None = None,
-    wire: Literal[1, 2] = 1,
+    wire: Literal[1, 2] | None = None,
+    previous: Literal["last_sent", "last_sample"] = "last_sent",
+    intensity: Literal["value", "difference", "nothing"] = "value",
+    version_2: Version2 | None = None,
+    flaws: Flaws | None = None,
+    faults: Faults | None = None,
+    reset_every_s: float | None = None,
+    drift_ppm: float = 0.0,
     control: str | None = None,
+    line: str | os.PathLike[str] | None = None,
+    baud: int = 115_200,
+    sync: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    source_port: int = 0,
     begun: Callable[[str | None], None] = lambda _: None,
     watch: Callable[[EmulatorReport], None] = lambda _: None,
+    touched: Callable[[list[Contact]], None] = lambda _: None,
 ) -> EmulatorReport:
-    """Let an emulated board feel acts in real time, and send its datagrams by UDP.
+    """Let an emulated board feel something in real time, and send its datagrams by UDP.
 
     Parameters
     ----------
     to : str
         Address and port, as "127.0.0.1:5208".
-    acts, seed, preset, tare_ms, array, sensor
-        As in `play`.
-    wire : {1, 2}
-        The version of the wire that the board speaks.
+    touch : iterable of Scene, Silence, Pictures; Replay; or Pipe
+        What it feels. Acts may be without an end: each is made ready while those before it are played. Of acts the
+        board arms after the first frame, is tared with a noise floor of 0 for `tare_ms`, marks a start, and at the end
+        a stop.
+    seed, preset, tare_ms, array, sensor
+        As in `play`; of a Replay or a Pipe the array is theirs.
+    registers : Registers, optional
+        What the board holds instead of the preset.
+    wire : {1, 2}, optional
+        The version of the wire that it speaks; left out, the registers'.
+    previous, intensity
+        As in `Board`.
+    version_2 : Version2, optional
+        How it speaks version 2.
+    flaws : Flaws, optional
+        What is wrong with its taxels.
+    faults : Faults, optional
+        What the network does to its datagrams.
+    reset_every_s : float, s, optional
+        The board is reset so often, by its own clock.
+    drift_ppm : float, parts per million
+        How much faster its clock runs than this machine's.
     control : str, optional
         Address and port where the board takes commands by TCP; port 0 finds a free one.
+    line : path, optional
+        A serial line: a link of this name to a pseudo-terminal, at `baud` and no faster.
+    sync : path, optional
+        A new file, or a pipe that is there: the sync line, a line an edge: board time (us), 1 or 0, host time (ns).
+    overwrite : bool
+        Whether an existing file `sync` may be replaced.
+    source_port : int
+        The UDP port that it sends from; 0 finds a free one.
     begun : function, optional
         Called with the address of `control` just before the first frame.
     watch : function, optional
         Called with a report ten times a second.
+    touched : function, optional
+        Called before `watch` with touches of acts that were made ready since; us of the board's clock.
 
     Returns
     -------
@@ -220,28 +397,75 @@ def emulate(
 
     Raises
     ------
-    As in `play`; OSError where a socket cannot be had.
+    As in `play`; OSError where a socket, line or file cannot be had.
     """
+    felt: Any
+    if isinstance(touch, Replay | Pipe):
+        sensed, acts = touch.array, None
+        held = touch.registers(text("preset", preset)) if registers is None else registers
+        felt = touch._touch(instance("registers", held, Registers))
+    else:
+        sensed, acts = Array._of(array), _checked(touch, Array._of(array))
+        held = _fitting(text("preset", preset), sensed) if registers is None else registers
+        felt = acts
+    held = instance("registers", held, Registers)
+    if wire is not None:
+        held = held.replace(wire_version=whole("wire", wire, 1, 2))
+    options = {
+        "registers": held._held,
+        "tare_ms": None if acts is None else number("tare_ms", tare_ms),
+        "previous": text("previous", previous, ("last_sent", "last_sample")),
+        "intensity": text("intensity", intensity, ("value", "difference", "nothing")),
+        "version_2": asdict(instance("version_2", version_2 or Version2(), Version2)),
+        "control": None if control is None else text("control", control),
+        "line": None if line is None else (str(Path(checked_path("line", line))), whole("baud", baud, 300, 4_000_000)),
+        "sync": None if sync is None else (str(Path(checked_path("sync", sync))), bool(overwrite)),
+        "flaws": None if flaws is None else instance("flaws", flaws, Flaws)._parts(),
+        "faults": None if faults is None else instance("faults", faults, Faults)._parts(),
+        "reset_every_s": None if reset_every_s is None else number("reset_every_s", reset_every_s),
+        "drift_ppm": number("drift_ppm", drift_ppm),
+        "source_port": whole("source_port", source_port, 0, 65_535),
+    }
+
+    def tell(said: str, contacts: list[Any]) -> None:
+        if contacts:
+            touched([Contact(*contact) for contact in contacts])
+        watch(EmulatorReport._from_json(said))
+
+    callback("watch", watch), callback("touched", touched)
     report = _core.emulate(
         text("to", to),
-        Array._of(array)._parts(),
-        text("preset", preset),
+        sensed._parts(),
         parameters({} if sensor is None else mapping("sensor", sensor)),
         whole("seed", seed, 0),
-        _parts(acts, Array._of(array)),
-        number("tare_ms", tare_ms),
-        whole("wire", wire, 1, 2),
-        None if control is None else text("control", control),
+        felt,
+        parameters(options),
         callback("begun", begun),
-        lambda said: callback("watch", watch)(EmulatorReport._from_json(said)),
+        tell,
     )
     return EmulatorReport._from_json(report)
 
 
+def _checked(acts: Iterable[Act], array: Array) -> Iterator[Any]:
+    """Return the parts of acts, one after the other; what is wrong with one is said when it is its turn.
+
+    Of a sequence that is said at once.
+    """
+    if isinstance(acts, Sequence):
+        return iter(_parts(acts, array))
+    try:
+        return (_part(n, act, array) for n, act in enumerate(iter(acts)))
+    except TypeError:
+        raise ProblemError(f"touch is {shown(acts)}: must be acts, a Replay or a Pipe") from None
+
+
 def _parts(acts: Sequence[Act], array: Array) -> list[Any]:
-    for n, act in enumerate(several("acts", acts)):
-        if not isinstance(act, Silence | Scene | Pictures):
-            raise ProblemError(f"act {n} is {shown(act)}: must be a Scene, Silence or Pictures")
-        if isinstance(act, Pictures) and act.values.shape[1:] != array.shape:
-            raise ProblemError(f"act {n}: pictures of shape {act.values.shape[1:]}, the array has {array.shape}")
-    return [act._part() for act in acts]
+    return [_part(n, act, array) for n, act in enumerate(several("acts", acts))]
+
+
+def _part(n: int, act: Act, array: Array) -> Any:
+    if not isinstance(act, Silence | Scene | Pictures):
+        raise ProblemError(f"act {n} is {shown(act)}: must be a Scene, Silence or Pictures")
+    if isinstance(act, Pictures) and act.values.shape[1:] != array.shape:
+        raise ProblemError(f"act {n}: pictures of shape {act.values.shape[1:]}, the array has {array.shape}")
+    return act._part()

@@ -14,22 +14,36 @@ use crate::{Result, Stop, problem};
 ///
 /// `Problem` where the tare is not between 0 and a minute, or does not leave two frames.
 pub fn session(registers: &Registers, tare_ms: f64, frames: u64) -> Result<Vec<(u64, Command)>> {
+    let mut commands = opening(registers, tare_ms)?;
+    let start = commands.last().map_or(1, |(frame, _)| *frame);
+    if frames < start + 2 {
+        return Err(problem!("{frames} frames: arming, a tare of {tare_ms} ms, start and stop need {}", start + 2));
+    }
+    commands.push((frames - 1, write(7, Registers { record: false, ..*registers })));
+    Ok(commands)
+}
+
+/// The commands with which a session of any length begins: those of [`session`] but the stop.
+///
+/// # Errors
+///
+/// `Problem` where the tare is not between 0 and a minute.
+pub fn opening(registers: &Registers, tare_ms: f64) -> Result<Vec<(u64, Command)>> {
     if !(0.0..=60_000.0).contains(&tare_ms) {
         return Err(problem!("tare of {tare_ms} ms: must be 0 to 60000"));
     }
     let start = 1 + (us(tare_ms) / registers.frame_us()).ceil() as u64;
-    if frames < start + 2 {
-        return Err(problem!("{frames} frames: arming, a tare of {tare_ms} ms, start and stop need {}", start + 2));
-    }
-    let write = |register: u8, registers: Registers| Command { register, value: registers.word(register) };
     let mut commands = vec![];
     if start > 1 {
         commands.push((1, write(5, Registers { noise_floor: 0, ..*registers })));
         commands.push((start, write(5, *registers)));
     }
     commands.push((start, write(7, Registers { record: true, ..*registers })));
-    commands.push((frames - 1, write(7, Registers { record: false, ..*registers })));
     Ok(commands)
+}
+
+fn write(register: u8, registers: Registers) -> Command {
+    Command { register, value: registers.word(register) }
 }
 
 impl Board {

@@ -54,6 +54,25 @@ pub struct Stage {
     drive: Vec<f32>,
 }
 
+/// An act made ready: worked out wherever there is time for it, then given to a [`Stage`].
+#[derive(Debug)]
+pub struct Prepared {
+    part: Part,
+    contacts: Vec<Contact>,
+}
+
+impl Prepared {
+    /// Makes an act ready: motion, touches and footprint, some milliseconds for a ball.
+    ///
+    /// # Errors
+    ///
+    /// `Scene` where the act cannot be played.
+    pub fn of(array: &Array, frame_us: f64, act: &Act) -> Result<Self> {
+        let (part, contacts) = part(array, frame_us, act)?;
+        Ok(Self { part, contacts })
+    }
+}
+
 #[derive(Debug)]
 struct Part {
     frames: usize,
@@ -88,23 +107,33 @@ impl Stage {
         if !(frame_us.is_finite() && frame_us > 0.0 && frame_us <= 4_000.0) {
             return Err(Error::Scene(format!("frame is {frame_us} us: must be above 0, at most 4000")));
         }
-        let (mut parts, mut contacts, mut begins) = (vec![], vec![], 0_usize);
+        let clean = (0..taxels.len()).map(|k| taxels.ticks(k, 0.0)).collect();
+        let (parts, contacts, profile, drive) = (vec![], vec![], vec![], vec![]);
+        let mut stage = Self { taxels, frame_us, parts, contacts, part: 0, frame: 0, clean, profile, drive };
         for (n, act) in acts.iter().enumerate() {
-            let (part, touches) = part(array, frame_us, act).map_err(|error| match error {
+            stage.push(Prepared::of(array, frame_us, act).map_err(|error| match error {
                 Error::Scene(text) => Error::Scene(format!("act {n}: {text}")),
                 other => other,
-            })?;
-            let offset = begins as f64 * frame_us;
-            contacts.extend(touches.into_iter().map(|c| Contact {
-                start_us: c.start_us + offset,
-                stop_us: c.stop_us + offset,
-                ..c
-            }));
-            begins += part.frames;
-            parts.push(part);
+            })?);
         }
-        let clean = (0..taxels.len()).map(|k| taxels.ticks(k, 0.0)).collect();
-        Ok(Self { taxels, frame_us, parts, contacts, part: 0, frame: 0, clean, profile: vec![], drive: vec![] })
+        Ok(stage)
+    }
+
+    /// Adds an act, to be played when all before it are over.
+    pub fn push(&mut self, act: Prepared) {
+        let offset = self.frames() as f64 * self.frame_us;
+        self.contacts.extend(act.contacts.into_iter().map(|c| Contact {
+            start_us: c.start_us + offset,
+            stop_us: c.stop_us + offset,
+            ..c
+        }));
+        self.parts.push(act.part);
+    }
+
+    /// Whether all frames of all acts so far have been played.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.parts[self.part.min(self.parts.len())..].iter().map(|part| part.frames).sum::<usize>() == self.frame
     }
 
     /// All touches of all acts, by time; us from the first frame's start.
@@ -142,6 +171,8 @@ impl Stage {
             return Err(Error::Scene(format!("room for {} ticks: must be {}", ticks.len(), self.clean.len())));
         }
         while self.parts.get(self.part).is_some_and(|p| self.frame == p.frames) {
+            // Its tables are not needed any more; how long it was is.
+            self.parts[self.part].what = What::Silence;
             self.part += 1;
             self.frame = 0;
         }

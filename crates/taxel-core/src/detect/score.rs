@@ -153,7 +153,8 @@ mod tests {
 
     #[test]
     fn every_further_spike_is_false_inside_the_window_too() {
-        let said = |label: &str, t| Detection { label: label.to_owned(), t, known: t + 300, slope: 1.0 };
+        let said =
+            |label: &str, t| Detection { label: label.to_owned(), t, known: t + 300, slope: 1.0, repaired: false };
         let event = |label: &str, t| Reference { label: label.to_owned(), t };
         let found = [said("lift", 9_000), said("contact", 1_000), said("contact", 2_000), said("contact", 900_000)];
         let truth = [event("contact", 500_000), event("contact", 0), event("lift", 10_000)];

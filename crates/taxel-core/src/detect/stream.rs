@@ -1,5 +1,7 @@
 //! The way from events to detections, piece by piece: the same detections live and from a recording.
 
+use std::collections::VecDeque;
+
 use crate::detect::{Detection, FrameClock, TrainedNeuron};
 use crate::encode::Stream;
 use crate::neuron::{Neuron, NeuronStream, OutputSpike};
@@ -28,8 +30,11 @@ pub struct ReadoutStream {
     delays_ms: Vec<f64>,
     /// What the encoder just said.
     heard: Vec<Spike>,
-    /// Spikes by the neurons' inputs that are known already and that others may still come before.
-    waiting: Vec<Spike>,
+    /// Spikes by the neurons' inputs that are known already and that others may still come before, and whether an event that
+    /// a state repaired may have given them.
+    waiting: Vec<(Spike, bool)>,
+    /// When taxels were repaired last, us, as far back as the encoder may still speak of it.
+    repaired: VecDeque<i64>,
     late: u64,
 }
 
@@ -45,6 +50,8 @@ struct Voice {
     /// Begun with the first spike, so that a grid lies alike wherever the listening starts.
     stream: Option<NeuronStream>,
     crossings: Vec<OutputSpike>,
+    /// When the last input came that may tell of a repaired taxel, ms.
+    repaired: Option<f64>,
 }
 
 impl ReadoutStream {
@@ -65,9 +72,11 @@ impl ReadoutStream {
             threshold,
             stream: None,
             crossings: vec![],
+            repaired: None,
         });
         let voices = voices.collect();
-        Self { voices, encoder, array, clock, now: None, delays_ms, heard: vec![], waiting: vec![], late: 0 }
+        let (heard, waiting, repaired) = (vec![], vec![], VecDeque::new());
+        Self { voices, encoder, array, clock, now: None, delays_ms, heard, waiting, repaired, late: 0 }
     }
 
     /// Takes the next events; adds what is certain now to `out`.
@@ -87,6 +96,7 @@ impl ReadoutStream {
         let mut latest = self.now.map_or(first, |now| now.max(first));
         let in_order = latest == first && rest.iter().is_sorted() && rest.first().is_none_or(|&t| t >= first);
         if in_order {
+            self.note_repaired(events);
             self.encoder.push_events(events, &mut self.heard)?;
         } else {
             let mut moved = events.t.to_vec();
@@ -95,7 +105,9 @@ impl ReadoutStream {
                 latest = latest.max(*t);
                 *t = latest;
             }
-            self.encoder.push_events(EventsView { t: &moved, ..events }, &mut self.heard)?;
+            let moved = EventsView { t: &moved, ..events };
+            self.note_repaired(moved);
+            self.encoder.push_events(moved, &mut self.heard)?;
         }
         self.settle(events.t[events.len() - 1].max(latest), out)
     }
@@ -183,27 +195,60 @@ impl ReadoutStream {
         self.now = Some(self.now.map_or(until, |now| now.max(until)));
         let until_ms = ms(until);
         self.take_in();
-        self.waiting.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
-        let certain = self.waiting.partition_point(|spike| spike.t < until_ms);
-        let mut crossings: Vec<(f64, usize, f64)> = Vec::new();
+        // All spikes before `until` are said, so what lies too far behind it is forgotten.
+        self.forget_repaired(until_ms);
+        self.waiting.sort_by(|(a, _), (b, _)| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
+        let certain = self.waiting.partition_point(|(spike, _)| spike.t < until_ms);
+        let mut crossings: Vec<(OutputSpike, usize, bool)> = Vec::new();
         for (k, voice) in self.voices.iter_mut().enumerate() {
-            for spike in &self.waiting[..certain] {
+            for (spike, repaired) in &self.waiting[..certain] {
                 voice.push(spike.t, spike.train)?;
+                if *repaired {
+                    // What the neuron said up to here cannot rest on it.
+                    voice.say(k, &mut crossings);
+                    voice.repaired = Some(spike.t);
+                }
             }
             if let Some(stream) = &mut voice.stream {
                 stream.advance(until_ms, &mut voice.crossings);
             }
-            crossings.extend(voice.crossings.drain(..).map(|c| (c.t, k, c.slope)));
+            voice.say(k, &mut crossings);
         }
         self.waiting.drain(..certain);
-        crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
-        out.extend(crossings.into_iter().map(|(t, k, slope)| Detection {
+        crossings.sort_by(|a, b| a.0.t.total_cmp(&b.0.t));
+        out.extend(crossings.into_iter().map(|(OutputSpike { t, slope, .. }, k, repaired)| Detection {
             label: self.voices[k].label.clone(),
             t: us(t - self.voices[k].offset_ms).round() as i64,
             known: self.clock.end_of(t),
             slope,
+            repaired,
         }));
         Ok(())
+    }
+
+    /// Remembers when taxels were repaired, where the encoder tells of it.
+    fn note_repaired(&mut self, events: EventsView<'_>) {
+        let Some(repaired) = events.repaired.filter(|_| self.encoder.hears_repaired_ms().is_some()) else { return };
+        for (&t, _) in events.t.iter().zip(repaired).filter(|&(_, &repaired)| repaired) {
+            if self.repaired.back() != Some(&t) {
+                self.repaired.push_back(t);
+            }
+        }
+    }
+
+    /// Whether a spike of the encoder may tell of a repaired taxel. Spikes come in order of time.
+    fn tells_of_repaired(&mut self, t: f64) -> bool {
+        self.forget_repaired(t);
+        self.repaired.front().is_some_and(|&at| ms(at) <= t)
+    }
+
+    /// Forgets what no spike at `t` ms or later can tell of any more.
+    fn forget_repaired(&mut self, t: f64) {
+        let within = self.encoder.hears_repaired_ms().unwrap_or(0.0);
+        // Half a us for what a sum of ms loses.
+        while self.repaired.front().is_some_and(|&at| ms(at) + within + 5e-4 < t) {
+            self.repaired.pop_front();
+        }
     }
 
     /// Sorts what the encoder said to the neurons' inputs.
@@ -214,10 +259,12 @@ impl ReadoutStream {
         let trains = u32::try_from(self.encoder.trains()).unwrap_or(u32::MAX);
         let signed = self.encoder.signed();
         let inputs = if signed { 2 * trains } else { trains };
-        for spike in self.heard.drain(..) {
+        for spike in std::mem::take(&mut self.heard) {
+            let repaired = self.tells_of_repaired(spike.t);
             let input = if signed && spike.value <= 0.0 { trains + spike.train } else { spike.train };
             for (copy, delay) in (0_u32..).zip(&self.delays_ms) {
-                self.waiting.push(Spike { t: spike.t + delay, train: copy * inputs + input, ..spike });
+                let delayed = Spike { t: spike.t + delay, train: copy * inputs + input, ..spike };
+                self.waiting.push((delayed, repaired));
             }
         }
     }
@@ -250,6 +297,13 @@ impl Voice {
             }
         };
         stream.push(t, input, &mut self.crossings)
+    }
+
+    /// Hands its crossings on, each with whether it may rest on repaired taxels.
+    fn say(&mut self, k: usize, out: &mut Vec<(OutputSpike, usize, bool)>) {
+        let repaired = self.repaired;
+        let rests = |t: f64| repaired.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
+        out.extend(self.crossings.drain(..).map(|crossing| (crossing, k, rests(crossing.t))));
     }
 }
 

@@ -13,7 +13,8 @@ use crate::{Array, Result, Spike, problem};
 
 /// Change events: U = value - previous value in units of the noise floor, saturating at +-(2^bits - 1).
 ///
-/// A spike's value is the quantised change. The first sample is the first previous value and gives none. Reckoned in
+/// A spike's value is the quantised change. A value that a state of version 2 repaired moves the previous one with it and gives
+/// none. The first sample is the first previous value and gives none. Reckoned in
 /// f32. One signed train a taxel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -150,6 +151,12 @@ impl Rule for Changes {
                 *last = *new;
             }
         }
+    }
+
+    const HEARS_REPAIRED: bool = false;
+
+    fn repair(&mut self, channel: usize, from: f32, to: f32) {
+        self.last[channel / BLOCK][channel % BLOCK] += to - from;
     }
 
     fn idle(&self) -> bool {

@@ -21,8 +21,8 @@ use crate::{Array, Result, Spike, problem};
 
 /// The FA-1 afferent exactly as equations 5.1 to 5.5, polarity kept.
 ///
-/// Reckoned in f64; pressure below 0 counts as 0 before 5.1. It begins as if the first sample had always been. One
-/// signed train a taxel.
+/// Reckoned in f64; pressure below 0 counts as 0 before 5.1. A value that a state of version 2 repaired is no change of 5.3.
+/// It begins as if the first sample had always been. One signed train a taxel.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Fa1 {
@@ -284,6 +284,17 @@ impl Rule for Afferents {
                 }
             }
         }
+    }
+
+    const HEARS_REPAIRED: bool = false;
+
+    fn repair(&mut self, channel: usize, from: f32, to: f32) {
+        let (mut values, mut rho) = ([0.0; BLOCK], [0.0; BLOCK]);
+        (values[0], values[1]) = (from, to);
+        Self::compress(self.alpha, &self.table, &values, &mut rho);
+        let base = &mut self.blocks[channel / BLOCK].base[channel % BLOCK];
+        // Exactly where nothing was summed up: with a threshold of 0 a rounding would fire.
+        *base = if *base == rho[0] { rho[1] } else { *base + (rho[1] - rho[0]) };
     }
 
     fn idle(&self) -> bool {

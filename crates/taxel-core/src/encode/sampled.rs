@@ -36,6 +36,13 @@ pub(super) trait Rule: Send + Clone + 'static {
     /// What falls due before `t` (exclusive) while the last sample holds.
     fn pass(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
 
+    /// Whether it speaks of values that a state repaired. One that tells changes does not, as nobody knows when the value
+    /// changed: its reference moves with the value ([`Rule::repair`]).
+    const HEARS_REPAIRED: bool = true;
+
+    /// A state says that a channel which read `from` reads `to`, and did so before: no change is to be told.
+    fn repair(&mut self, _channel: usize, _from: f32, _to: f32) {}
+
     /// Whether nothing would ever come while the last sample holds, so that samples without change may be left out.
     fn idle(&self) -> bool;
 }
@@ -345,7 +352,11 @@ impl<R: Rule> Stream for Sampled<R> {
             if intensity.present[k]
                 && let Some(channel) = self.channels.of(events.x[k], events.y[k])
             {
-                self.held[channel / BLOCK][channel % BLOCK] = f32::from(intensity.ticks[k]);
+                let (held, value) = (&mut self.held[channel / BLOCK][channel % BLOCK], f32::from(intensity.ticks[k]));
+                if self.begun && events.is_repaired(k) {
+                    self.rule.repair(channel, *held, value);
+                }
+                *held = value;
                 self.changed[channel / BLOCK] = true;
                 self.quiet = false;
             }
@@ -354,6 +365,10 @@ impl<R: Rule> Stream for Sampled<R> {
             pass(&mut self.rule, present, out);
         }
         Ok(())
+    }
+
+    fn hears_repaired_ms(&self) -> Option<f64> {
+        R::HEARS_REPAIRED.then(|| ms(self.period) + self.latency_ms)
     }
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {

@@ -24,6 +24,12 @@ pub trait Stream: Send {
     /// `Problem` where the encoder needs intensities that are not there, or the stream was begun with frames.
     fn push_events(&mut self, events: EventsView<'_>, out: &mut Vec<Spike>) -> Result<()>;
 
+    /// How long after an event that a state repaired its spikes come at the latest, ms; none of an encoder of changes, which
+    /// moves its reference with such an event and tells nothing.
+    fn hears_repaired_ms(&self) -> Option<f64> {
+        Some(self.latency_ms())
+    }
+
     /// Takes the next picture, row by row, at `t` us.
     ///
     /// # Errors

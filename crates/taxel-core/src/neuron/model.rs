@@ -170,6 +170,13 @@ impl Neuron {
         self.tau_s.unwrap_or(0.25 * self.tau)
     }
 
+    /// How long an input moves the potential, ms: after it less than 1 % of its largest effect is left, whatever the kernel (of
+    /// 6.5, which is the slowest, after 7.64 tau).
+    #[must_use]
+    pub fn memory_ms(&self) -> f64 {
+        8.0 * self.tau.max(self.tau_s())
+    }
+
     /// The kernel with its constants.
     #[must_use]
     pub fn shape(&self) -> Shape {

@@ -195,6 +195,7 @@ impl Decoder {
             }
             out.intensity = Some(intensity);
         }
+        out.mark_repaired(before, false);
     }
 
     /// How many rows the next `bytes` bytes can give at most.
@@ -214,6 +215,7 @@ impl Decoder {
     pub fn end_of_datagram_into(&mut self, out: &mut Events) {
         if let Some(change) = self.waiting.take() {
             append(out, change, None);
+            out.mark_repaired(out.len() - 1, false);
         }
     }
 
@@ -228,7 +230,9 @@ impl Decoder {
     pub fn finish_into(&mut self, out: &mut Events) {
         self.end_of_datagram_into(out);
         if let Some(by_taxel) = &mut self.by_taxel {
+            let before = out.len();
             by_taxel.finish_into(out);
+            out.mark_repaired(before, false);
         }
         self.as_new();
     }

@@ -21,6 +21,8 @@ pub struct Took {
     pub until: Option<i64>,
     /// Numbers that have not come so far (version 2).
     pub missing: u64,
+    /// The latest time that was heard, us.
+    pub now: Option<i64>,
 }
 
 /// Hears one sender (address and port).
@@ -96,19 +98,16 @@ impl Receiver {
         }
     }
 
-    /// Takes a datagram; appends its events, and for each event of `out` whether a state repaired it.
-    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events, repaired: &mut Vec<bool>) -> Took {
+    /// Takes a datagram; appends its events.
+    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Took {
         let (before, heard) = (self.version, out.len());
         let mut took = Took::default();
         let second = datagram.first() == Some(&v2::MAGIC) && (self.version == 2 || Header::read(datagram).is_ok());
         if second {
             if self.version == 1 {
                 self.change(2, out);
-                if let Some((latest, heard)) = self.latest {
-                    self.two.go_on_from(latest, heard);
-                }
             }
-            if let Heard::Intact { until, missing, reset } = self.two.push(datagram, arrived, out, repaired) {
+            if let Heard::Intact { until, missing, reset } = self.two.push(datagram, arrived, out) {
                 self.whole_since = None;
                 (took.until, took.missing, took.reset) = (until, missing, reset);
             }
@@ -117,30 +116,28 @@ impl Receiver {
         } else {
             if self.version == 2 {
                 self.change(1, out);
-                self.offset = None;
             }
             let rows = out.len();
             let markers = out.markers.len();
             self.one.push_into(datagram, arrived, out);
             self.one.end_of_datagram_into(out);
             self.carry(rows, markers, arrived, out);
-            repaired.resize(out.len(), false);
         }
         if let Some(&t) = out.t[heard..].last() {
             let latest = self.latest.map_or(t, |(latest, _)| latest.max(t));
             self.latest = Some((latest, arrived));
         }
+        took.now = if self.version == 2 { Some(self.two.latest()) } else { self.latest.map(|(t, _)| t) };
         took.version = self.version;
         took.changed = self.version != before;
         took
     }
 
     /// Ends the stream: gives what waits.
-    pub fn finish_into(&mut self, out: &mut Events, repaired: &mut Vec<bool>) {
+    pub fn finish_into(&mut self, out: &mut Events) {
         let (rows, markers) = (out.len(), out.markers.len());
         self.one.finish_into(out);
         self.carry(rows, markers, None, out);
-        repaired.resize(out.len(), false);
     }
 
     /// Whether whole words of version 1, and nothing else, have come for long enough.
@@ -160,6 +157,11 @@ impl Receiver {
         self.one.end_of_datagram_into(out);
         (self.version, self.whole_since) = (version, None);
         self.changes += 1;
+        if version == 1 {
+            self.offset = None;
+        } else if let Some((latest, heard)) = self.latest {
+            self.two.go_on_from(latest, heard);
+        }
     }
 
     /// Moves times of version 1 behind what was heard before the change.
@@ -214,13 +216,13 @@ mod tests {
         let array = Array::thesis();
         let mut board = Board::new(Registers::default(), &array).unwrap();
         let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
-        let (mut events, mut repaired) = (Events::empty(array), vec![]);
+        let mut events = Events::empty(array);
         let (mut now, mut changes) = (5_000_000, vec![]);
         for version in [1, 2, 1] {
             speak(&mut board, version);
             for _ in 0..6000 {
                 play(&mut board, 1, |datagram| {
-                    let took = receiver.push(datagram, Some(now), &mut events, &mut repaired);
+                    let took = receiver.push(datagram, Some(now), &mut events);
                     if took.changed {
                         changes.push((took.version, now));
                     }
@@ -235,7 +237,7 @@ mod tests {
                     events.t.drain(..last);
                     events.p.drain(..last);
                     events.intensity = None;
-                    repaired.truncate(1);
+                    events.repaired = None;
                 }
             }
         }
@@ -252,16 +254,16 @@ mod tests {
         let array = Array::thesis();
         let mut board = Board::new(Registers { wire_version: 2, ..Registers::default() }, &array).unwrap();
         let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
-        let (mut events, mut repaired) = (Events::empty(array), vec![]);
+        let mut events = Events::empty(array);
         play(&mut board, 3, |datagram| {
-            receiver.push(datagram, Some(0), &mut events, &mut repaired);
+            receiver.push(datagram, Some(0), &mut events);
         });
         assert_eq!((receiver.version(), receiver.changes()), (2, 1));
         speak(&mut board, 1);
         receiver.expect(1, &mut events);
         let heard = events.len();
         play(&mut board, 2, |datagram| {
-            receiver.push(datagram, Some(400), &mut events, &mut repaired);
+            receiver.push(datagram, Some(400), &mut events);
         });
         assert_eq!((receiver.version(), receiver.refused()), (1, 0));
         assert_eq!(events.len(), heard + 2 * 4096);
@@ -271,10 +273,10 @@ mod tests {
     fn a_damaged_datagram_changes_no_version() {
         let array = Array::thesis();
         let mut receiver = Receiver::new(Decoder::new(array.clone()), 1);
-        let (mut events, mut repaired) = (Events::empty(array), vec![]);
+        let mut events = Events::empty(array);
         let mut damaged = vec![v2::MAGIC, 0x21];
         damaged.resize(40, 7);
-        receiver.push(&damaged, Some(0), &mut events, &mut repaired);
+        receiver.push(&damaged, Some(0), &mut events);
         assert_eq!((receiver.version(), receiver.counts().skipped), (1, 40));
     }
 }

@@ -104,6 +104,48 @@ impl Registers {
         registers
     }
 
+    /// What a board holds that scans another sensor's frames as they come: so many a second, of values of so many bits. And by
+    /// how many bits a value is to be shifted down, where the ramp of so fast a scan cannot tell that many.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where there are no such bits or so fast a scan is none; `Device` where the array breaks a rule.
+    pub fn of_source(array: &Array, rate_hz: f64, bits: u32) -> Result<(Self, u32)> {
+        const CHANNELS: u8 = 64;
+        if !(1..=16).contains(&bits) {
+            return Err(problem!("bits is {bits}: must be 1 to 16"));
+        }
+        let line = 1e8 / (rate_hz * f64::from(array.columns));
+        let steps = u32::from(sense_lines(array)).div_ceil(CHANNELS.into());
+        // Rule 7, and a ramp of 16 ticks.
+        let least = f64::from(steps * (u32::from(CHANNELS) + 10));
+        if !(line >= least && line <= 4e9) {
+            let most = 1e8 / (least * f64::from(array.columns));
+            let (rows, columns) = (array.rows, array.columns);
+            return Err(problem!(
+                "rate is {rate_hz} frames/s: of {rows} x {columns} taxels it must be above 0 and at most {most:.0}"
+            ));
+        }
+        let line_period = line.round() as u32;
+        let step_period = (line_period / steps).min(65_535);
+        let step_read = step_period - 20;
+        let (values, most) = ((1_u32 << bits) - 1, (3 * step_read - 1).min(65_534));
+        let shift = (0..16).find(|shift| values >> shift <= most).unwrap_or(16);
+        let registers = Self {
+            channels: CHANNELS,
+            lines: array.columns,
+            line_period,
+            line_read: line_period,
+            step_period: step_period as u16,
+            step_read: step_read as u16,
+            ramp: (values >> shift) as u16,
+            wire_version: 2,
+            ..Self::default()
+        };
+        registers.check(array)?;
+        Ok((registers, shift))
+    }
+
     /// Multiplexer steps in a line: on a board of 64 sense lines 4 with 16 channels, 1 with 64.
     #[must_use]
     pub fn steps(&self, array: &Array) -> u32 {
@@ -292,6 +334,22 @@ pub(crate) fn sense_lines(array: &Array) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn any_sensor_has_registers_that_keep_the_rules_and_its_rate() {
+        for (rows, columns, rate, bits) in [(16, 8, 50.0, 12), (4, 5, 1000.0, 16), (128, 128, 400.0, 8), (1, 1, 0.1, 1)]
+        {
+            let array = Array::new(rows, columns, 1.0, "other").unwrap();
+            let (registers, shift) = Registers::of_source(&array, rate, bits).unwrap();
+            assert_eq!(u32::from(registers.ramp), ((1 << bits) - 1) >> shift);
+            assert!((1e6 / registers.frame_us() / rate - 1.0).abs() < 1e-3, "{registers:?}");
+            assert!(shift == 0 || bits == 16, "{shift} of {bits}");
+        }
+        let array = Array::new(64, 64, 1.0, "other").unwrap();
+        for (rate, bits) in [(1e6, 8), (0.0, 8), (f64::NAN, 8), (-1.0, 8), (100.0, 0), (100.0, 17)] {
+            assert!(Registers::of_source(&array, rate, bits).is_err());
+        }
+    }
 
     fn thesis() -> Array {
         Array::thesis()

@@ -224,6 +224,17 @@ impl Header {
     }
 }
 
+/// Whether bytes begin with an intact datagram of version 2, of whatever length, with its length before it or without.
+#[must_use]
+pub fn begins(bytes: &[u8]) -> bool {
+    let whole = |bytes: &[u8]| {
+        bytes.first() == Some(&MAGIC)
+            && (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES.min(bytes.len()))
+                .any(|length| Header::read(&bytes[..length]).is_ok())
+    };
+    whole(bytes) || bytes.get(2..).is_some_and(whole)
+}
+
 /// The stride of an array: the fewest bits that name each of its rows.
 #[must_use]
 pub fn stride(rows: u16) -> u8 {

@@ -66,7 +66,18 @@ impl Sender {
     ///
     /// `Socket` where no socket can be had.
     pub fn open(to: SocketAddr, segment: bool) -> Result<Self> {
-        let socket = UdpSocket::bind(unspecified(to)).map_err(Error::socket(format!("UDP to {to}")))?;
+        Self::open_from(0, to, segment)
+    }
+
+    /// The same, from a port of this machine; 0 finds a free one.
+    ///
+    /// # Errors
+    ///
+    /// As [`Sender::open`], and where the port is taken.
+    pub fn open_from(port: u16, to: SocketAddr, segment: bool) -> Result<Self> {
+        let mut from = unspecified(to);
+        from.set_port(port);
+        let socket = UdpSocket::bind(from).map_err(Error::socket(format!("UDP from port {port} to {to}")))?;
         // Not connected: a connected socket would fail where nobody listens yet, and a board does not care.
         let segmenting =
             segment && super::socket::set(socket.as_raw_fd(), libc::SOL_UDP, libc::UDP_SEGMENT, &0).is_ok();

@@ -1,49 +1,68 @@
-//! The emulated board's UART, as a TCP port: five-byte commands in, ASCII status lines out.
+//! The emulated board's UART: five-byte commands in, ASCII status lines out, over a TCP port, a pseudo-terminal, or both.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 
 use taxel_core::board::Board;
 
+use super::line::Line;
 use crate::{Error, Result};
 
-/// Takes commands from whoever is connected; one at a time, as a UART has one cable: a new one takes the place of the old.
+/// Takes commands from whoever is connected. Of the TCP port one at a time, as a UART has one cable: a new one takes the
+/// place of the old.
 #[derive(Debug)]
 pub(super) struct Control {
-    listener: TcpListener,
-    address: SocketAddr,
+    listener: Option<(TcpListener, SocketAddr)>,
     cable: Option<TcpStream>,
-    greeting: String,
+    line: Option<Line>,
 }
 
 impl Control {
-    pub(super) fn listen(address: SocketAddr, board: &Board) -> Result<Self> {
-        let listener = TcpListener::bind(address).map_err(place(address))?;
-        listener.set_nonblocking(true).map_err(place(address))?;
-        let address = listener.local_addr().map_err(place(address))?;
-        Ok(Self { listener, address, cable: None, greeting: board.greeting() })
+    pub(super) fn open(address: Option<SocketAddr>, line: Option<Line>, board: &Board) -> Result<Self> {
+        let mut control = Self { listener: None, cable: None, line };
+        if let Some(address) = address {
+            let place = |error| Error::socket(format!("TCP {address}"))(error);
+            let listener = TcpListener::bind(address).map_err(place)?;
+            listener.set_nonblocking(true).map_err(place)?;
+            let found = listener.local_addr().map_err(place)?;
+            control.listener = Some((listener, found));
+        }
+        control.greet(board);
+        Ok(control)
     }
 
-    pub(super) fn address(&self) -> SocketAddr {
-        self.address
+    pub(super) fn address(&self) -> Option<SocketAddr> {
+        self.listener.as_ref().map(|(_, address)| *address)
+    }
+
+    /// Says what a board says at reset.
+    pub(super) fn greet(&mut self, board: &Board) {
+        self.say(&board.greeting());
     }
 
     /// Carries out what came and answers; never waits.
     pub(super) fn serve(&mut self, board: &mut Board) {
-        if let Ok((cable, _)) = self.listener.accept() {
+        if let Some((listener, _)) = &self.listener
+            && let Ok((mut cable, _)) = listener.accept()
+        {
             let ready = cable.set_nonblocking(true).and_then(|()| cable.set_nodelay(true));
+            let ready = ready.and_then(|()| cable.write_all(board.greeting().as_bytes()));
             self.cable = ready.is_ok().then_some(cable);
-            self.say(&self.greeting.clone());
         }
         let faults = board.faults();
         self.say(&faults);
+        if let Some(line) = &mut self.line {
+            let bytes = line.read();
+            let answers = board.command(&bytes);
+            line.say(&answers);
+        }
         let mut bytes = [0; 256];
         while let Some(cable) = &mut self.cable {
             match cable.read(&mut bytes) {
                 Ok(0) => self.cable = None,
                 Ok(n) => {
                     let lines = board.command(&bytes[..n]);
-                    self.say(&lines);
+                    say(&mut self.cable, &lines);
                 }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => return,
                 Err(_) => self.cable = None,
@@ -51,18 +70,20 @@ impl Control {
         }
     }
 
-    /// A status line that nobody reads is lost, as on a UART; a cable that was pulled is let go.
     fn say(&mut self, lines: &str) {
-        if let Some(cable) = &mut self.cable
-            && let Err(error) = cable.write_all(lines.as_bytes())
-            && error.kind() != ErrorKind::WouldBlock
-        {
-            self.cable = None;
+        say(&mut self.cable, lines);
+        if let Some(line) = &mut self.line {
+            line.say(lines);
         }
     }
 }
 
-/// Names a socket in an error.
-fn place(address: SocketAddr) -> impl FnOnce(std::io::Error) -> Error {
-    Error::socket(format!("TCP {address}"))
+/// A status line that nobody reads is lost, as on a UART; a cable that was pulled is let go.
+fn say(cable: &mut Option<TcpStream>, lines: &str) {
+    if let Some(there) = cable
+        && let Err(error) = there.write_all(lines.as_bytes())
+        && error.kind() != ErrorKind::WouldBlock
+    {
+        *cable = None;
+    }
 }

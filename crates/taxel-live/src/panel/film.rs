@@ -507,12 +507,12 @@ impl FileFilm {
         events: &mut Events,
         mut remarks: Option<&mut Remarks>,
     ) -> Result<u64> {
-        let (mut repaired, mut bytes) = (vec![], 0);
+        let mut bytes = 0;
         match (&self.source, &mut *ear) {
             (Source::Mcap(reader), Ear::Datagrams(receiver)) => {
                 reader.block(k, place, |message| {
                     if message.topic == Topic::Datagrams {
-                        receiver.push(message.data, Some(message.at_ns / 1000), events, &mut repaired);
+                        receiver.push(message.data, Some(message.at_ns / 1000), events);
                         bytes += message.data.len() as u64;
                     } else if message.topic == Topic::Pressure {
                         return Ok(());
@@ -534,7 +534,7 @@ impl FileFilm {
         }
         if k + 1 == self.blocks() {
             match ear {
-                Ear::Datagrams(receiver) => receiver.finish_into(events, &mut repaired),
+                Ear::Datagrams(receiver) => receiver.finish_into(events),
                 Ear::Bytes(decoder) => decoder.finish_into(events),
             }
         }

@@ -29,6 +29,9 @@ pub struct Counters {
     pub wire_refused: u64,
     /// How often the board changed its version.
     pub wire_changes: u64,
+    /// Events of version 2 that came when time had gone on without them: their datagram was overtaken by more than a gap is
+    /// waited for.
+    pub wire_late: u64,
     /// Events that it gave.
     pub events: u64,
     /// Events that the readout has heard.

@@ -6,7 +6,6 @@ use std::time::{Duration, Instant};
 use taxel_core::Events;
 use taxel_core::wire::{Decoder, Receiver, Took};
 
-use super::handover;
 use super::options::LiveOptions;
 use super::recorder::Recorder;
 use super::shared::{Shared, Wish};
@@ -16,6 +15,7 @@ use crate::capture::Batch;
 use crate::clock::BoardClock;
 use crate::locked::lock;
 use crate::recording::now_ns;
+use crate::recording::{BoardChange, Change};
 
 /// How often those who look on get a new picture, the recording too.
 const PICTURE_EVERY: Duration = Duration::from_millis(100);
@@ -39,8 +39,9 @@ pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, list
     let mut work = Work {
         shared,
         sender,
-        repaired: vec![],
         promise: Promise::default(),
+        believed: None,
+        heard: None,
         options,
         listens,
         clock: BoardClock::default(),
@@ -51,6 +52,7 @@ pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, list
         fresh: None,
         has_intensities: false,
         decoded: 0,
+        late: 0,
         counted: 0,
         tared: false,
         pictured: Instant::now(),
@@ -68,9 +70,11 @@ pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, list
 struct Work<'a> {
     shared: &'a Shared,
     sender: Receiver,
-    /// For each event that waits whether a state repaired it (version 2).
-    repaired: Vec<bool>,
     promise: Promise,
+    /// What the readout was told last of how far time has come, by promises of version 2.
+    believed: Option<i64>,
+    /// The latest time that was heard, us.
+    heard: Option<i64>,
     options: &'a LiveOptions,
     listens: bool,
     clock: BoardClock,
@@ -84,6 +88,7 @@ struct Work<'a> {
     /// Whether any intensity has come: from then on every piece has the column, so that a lost one is one missing value.
     has_intensities: bool,
     decoded: u64,
+    late: u64,
     counted: u64,
     /// Whether the recorder knows the tare.
     tared: bool,
@@ -102,11 +107,11 @@ struct Promise {
 
 impl Promise {
     /// A datagram came. At a gap what it promises waits for a frame: the missing ones may only be late.
-    fn note(&mut self, took: &Took, arrived_us: i64, frame_us: i64) {
+    fn note(&mut self, took: &Took, arrived_us: i64, gap_us: i64) {
         if took.reset || took.missing < self.missing {
             (self.missing, self.waits) = (took.missing, None);
         } else if took.missing > self.missing {
-            (self.missing, self.waits) = (took.missing, Some(arrived_us + frame_us));
+            (self.missing, self.waits) = (took.missing, Some(arrived_us + gap_us));
         }
         if self.waits.is_some_and(|until| arrived_us >= until) {
             self.waits = None;
@@ -126,6 +131,7 @@ impl Work<'_> {
         let tick = if self.listens { TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)) } else { IDLE };
         let mut batch = Batch::new();
         while !self.shared.receiver.is_done() {
+            self.expect()?;
             if self.shared.receiver.take(&mut batch, tick)? {
                 self.decode(&batch)?;
                 self.record(|recorder| recorder.datagrams(&batch))?;
@@ -138,7 +144,7 @@ impl Work<'_> {
                 self.fulfil()?;
             }
         }
-        self.sender.finish_into(&mut self.events, &mut self.repaired);
+        self.sender.finish_into(&mut self.events);
         self.hand_on()?;
         self.silence();
         self.taps.retain_mut(Tap::tick);
@@ -192,9 +198,7 @@ impl Work<'_> {
                 }
                 Wish::Registers(registers) => {
                     self.frame_us = registers.frame_us();
-                    if registers.wire_version != self.sender.version() {
-                        self.sender.expect(registers.wire_version, &mut self.events);
-                    }
+                    self.speaks(registers.wire_version)?;
                     self.record(|recorder| recorder.registers(&registers))?;
                 }
             }
@@ -205,8 +209,8 @@ impl Work<'_> {
     /// The recording's own decoder has come to its first event: from then on it is known what its clock lacks.
     fn compare(&mut self, bytes: &[u8], arrived_us: i64, heard: usize) -> Result<()> {
         let Some(fresh) = &mut self.fresh else { return Ok(()) };
-        let (mut events, mut repaired) = (Events::empty(self.options.array.clone()), vec![]);
-        fresh.push(bytes, Some(arrived_us), &mut events, &mut repaired);
+        let mut events = Events::empty(self.options.array.clone());
+        fresh.push(bytes, Some(arrived_us), &mut events);
         if let (Some(ours), Some(theirs)) = (self.events.t.get(heard), events.t.first()) {
             let origin_us = ours - theirs;
             self.fresh = None;
@@ -215,16 +219,57 @@ impl Work<'_> {
         Ok(())
     }
 
+    /// The host may have told the board to speak another version of the wire.
+    fn expect(&mut self) -> Result<()> {
+        let version = self.shared.expected.swap(0, std::sync::atomic::Ordering::AcqRel);
+        if version == 0 { Ok(()) } else { self.speaks(version) }
+    }
+
+    /// The board was told to speak this version of the wire.
+    fn speaks(&mut self, version: u8) -> Result<()> {
+        if version == self.sender.version() {
+            return Ok(());
+        }
+        self.sender.expect(version, &mut self.events);
+        let change = Change::Wire { version, asked: true };
+        let change = BoardChange { at_ns: now_ns(), t_us: self.heard, change };
+        self.record(|recorder| recorder.board_change(&change))
+    }
+
+    /// What became of the board is kept.
+    fn mark(&self, took: &Took, at_ns: i64) -> Result<()> {
+        if took.version == 1 && !took.changed {
+            return Ok(());
+        }
+        let wire = took.changed.then_some(Change::Wire { version: took.version, asked: false });
+        self.record(|recorder| {
+            recorder.takes(took.version)?;
+            for change in wire.into_iter().chain(took.reset.then_some(Change::Reset)) {
+                recorder.board_change(&BoardChange { at_ns, t_us: took.now, change })?;
+            }
+            Ok(())
+        })
+    }
+
+    #[allow(clippy::cast_possible_truncation)]
     fn decode(&mut self, batch: &Batch) -> Result<()> {
         for (datagram, bytes) in batch.iter() {
             let before = self.events.len();
             let arrived_us = datagram.arrived_ns / 1000;
-            let took = self.sender.push(bytes, Some(arrived_us), &mut self.events, &mut self.repaired);
+            let took = self.sender.push(bytes, Some(arrived_us), &mut self.events);
             let now = now_ns();
             self.decoded += 1;
+            self.mark(&took, datagram.arrived_ns)?;
+            self.heard = took.now.or(self.heard);
             self.compare(bytes, arrived_us, before)?;
             if took.version == 2 {
-                self.promise.note(&took, arrived_us, self.frame_us());
+                if took.reset {
+                    self.believed = None;
+                }
+                let late = self.events.t[before..].iter().filter(|&&t| self.believed.is_some_and(|until| t < until));
+                self.late += late.count() as u64;
+                let gap_us = (self.options.gap_frames * self.frame_us) as i64;
+                self.promise.note(&took, arrived_us, gap_us);
                 if let Some(until) = took.until {
                     self.clock.note(until, datagram.arrived_ns);
                 }
@@ -275,6 +320,7 @@ impl Work<'_> {
             counters.wire_version = self.sender.version();
             counters.wire_refused = self.sender.refused();
             counters.wire_changes = self.sender.changes();
+            counters.wire_late = self.late;
             counters.events += events.len() as u64;
             counters.offset = self.clock.offset();
             counters.board_us = counters.board_us.max(events.t.iter().max().copied());
@@ -285,10 +331,10 @@ impl Work<'_> {
             let dropped = self.shared.handover.put(events);
             self.shared.shown().counters.events_dropped = dropped;
         }
-        handover::clear(events);
-        self.repaired.clear();
+        events.clear();
         if let Some(until) = self.promise.take().filter(|_| self.listens) {
             self.shared.handover.quiet(until);
+            self.believed = self.believed.max(Some(until));
         }
         if self.has_intensities {
             events.intensity.get_or_insert_default();

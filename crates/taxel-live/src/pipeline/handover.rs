@@ -2,7 +2,7 @@
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-use taxel_core::{Array, Events, Intensities};
+use taxel_core::{Array, Events};
 
 /// Events that wait for the readout, and how far the board's time has come without any.
 #[derive(Debug)]
@@ -45,8 +45,8 @@ impl Handover {
         } else {
             let dropped = events.len().saturating_sub(room);
             state.dropped += dropped as u64;
-            append(&mut state.events, events, room.min(events.len()));
-            clear(events);
+            state.events.append(events, room.min(events.len()));
+            events.clear();
         }
         state.quiet_until = None;
         let dropped = state.dropped;
@@ -68,7 +68,7 @@ impl Handover {
 
     /// Waits for something and takes all of it.
     pub(super) fn take(&self, events: &mut Events) -> Taken {
-        clear(events);
+        events.clear();
         let nothing = |s: &mut Waiting| {
             s.events.is_empty() && s.events.markers.is_empty() && s.quiet_until.is_none() && !s.closed
         };
@@ -83,45 +83,10 @@ impl Handover {
     }
 }
 
-/// Empties columns that are used again.
-pub(super) fn clear(events: &mut Events) {
-    events.t.clear();
-    events.x.clear();
-    events.y.clear();
-    events.p.clear();
-    if let Some(intensity) = &mut events.intensity {
-        intensity.ticks.clear();
-        intensity.present.clear();
-    }
-    events.markers.clear();
-}
-
-/// Appends the first `n` events of `more`, and all its markers.
-fn append(to: &mut Events, more: &Events, n: usize) {
-    let rows = to.len();
-    to.t.extend_from_slice(&more.t[..n]);
-    to.x.extend_from_slice(&more.x[..n]);
-    to.y.extend_from_slice(&more.y[..n]);
-    to.p.extend_from_slice(&more.p[..n]);
-    to.markers.extend_from_slice(&more.markers);
-    if to.intensity.is_some() || more.intensity.is_some() {
-        let none = || Intensities { ticks: vec![0; rows], present: vec![false; rows] };
-        let column = to.intensity.get_or_insert_with(none);
-        match &more.intensity {
-            Some(intensity) => {
-                column.ticks.extend_from_slice(&intensity.ticks[..n]);
-                column.present.extend_from_slice(&intensity.present[..n]);
-            }
-            None => {
-                column.ticks.resize(rows + n, 0);
-                column.present.resize(rows + n, false);
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use taxel_core::Intensities;
+
     use super::*;
 
     fn events(t: &[i64], ticks: Option<u16>) -> Events {

@@ -19,6 +19,8 @@ pub struct LiveOptions {
     pub differences: bool,
     /// In silence the readout's time follows the host's clock, this many frames behind it.
     pub guard_frames: f64,
+    /// At a gap in the sequence of version 2 time waits so many frames: the missing datagrams may only be late.
+    pub gap_frames: f64,
     /// How many events may wait for the readout.
     pub readout_events: usize,
     /// The socket and the queue behind it.
@@ -36,6 +38,7 @@ impl LiveOptions {
             registers: Registers::default(),
             differences: false,
             guard_frames: 5.0,
+            gap_frames: 1.0,
             readout_events: 1 << 20,
             capture: ReceiverOptions::default(),
             record: None,

@@ -15,7 +15,7 @@ use super::options::{LiveOptions, Record};
 use super::said::Said;
 use crate::capture::Batch;
 use crate::locked::lock;
-use crate::recording::{self, Header, LsaWriter, Writer, now_ns};
+use crate::recording::{self, BoardChange, Header, LsaWriter, Writer, now_ns};
 use crate::{Error, Result};
 
 /// A recording being written. Raw `.lsa` holds bytes and nothing else: what else there is to keep is left out of it.
@@ -28,6 +28,9 @@ pub(super) struct Recorder {
     /// Whether there was no such file.
     new: bool,
     noted: AtomicBool,
+    /// Whether something came that the file cannot hold, and whether anything is in it.
+    refused: AtomicBool,
+    begun: AtomicBool,
     kind: OnceLock<Kind>,
     /// Held by the one who opens the file.
     opening: Mutex<()>,
@@ -48,6 +51,7 @@ struct Guest {
 enum Entry {
     Datagram(i64, u64, Vec<u8>),
     Registers(i64, Registers),
+    Board(BoardChange),
     Held(i64, Option<i64>, Vec<u16>),
     Note(i64, Option<i64>, String),
 }
@@ -78,6 +82,8 @@ impl Recorder {
             header,
             new,
             noted: AtomicBool::new(false),
+            refused: AtomicBool::new(false),
+            begun: AtomicBool::new(false),
             kind: OnceLock::new(),
             opening: Mutex::new(()),
             guest: None,
@@ -148,6 +154,7 @@ impl Recorder {
             (Kind::Mcap(writer), Entry::Datagram(at, number, bytes)) => writer.datagram(at, number, &bytes),
             (Kind::Lsa(writer), Entry::Datagram(_, _, bytes)) => lock(writer).bytes(&bytes),
             (Kind::Mcap(writer), Entry::Registers(at, registers)) => writer.registers(at, &registers),
+            (Kind::Mcap(writer), Entry::Board(change)) => writer.board_change(&change),
             (Kind::Mcap(writer), Entry::Held(at, t_us, held)) => writer.held(at, t_us, &held),
             (Kind::Mcap(writer), Entry::Note(at, t_us, text)) => writer.note(at, t_us, &text),
             (Kind::Lsa(_), _) => Ok(()),
@@ -180,6 +187,7 @@ impl Recorder {
     }
 
     pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
+        self.begun.store(true, Ordering::Relaxed);
         if self.waits() {
             let mut all = batch.iter();
             return all.try_for_each(|(d, bytes)| self.push(Entry::Datagram(d.arrived_ns, d.number, bytes.to_vec())));
@@ -198,6 +206,21 @@ impl Recorder {
     /// The board's registers as they are from now on.
     pub(super) fn registers(&self, registers: &Registers) -> Result<()> {
         self.push(Entry::Registers(now_ns(), *registers))
+    }
+
+    /// Raw bytes are of version 1: those of version 2 do not say where a datagram ends.
+    pub(super) fn takes(&self, version: u8) -> Result<()> {
+        if version == 1 || named(&self.record.path)? == "mcap" {
+            return Ok(());
+        }
+        self.refused.store(true, Ordering::Relaxed);
+        let path = self.record.path.display();
+        Err(problem!("{path}: a .lsa holds wire version 1, and the board speaks version 2; record to a .mcap file")
+            .into())
+    }
+
+    pub(super) fn board_change(&self, change: &BoardChange) -> Result<()> {
+        self.push(Entry::Board(*change))
     }
 
     pub(super) fn marker(&self, marker: Marker) -> Result<()> {
@@ -277,7 +300,8 @@ impl Recorder {
             self.kind()?;
         }
         let path = self.record.path;
-        if nothing && !self.noted.into_inner() {
+        let refused = self.refused.into_inner();
+        if (nothing && !self.noted.into_inner()) || (refused && !self.begun.into_inner()) {
             drop(self.kind);
             if self.new {
                 std::fs::remove_file(&path).map_err(Error::file(&path))?;
@@ -286,6 +310,10 @@ impl Recorder {
         }
         match self.kind.into_inner() {
             Some(Kind::Mcap(writer)) => drop(writer.finish(lost)?),
+            // Without its .lss, as it is not whole.
+            Some(Kind::Lsa(writer)) if refused => {
+                writer.into_inner().unwrap_or_else(PoisonError::into_inner).flush()?
+            }
             Some(Kind::Lsa(writer)) => writer.into_inner().unwrap_or_else(PoisonError::into_inner).finish()?,
             None => {}
         }

@@ -41,6 +41,7 @@ impl<W: std::io::Write + Send> Sink for Lines<W> {
             "t_us": detection.t,
             "known_us": detection.known,
             "slope_mv_per_ms": detection.slope,
+            "repaired": detection.repaired,
             "said_us": said,
             "said_ns": said_ns,
         }))?;

@@ -1,6 +1,6 @@
 //! What the threads of a pipeline share, and what they show to those who look on.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Mutex, MutexGuard};
 use std::time::Instant;
 
@@ -51,6 +51,8 @@ pub(super) struct Shared {
     pub(super) listeners: Mutex<Vec<channel::Sender<Said>>>,
     /// What the registers hold now, which may not be what they held at the beginning.
     pub(super) registers: Mutex<Registers>,
+    /// The version of the wire that the board was told to speak, since this was looked at last; 0: nothing was said.
+    pub(super) expected: AtomicU8,
     pub(super) ended: AtomicBool,
 }
 

@@ -87,7 +87,8 @@ pub struct DecodedLsa {
 ///
 /// # Errors
 ///
-/// `File` where it cannot be read; `Core(Interrupted)` where asked to stop.
+/// `File` where it cannot be read; `Core` (format) where it holds datagrams of version 2; `Core(Interrupted)` where asked to
+/// stop.
 pub fn decode_lsa(
     path: &Path,
     array: Array,
@@ -98,6 +99,11 @@ pub fn decode_lsa(
     /// Bytes between two looks at `stop`.
     const PIECE: usize = 1 << 22;
     let bytes = std::fs::read(path).map_err(Error::file(path))?;
+    if wire::v2::begins(&bytes) {
+        let name = path.display();
+        let said = "begins with a datagram of wire version 2; a .lsa holds version 1";
+        return Err(taxel_core::Error::Format(format!("{name}: {said}: record version 2 to a .mcap file")).into());
+    }
     let mut decoder = Decoder::new(array.clone()).pairing(pairing).differences(differences);
     let mut events = Events::empty(array);
     for piece in bytes.chunks(PIECE) {

@@ -19,7 +19,7 @@ use taxel_core::wire::{self, Decoder, Pairing, Registers};
 use taxel_core::{Events, Marker, Stop};
 
 use super::mcap_writer::{BEGIN, END, unbase64};
-use super::{Counts, Header, Note, Topic, limits};
+use super::{BoardChange, Change, Counts, Header, Note, Topic, limits};
 use crate::{Error, Result};
 
 /// Opcode, length.
@@ -116,8 +116,6 @@ pub struct Decoded {
     pub counts: wire::Counts,
     /// What was heard and missed of version 2.
     pub version_2: wire::v2::Counts,
-    /// For each event whether a state of version 2 repaired it.
-    pub repaired: Vec<bool>,
     /// When each datagram came, ns since 1970.
     pub arrived_ns: Vec<i64>,
     /// Our arrival number of each.
@@ -130,8 +128,8 @@ pub struct Decoded {
 
 impl Decoded {
     fn empty(events: Events) -> Self {
-        let (counts, version_2, repaired) = (wire::Counts::default(), wire::v2::Counts::default(), vec![]);
-        Self { events, counts, version_2, repaired, arrived_ns: vec![], number: vec![], first: vec![], bad_chunks: 0 }
+        let (counts, version_2) = (wire::Counts::default(), wire::v2::Counts::default());
+        Self { events, counts, version_2, arrived_ns: vec![], number: vec![], first: vec![], bad_chunks: 0 }
     }
 }
 
@@ -156,6 +154,8 @@ pub struct Remarks {
     pub arrivals: Option<(i64, i64)>,
     /// How many pictures there are.
     pub pictures: u64,
+    /// Resets of the board, and changes of its version of the wire.
+    pub board: Vec<BoardChange>,
     /// What the taxels held when the recording began, ticks by index, 65 535 where a taxel was not heard of; where it says.
     pub held: Option<Vec<u16>>,
 }
@@ -199,7 +199,8 @@ impl Remarks {
                 {
                     // JSON has no NaN: a slope that is not known is written as null.
                     let slope = said["slope"].as_f64().unwrap_or(f64::NAN);
-                    self.detections.push((message.at_ns, Detection { label: label.to_owned(), t, known, slope }));
+                    let (label, repaired) = (label.to_owned(), said["repaired"].as_bool().unwrap_or(false));
+                    self.detections.push((message.at_ns, Detection { label, t, known, slope, repaired }));
                 }
             }
             Topic::Held => {
@@ -207,6 +208,11 @@ impl Remarks {
                     && let Some(ticks) = said["ticks"].as_str().and_then(unbase64)
                 {
                     self.held = Some(ticks.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect());
+                }
+            }
+            Topic::Board => {
+                if let Ok(said) = serde_json::from_slice::<BoardChange>(message.data) {
+                    self.board.push(BoardChange { at_ns: message.at_ns, ..said });
                 }
             }
             Topic::Counts => self.counts = serde_json::from_slice(message.data).ok().or(self.counts.take()),
@@ -383,14 +389,21 @@ impl Reader {
             if message.topic == Topic::Datagrams {
                 let before = decoded.events.len();
                 let arrived = Some(message.at_ns / 1000);
-                sender.push(message.data, arrived, &mut decoded.events, &mut decoded.repaired);
+                sender.push(message.data, arrived, &mut decoded.events);
                 decoded.arrived_ns.push(message.at_ns);
                 decoded.number.push(message.number);
                 decoded.first.push(before as u64);
             }
+            // What the host told the board cannot be seen from its datagrams.
+            if message.topic == Topic::Board
+                && let Ok(BoardChange { change: Change::Wire { version, asked: true }, .. }) =
+                    serde_json::from_slice(message.data)
+            {
+                sender.expect(version, &mut decoded.events);
+            }
             Ok(())
         })?;
-        sender.finish_into(&mut decoded.events, &mut decoded.repaired);
+        sender.finish_into(&mut decoded.events);
         decoded.events.t.iter_mut().for_each(|t| *t += self.header.origin_us);
         decoded.events.markers.iter_mut().for_each(|m| m.t += self.header.origin_us);
         decoded.counts = *sender.counts();

@@ -27,7 +27,7 @@ use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::picture::Pictures;
-use super::{Compression, Counts, FLUSH_EVERY, Header, LATE, Topic, WriterOptions, create};
+use super::{BoardChange, Compression, Counts, FLUSH_EVERY, Header, LATE, Topic, WriterOptions, create};
 use crate::{Error, Result};
 
 /// A chunk is closed when it is this large, or when the queue is empty.
@@ -201,14 +201,24 @@ impl Writer {
         self.push_json(Topic::Notes, at_ns, &note)
     }
 
+    /// Keeps a reset of the board, or a change of its version of the wire.
+    ///
+    /// # Errors
+    ///
+    /// As [`Writer::datagram`].
+    pub fn board_change(&self, change: &BoardChange) -> Result<()> {
+        let said = serde_json::to_value(change).unwrap_or_default();
+        self.push_json(Topic::Board, change.at_ns, &said)
+    }
+
     /// Keeps what a readout said; `at_ns` is when it said so.
     ///
     /// # Errors
     ///
     /// As [`Writer::datagram`].
     pub fn detection(&self, at_ns: i64, detection: &Detection) -> Result<()> {
-        let Detection { label, t, known, slope } = detection;
-        let said = json!({ "label": label, "t_us": t, "known_us": known, "slope": slope });
+        let Detection { label, t, known, slope, repaired } = detection;
+        let said = json!({ "label": label, "t_us": t, "known_us": known, "slope": slope, "repaired": repaired });
         self.push_json(Topic::Detections, at_ns, &said)
     }
 

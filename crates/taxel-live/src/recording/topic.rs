@@ -5,7 +5,7 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u16)]
 pub enum Topic {
-    /// Raw datagrams of the board, version 1 of the wire.
+    /// Raw datagrams of the board, of either version of the wire.
     Datagrams = 1,
     /// The board's register file, when it was set.
     Registers = 2,
@@ -21,11 +21,13 @@ pub enum Topic {
     Pressure = 7,
     /// What the taxels held when the recording began.
     Held = 8,
+    /// Resets of the board, and changes of its version of the wire.
+    Board = 9,
 }
 
 impl Topic {
     /// All, by number.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Datagrams,
         Self::Registers,
         Self::Markers,
@@ -34,6 +36,7 @@ impl Topic {
         Self::Counts,
         Self::Pressure,
         Self::Held,
+        Self::Board,
     ];
 
     /// The name in the file.
@@ -48,6 +51,7 @@ impl Topic {
             Self::Counts => "/counts",
             Self::Pressure => "/pressure",
             Self::Held => "/held",
+            Self::Board => "/board",
         }
     }
 
@@ -70,6 +74,7 @@ impl Topic {
             Self::Counts => ("taxel.Counts", include_str!("schemas/Counts.json")),
             Self::Pressure => ("foxglove.RawImage", include_str!("schemas/RawImage.json")),
             Self::Held => ("taxel.Held", include_str!("schemas/Held.json")),
+            Self::Board => ("taxel.Board", include_str!("schemas/Board.json")),
         })
     }
 

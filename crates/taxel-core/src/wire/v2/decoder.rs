@@ -225,17 +225,22 @@ impl Decoder {
         self.goes_on = true;
     }
 
+    /// The latest time that was heard or promised, us.
+    pub(crate) fn latest(&self) -> i64 {
+        self.latest
+    }
+
     /// What each taxel holds as far as was heard, by index.
     #[must_use]
     pub fn held(&self) -> &[Option<u16>] {
         &self.held
     }
 
-    /// Takes a datagram; appends its events, and for each event of `out` whether it was repaired.
+    /// Takes a datagram; appends its events.
     ///
     /// `arrived` is the host's clock in us. After a reset it says how much time has passed, else time goes on from the latest
     /// that was heard.
-    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events, repaired: &mut Vec<bool>) -> Heard {
+    pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
         self.counts.datagrams += 1;
         let (header, body) = match Header::read(datagram) {
             Ok(read) => read,
@@ -271,7 +276,7 @@ impl Decoder {
         self.counts.dropped += u64::from(header.flags & DROPPED != 0);
         self.counts.unknown_flags += u64::from(header.flags & !(FRAME_SYNC | DIFFERENCES | DROPPED) != 0);
         self.latest = self.latest.max(base);
-        self.body(&header, body, base, out, repaired);
+        self.body(&header, body, base, out);
         self.heard = arrived.map(|now| (now, self.latest)).or(self.heard);
         let until = (header.span > 0).then(|| base + i64::from(header.span));
         self.latest = self.latest.max(until.unwrap_or(i64::MIN));
@@ -316,7 +321,7 @@ impl Decoder {
         (self.sessions.len() - 1, !began)
     }
 
-    fn body(&mut self, header: &Header, body: &[u8], base: i64, out: &mut Events, repaired: &mut Vec<bool>) {
+    fn body(&mut self, header: &Header, body: &[u8], base: i64, out: &mut Events) {
         let Some(kind) = Kind::of(header.kind) else {
             self.counts.unknown_kind += 1;
             return;
@@ -324,7 +329,7 @@ impl Decoder {
         match kind {
             Kind::Changes | Kind::Small | Kind::Large | Kind::SmallStates | Kind::LargeStates => {
                 let Some(word) = kind.layout() else { return };
-                self.words(header, kind, word, body, base, out, repaired);
+                self.words(header, kind, word, body, base, out);
             }
             Kind::Markers => {
                 self.counts.malformed += u64::from(!body.len().is_multiple_of(8));
@@ -348,17 +353,7 @@ impl Decoder {
         }
     }
 
-    #[allow(clippy::too_many_arguments)]
-    fn words(
-        &mut self,
-        header: &Header,
-        kind: Kind,
-        word: Layout,
-        body: &[u8],
-        base: i64,
-        out: &mut Events,
-        repaired: &mut Vec<bool>,
-    ) {
+    fn words(&mut self, header: &Header, kind: Kind, word: Layout, body: &[u8], base: i64, out: &mut Events) {
         let valued = word.value > 0;
         let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
         let differences = header.flags & DIFFERENCES != 0 && !states;
@@ -370,7 +365,6 @@ impl Decoder {
             [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
             _ => 0,
         });
-        repaired.resize(out.len(), false);
         let before = out.len();
         if valued {
             let column = out.intensity.get_or_insert_with(Intensities::default);
@@ -428,12 +422,12 @@ impl Decoder {
             out.x.push(x);
             out.y.push(y);
             out.p.push(p);
-            repaired.push(states);
             if let Some(column) = &mut out.intensity {
                 column.ticks.push(if valued { told } else { 0 });
                 column.present.push(valued);
             }
         }
+        out.mark_repaired(before, states);
         self.counts.malformed += u64::from(cut);
     }
 }

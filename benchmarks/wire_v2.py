@@ -1,0 +1,142 @@
+"""How large version 2 of the wire is, and how fast it is decoded, beside version 1 with the same events.
+
+Bytes an event: the same trip times go through a board of each version at 5208 frames/s (kind S, values included).
+What a board of version 2 says beside events (heartbeats, states, totals) is counted apart. Scenes: every taxel in
+every frame; a footfall, which is a picture that rolls from heel to toe, drawn by a seed (no recording); a ball
+dropped and pressed (the demo's scene of that seed), tared away from the noise.
+
+Decoding: the whole stream at once, checksums included, beside version 1's pairs of change and intensity; an event is
+a pair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from _rounds import measure, ratio, stamp
+from numpy.typing import NDArray
+
+from taxel import wire, wire_v2
+from taxel.simulate import Board, Pictures, Scene, Silence, Version2, play
+from taxel.wire import FRAME_US, Registers
+
+SEED, TARE_MS, DECODED = 20_261_121, 50.0, 4_000_000
+
+#: Bytes an event against version 1 that were to be reached, at once and with a hold of 1 ms.
+GOALS = {"full array": (0.21, None), "footfall": (0.75, None), "drop": (1.05, 0.80)}
+
+Frames = list[NDArray[np.uint16]]
+
+
+def full() -> Frames:
+    """Return frames in which every taxel moves beyond the floor."""
+    return [np.full(4096, 40 + 60 * (k % 2), np.uint16) for k in range(200)]
+
+
+def felt(acts: list[Any]) -> Frames:
+    """Return what the taxels hold frame by frame, from the start marker on, as a board of version 1 tells it."""
+    events = play([Silence(TARE_MS + 50.0), *acts], seed=SEED, tare_ms=TARE_MS).events
+    start, stop = (t for t, _ in events.markers)
+    held = np.zeros(4096, np.uint16)
+    frame = ((events.t + 100) // FRAME_US).astype(int)
+    place, first, last = events.y.astype(int) * 64 + events.x, int(start // FRAME_US), int(stop // FRAME_US)
+    frames, edges = [], np.searchsorted(frame, np.arange(frame[0], last + 2))
+    for k, (a, b) in enumerate(pairwise(edges), int(frame[0])):
+        held[place[a:b]] = events.intensity[a:b]
+        if k >= first:
+            frames.append(held.copy())
+    return frames
+
+
+def footfall() -> Frames:
+    """Return a footfall: a loaded patch that rolls from heel to toe, and a toe."""
+    draw = np.random.default_rng(SEED)
+    y, x = np.mgrid[:64, :64]
+    pictures = np.zeros((350, 64, 64), np.float32)
+    for k in range(1, 349):
+        share = k / 349
+        centre, load = 10 + 40 * share, np.sin(np.pi * share) ** 0.3
+        sole = np.exp(-(((y - centre) / 9) ** 2) - ((x - 32 - 4 * np.sin(3 * share)) / 6) ** 2)
+        toe = np.exp(-(((y - 54) / 3) ** 2) - ((x - 36) / 3) ** 2) * max(0.0, share - 0.5)
+        pictures[k] = load * (sole + 1.5 * toe)
+    pictures *= np.float32(0.8) / pictures.max() * (1 + 0.02 * draw.standard_normal((64, 64)).clip(-2, 2))
+    return felt([Pictures(pictures.clip(0, 1), 2000.0)])
+
+
+def drop() -> Frames:
+    """Return a ball that drops, bounces, is caught and pressed."""
+    return felt([Scene.draw(SEED)])
+
+
+def sent(frames: Frames, registers: Registers, **options: int) -> list[bytes]:
+    """Return the datagrams of a board that begins with what the first frame holds."""
+    board = Board(registers, version_2=Version2(**options))
+    board.frame(frames[0])
+    return [datagram for frame in frames[1:] for datagram in board.frame(frame)]
+
+
+def sizes(frames: Frames) -> dict[str, Any]:
+    """Return bytes an event: of version 1, and of version 2 by what they are for."""
+    one = sent(frames, Registers())
+    changes = sum(map(len, one)) // 10
+    said: dict[str, Any] = {"events": changes, "frames": len(frames) - 1, "version 1": 10.0}
+    for name, hold in (("at once", 0), ("hold 1 ms", 1000)):
+        two = sent(frames, Registers(wire_version=2), hold_us=hold)
+        kinds = {"events": 0, "heartbeats": 0, "states": 0, "totals": 0}
+        for datagram in two:
+            kind = datagram[1] & 15
+            what = "totals" if kind == 4 else "states" if kind in (6, 7) else "events"
+            kinds["heartbeats" if len(datagram) == 24 else what] += len(datagram)
+        said[name] = {what: total / changes for what, total in kinds.items()}
+        said[name]["events against version 1"] = kinds["events"] / changes / 10.0
+    return said
+
+
+def stream(frames: Frames, version: int, events: int) -> tuple[bytes, int]:
+    """Return bytes of about so many events, and how many they are."""
+    out, count = [], 0
+    board = Board(Registers(wire_version=version), version_2=Version2(states_us=0))
+    board.frame(frames[0])
+    k = 0
+    before = board.counts["changes"]
+    while count < events:
+        k += 1
+        made = board.frame(frames[k % len(frames)])
+        out += made if version == 1 else [len(datagram).to_bytes(2, "little") + datagram for datagram in made]
+        count = board.counts["changes"] - before
+    return b"".join(out), count
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    scenes = {"full array": full(), "footfall": footfall(), "drop": drop()}
+    bytes_an_event = {name: sizes(frames) for name, frames in scenes.items()}
+    events, rounds = (DECODED // 20, 3) if quick else (DECODED, 11)
+    data = {(name, v): stream(scenes[name], v, events) for name in ("full array", "footfall") for v in (1, 2)}
+    runs: dict[str, Callable[[], Any]] = {}
+    for name in ("full array", "footfall"):
+        runs[f"version 2, {name}"] = lambda name=name: wire_v2.decode(data[name, 2][0])
+        runs[f"version 1, {name}"] = lambda name=name: wire.Decoder().push(data[name, 1][0])
+        assert len(wire_v2.decode(data[name, 2][0])[0]) == data[name, 2][1]
+    results = measure(runs, rounds=rounds)
+    for name, version in data:
+        result = results[f"version {version}, {name}"]
+        result["rate"] *= data[name, version][1]
+    ratios: dict[str, Any] = {}
+    for name, said in bytes_an_event.items():
+        for how, goal in zip(("at once", "hold 1 ms"), GOALS[name], strict=True):
+            against = said[how]["events against version 1"]
+            ratios[f"bytes an event, {name}, {how} / version 1" + (f" (goal {goal})" if goal else "")] = against
+    for name in ("full array", "footfall"):
+        ratios[f"decoded, {name}, version 2 / version 1"] = ratio(results, f"version 2, {name}", f"version 1, {name}")
+        ratios[f"version 2, {name}, million events/s"] = results[f"version 2, {name}"]["rate"] / 1e6
+    return {
+        "question": __doc__.splitlines()[0],
+        **stamp(),
+        "seed": SEED,
+        "bytes_an_event": bytes_an_event,
+        "results": results,
+        "ratios": ratios,
+    }

@@ -1,0 +1,180 @@
+//! A serial line without a wire: a pseudo-terminal under a stable name, as fast as its baud rate and no faster.
+
+use std::collections::VecDeque;
+use std::fs::File;
+use std::io::{ErrorKind, Read, Write};
+use std::os::fd::{AsRawFd, FromRawFd, OwnedFd};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::{Error, Result};
+
+/// Bits on the line for a byte: start, 8 of data, stop.
+const BITS_A_BYTE: f64 = 10.0;
+
+/// What a UART gathers at most while nobody looks, bytes.
+const GATHERS: f64 = 64.0;
+
+/// What waits to be sent at most, bytes; more is lost, as on a UART.
+const WAITING: usize = 4096;
+
+/// One end of a pseudo-terminal; the other has a name in the file system, as a serial device has.
+#[derive(Debug)]
+pub(super) struct Line {
+    ours: File,
+    /// Held open, so that the line stays up while nobody is on it.
+    _theirs: OwnedFd,
+    link: PathBuf,
+    bytes_per_s: f64,
+    /// Bytes that may pass now, each way.
+    into: f64,
+    out: f64,
+    looked: Instant,
+    waiting: VecDeque<u8>,
+}
+
+impl Line {
+    /// Opens a line and puts its name at `link`; an earlier link there is replaced, a file is not.
+    ///
+    /// # Errors
+    ///
+    /// `File` where there is no pseudo-terminal to be had, or something else stands at `link`.
+    pub(super) fn open(link: &Path, baud: u32) -> Result<Self> {
+        let (mut ours, mut theirs) = (-1, -1);
+        let mut name = [0 as libc::c_char; 128];
+        // SAFETY: openpty writes two descriptors and a name of some 12 bytes into the room given; no settings are passed.
+        let opened = unsafe {
+            libc::openpty(&raw mut ours, &raw mut theirs, name.as_mut_ptr(), std::ptr::null(), std::ptr::null())
+        };
+        if opened != 0 {
+            return Err(Error::file(link)(std::io::Error::last_os_error()));
+        }
+        // SAFETY: both are open and belong to nobody else; the name ends within its room.
+        let (ours, theirs, name) = unsafe {
+            let name = std::ffi::CStr::from_ptr(name.as_ptr()).to_string_lossy().into_owned();
+            (File::from_raw_fd(ours), OwnedFd::from_raw_fd(theirs), name)
+        };
+        // Raw before anybody can open it: else what the board says would be echoed back to it.
+        // SAFETY: a descriptor of ours, settings on our stack.
+        let ready = unsafe {
+            let mut settings = std::mem::zeroed();
+            libc::tcgetattr(theirs.as_raw_fd(), &raw mut settings) == 0
+                && {
+                    libc::cfmakeraw(&raw mut settings);
+                    libc::tcsetattr(theirs.as_raw_fd(), libc::TCSANOW, &raw const settings) == 0
+                }
+                && libc::fcntl(ours.as_raw_fd(), libc::F_SETFL, libc::O_NONBLOCK) == 0
+        };
+        if !ready {
+            return Err(Error::file(link)(std::io::Error::last_os_error()));
+        }
+        if std::fs::symlink_metadata(link).is_ok_and(|there| !there.file_type().is_symlink()) {
+            return Err(Error::file(link)(std::io::Error::from_raw_os_error(libc::EEXIST)));
+        }
+        // By way of another name, so that there is always a whole link.
+        let mut other = link.as_os_str().to_owned();
+        other.push(format!(".{}", std::process::id()));
+        let made = std::os::unix::fs::symlink(&name, &other).and_then(|()| std::fs::rename(&other, link));
+        made.map_err(Error::file(link))?;
+        let (link, bytes_per_s) = (link.to_owned(), f64::from(baud) / BITS_A_BYTE);
+        let (looked, waiting) = (Instant::now(), VecDeque::new());
+        Ok(Self { ours, _theirs: theirs, link, bytes_per_s, into: 0.0, out: 0.0, looked, waiting })
+    }
+
+    /// What came since this was asked last, as far as the line has carried it.
+    pub(super) fn read(&mut self) -> Vec<u8> {
+        self.pass();
+        let mut bytes = vec![0; self.into as usize];
+        let n = loop {
+            match self.ours.read(&mut bytes) {
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                came => break came.unwrap_or(0),
+            }
+        };
+        self.into -= n as f64;
+        bytes.truncate(n);
+        bytes
+    }
+
+    /// Says something; it leaves as fast as the line carries it.
+    pub(super) fn say(&mut self, lines: &str) {
+        let room = WAITING - self.waiting.len();
+        self.waiting.extend(lines.bytes().take(room));
+        self.pass();
+        let now: Vec<u8> = self.waiting.iter().take(self.out as usize).copied().collect();
+        if !now.is_empty() {
+            let n = match self.ours.write(&now) {
+                Ok(n) => n,
+                Err(error) if error.kind() == ErrorKind::Interrupted => 0,
+                // Nobody reads, so the terminal is full: lost, as on a UART.
+                Err(_) => now.len(),
+            };
+            self.out -= n as f64;
+            self.waiting.drain(..n);
+        }
+    }
+
+    fn pass(&mut self) {
+        let passed = self.looked.elapsed().as_secs_f64() * self.bytes_per_s;
+        self.looked = Instant::now();
+        // A machine that looks late must not slow the line down for good.
+        let most = GATHERS.max(passed);
+        (self.into, self.out) = ((self.into + passed).min(most), (self.out + passed).min(most));
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.link);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    fn until(line: &mut Line, mut enough: impl FnMut(&mut Line) -> bool) {
+        let begun = Instant::now();
+        while !enough(line) {
+            assert!(begun.elapsed() < Duration::from_secs(30), "never came");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    #[test]
+    fn a_line_has_a_name_and_carries_bytes_no_faster_than_its_rate() {
+        let link = std::env::temp_dir().join(format!("taxel-{}-line", std::process::id()));
+        let begun = Instant::now();
+        let mut line = Line::open(&link, 9600).expect("a pseudo-terminal");
+        let mut host = File::options().read(true).write(true).open(&link).expect("the other end");
+        host.write_all(&[7; 480]).expect("room");
+        let mut came = vec![];
+        until(&mut line, |line| {
+            came.extend(line.read());
+            came.len() == 480
+        });
+        assert!(begun.elapsed() >= Duration::from_millis(400), "960 bytes a second, 64 at once: {:?}", begun.elapsed());
+        assert!(came.iter().all(|&byte| byte == 7));
+        line.say("ok REG4=0x000000A0\n");
+        until(&mut line, |line| {
+            line.say("");
+            line.waiting.is_empty()
+        });
+        let mut said = [0; 64];
+        let n = host.read(&mut said).expect("an answer");
+        assert!("ok REG4=0x000000A0\n".as_bytes().starts_with(&said[..n]) && n > 0);
+        drop(line);
+        assert!(!link.exists());
+    }
+
+    #[test]
+    fn a_file_is_not_replaced_by_a_line() {
+        let place = std::env::temp_dir().join(format!("taxel-{}-no-line", std::process::id()));
+        std::fs::write(&place, "kept").expect("room");
+        assert!(Line::open(&place, 115_200).is_err());
+        assert_eq!(std::fs::read_to_string(&place).expect("still there"), "kept");
+        std::fs::remove_file(&place).expect("ours");
+    }
+}

@@ -1,0 +1,91 @@
+//! Acts one after the other, each made ready while those before it are played.
+
+use std::time::Duration;
+
+use crossbeam_channel as channel;
+use taxel_core::contact::{Act, Contact, Prepared, Stage, Taxels};
+use taxel_core::{Array, Stop};
+
+use super::Touch;
+use crate::{Error, Result};
+
+/// How many acts are made ready ahead of the one that is played.
+const AHEAD: usize = 4;
+
+/// How long to wait before looking whether to stop.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+
+/// Acts without an end, or with one.
+#[derive(Debug)]
+pub struct Scenes {
+    stage: Stage,
+    coming: channel::Receiver<Result<Prepared>>,
+    over: bool,
+    /// Touches that were not asked for yet.
+    told: usize,
+}
+
+impl Scenes {
+    /// Begins to make acts ready, in a thread of its own that ends with this.
+    ///
+    /// # Errors
+    ///
+    /// As [`Stage::new`]; what is wrong with an act shows when it is to be played.
+    pub fn new(
+        array: &Array,
+        taxels: Taxels,
+        frame_us: f64,
+        acts: impl Iterator<Item = Result<Act>> + Send + 'static,
+    ) -> Result<Self> {
+        let stage = Stage::new(array, taxels, frame_us, &[])?;
+        let (ready, coming) = channel::bounded(AHEAD);
+        let array = array.clone();
+        let work = move || {
+            for (n, act) in acts.enumerate() {
+                let prepared = act.and_then(|act| {
+                    Prepared::of(&array, frame_us, &act).map_err(|error| match error {
+                        taxel_core::Error::Scene(text) => taxel_core::Error::Scene(format!("act {n}: {text}")).into(),
+                        other => other.into(),
+                    })
+                });
+                let last = prepared.is_err();
+                if ready.send(prepared).is_err() || last {
+                    break;
+                }
+            }
+        };
+        std::thread::Builder::new().name("taxel-scenes".to_owned()).spawn(work).map_err(Error::socket("thread"))?;
+        Ok(Self { stage, coming, over: false, told: 0 })
+    }
+
+    /// Touches of acts that were made ready since this was asked last, us from the first frame's start.
+    pub fn take_contacts(&mut self) -> Vec<Contact> {
+        let contacts = self.stage.contacts();
+        let new = contacts[self.told..].to_vec();
+        self.told = contacts.len();
+        new
+    }
+
+    /// Waits until there is a frame to play; false where there is none any more, or the caller stops.
+    fn is_ready(&mut self, stop: Stop<'_>) -> Result<bool> {
+        while !self.over && self.stage.is_over() {
+            match self.coming.recv_timeout(LOOK_EVERY) {
+                Ok(act) => self.stage.push(act?),
+                Err(channel::RecvTimeoutError::Timeout) if !stop.asked() => {}
+                Err(channel::RecvTimeoutError::Timeout) => return Ok(false),
+                Err(channel::RecvTimeoutError::Disconnected) => self.over = true,
+            }
+        }
+        Ok(!self.stage.is_over())
+    }
+}
+
+impl Touch for Scenes {
+    fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool> {
+        Ok(self.is_ready(stop)? && self.stage.frame(ticks)?)
+    }
+
+    fn is_last(&mut self, stop: Stop<'_>) -> Result<bool> {
+        Ok(!self.is_ready(stop)?)
+    }
+}

@@ -1,0 +1,57 @@
+//! The board's sync line as lines of text: a line an edge, written as it comes.
+
+use std::fs::File;
+use std::io::Write;
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::path::Path;
+
+use crate::recording::now_ns;
+use crate::{Error, Result};
+
+/// Where edges are written.
+#[derive(Debug)]
+pub(super) struct Sync {
+    out: File,
+    high: bool,
+}
+
+impl Sync {
+    /// Opens a new file, or a pipe or terminal that is there, and says how the line stands.
+    ///
+    /// # Errors
+    ///
+    /// `File` where it cannot be opened, or a file is there and may not be replaced.
+    pub(super) fn open(path: &Path, overwrite: bool) -> Result<Self> {
+        let there = std::fs::metadata(path).ok();
+        let pipe = there.is_some_and(|m| m.file_type().is_fifo() || m.file_type().is_char_device());
+        let mut options = File::options();
+        options.write(true);
+        if pipe {
+            // Reading too, so that a pipe opens before anybody reads it; and never waiting for who reads too slowly.
+            options.read(true).custom_flags(libc::O_NONBLOCK | libc::O_NOCTTY);
+        } else if overwrite {
+            options.create(true).truncate(true);
+        } else {
+            options.create_new(true);
+        }
+        let out = options.open(path).map_err(Error::file(path))?;
+        let mut sync = Self { out, high: false };
+        sync.edge(0.0);
+        Ok(sync)
+    }
+
+    /// Says how the line stands at a time of the board, us, where that has changed.
+    pub(super) fn follow(&mut self, time_us: f64, high: bool) {
+        if high != self.high {
+            self.high = high;
+            self.edge(time_us);
+        }
+    }
+
+    /// The board's time in us, 1 or 0, the host's time in ns since 1970.
+    fn edge(&mut self, time_us: f64) {
+        let line = format!("{time_us} {} {}\n", u8::from(self.high), now_ns());
+        // A line that nobody reads is lost, as an edge that nobody samples.
+        let _ = self.out.write_all(line.as_bytes());
+    }
+}

@@ -1,0 +1,52 @@
+//! Serial ports that the system knows.
+
+use serde::Serialize;
+use serialport::SerialPortType;
+
+use crate::{Error, Result};
+
+/// A serial port.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Port {
+    /// Where it is, as "/dev/ttyUSB0".
+    pub place: String,
+    /// "usb", "pci", "bluetooth" or "other".
+    pub kind: &'static str,
+    /// What a USB device calls itself: its product, maker and serial number, as far as it says.
+    pub product: Option<String>,
+    /// As above.
+    pub maker: Option<String>,
+    /// As above.
+    pub serial: Option<String>,
+    /// Vendor and product numbers of a USB device.
+    pub usb: Option<(u16, u16)>,
+}
+
+/// All serial ports, USB devices first, each kind by name. Pseudo-terminals are not among them: the system does not list them.
+///
+/// # Errors
+///
+/// `File` where the system cannot be asked.
+pub fn ports() -> Result<Vec<Port>> {
+    let found = serialport::available_ports()
+        .map_err(|error| Error::file(std::path::Path::new("/sys/class/tty"))(error.into()))?;
+    let mut ports: Vec<Port> = found.into_iter().map(|port| told(port.port_name, port.port_type)).collect();
+    ports.sort_by(|a, b| (a.kind != "usb", &a.place).cmp(&(b.kind != "usb", &b.place)));
+    Ok(ports)
+}
+
+fn told(place: String, kind: SerialPortType) -> Port {
+    let port = |kind| Port { place, kind, product: None, maker: None, serial: None, usb: None };
+    match kind {
+        SerialPortType::UsbPort(usb) => Port {
+            product: usb.product,
+            maker: usb.manufacturer,
+            serial: usb.serial_number,
+            usb: Some((usb.vid, usb.pid)),
+            ..port("usb")
+        },
+        SerialPortType::PciPort => port("pci"),
+        SerialPortType::BluetoothPort => port("bluetooth"),
+        SerialPortType::Unknown => port("other"),
+    }
+}

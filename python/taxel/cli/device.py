@@ -1,0 +1,175 @@
+"""``taxel device``: a board on its serial line."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from taxel._core import ProblemError
+from taxel.cli._app import App, app
+from taxel.device import Device, ports
+from taxel.wire import PRESETS, Registers, described
+
+__all__ = ["apply", "listed", "record", "set_registers", "show", "watch"]
+
+_device = App(
+    no_args_is_help=True, help="Find a board on its serial line, set it by name, and read back what it holds."
+)
+app.add_typer(_device, name="device")
+
+PlaceArgument = Annotated[str, typer.Argument(help="A serial device (/dev/ttyUSB0), or host:port.")]
+BaudOption = Annotated[int, typer.Option(help="Of the serial line.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+
+
+@_device.callback()
+def _root() -> None:
+    """Find a board on its serial line, set it by name, and read back what it holds."""
+
+
+@_device.command("ports")
+def listed(as_json: JsonOption = False) -> None:
+    """List the serial ports of this machine.
+
+    Example: taxel device ports
+    """
+    found = ports()
+    if as_json:
+        typer.echo(json.dumps([asdict(port) for port in found]))
+        return
+    for port in found:
+        usb = "" if port.usb is None else f"{port.usb[0]:04x}:{port.usb[1]:04x}"
+        typer.echo("  ".join(filter(None, (port.place, port.kind, usb, port.maker, port.product, port.serial))))
+    if not found:
+        typer.echo("no serial port: is the cable in, and may you open it?", err=True)
+
+
+@_device.command()
+def show(place: PlaceArgument, baud: BaudOption = 115_200, as_json: JsonOption = False) -> None:
+    """Show what a board is, and every register with its unit.
+
+    Example: taxel device show /dev/ttyUSB0
+    """
+    with Device(place, baud=baud) as device:
+        _say(device, device.registers, as_json)
+
+
+@_device.command("set")
+def set_registers(
+    place: PlaceArgument,
+    fields: Annotated[
+        list[str], typer.Argument(metavar="NAME=VALUE...", help="As ramp=140 noise_floor=4; times in us.")
+    ],
+    baud: BaudOption = 115_200,
+    as_json: JsonOption = False,
+) -> None:
+    """Set registers by name, in an order in which the board is never without a valid set, and read them back.
+
+    Example: taxel device set /dev/ttyUSB0 noise_floor=5 wire_version=2
+    """
+    values = dict(_field(said) for said in fields)
+    with Device(place, baud=baud) as device:
+        _say(device, device.set(**values), as_json)
+
+
+@_device.command()
+def apply(
+    place: PlaceArgument,
+    preset: Annotated[str, typer.Argument(help='As "2 kHz"; --help names all.')],
+    baud: BaudOption = 115_200,
+    as_json: JsonOption = False,
+) -> None:
+    """Set a board to a preset, and read it back.
+
+    Example: taxel device apply /dev/ttyUSB0 "2 kHz"
+    """
+    if preset not in PRESETS:
+        raise ProblemError(f"preset {preset!r}: there are {', '.join(map(repr, PRESETS))}")
+    with Device(place, baud=baud) as device:
+        _say(device, device.apply(preset), as_json)
+
+
+@_device.command()
+def record(
+    place: PlaceArgument,
+    what: Annotated[str, typer.Argument(help="start or stop.")],
+    baud: BaudOption = 115_200,
+    as_json: JsonOption = False,
+) -> None:
+    """Let a board mark the start or stop of a recording, in its events and on its sync pin.
+
+    Example: taxel device record /dev/ttyUSB0 start
+    """
+    if what not in ("start", "stop"):
+        raise ProblemError(f"{what}: must be start or stop")
+    with Device(place, baud=baud) as device:
+        _say(device, device.record(what == "start"), as_json)
+
+
+@_device.command()
+def watch(
+    place: PlaceArgument,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
+    baud: BaudOption = 115_200,
+    as_json: Annotated[bool, typer.Option("--json", help="Print a line of JSON a change, and nothing else.")] = False,
+) -> None:
+    """Say what a board says of its faults as it says so; a cable that was pulled is waited for.
+
+    Example: taxel device watch /dev/ttyUSB0 --seconds 60
+    """
+    with Device(place, baud=baud, patience=float("inf")) as device:
+        console = Console(stderr=True, quiet=as_json)
+        console.print(f"{device}; Ctrl-C ends")
+        begun, before = time.monotonic(), None
+        while seconds is None or time.monotonic() - begun < seconds:
+            now = {"faults": device.faults, "reconnects": device.reconnects}
+            if now != before:
+                said = ", ".join(f"{n} {name}" for name, n in device.faults.items()) or "no faults"
+                again = f"; found again {device.reconnects} times" if device.reconnects else ""
+                typer.echo(json.dumps(now) if as_json else said + again)
+                before = now
+            time.sleep(_LOOK_S)
+
+
+#: How often `watch` looks, s.
+_LOOK_S = 0.1
+
+
+def _field(said: str) -> tuple[str, float]:
+    """Return name and value of NAME=VALUE."""
+    name, equals, value = said.partition("=")
+    try:
+        number = float(value)
+    except ValueError:
+        number = {"true": 1.0, "false": 0.0}.get(value, math.nan)
+    if not equals or math.isnan(number):
+        raise ProblemError(f"{said}: must be NAME=NUMBER, as noise_floor=4")
+    return name, int(number) if number.is_integer() else number
+
+
+def _say(device: Device, registers: Registers, as_json: bool) -> None:
+    rows = described(registers)
+    if as_json:
+        said: dict[str, Any] = {"place": device.cable.place, **asdict(device.greeting), "frame_us": registers.frame_us}
+        said["registers"] = {name: value for name, value, *_ in rows}
+        said["warnings"] = list(registers.warnings)
+        typer.echo(json.dumps(said))
+        return
+    g = device.greeting
+    typer.echo(
+        f"{device.cable.place}: {g.rows} x {g.columns} taxels, {g.channels} channels, wire version "
+        f"{registers.wire_version}, {1e6 / registers.frame_us:.2f} frames/s"
+    )
+    table = Table.grid(padding=(0, 2))
+    for name, value, unit, place, meaning in rows:
+        table.add_row(name, f"{value:g}", unit, place, meaning)
+    Console(soft_wrap=True).print(table)
+    for warning in registers.warnings:
+        typer.echo(f"warning: {warning}", err=True)

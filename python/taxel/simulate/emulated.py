@@ -1,0 +1,177 @@
+"""The emulated board, as a state machine: trip times and commands in, datagrams and status lines out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taxel import _core
+from taxel._arguments import flag, instance, numbers, text, whole
+from taxel.array import Array
+from taxel.wire import Registers, _bytes
+
+__all__ = ["NOT_RETURNED", "Board", "Version2"]
+
+#: A trip time that says: the comparator had not returned when the ramp began. A fault, not a value.
+NOT_RETURNED = 65_535
+
+
+@dataclass(frozen=True)
+class Version2:
+    """Say how a board speaks wire version 2.
+
+    Parameters
+    ----------
+    board : int, 0 to 65535
+        Its number: with the sender's address it names a source.
+    seed : int, 0 to 65535
+        The number of its first session; each reset takes the next.
+    hold_us : int, us
+        For how long events may wait for company: 1000 makes sparse scenes a quarter smaller, and all up to 1 ms later.
+    heartbeat_us : int, us
+        How often it promises that nothing has happened; each frame for 0.1 s after an event.
+    states_us : int, us
+        How often each value is told again and the board's totals said; 0: never.
+
+    Raises
+    ------
+    ProblemError : out of these ranges
+    """
+
+    board: int = 0
+    seed: int = 1
+    hold_us: int = 0
+    heartbeat_us: int = 10_000
+    states_us: int = 1_000_000
+
+    def __post_init__(self) -> None:
+        for name, most in (("board", 65_535), ("seed", 65_535), ("hold_us", 30_000), ("heartbeat_us", 10**9)):
+            whole(name, getattr(self, name), 0, most)
+        whole("states_us", self.states_us, 0, 10**9)
+
+    def _json(self) -> str:
+        return json.dumps(asdict(self))
+
+
+class Board:
+    """Emulate the board: scan frames of trip times into the datagrams that the real one would send.
+
+    It has no clock: each frame moves its time on. The same contract holds for the logic on the FPGA.
+
+    Parameters
+    ----------
+    registers : Registers, optional
+        What it holds after reset; where it is left out, of a board of 64 x 64 taxels the preset "5.2 kHz".
+    array : Array, optional
+        Up to 65 536 positions; the thesis' where it is left out.
+    previous : {"last_sent", "last_sample"}
+        What a new value is compared with.
+    intensity : {"value", "difference", "nothing"}
+        What an intensity word holds.
+    queue : int, words, 0 or more
+        A taxel whose two words find no room is dropped and counted.
+    version_2 : Version2, optional
+        How it speaks version 2 of the wire.
+
+    Raises
+    ------
+    ProblemError, DeviceError : arguments or registers that make no sense
+
+    Examples
+    --------
+    >>> board = Board()
+    >>> ticks = np.zeros(4096, np.uint16)
+    >>> board.frame(ticks)
+    []
+    >>> ticks[board.array.index(3, 4)] = 40
+    >>> [datagram.hex(" ", 5) for datagram in board.frame(ticks)]
+    ['c000010304 e000280304']
+    """
+
+    def __init__(
+        self,
+        registers: Registers | None = None,
+        array: Array | None = None,
+        *,
+        previous: Literal["last_sent", "last_sample"] = "last_sent",
+        intensity: Literal["value", "difference", "nothing"] = "value",
+        queue: int = 16_384,
+        version_2: Version2 | None = None,
+    ) -> None:
+        self.array = Array._of(array)
+        start = Registers(array=self.array) if registers is None else instance("registers", registers, Registers)
+        self._core = _core.WireBoard(
+            start._json(),
+            self.array._parts(),
+            text("previous", previous, ("last_sent", "last_sample")),
+            text("intensity", intensity, ("value", "difference", "nothing")),
+            whole("queue", queue, 0, 2**32),
+            instance("version_2", Version2() if version_2 is None else version_2, Version2)._json(),
+        )
+
+    def frame(self, ticks: ArrayLike, *, most: int | None = None) -> list[bytes]:
+        """Scan one frame; return the datagrams that went out.
+
+        Parameters
+        ----------
+        ticks : uint16, shape (rows * columns,) or (rows, columns)
+            Trip times of the comparators by taxel, in 1/300 us from the ramp's start. At or above the ramp's length
+            one reads as that length; `NOT_RETURNED` is a fault.
+        most : int, optional
+            How many datagrams the network takes during this frame; the rest waits in the queue.
+
+        Returns
+        -------
+        list of bytes, at most 1400 each
+
+        Raises
+        ------
+        ProblemError : not one trip time a taxel
+        """
+        taken = 2**32 if most is None else whole("most", most, 0, 2**32)
+        return self._core.frame(numbers("ticks", ticks, np.uint16).reshape(-1), taken)
+
+    def reset(self) -> None:
+        """Reset it: registers, values and time as at the start, in a new session; what waits is still sent."""
+        self._core.reset()
+
+    def command(self, data: Any) -> str:
+        """Take command bytes as they come; return the status lines that answer them."""
+        return self._core.command(_bytes(data))
+
+    def record(self, start: bool) -> None:
+        """Start or stop a recording: a marker goes out where that changes anything."""
+        self._core.record(flag("start", start))
+
+    def faults(self) -> str:
+        """Return a status line for each fault whose count has moved since this was last asked."""
+        return self._core.faults()
+
+    @property
+    def greeting(self) -> str:
+        """What the board says at reset."""
+        return self._core.greeting()
+
+    @property
+    def time_us(self) -> float:
+        """The start of the next frame since reset, us."""
+        return self._core.time_us()
+
+    @property
+    def registers(self) -> Registers:
+        """As written; the scan takes them over at the next frame's edge."""
+        registers = Registers.__new__(Registers)
+        registers._held, registers.array = json.loads(self._core.registers()), self.array
+        return registers
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Frames, changes, words, datagrams, words sent, taxels dropped, comparators not returned."""
+        return dict(json.loads(self._core.counts()))
+
+    def __repr__(self) -> str:
+        return f"Board({self.greeting.strip()}, {self.time_us:g} us after reset)"

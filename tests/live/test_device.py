@@ -1,0 +1,255 @@
+"""The board on its serial line: commands, read-back, units, faults, and a cable that is pulled."""
+
+import json
+import os
+import pty
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import taxel
+from taxel import DeviceError, ProblemError
+from taxel.device import Cable, Device, Greeting, ports
+from taxel.simulate import Board
+from taxel.wire import Command, Registers
+
+
+def serve(board: Board, read: int, write: int, greets: bool = True) -> threading.Thread:
+    def answer() -> None:
+        if greets:
+            os.write(write, board.greeting.encode())
+        while True:
+            try:
+                said = os.read(read, 5)
+                if not said:
+                    return
+                os.write(write, board.command(said).encode())
+            except OSError:
+                return
+
+    thread = threading.Thread(target=answer, daemon=True)
+    thread.start()
+    return thread
+
+
+@pytest.fixture(params=["serial", "server"])
+def line(request: pytest.FixtureRequest) -> Iterator[tuple[str, Board]]:
+    board = Board()
+    if request.param == "serial":
+        ours, theirs = pty.openpty()
+        serve(board, ours, ours)
+        yield os.ttyname(theirs), board
+        os.close(theirs)
+    else:
+        with socket.create_server(("127.0.0.1", 0)) as server:
+            threading.Thread(target=lambda: serve(board, *(server.accept()[0].detach(),) * 2), daemon=True).start()
+            yield f"127.0.0.1:{server.getsockname()[1]}", board
+
+
+def test_a_register_is_written_and_read_back(line: tuple[str, Board]) -> None:
+    place, board = line
+    with Cable(place, timeout=30) as cable:
+        assert cable.command(Command(4, 140)) == 140
+        assert cable.read(4) == 140
+    assert board.registers.ramp == 140
+
+
+def test_the_floor_is_0_for_a_while_and_the_lines_stay(line: tuple[str, Board]) -> None:
+    place, board = line
+    with Cable(place, timeout=30) as cable:
+        with cable.floor(0):
+            assert (board.registers.noise_floor, board.registers.lines) == (0, 64)
+        assert (board.registers.noise_floor, board.registers.lines) == (3, 64)
+
+
+def test_a_refusal_names_the_rule(line: tuple[str, Board]) -> None:
+    place, _ = line
+    with (
+        Cable(place, timeout=30) as cable,
+        pytest.raises(DeviceError, match=r"refuses REG2 = 0x0000012D \(REG2 rule 1"),
+    ):
+        cable.command(Command(2, 301))
+
+
+def test_a_line_without_a_board_is_said() -> None:
+    ours, theirs = pty.openpty()
+    with Cable(os.ttyname(theirs), timeout=0.05) as cable, pytest.raises(DeviceError, match="no answer within"):
+        cable.read(5)
+    os.close(ours)
+    os.close(theirs)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"place": "ttyUSB0"}, "place is 'ttyUSB0'"),
+        ({"place": 3}, "place is 3"),
+        ({"place": "host:99999"}, "place is 'host:99999'"),
+        ({"place": "/dev/null", "baud": 5}, "baud is 5: must be one of 9600"),
+        ({"place": "/dev/null", "timeout": 0}, "timeout is 0"),
+    ],
+)
+def test_nonsense_is_refused_by_name(arguments: dict[str, object], said: str) -> None:
+    with pytest.raises(ProblemError) as refused:
+        Cable(**arguments)  # type: ignore[arg-type]
+    assert said in str(refused.value)
+
+
+def test_a_file_that_is_no_serial_device_is_refused() -> None:
+    with pytest.raises(DeviceError, match="/dev/null: no serial device"):
+        Cable("/dev/null")
+    with pytest.raises(FileNotFoundError):
+        Cable("/dev/no-such-device")
+
+
+def test_the_board_says_what_it_is_when_it_is_asked(line: tuple[str, Board]) -> None:
+    place, _ = line
+    with Cable(place, timeout=30) as cable:
+        assert cable.greeting() == Greeting(1, 64, 64, 16)
+
+
+def test_registers_are_set_by_name_in_an_order_that_keeps_the_rules(line: tuple[str, Board]) -> None:
+    place, board = line
+    with Device(place, timeout=30) as device:
+        for preset in ("2 kHz", "5.2 kHz", "2 kHz"):
+            assert device.apply(preset) == Registers.preset(preset) == board.registers
+        held = device.set(noise_floor=7, ramp=400, wire_version=2)
+        assert (held.noise_floor, held.ramp, held.wire_version) == (7, 400, 2)
+        assert held == board.registers == device.registers
+        assert device.record(True).record
+        assert board.registers.record
+        assert device.apply("5.2 kHz").record, "a preset starts and stops nothing"
+        assert not device.set(record=False).record
+        with pytest.raises(DeviceError, match="rule 1"):
+            device.set(line_read=1e6)
+        assert device.registers == Registers.preset("5.2 kHz")
+        with pytest.raises(ProblemError, match="no_such"):
+            device.set(no_such=3)
+
+
+class Unfaithful(Board):
+    """A board whose ramp cannot be set, though it says that it was."""
+
+    def command(self, data: bytes) -> str:  # type: ignore[override]
+        if data[0] >> 4 & 7 == 4:
+            return f"ok REG4=0x{Command.from_bytes(data).value:08X}\n"
+        return super().command(data)
+
+
+def test_what_is_set_is_read_back() -> None:
+    ours, theirs = pty.openpty()
+    serve(Unfaithful(), ours, ours)
+    with (
+        Device(os.ttyname(theirs), timeout=30) as device,
+        pytest.raises(DeviceError, match="REG4 is 0x00000096, not 0x0000008C"),
+    ):
+        device.set(ramp=140)
+    os.close(theirs)
+
+
+def test_a_board_of_another_size_is_refused() -> None:
+    ours, theirs = pty.openpty()
+    serve(Board(Registers(array=taxel.Array(16, 8)), taxel.Array(16, 8)), ours, ours)
+    with pytest.raises(DeviceError, match="16 x 8 taxels"):
+        Device(os.ttyname(theirs), timeout=30, array=taxel.Array(8, 8))
+    with Device(os.ttyname(theirs), timeout=30) as device:
+        assert device.array.shape == (16, 8)
+        assert device.apply("2 kHz").lines == 8
+    os.close(theirs)
+
+
+def test_a_pulled_cable_is_found_again_and_the_board_set_as_it_was(tmp_path: Path) -> None:
+    link = tmp_path / "board"
+
+    def plug() -> tuple[Board, int, int]:
+        board = Board()
+        ours, theirs = pty.openpty()
+        serve(board, ours, ours, greets=False)
+        os.symlink(os.ttyname(theirs), tmp_path / "new")
+        os.rename(tmp_path / "new", link)
+        return board, ours, theirs
+
+    _, ours, theirs = plug()
+    with Device(str(link), timeout=30, patience=30) as device:
+        device.set(noise_floor=9)
+        os.close(ours)
+        os.close(theirs)
+        link.unlink()
+        plugged: list[tuple[Board, int, int]] = []
+        back = threading.Timer(0.2, lambda: plugged.append(plug()))
+        back.start()
+        assert device.registers.noise_floor == 9
+        back.join()
+        board, ours, theirs = plugged[0]
+        assert board.registers.noise_floor == 9, "another board, after its reset: set again"
+        assert device.reconnects == 1
+        os.close(ours)
+        os.close(theirs)
+        link.unlink()
+        device.patience = 0.1
+        with pytest.raises(DeviceError, match=r"no board there after 0\.1 s"):
+            _ = device.registers
+
+
+def test_faults_are_counted_as_the_board_says_them() -> None:
+    ours, theirs = pty.openpty()
+    serve(Board(), ours, ours)
+    with Device(os.ttyname(theirs), timeout=30) as device:
+        os.write(ours, b"fault queue 3\nfault comparator 12\nfault queue 5\n")
+        until = time.monotonic() + 30
+        while device.faults.get("queue") != 5:
+            assert time.monotonic() < until
+        assert device.faults == {"queue": 5, "comparator": 12}
+        assert device.set(ramp=140).ramp == 140
+    os.close(theirs)
+
+
+def test_ports_have_names() -> None:
+    assert all(port.place and port.kind in ("usb", "pci", "bluetooth", "other") for port in ports())
+
+
+def command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    line = [sys.executable, "-m", "taxel", "device", *arguments]
+    return subprocess.run(line, capture_output=True, text=True, timeout=120, check=False)
+
+
+def test_the_command_does_all_of_it_on_an_emulated_line(tmp_path: Path) -> None:
+    link = tmp_path / "board"
+    emulate = [sys.executable, "-m", "taxel", "emulate", "--line", str(link), "--port", "9", "--json", "--wire", "2"]
+    board = subprocess.Popen(emulate, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        until = time.monotonic() + 60
+        while not link.is_symlink():
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        shown = json.loads(command("show", str(link), "--json").stdout)
+        assert (shown["rows"], shown["columns"], shown["wire_version"]) == (64, 64, 2)
+        assert shown["registers"]["line_period"] == 3.0
+        assert "line_period" in command("show", str(link)).stdout
+        said = json.loads(command("set", str(link), "noise_floor=6", "ramp=140", "--json").stdout)
+        assert (said["registers"]["noise_floor"], said["registers"]["ramp"]) == (6, 140)
+        assert json.loads(command("apply", str(link), "2 kHz", "--json").stdout)["registers"]["line_period"] == 7.81
+        assert json.loads(command("record", str(link), "stop", "--json").stdout)["registers"]["record"] == 0
+        refused = command("set", str(link), "line_read=99999")
+        assert refused.returncode == 3
+        assert "rule 1" in refused.stderr
+        assert refused.stderr.count("\n") == 1
+        assert command("watch", str(link), "--seconds", "0.3", "--json").returncode == 0
+    finally:
+        board.send_signal(2)
+        out, _ = board.communicate(timeout=60)
+    assert board.returncode == 0
+    assert json.loads(out)["frames"] > 0
+    assert not link.is_symlink()
+    gone = command("show", str(link))
+    assert (gone.returncode, gone.stderr.count("\n")) == (2, 1)
+    assert json.loads(command("ports", "--json").stdout) == [
+        {"place": p.place, "kind": p.kind, "product": p.product, "maker": p.maker, "serial": p.serial, "usb": p.usb}
+        for p in ports()
+    ]
