@@ -118,7 +118,7 @@ def test_a_board_may_be_used_from_several_threads():
 
 
 def test_a_decoder_of_version_2_may_be_used_from_several_threads():
-    board, ticks = taxel.device.Board(taxel.wire.Registers(wire_version=2)), np.zeros(4096, np.uint16)
+    board, ticks = taxel.simulate.Board(taxel.wire.Registers(wire_version=2)), np.zeros(4096, np.uint16)
     datagrams = []
     for value in range(40, 60):
         ticks[:] = value
@@ -137,7 +137,7 @@ def test_a_decoder_of_version_2_may_be_used_from_several_threads():
 
 
 def test_a_stream_of_version_2_may_be_used_from_several_threads():
-    board = taxel.device.Board(taxel.wire.Registers(wire_version=2))
+    board = taxel.simulate.Board(taxel.wire.Registers(wire_version=2))
     sent = board.frame(np.full(4096, 40, np.uint16))
     data = b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent)
     reader, found = taxel.wire_v2.StreamReader(), []

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import flag, instance, number, shown, text, whole
+from taxel._arguments import flag, instance, number, several, shown, text, whole
 from taxel._columns import frozen
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
@@ -513,7 +513,7 @@ class Registers:
         True
         """
         held: dict[str, Any] = {"channels": whole("channels", channels, 0, 255)}
-        eight = [whole(f"words[{n}]", word, 0, 2**32 - 1) for n, word in enumerate(words)]
+        eight = [whole(f"words[{n}]", word, 0, 2**32 - 1) for n, word in enumerate(several("words", words))]
         if len(eight) != 8:
             raise ProblemError(f"words: {len(eight)}, must be 8")
         for name, field in _FIELDS.items():
@@ -593,12 +593,12 @@ def described(registers: Registers) -> list[tuple[str, float, str, str, str]]:
     >>> described(Registers())[9][:4]
     ('step_read', 0.55, 'us', 'REG3[31:16]')
     """
-    rows = []
+    held, rows = instance("registers", registers, Registers), []
     for name, field in _FIELDS.items():
         low, high = field["shift"], field["shift"] + int(field["mask"]).bit_length() - 1
         bits = f"{high}:{low}" if high > low else f"{low}"
         unit = {"10 ns": "us", "flag": ""}.get(field["unit"], field["unit"])
-        rows.append((name, float(getattr(registers, name)), unit, f"REG{field['register']}[{bits}]", field["text"]))
+        rows.append((name, float(getattr(held, name)), unit, f"REG{field['register']}[{bits}]", field["text"]))
     return rows
 
 

@@ -377,7 +377,7 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path) -> None:
         process.send_signal(signal.SIGINT)
         lines += [json.loads(line) for line in process.stdout]
     assert process.returncode == 0
-    keys = {"label", "t_us", "known_us", "slope_mv_per_ms"}
+    keys = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired"}
     assert [set(line) for line in lines] == [keys | {"said_us", "said_ns"}] * 5
     heard_again = ("detect", tmp_path / "live.mcap", "--readout", tmp_path / "touch.json", "--json")
     again = subprocess.run(command(*heard_again), capture_output=True, text=True, check=True)

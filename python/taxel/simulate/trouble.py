@@ -59,7 +59,7 @@ class Flaws:
     def __post_init__(self) -> None:
         for name in self._names():
             number(name, getattr(self, name))
-        for name, seed in mapping("seeds", self.seeds or {}).items():
+        for name, seed in mapping("seeds", {} if self.seeds is None else self.seeds).items():
             if name not in self._names():
                 raise ProblemError(f"seeds: {shown(name)} is no flaw: there are {', '.join(self._names())}")
             whole(f"seeds[{name}]", seed, 0, 2**63 - 1)
