@@ -159,7 +159,7 @@ impl Iterator for Acts {
             match next {
                 Err(error) if error.is_instance_of::<PyStopIteration>(py) => None,
                 Err(error) => Some(Err(error)),
-                Ok(act) => Some(act.extract::<ActIn<'_>>().map_err(PyErr::from).and_then(to_act)),
+                Ok(act) => Some(act.extract::<ActIn<'_>>().and_then(to_act)),
             }
         })?;
         // What Python raised is raised again as it was.
