@@ -143,10 +143,10 @@ def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live
     assert file.registers.noise_floor == 5
     rows = list(csv.DictReader((live.folder / "walk7.notes.csv").open()))
     assert [row["label"] for row in rows] == ["contact"]
-    # The trial's label stands at the start of the recording, which may begin in silence.
+    # The trial's label is no event: it has no time. The recording may begin in silence.
     said = {note.text: note.t for note in file.notes}
-    assert said["contact"] == int(rows[0]["t_us"])
-    assert said["heel"] <= said["contact"] <= max(said["heel"], file.events.t[-1]) + 2_500_000
+    assert said == {"heel": None, "contact": int(rows[0]["t_us"])}
+    assert file.events.t[0] - 2_500_000 <= said["contact"] <= file.events.t[-1] + 2_500_000
 
 
 def test_a_refused_value_stays_typed_with_its_reason_until_escape(page: Any) -> None:

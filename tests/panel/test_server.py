@@ -291,7 +291,7 @@ def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # n
         assert "exists" in again["reason"]
         recording = taxel.open(tmp_path / "step1.mcap")
         assert recording.verdict.startswith("nothing lost")
-        assert [note.text for note in recording.notes] == ["heel"]
+        assert [(note.text, note.t) for note in recording.notes] == [("heel", None)]
         # On the clock that the board was heard on, not from its own first stamp.
         assert recording.events.t[0] > 6_553_600
         page.send(type="credit", n=2)

@@ -210,7 +210,7 @@ impl Live {
     ///
     /// `Core(Problem)` where nothing is recorded that can hold notes, `File` where the disk is full.
     pub fn note(&self, text: &str) -> Result<()> {
-        self.shared.note(text)
+        self.shared.note(text, true)
     }
 
     /// Says that the host told the board to speak this version of the wire (a write of REG0): what comes of it is believed

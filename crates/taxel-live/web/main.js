@@ -49,7 +49,7 @@ const labels = new Labels(server, settings, player, () => timeline, failed, () =
 const board = new Board(server, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
-const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections, notes: opened?.notes ?? [], cut: view.cut }));
+const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections, notes: timed(opened?.notes ?? []), cut: view.cut }));
 
 /** @type {Timeline | null} */
 let timeline = null;
@@ -262,6 +262,8 @@ function open(told) {
   part("notes-block", HTMLElement).hidden = !told.notes.length;
   part("note-list", HTMLElement).replaceChildren(
     ...told.notes.map(({ t_us, text }) => {
+      // A note without a time is about the whole recording.
+      if (t_us === null) return make("li", {}, text);
       const button = make("button", { type: "button", class: "link" }, `${seconds(t_us)}  ${text}`);
       button.onclick = () => player.seek(t_us);
       return make("li", {}, button);
@@ -271,6 +273,15 @@ function open(told) {
   showRegisters();
   player.show();
   showState();
+}
+
+/**
+ * The notes that stand somewhere on the time line.
+ *
+ * @param {import("./protocol.js").Opened["notes"]} notes
+ */
+function timed(notes) {
+  return notes.flatMap(({ t_us }) => (t_us === null ? [] : [{ t_us }]));
 }
 
 /** @param {import("./protocol.js").Transport} told */

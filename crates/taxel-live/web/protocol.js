@@ -27,7 +27,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "recordings", folder: string, files: FileTold[] }} Recordings
  * @typedef {{ type: "opened", name: string, array: ArrayTold, start_us: number | null, stop_us: number | null, events: number, bytes: number,
  *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null, markers: { t_us: number, start: boolean }[],
- *   notes: { t_us: number, text: string }[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
+ *   notes: { t_us: number | null, text: string }[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
  * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[] }} Overview
  * @typedef {{ type: "transport", source: string | null, state: "following" | "playing" | "paused", speed: number, t_us: number | null }} Transport
  * @typedef {{ label_id: number, label: string, t_us: number }} Label

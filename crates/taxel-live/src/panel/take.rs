@@ -121,7 +121,7 @@ async fn one(hub: &Arc<Hub>, plan: &Plan) -> Result<String, String> {
     let since = Instant::now();
     set(hub, |state| state.doing = Doing::Recording(since));
     tell_board(hub, true).await;
-    let noted = plan.label.as_ref().filter(|_| plan.ending == "mcap").map(|label| live.handle.note(label));
+    let noted = plan.label.as_ref().filter(|_| plan.ending == "mcap").map(|label| live.handle.entitle(label));
     if let Some(Err(error)) = noted {
         hub.tell_all(&json!({ "type": "warning", "text": format!("label: {error}") }));
     }

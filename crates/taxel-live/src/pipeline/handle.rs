@@ -133,7 +133,16 @@ impl Handle {
     ///
     /// As [`Live::note`](super::Live::note).
     pub fn note(&self, text: &str) -> Result<()> {
-        self.shared.note(text)
+        self.shared.note(text, true)
+    }
+
+    /// Writes down what holds for the whole recording, such as the name of a trial: a note without a time, which is no event.
+    ///
+    /// # Errors
+    ///
+    /// As [`Live::note`](super::Live::note).
+    pub fn entitle(&self, text: &str) -> Result<()> {
+        self.shared.note(text, false)
     }
 
     fn wait<T>(&self, from: &channel::Receiver<T>) -> Result<T> {

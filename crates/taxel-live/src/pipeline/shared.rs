@@ -90,8 +90,9 @@ impl Shared {
         }
     }
 
-    pub(super) fn note(&self, text: &str) -> Result<()> {
-        let board_us = self.shown().counters.board_us;
+    /// Writes something down, with the time of now or without one.
+    pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
+        let board_us = self.shown().counters.board_us.filter(|_| timed);
         match &*lock(&self.recorder) {
             Some(recorder) => recorder.note(board_us, text),
             None => Err(taxel_core::problem!("a note is kept in a recording: record to a .mcap file").into()),
