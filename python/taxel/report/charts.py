@@ -106,9 +106,13 @@ def chart_data(figure: Figure) -> dict[str, Any]:
 
 
 def _repeats(inset: Axes, axes: Axes) -> bool:
-    """Tell whether an inset shows lines of its axes again, only closer: in a page one can look closer anyhow."""
-    known = [line.get_xydata() for line in axes.lines]
-    return not inset.images and all(any(np.array_equal(line.get_xydata(), k) for k in known) for line in inset.lines)
+    """Tell whether an inset shows points of its axes' lines again, only closer: a page can do that anyhow."""
+
+    def points(line: Any) -> set[tuple[float, ...]]:
+        return {tuple(point) for point in np.asarray(line.get_xydata(), float).tolist()}
+
+    known = [points(line) for line in axes.lines]
+    return not inset.images and all(any(points(line) <= one for one in known) for line in inset.lines)
 
 
 def _columns(axes: Axes) -> int:
