@@ -96,6 +96,7 @@ FITTED = taxel.learn.ConeR(neuron=taxel.Neuron(tau=5.0), ub=1.0).fit([PLAIN], [[
 SOLVED = taxel.learn.ConeX(neuron=taxel.Neuron(tau=5.0), lb=-9.0, ub=9.0).fit([PLAIN], [[5.0]])
 REFUTED = taxel.learn.ConeX().fit([UNSIGNED], [[0.5]])
 SCENE = taxel.simulate.Scene.draw(1)
+LAYER = taxel.simulate.Layer(array=ARRAY)
 REGISTERS = taxel.wire.Registers()
 BYTES = taxel.wire.encode(EVENTS)
 
@@ -652,6 +653,11 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.truth": plain(
         taxel.simulate.truth, acts=[taxel.simulate.Silence(10.0)], preset="5.2 kHz", array=None
     ),
+    "taxel.simulate.Layer": plain(taxel.simulate.Layer, foam={}, array=ARRAY, tolerance=1e-4),
+    "taxel.simulate.Layer.press": method(LAYER, "press", sunk_mm=np.full((4, 4), 0.5)),
+    "taxel.simulate.Layer.forget": method(LAYER, "forget"),
+    "taxel.simulate.Layer.compliance": method(LAYER, "compliance", waves=[0.1]),
+    "taxel.simulate.Layer.base_share": method(LAYER, "base_share", waves=[0.1]),
     "taxel.simulate.Silence": plain(
         lambda **given: taxel.simulate.play([taxel.simulate.Silence(**given)], seed=1, tare_ms=3.0), ms=10.0
     ),
@@ -833,6 +839,7 @@ for encoder in laws.ENCODERS.values():
 
 #: What is not tried, and why.
 LEFT_OUT = {
+    "taxel.simulate.Pressed": "what Layer.press returns",
     "taxel.Error": "raised, not called",
     "taxel.FormatError": "raised, not called",
     "taxel.ProblemError": "raised, not called",

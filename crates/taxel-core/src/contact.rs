@@ -8,6 +8,7 @@
 //! Good for foam that does not widen when pressed (Poisson ratio near 0): there the columns, smoothed by the layer and
 //! scaled to the right force, lie within a few per cent of the bonded layer's full solution.
 
+pub mod bonded;
 pub mod foam;
 pub mod footprint;
 pub mod layer;
@@ -15,7 +16,9 @@ pub mod motion;
 pub mod scene;
 pub mod sensor;
 pub mod stage;
+mod waves;
 
+pub use bonded::Bonded;
 pub use foam::Foam;
 pub use footprint::Footprint;
 pub use motion::{Contact, Kind, Motion};

@@ -8,7 +8,7 @@ use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use serde::Deserialize;
 use taxel_core::board::{Board, Faults, Flaws, IntensityWord, Play, Played, Previous, Version2, opening};
-use taxel_core::contact::{Act, Contact, Motion, Pictures, Scene, Sensor, Taxels};
+use taxel_core::contact::{Act, Bonded, Contact, Foam, Motion, Pictures, Scene, Sensor, Taxels};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, Error, Result, Stop, reading};
 use taxel_live::address::of_text;
@@ -268,6 +268,54 @@ fn emulate(
     })
 }
 
+/// Two columns.
+type TwoOut<'py, A, B> = (Bound<'py, PyArray1<A>>, Bound<'py, PyArray1<B>>);
+
+/// Foam bonded to the board.
+#[pyclass(frozen, module = "taxel._core")]
+struct Layer(Shared<Bonded>);
+
+#[pymethods]
+impl Layer {
+    /// `foam` is JSON.
+    #[new]
+    fn new(py: Python<'_>, parts: ArrayParts, foam: &str, tolerance: f64) -> PyResult<Self> {
+        let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::Scene(unfit.of("foam"))))?;
+        let array = to_array(parts)?;
+        Ok(Self(Shared::new(enter(py, |_| Ok::<_, Error>(Bonded::new(&foam, &array)?.to_within(tolerance)))?)))
+    }
+
+    /// mm/MPa and the share that arrives at the base, by wave number in 1/mm.
+    fn waves<'py>(&self, py: Python<'py>, waves: PyReadonlyArray1<'py, f64>) -> PyResult<TwoOut<'py, f64, f64>> {
+        let waves = slice("waves", &waves)?;
+        let (compliance, share) = self.0.look(py, |layer| {
+            waves.iter().map(|q| (layer.compliance(*q), layer.base_share(*q))).unzip::<_, _, Vec<_>, Vec<_>>()
+        });
+        Ok((array(py, compliance), array(py, share)))
+    }
+
+    /// Pressure on the face and stress at the base, MPa, by taxel, where a body has sunk by so many mm.
+    fn press<'py>(&self, py: Python<'py>, sunk: PyReadonlyArray1<'py, f64>) -> PyResult<TwoOut<'py, f64, f32>> {
+        let sunk = slice("sunk", &sunk)?;
+        let (pressure, base) = self.0.enter(py, |layer, _| {
+            let cells = layer.under(sunk);
+            let pressure = layer.press(&cells).to_vec();
+            let mut base = vec![];
+            layer.arrive(&cells, &pressure, &mut base);
+            Ok::<_, Error>((layer.on_array(&cells, &pressure), base))
+        })?;
+        Ok((array(py, pressure), array(py, base)))
+    }
+
+    /// Forgets what was pressed before.
+    fn forget(&self, py: Python<'_>) -> PyResult<()> {
+        self.0.enter(py, |layer, _| {
+            layer.forget();
+            Ok::<_, Error>(())
+        })
+    }
+}
+
 /// A board that scans frames as they are pushed, and sends what it makes of them.
 #[pyclass(frozen, module = "taxel._core")]
 struct Source(Shared<(Board, Sender)>);
@@ -317,6 +365,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(motion, module)?)?;
     module.add_function(wrap_pyfunction!(truth, module)?)?;
     module.add_function(wrap_pyfunction!(play, module)?)?;
+    module.add_class::<Layer>()?;
     module.add_class::<Source>()?;
     module.add_function(wrap_pyfunction!(emulate, module)?)
 }

@@ -7,6 +7,7 @@ UDP: acts, a recording again, or the frames of any other sensor. `Board` is the 
 from taxel.simulate.acts import Act, Contact, Motion, Pictures, Scene, Silence
 from taxel.simulate.board import EmulatorReport, Pipe, Played, Replay, emulate, play, truth
 from taxel.simulate.emulated import NOT_RETURNED, Board, Version2
+from taxel.simulate.layer import Layer, Pressed
 from taxel.simulate.trouble import Faults, Flaws
 
 __all__ = [
@@ -17,10 +18,12 @@ __all__ = [
     "EmulatorReport",
     "Faults",
     "Flaws",
+    "Layer",
     "Motion",
     "Pictures",
     "Pipe",
     "Played",
+    "Pressed",
     "Replay",
     "Scene",
     "Silence",

@@ -15,6 +15,26 @@ pub fn base_stress(x: f64, poisson: f64) -> f64 {
     above / (m * m - (m - 1.0).powi(2) * tanh * tanh + (x * one_over_cosh).powi(2))
 }
 
+/// How far a pressure wave on the upper face of a bonded elastic layer pushes that face in, in units of the pressure
+/// times the thickness over Young's modulus.
+///
+/// `x` is the wave number times the thickness. From the same four conditions as [`base_stress`] (no displacement at the
+/// base, no shear above): `2 (1 - nu^2) / x (2 k sinh 2x - 4x) / (2 k cosh 2x + 4x^2 + 1 + k^2)` with `k = 3 - 4 nu`
+/// (Carbone and Mangialardi 2008). Long waves meet the confined modulus, short ones a half-space.
+#[must_use]
+pub fn surface_compliance(x: f64, poisson: f64) -> f64 {
+    let (k, plane) = (3.0 - 4.0 * poisson, 1.0 - poisson * poisson);
+    if x < 1e-4 {
+        // Both parts of the fraction vanish; what is left out is of the order of x^2.
+        return (1.0 + poisson) * (1.0 - 2.0 * poisson) / (1.0 - poisson);
+    }
+    // Above and below times e^-2x, so that nothing overflows.
+    let decay = (-2.0 * x).exp();
+    let above = k * (1.0 - decay * decay) - 4.0 * x * decay;
+    let below = k * (1.0 + decay * decay) + (4.0 * x * x + 1.0 + k * k) * decay;
+    2.0 * plane / x * above / below
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -42,8 +62,9 @@ mod tests {
         (0..squarings).fold(sum, |power, _| times(&power, &power))
     }
 
-    /// The base stress from the layer's state equation, plane strain, shear modulus 1, wave number `x`, thickness 1.
-    fn by_state_equation(x: f64, nu: f64) -> f64 {
+    /// Base stress and surface displacement under a pressure of 1 from the layer's state equation, plane strain, shear
+    /// modulus 1, wave number `x`, thickness 1.
+    fn by_state_equation(x: f64, nu: f64) -> (f64, f64) {
         // State (u, w, tau, sigma): displacements along sin and cos, stresses along sin and cos; d/dz = A state.
         let confined = 2.0 * (1.0 - nu) / (1.0 - 2.0 * nu);
         let coupling = nu / (1.0 - nu);
@@ -57,16 +78,32 @@ mod tests {
         let e = exponential(&a);
         // Base: u = w = 0, unknown (tau0, sigma0). Top: tau = 0, sigma = 1.
         let determinant = e[2][2] * e[3][3] - e[2][3] * e[3][2];
-        e[2][2] / determinant
+        (e[2][2] / determinant, (e[1][3] * e[2][2] - e[1][2] * e[2][3]) / determinant)
     }
 
     #[test]
     fn the_closed_form_equals_the_state_equation() {
         for nu in [0.0, 0.1, 0.3, 0.45] {
             for x in [1e-3, 0.1, 0.5, 1.0, 2.0, 4.0, 7.0] {
-                let (closed, oracle) = (base_stress(x, nu), by_state_equation(x, nu));
-                assert!((closed - oracle).abs() < 1e-7, "nu {nu}, x {x}: {closed} against {oracle}");
+                let (stress, displacement) = by_state_equation(x, nu);
+                let closed = base_stress(x, nu);
+                assert!((closed - stress).abs() < 1e-7, "nu {nu}, x {x}: {closed} against {stress}");
+                // Young's modulus is 2 (1 + nu) of the shear modulus.
+                let (closed, oracle) = (surface_compliance(x, nu), 2.0 * (1.0 + nu) * displacement);
+                assert!((closed - oracle).abs() < 1e-6, "nu {nu}, x {x}: {closed} against {oracle}");
             }
+        }
+    }
+
+    #[test]
+    fn a_short_wave_meets_a_half_space_and_a_long_one_the_confined_layer() {
+        for nu in [0.0_f64, 0.2, 0.45, 0.499] {
+            let half_space = 2.0 * (1.0 - nu * nu) / 50.0;
+            assert!((surface_compliance(50.0, nu) / half_space - 1.0).abs() < 1e-12);
+            let confined = (1.0 + nu) * (1.0 - 2.0 * nu) / (1.0 - nu);
+            assert!((surface_compliance(2e-4, nu) - confined).abs() < 1e-6, "nu {nu}");
+            assert!((surface_compliance(0.0, nu) - confined).abs() < 1e-15);
+            assert!(surface_compliance(900.0, nu) > 0.0);
         }
     }
 
