@@ -1,0 +1,132 @@
+"""Drops on the emulated board: the cut against the board's own events, the quick distances against taxel.metrics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taxel import Array, SpikeTrains
+from taxel.information.neighbours import distances_of
+from taxel.metrics import pairwise
+from taxel.spikes import to_ms
+from taxel.studies import dropped, drops, fig5_11
+from taxel.studies.dropped import FRAMES, REGION, Condition
+from taxel.studies.study import Row
+from taxel.wire import FRAME_US
+
+FEW = {**dropped.TABLE, "drops": 4}
+SIDE, PERIOD_MS = 4, 0.5
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("drops")
+
+
+@pytest.fixture(scope="module")
+def fallen(folder):
+    return dropped.played(FEW, Condition(50.0, 100.0, 0.0), 1, folder)
+
+
+def patterns(seed=1, count=7, samples=12, layers=2):
+    """Return random patterns, as an array of spikes and as trains of spikes at the samples' times."""
+    spikes = (np.random.default_rng(seed).random((count, samples, layers, SIDE * SIDE)) < 0.06).astype(np.uint8)
+    spikes[0] = 0
+    trains = []
+    for one in spikes:
+        times = [PERIOD_MS * np.flatnonzero(one[:, layer, n]) for layer in range(layers) for n in range(SIDE * SIDE)]
+        trains.append(SpikeTrains.from_lists(times, start=0.0, stop=samples * PERIOD_MS))
+    return spikes, trains
+
+
+@pytest.mark.parametrize(("tau", "sigma"), [(0.1, 1.0), (0.4, 2.0), (2.0, 5.0)])
+def test_inner_products_give_the_distances_of_metrics(tau, sigma):
+    spikes, trains = patterns()
+    array = Array(SIDE, SIDE, pitch_mm=2.67)
+    kernel = dropped.smoothed(SIDE, array.pitch_mm, sigma)
+    gram = dropped.spatial_grams(spikes, PERIOD_MS, tau, [kernel], [spikes.shape[1]])[0][0]
+    wanted = pairwise("van_rossum_spatial", trains, array=array, tau=tau, sigma=sigma, normalisation="none")
+    np.testing.assert_allclose(distances_of(gram), wanted, atol=2e-3 * wanted.max())
+
+
+def test_an_end_leaves_out_what_comes_after_it():
+    spikes, _ = patterns()
+    kernels = [dropped.smoothed(SIDE, 2.67, sigma) for sigma in (1.0, 3.0)]
+    both = dropped.spatial_grams(spikes, PERIOD_MS, 0.7, kernels, [5, 12])
+    for kernel, (early, late) in zip(kernels, both, strict=True):
+        np.testing.assert_allclose(
+            early, dropped.spatial_grams(spikes[:, :5], PERIOD_MS, 0.7, [kernel], [5])[0][0], rtol=1e-6
+        )
+        np.testing.assert_allclose(late, dropped.spatial_grams(spikes, PERIOD_MS, 0.7, [kernel], [12])[0][0], rtol=1e-6)
+
+
+def test_absolute_differences_are_those_of_metrics():
+    spikes, trains = patterns(layers=1)
+    array, samples = Array(SIDE, SIDE, pitch_mm=2.67), spikes.shape[1]
+    found = dropped.absolute_distances(spikes, PERIOD_MS, 0.7, dropped.smoothed(SIDE, array.pitch_mm, 2.0))
+    # Samples at the spikes' own times, up to the last of them.
+    window = (0.0, (samples - 1) * PERIOD_MS)
+    wanted = pairwise(
+        "van_rossum_spatial_absolute", trains, array=array, tau=0.7, sigma=2.0, window=window, step_ms=PERIOD_MS
+    )
+    np.testing.assert_allclose(found, wanted, rtol=1e-4, atol=1e-4)
+
+
+def test_at_every_frame_the_events_are_the_boards(fallen):
+    """The encoder sees what the host holds; what it says is what the board said, event by event."""
+    assert fallen.ticks.shape == (4, 1 + FRAMES, REGION * REGION)
+    spikes = dropped.sampled(fallen.ticks, to_ms(FRAME_US), np.zeros(4))
+    np.testing.assert_array_equal(spikes.sum((1, 2, 3)), fallen.events)
+    moved = np.diff(fallen.ticks.astype(int), axis=1)
+    np.testing.assert_array_equal(spikes[:, :FRAMES, 0], (moved > 0)[:, : spikes.shape[1]])
+    assert (np.abs(moved[moved != 0]) > dropped.NOISE_FLOOR).all()
+    assert (fallen.lasted_us < 50_000).all()
+    assert (fallen.lasted_us > 15_000).all()  # an impact on this foam lasts that long
+
+
+def test_a_longer_period_and_another_phase_see_less(fallen):
+    counts = [dropped.sampled(fallen.ticks, period, np.zeros(4)).sum() for period in (0.5, 2.0, 10.0)]
+    assert counts[0] > counts[1] > counts[2] > 0
+    late = dropped.sampled(fallen.ticks, 2.0, np.array([0.0, 0.5, 1.0, 1.9]))
+    assert late[:, 0].any(axis=(1, 2)).all()  # sample 0 is the first at which anything fires
+    np.testing.assert_array_equal(late[0], dropped.sampled(fallen.ticks, 2.0, np.zeros(4))[0])
+
+
+def test_drops_are_kept_and_belong_to_what_made_them(folder, fallen):
+    again = dropped.played(FEW, Condition(50.0, 100.0, 0.0), 1, folder)
+    np.testing.assert_array_equal(again.ticks, fallen.ticks)
+    assert len(list(folder.glob("drops-50mm-100mm-0deg-*.npz"))) == 1
+    other = dropped.played({**FEW, "drops": 2}, Condition(50.0, 100.0, 0.0), 2, folder)
+    assert len(list(folder.glob("drops-50mm-100mm-0deg-*.npz"))) == 2
+    assert len(other.ticks) == 2
+    assert not np.array_equal(other.ticks, fallen.ticks[:2])
+
+
+def test_drops_of_one_condition_differ_and_higher_ones_tell_more(folder, fallen):
+    assert len({one.tobytes() for one in fallen.ticks}) == 4
+    high = dropped.played(FEW, Condition(50.0, 200.0, 0.0), 1, folder)
+    slanted = dropped.played(FEW, Condition(50.0, 200.0, 30.0), 1, folder)
+    assert fallen.events.mean() < slanted.events.mean() < high.events.mean()
+
+
+def test_none_is_its_own_neighbour():
+    distances = np.array([[0.0, 1.0, 9.0], [1.0, 0.0, 9.0], [9.0, 9.0, 0.0]])
+    said = dropped.named_by_neighbours(distances, np.array([0, 1, 1]), 1)
+    np.testing.assert_array_equal(said, [1, 0, 0])
+    assert not np.diag(distances).any()
+
+
+def test_search_first_then_details_at_each_periods_best(tmp_path):
+    p = fig5_11.STUDY.set("toy")
+    rows = [Row(t.params, t.seed, {}) for t in fig5_11.tasks(p, tmp_path)]
+    search = fig5_11.then(p, rows, tmp_path)
+    assert [t.params["ask"] for t in search] == ["search"] * 4
+    rows += [Row(t.params, t.seed, [2 - abs(t.params["tau_ms"] - 1.0)]) for t in search]
+    last = [t for t in fig5_11.then(p, rows, tmp_path) if t.params["ask"] != "search"]
+    assert [t.params["ask"] for t in last] == ["detail", "any phase", "detail", "any phase", "absolute"]
+    assert {(t.params["tau_ms"], t.params["sigma_mm"]) for t in last} == {(1.0, 2.0)}
+
+
+def test_frames_cost_what_the_thesis_says():
+    assert drops._frames_kbit_s(drops.INTENSITY_BITS) == pytest.approx(13_333, rel=1e-3)
+    assert drops._frames_kbit_s(drops.CHANGE_BITS) == pytest.approx(2_667, rel=1e-3)
