@@ -4,7 +4,7 @@ Each takes times in whole us and values of shape (samples, channels), and gives 
 """
 
 import numpy as np
-from scipy import ndimage
+from scipy import ndimage, signal
 
 TICK_SHIFT = 0.5
 
@@ -209,3 +209,23 @@ def moments(t, pictures, rest, end, floor, pitch, every, tonic=None):
         if begin is not None and tonic:
             spikes += [(s, 2 * len(every) + n, 1) for s in range(begin, end + 1, tonic)]
     return sorted(spikes)
+
+
+def afferent(t, values, transfer, *, range_, threshold, jump, recovery_ms, refractory_ms, settled, finer=20):
+    """A linear filter (numerator, denominator in ms) of pressure that moves in straight lines; a moving threshold.
+
+    Spikes in ms, on a grid `finer` than the samples; `settled` is the filter's gain at rest.
+    """
+    x = np.maximum(np.asarray(values, float), 0) / range_
+    fine = np.linspace(t[0], t[-1], (len(t) - 1) * finer + 1)
+    line = np.interp(fine, t, x)
+    # From rest at the first value: the filter is linear, so what was always there is added.
+    u = signal.lsim(transfer, line - line[0], fine - fine[0])[1] + settled * line[0]
+    raised, last, spikes, step = max(u[0] - threshold, 0.0), -np.inf, [], fine[1] - fine[0]
+    for at, potential in zip(fine[1:], u[1:], strict=True):
+        raised *= np.exp(-step / recovery_ms)
+        if potential >= threshold + raised and at - last >= refractory_ms:
+            raised += jump
+            last = at
+            spikes.append(at)
+    return np.array(spikes)

@@ -2,7 +2,8 @@
 
 `tests/encode/test_NAME.py` has the examples of the encoder NAME, `EXAMPLES`, with the options that hold time back; and
 either `trains_of(encoder, taxels, of)`, the numbers of the trains of some of so many taxels, or, where no train belongs
-to one taxel, `turned(encoder)`, the trains as they stand when the array is turned by half a turn.
+to one taxel, `turned(encoder)`, the trains as they stand when the array is turned by half a turn; or, where each train
+has a place of its own, `places(encoder, array)`, one (x, y) in mm a train.
 """
 
 import json
@@ -35,7 +36,8 @@ each_encoder = pytest.mark.parametrize("encoder", ENCODERS.values(), ids=ENCODER
 SAMPLED = {label: encoder for label, encoder in ENCODERS.items() if hasattr(encoder, "period_ms")}
 each_sampled_encoder = pytest.mark.parametrize("encoder", SAMPLED.values(), ids=SAMPLED)
 BY_TAXEL = {label: encoder for label, encoder in ENCODERS.items() if hasattr(FILES[encoder.name], "trains_of")}
-OF_THE_ARRAY = {label: encoder for label, encoder in ENCODERS.items() if label not in BY_TAXEL}
+OF_THE_ARRAY = {label: encoder for label, encoder in ENCODERS.items() if hasattr(FILES[encoder.name], "turned")}
+PLACED = {label: encoder for label, encoder in ENCODERS.items() if hasattr(FILES[encoder.name], "places")}
 #: The first window read by itself comes late by definition.
 PROMPT = {name: encoder for name, encoder in ENCODERS.items() if "by itself" not in name}
 seeds = st.integers(0, 2**32 - 1)
@@ -61,8 +63,9 @@ def test_an_encoder_has_a_file_in_each_place_and_nothing_is_left_out():
         examples = getattr(file, "EXAMPLES", {})
         assert examples, f"EXAMPLES in tests/encode/test_{name}.py"
         assert {example.name for example in examples.values()} == {name}
-        assert hasattr(file, "trains_of") != hasattr(file, "turned"), f"trains_of or turned in test_{name}.py"
-        assert all(hasattr(example, "tare") for example in examples.values()) or hasattr(file, "trains_of")
+        ways = [way for way in ("trains_of", "turned", "places") if hasattr(file, way)]
+        assert len(ways) == 1, f"trains_of, turned or places in test_{name}.py"
+        assert all(hasattr(example, "tare") for example in examples.values()) or ways != ["turned"]
 
 
 def in_pieces(encoder, pieces, moves):
@@ -130,10 +133,12 @@ def test_events_out_of_order_are_heard_as_a_stream_hears_them_or_refused(encoder
 
 
 #: They tell changes, and of a value that a state repaired nobody knows when it changed.
-OF_CHANGE = {label: encoder for label, encoder in ENCODERS.items() if encoder.name in ("change_events", "fa1")}
+OF_CHANGE = {label: encoder for label, encoder in ENCODERS.items() if encoder.name in ("change_events", "fa1", "fa2")}
+#: They tell values alone; a skin tells both.
+OF_VALUES = {label: e for label, e in ENCODERS.items() if label not in OF_CHANGE and label not in PLACED}
 
 
-@pytest.mark.parametrize("encoder", [e for e in ENCODERS.values() if e not in OF_CHANGE.values()], ids=lambda e: e.name)
+@pytest.mark.parametrize("encoder", OF_VALUES.values(), ids=OF_VALUES)
 def test_what_reads_values_takes_a_repaired_one_as_any_other(encoder):
     events = touch(np.random.default_rng(5), ARRAY, repaired=0.5)
     assert events.repaired is not None
@@ -277,6 +282,21 @@ def test_an_array_that_is_turned_gives_the_same_trains_as_they_stand_then(encode
     assert spikes_of(turned) == spikes_of(plain.select(FILES[encoder.name].turned(encoder)))
 
 
+@pytest.mark.parametrize("encoder", PLACED.values(), ids=PLACED)
+def test_a_train_with_a_place_hears_what_is_near_it_and_not_what_is_far(encoder):
+    array = Array(20, 20)
+    t = np.arange(200) * round(encoder.period_ms * 1000)
+    pictures = np.zeros((200, 20, 20))
+    pictures[20:60, 3, 4] = 150
+    spikes = encoder.encode(Frames(pictures, t, array=array))
+    places = FILES[encoder.name].places(encoder, array)
+    assert len(places) == len(spikes) == encoder.trains(array)
+    away = np.hypot(*(places - [4, 3]).T)
+    heard = np.diff(spikes.offsets) > 0
+    assert heard[away < 1].any()
+    assert not heard[away > 8].any()
+
+
 @each_encoder
 def test_taxels_that_do_not_exist_have_no_train_and_are_not_heard(encoder):
     rng = np.random.default_rng(14)
@@ -286,10 +306,10 @@ def test_taxels_that_do_not_exist_have_no_train_and_are_not_heard(encoder):
     some = Events(
         events.t, events.x, events.y, events.p, array=masked, intensity=events.intensity, present=events.present
     )
-    if encoder.name in {e.name for e in OF_THE_ARRAY.values()}:
+    if encoder.name not in {e.name for e in BY_TAXEL.values()}:
         encoder = encoder.with_tare(rest(masked))
-        # The first event stays: where time begins is not what is tried here.
-        only = some[exists[some.y, some.x] | (np.arange(len(some)) == 0)]
+        # The first event and the last stay: where time begins and ends is not what is tried here.
+        only = some[exists[some.y, some.x] | np.isin(np.arange(len(some)), [0, len(some) - 1])]
         assert spikes_of(encoder.encode(some)) == spikes_of(encoder.encode(only))
         return
     taxels = np.flatnonzero(exists)
@@ -372,7 +392,7 @@ def test_a_long_silence_costs_no_time_once_nothing_can_come():
         (lambda: Encoder.from_json("{"), "encoder: not JSON"),
         (lambda: Encoder.from_json("[]"), r"encoder is \[\]: must be values by name"),
         (lambda: Encoder.from_json("{}"), "without a name: must be one of change_events"),
-        (lambda: Encoder.from_json('{"name": "sa1"}'), "encoder sa1: must be one of"),
+        (lambda: Encoder.from_json('{"name": "sa3"}'), "encoder sa3: must be one of"),
         (lambda: Encoder.from_json('{"name": "fa1", "tau": 5}'), 'encoder fa1: tau is not known: there is "alpha", '),
         (lambda: Encoder.from_json('{"name": "level_crossing"}'), "encoder level_crossing: levels is missing"),
         (lambda: Encoder.from_json(None), "must be JSON text"),

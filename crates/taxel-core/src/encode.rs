@@ -6,8 +6,10 @@ mod loaded;
 mod periods;
 mod pieces;
 mod power;
+mod receptor;
 mod running_range;
 mod sampled;
+mod slow;
 mod stream;
 mod tare;
 
@@ -81,6 +83,14 @@ encoders! {
     threshold_izhikevich: ThresholdIzhikevich,
     /// The FA-1 afferent of equations 5.1 to 5.5.
     fa1: Fa1,
+    /// The SA-1 afferent, which tells how hard is pressed as long as it is.
+    sa1: Sa1,
+    /// The SA-2 afferent, which tells a held load steadily.
+    sa2: Sa2,
+    /// The FA-2 afferent, which tells vibration and the moment of contact.
+    fa2: Fa2,
+    /// Afferents of all four types in places of their own.
+    skin: Skin,
     /// How many taxels are loaded.
     contact_area: ContactArea,
     /// How large a touch is, how hard, and where its centre has gone.
@@ -144,7 +154,7 @@ impl Encoder {
     /// On how many trains the encoder speaks for an array.
     #[must_use]
     pub fn trains(&self, array: &Array) -> usize {
-        self.law().trains(sampled::Channels::new(array).len())
+        self.law().trains(array)
     }
 
     /// Whether its spikes carry a signed value, so that a neuron hears each train as two, ON and OFF.

@@ -1,11 +1,16 @@
 //! Encoders and the tare for Python; parameters cross as JSON.
 
 use pyo3::prelude::*;
-use taxel_core::encode::{Encoder, Pieces, Tare};
+use taxel_core::encode::{Encoder, Pieces, Skin, Tare};
+
+use taxel_core::problem;
 
 use crate::convert::{ArrayParts, EventsIn, FramesIn, SpikesOut, from_spikes, to_array, to_events, to_frames};
 use crate::enter::{Shared, enter};
 use crate::errors::core;
+
+/// Types, x and y of a skin's afferents.
+type SkinAfferents = (Vec<&'static str>, Vec<f64>, Vec<f64>);
 
 /// Checks an encoder; gives it back with every default filled in.
 #[pyfunction]
@@ -24,6 +29,21 @@ fn encoder_names() -> Vec<&'static str> {
 fn encoder_about(encoder: &str, array: ArrayParts) -> PyResult<(usize, bool, f64)> {
     let (encoder, array) = (Encoder::from_json(encoder).map_err(core)?, to_array(array)?);
     Ok((encoder.trains(&array), encoder.signed(), encoder.latency_ms()))
+}
+
+/// Type and place (x, y in mm) of each afferent of a skin on an array, a train each.
+#[pyfunction]
+fn skin_afferents(py: Python<'_>, skin: &str, array: ArrayParts) -> PyResult<SkinAfferents> {
+    let Encoder::Skin(skin) = Encoder::from_json(skin).map_err(core)? else {
+        return Err(core(problem!("skin: must be one")));
+    };
+    let array = to_array(array)?;
+    let placed = enter(py, |_| Skin::afferents(&skin, &array))?;
+    Ok((
+        placed.iter().map(|p| p.kind.name()).collect(),
+        placed.iter().map(|p| p.x_mm).collect(),
+        placed.iter().map(|p| p.y_mm).collect(),
+    ))
 }
 
 /// Encodes a whole recording of events.
@@ -122,6 +142,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(check_encoder, module)?)?;
     module.add_function(wrap_pyfunction!(encoder_names, module)?)?;
     module.add_function(wrap_pyfunction!(encoder_about, module)?)?;
+    module.add_function(wrap_pyfunction!(skin_afferents, module)?)?;
     module.add_function(wrap_pyfunction!(encode_events, module)?)?;
     module.add_function(wrap_pyfunction!(encode_frames, module)?)?;
     module.add_function(wrap_pyfunction!(tare_of_events, module)?)?;

@@ -5,9 +5,14 @@ from taxel.encode._encoder import EncoderStream as EncoderStream
 from taxel.encode.change_events import ChangeEvents as ChangeEvents
 from taxel.encode.contact_area import ContactArea as ContactArea
 from taxel.encode.fa1 import FA1 as FA1
+from taxel.encode.fa2 import FA2 as FA2
 from taxel.encode.level_crossing import LevelCrossing as LevelCrossing
 from taxel.encode.level_crossing import RunningRange as RunningRange
 from taxel.encode.moments import Moments as Moments
+from taxel.encode.sa1 import SA1 as SA1
+from taxel.encode.sa2 import SA2 as SA2
+from taxel.encode.skin import Afferents as Afferents
+from taxel.encode.skin import Skin as Skin
 from taxel.encode.threshold_izhikevich import ThresholdIzhikevich as ThresholdIzhikevich
 
 # The lines above are the registry: an encoder is one of them.

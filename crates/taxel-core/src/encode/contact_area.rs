@@ -81,7 +81,7 @@ impl Law for ContactArea {
         }))
     }
 
-    fn trains(&self, _taxels: usize) -> usize {
+    fn trains(&self, _array: &Array) -> usize {
         2 * self.levels.len()
     }
 

@@ -154,7 +154,7 @@ struct Afferent {
 }
 
 #[derive(Clone)]
-struct Afferents {
+pub(super) struct Afferents {
     alpha: f64,
     jump: f64,
     decay: f64,
@@ -171,7 +171,7 @@ struct Afferents {
 const TICKS: usize = 65_536;
 
 impl Afferents {
-    fn new(parameters: &Fa1, channels: usize) -> Self {
+    pub(super) fn new(parameters: &Fa1, channels: usize) -> Self {
         let (theta_0, t) = (parameters.baseline(), parameters.period_ms);
         let mut table = Box::new([0.0; TICKS]);
         for (k, rho) in table.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {

@@ -1,5 +1,6 @@
 //! What every encoder of the registry says of itself.
 
+use super::sampled::Channels;
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::parameters::Described;
@@ -18,9 +19,9 @@ pub(super) trait Law {
     /// Begins to encode what an array feels; the parameters are checked.
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>>;
 
-    /// On how many trains it speaks for an array of so many taxels.
-    fn trains(&self, taxels: usize) -> usize {
-        taxels
+    /// On how many trains it speaks for an array.
+    fn trains(&self, array: &Array) -> usize {
+        Channels::new(array).len()
     }
 
     /// Whether its spikes carry a signed value.

@@ -119,8 +119,8 @@ impl Law for LevelCrossing {
         Ok(Box::new(Sampled::new(crossings, array, self.period_ms, self.latency_ms())?))
     }
 
-    fn trains(&self, channels: usize) -> usize {
-        channels * (self.levels.len() + usize::from(self.tonic_ms.is_some()))
+    fn trains(&self, array: &Array) -> usize {
+        Channels::new(array).len() * (self.levels.len() + usize::from(self.tonic_ms.is_some()))
     }
 
     fn latency_ms(&self) -> f64 {

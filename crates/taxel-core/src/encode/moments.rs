@@ -176,7 +176,7 @@ impl Law for Moments {
         Ok(Box::new(Sampled::new(passing, &places, self.period_ms, 0.0)?))
     }
 
-    fn trains(&self, _taxels: usize) -> usize {
+    fn trains(&self, _array: &Array) -> usize {
         self.all_levels().len() * if self.tonic_ms.is_some() { 3 } else { 2 }
     }
 

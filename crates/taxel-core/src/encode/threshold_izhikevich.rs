@@ -98,8 +98,8 @@ impl Law for ThresholdIzhikevich {
         Ok(Box::new(Sampled::new(pairs, array, self.period_ms, self.latency_ms())?))
     }
 
-    fn trains(&self, channels: usize) -> usize {
-        channels * self.levels.len()
+    fn trains(&self, array: &Array) -> usize {
+        Channels::new(array).len() * self.levels.len()
     }
 
     fn latency_ms(&self) -> f64 {

@@ -1,0 +1,14 @@
+"""How many times faster than real time the SA-1 afferents of 64 x 64 taxels are, beside the obvious NumPy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from _receptor import benchmark
+
+from taxel.encode import SA1
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    """Measure; return seconds, real-time factors and ratios."""
+    return benchmark(__doc__, "SA-1", SA1(period_ms=0.192), quick=quick)

@@ -1,0 +1,158 @@
+//! FA-2: the fast adapting afferent of large fields, which tells vibration and the moment of contact.
+
+use serde::{Deserialize, Serialize};
+
+use super::law::Law;
+use super::receptor::{ByTaxel, Filter, Firing, Lanes, LowPass};
+use super::sampled::{BLOCK, Channels, Sampled};
+use super::stream::Stream;
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
+use crate::{Array, Result};
+
+/// The FA-2 afferent (Pacini): silent while pressure is held or moves slowly, a spike a cycle at 200 to 250 Hz.
+///
+/// Two high passes of `corner_ms`, a low pass of `membrane_ms`: `u = lowpass(highpass(highpass(x)))`, x the pressure as a
+/// share of `range`. So thresholds fall by 12 dB an octave up to the best frequency, as those of the channel that it
+/// carries do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). The threshold moves as in `receptor`;
+/// `refractory_ms` is that of Kobayashi et al. (2009). `corner_ms`, `membrane_ms`, `jump` and `recovery_ms` are fitted by
+/// us to a threshold of one spike a cycle that is least between 200 and 250 Hz. `threshold` is what a sensor allows: a
+/// step of one tick in 150 stays below it; a finger is far more sensitive. Pressure below 0 counts as 0. One unsigned
+/// train a taxel, at most one spike a sample. Begins as if the first sample had always been.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Fa2 {
+    /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
+    pub range: f64,
+    /// Where it begins to fire, a share of `range`.
+    pub threshold: f64,
+    /// The time constant of the two high passes, ms.
+    pub corner_ms: f64,
+    /// The membrane's time constant, ms.
+    pub membrane_ms: f64,
+    /// By how much a spike raises the threshold, a share of `range`.
+    pub jump: f64,
+    /// The time constant with which it sinks again, ms.
+    pub recovery_ms: f64,
+    /// How long after a spike none can come, ms.
+    pub refractory_ms: f64,
+    /// How often events are sampled, ms, at most 1; frames must come at it, give or take half.
+    pub period_ms: f64,
+}
+
+impl Default for Fa2 {
+    fn default() -> Self {
+        Self {
+            range: 150.0,
+            threshold: 0.003,
+            corner_ms: 0.9,
+            membrane_ms: 1.5,
+            jump: 0.003,
+            recovery_ms: 1.5,
+            refractory_ms: 2.0,
+            period_ms: 0.2,
+        }
+    }
+}
+
+impl Fa2 {
+    ranges! {
+        range: "", Range::ABOVE_0;
+        threshold: "", Range::ABOVE_0;
+        corner_ms: "ms", Range::ABOVE_0;
+        membrane_ms: "ms", Range::ABOVE_0;
+        jump: "", Range::ABOVE_0;
+        recovery_ms: "ms", Range::ABOVE_0;
+        refractory_ms: "ms", Range::FROM_0;
+        period_ms: "ms", Range::WHOLE_US.at_most(1.0);
+    }
+
+    pub(super) fn filter(&self) -> Fast {
+        let low_pass = |tau| LowPass::new(tau, self.period_ms);
+        Fast { corner: low_pass(self.corner_ms), membrane: low_pass(self.membrane_ms) }
+    }
+
+    pub(super) fn firing(&self) -> Firing {
+        Firing {
+            threshold: self.threshold,
+            jump: self.jump,
+            recovery_ms: self.recovery_ms,
+            refractory_ms: self.refractory_ms,
+            period_ms: self.period_ms,
+        }
+    }
+}
+
+impl Law for Fa2 {
+    fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
+    fn check(&self) -> Result<()> {
+        self.check_ranges()
+    }
+
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let afferents = ByTaxel::new(self.filter(), self.firing(), self.range, Channels::new(array).len());
+        Ok(Box::new(Sampled::new(afferents, array, self.period_ms, 0.0)?.steady()))
+    }
+
+    fn signed(&self) -> bool {
+        false
+    }
+}
+
+/// Two high passes and a low pass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fast {
+    corner: LowPass,
+    membrane: LowPass,
+}
+
+#[derive(Clone)]
+pub(super) struct State {
+    x: Lanes,
+    /// The low pass that the first high pass takes away, and what is left.
+    first: Lanes,
+    once: Lanes,
+    /// The same of the second.
+    second: Lanes,
+    twice: Lanes,
+}
+
+impl Filter for Fast {
+    type State = State;
+
+    fn settled(&self, x: &Lanes) -> (State, Lanes) {
+        let none = [0.0; BLOCK];
+        (State { x: *x, first: *x, once: none, second: none, twice: none }, none)
+    }
+
+    #[inline(always)]
+    fn step(&self, state: &mut State, x: &Lanes, u: &mut Lanes) -> bool {
+        let mut moved = 0;
+        for lane in 0..BLOCK {
+            let first = self.corner.step(state.first[lane], state.x[lane], x[lane]);
+            let once = x[lane] - first;
+            let second = self.corner.step(state.second[lane], state.once[lane], once);
+            let twice = once - second;
+            let potential = self.membrane.step(u[lane], state.twice[lane], twice);
+            moved |= (state.x[lane].to_bits() ^ x[lane].to_bits())
+                | (state.first[lane].to_bits() ^ first.to_bits())
+                | (state.second[lane].to_bits() ^ second.to_bits())
+                | (u[lane].to_bits() ^ potential.to_bits());
+            state.x[lane] = x[lane];
+            state.first[lane] = first;
+            state.once[lane] = once;
+            state.second[lane] = second;
+            state.twice[lane] = twice;
+            u[lane] = potential;
+        }
+        moved != 0
+    }
+
+    fn shift(&self, state: &mut State, lane: usize, by: f64) {
+        state.x[lane] += by;
+        state.first[lane] += by;
+    }
+}

@@ -1,0 +1,401 @@
+//! A skin: afferents of all four types, each in a place of its own, on one array.
+
+use rand::rngs::StdRng;
+use rand::{Rng, SeedableRng};
+use serde::{Deserialize, Serialize};
+
+use super::fa1::{self, Decay, Fa1};
+use super::fa2::{Fa2, Fast};
+use super::law::Law;
+use super::receptor::ByTaxel;
+use super::sa1::Sa1;
+use super::sa2::Sa2;
+use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
+use super::slow::Slow;
+use super::stream::{Stream, sort_from};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
+use crate::{Array, Result, Spike, problem};
+
+/// SA-1, FA-1, SA-2 and FA-2 afferents at given densities, in places that a seed draws; each feels a field of taxels.
+///
+/// Densities are those of a fingertip: 70, 140 and 25 a cm^2 of SA-1, FA-1 and FA-2, and for SA-2 what these leave of 241
+/// in all (Johansson and Vallbo 1979, J. Physiol. 286:283; the three as Saal et al. 2017, PNAS 114:E5693, use them). Field
+/// areas: medians of 11.0 mm^2 for SA-1 and 12.6 for FA-1, some 5 times as much for SA-2 and 10 times for FA-2 (Johansson
+/// and Vallbo 1980, Brain Res. 184:353). Within its field, a disc, an afferent feels the mean of the taxels, weighed by a
+/// Gaussian whose second standard deviation is the field's edge: that shape is our choice. Where no taxel's centre lies
+/// in its field it feels the taxel on which it stands. Each type is the encoder of its name with its defaults and this
+/// `range`; FA-1's threshold decays by the ms, so that the sampling period matters as little as it can.
+///
+/// Trains, unsigned as a nerve's spikes are: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to the last.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Skin {
+    /// SA-1 afferents a cm^2 of taxels.
+    pub sa1_per_cm2: f64,
+    /// FA-1 afferents a cm^2.
+    pub fa1_per_cm2: f64,
+    /// SA-2 afferents a cm^2.
+    pub sa2_per_cm2: f64,
+    /// FA-2 afferents a cm^2.
+    pub fa2_per_cm2: f64,
+    /// The field of an SA-1 afferent, mm^2.
+    pub sa1_field_mm2: f64,
+    /// The field of an FA-1 afferent, mm^2.
+    pub fa1_field_mm2: f64,
+    /// The field of an SA-2 afferent, mm^2.
+    pub sa2_field_mm2: f64,
+    /// The field of an FA-2 afferent, mm^2.
+    pub fa2_field_mm2: f64,
+    /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
+    pub range: f64,
+    /// What draws the places.
+    pub seed: u64,
+    /// How often events are sampled, ms, at most 1; frames must come at it, give or take half.
+    pub period_ms: f64,
+}
+
+impl Default for Skin {
+    fn default() -> Self {
+        Self {
+            sa1_per_cm2: 70.0,
+            fa1_per_cm2: 140.0,
+            sa2_per_cm2: 6.0,
+            fa2_per_cm2: 25.0,
+            sa1_field_mm2: 11.0,
+            fa1_field_mm2: 12.6,
+            sa2_field_mm2: 60.0,
+            fa2_field_mm2: 120.0,
+            range: 150.0,
+            seed: 1,
+            period_ms: 0.2,
+        }
+    }
+}
+
+/// The four types of afferents.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Kind {
+    /// Slowly adapting, small fields.
+    #[serde(rename = "SA-1")]
+    Sa1,
+    /// Fast adapting, small fields.
+    #[serde(rename = "FA-1")]
+    Fa1,
+    /// Slowly adapting, large fields.
+    #[serde(rename = "SA-2")]
+    Sa2,
+    /// Fast adapting, large fields.
+    #[serde(rename = "FA-2")]
+    Fa2,
+}
+
+impl Kind {
+    /// As people write it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Sa1 => "SA-1",
+            Self::Fa1 => "FA-1",
+            Self::Sa2 => "SA-2",
+            Self::Fa2 => "FA-2",
+        }
+    }
+}
+
+/// An afferent of a skin: its type, and where it stands, mm from the middle of the first taxel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placed {
+    /// Its type.
+    pub kind: Kind,
+    /// To the right.
+    pub x_mm: f64,
+    /// Downwards.
+    pub y_mm: f64,
+}
+
+/// As many afferents as a skin may have.
+const MOST: usize = 1_000_000;
+
+impl Skin {
+    ranges! {
+        sa1_per_cm2: "", Range::FROM_0;
+        fa1_per_cm2: "", Range::FROM_0;
+        sa2_per_cm2: "", Range::FROM_0;
+        fa2_per_cm2: "", Range::FROM_0;
+        sa1_field_mm2: "", Range::ABOVE_0;
+        fa1_field_mm2: "", Range::ABOVE_0;
+        sa2_field_mm2: "", Range::ABOVE_0;
+        fa2_field_mm2: "", Range::ABOVE_0;
+        range: "", Range::ABOVE_0;
+        period_ms: "ms", Range::WHOLE_US.at_most(1.0);
+    }
+
+    /// Type, density a cm^2 and field in mm^2, in the order of the trains.
+    fn types(&self) -> [(Kind, f64, f64); 4] {
+        [
+            (Kind::Sa1, self.sa1_per_cm2, self.sa1_field_mm2),
+            (Kind::Fa1, self.fa1_per_cm2, self.fa1_field_mm2),
+            (Kind::Sa2, self.sa2_per_cm2, self.sa2_field_mm2),
+            (Kind::Fa2, self.fa2_per_cm2, self.fa2_field_mm2),
+        ]
+    }
+
+    /// How many afferents of a density an array bears.
+    fn count(array: &Array, density: f64) -> usize {
+        let area_cm2 = Channels::new(array).len() as f64 * array.pitch_mm * array.pitch_mm / 100.0;
+        (density * area_cm2).round() as usize
+    }
+
+    /// All afferents on an array, a train each.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where a parameter makes no sense, or there would be more than a million.
+    pub fn afferents(&self, array: &Array) -> Result<Vec<Placed>> {
+        self.check()?;
+        let count = Law::trains(self, array);
+        if count > MOST {
+            let (array, pitch_mm) = (&array.name, array.pitch_mm);
+            return Err(problem!("skin on {array} of pitch {pitch_mm} mm: {count} afferents, must be at most {MOST}"));
+        }
+        let (mut all, taxels) = (vec![], places(array));
+        for (kind, density, _) in self.types() {
+            let count = Self::count(array, density);
+            // The types are drawn apart, so that a density changes no other type's places.
+            let mut draw = StdRng::seed_from_u64(self.seed.wrapping_mul(4).wrapping_add(kind as u64));
+            for k in 0..count {
+                // One in each of as many equal parts of the taxels in their order: even, and from the first to the last.
+                let at: f64 = draw.random();
+                let within = [draw.random::<f64>() - 0.5, draw.random::<f64>() - 0.5];
+                let part = ((k as f64 + at) / count as f64 * taxels.len() as f64) as usize;
+                let [x, y] = taxels[part.min(taxels.len() - 1)];
+                let [x_mm, y_mm] = [x + within[0], y + within[1]].map(|place| place * array.pitch_mm);
+                all.push(Placed { kind, x_mm, y_mm });
+            }
+        }
+        Ok(all)
+    }
+}
+
+/// Column and row of each taxel that exists, in the order of their index.
+fn places(array: &Array) -> Vec<[f64; 2]> {
+    let columns = usize::from(array.columns);
+    (0..array.len())
+        .filter(|&taxel| array.exists.as_ref().is_none_or(|exists| exists[taxel]))
+        .map(|taxel| [(taxel % columns) as f64, (taxel / columns) as f64])
+        .collect()
+}
+
+impl Law for Skin {
+    fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
+    fn check(&self) -> Result<()> {
+        self.check_ranges()
+    }
+
+    fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+        let placed = self.afferents(array)?;
+        Ok(Box::new(Sampled::new(Afferents::new(self, array, &placed), array, self.period_ms, 0.0)?.steady()))
+    }
+
+    fn trains(&self, array: &Array) -> usize {
+        self.types().iter().map(|&(_, density, _)| Self::count(array, density)).sum()
+    }
+
+    fn signed(&self) -> bool {
+        false
+    }
+}
+
+/// The afferents of one type with their fields.
+#[derive(Clone)]
+struct Type<R> {
+    rule: R,
+    /// Number of its first train.
+    first: usize,
+    /// Where in `felt` each afferent's field begins, and where the last one's ends.
+    fields: Vec<usize>,
+    /// Channels with their weights, field by field.
+    felt: Vec<(u32, f32)>,
+    /// The blocks of channels that each block of afferents feels, from one to before another.
+    feels: Vec<[usize; 2]>,
+    /// What each afferent feels.
+    held: Vec<Block>,
+    changed: Vec<bool>,
+}
+
+impl<R: Rule> Type<R> {
+    fn new(rule: R, array: &Array, first: usize, placed: &[&Placed], field_mm2: f64) -> Self {
+        let taxels = places(array);
+        let (pitch, edge) = (array.pitch_mm, (field_mm2 / std::f64::consts::PI).sqrt());
+        // Rows of the array are runs of channels: a field is looked for only in those that it can reach.
+        let rows: Vec<usize> =
+            (0..=usize::from(array.rows)).map(|row| taxels.partition_point(|at| at[1] < row as f64)).collect();
+        let (mut fields, mut felt) = (vec![0], vec![]);
+        for at in placed {
+            let (x, y) = (at.x_mm / pitch, at.y_mm / pitch);
+            let reach = edge / pitch;
+            let row = |y: f64| (y.max(0.0) as usize).min(rows.len() - 1);
+            let near = rows[row((y - reach).ceil())]..rows[row((y + reach).floor() + 1.0)];
+            let from = felt.len();
+            let mut sum = 0.0;
+            for channel in near {
+                let [column, line] = taxels[channel];
+                let away = ((column - x).powi(2) + (line - y).powi(2)) * pitch * pitch;
+                if away <= edge * edge {
+                    // The edge is the second standard deviation.
+                    let weight = (-2.0 * away / (edge * edge)).exp();
+                    felt.push((channel as u32, weight as f32));
+                    sum += weight;
+                }
+            }
+            if felt.len() == from {
+                let on = [x.round(), y.round()];
+                let channel = taxels.iter().position(|taxel| *taxel == on).unwrap_or(0);
+                felt.push((channel as u32, 1.0));
+                sum = 1.0;
+            }
+            felt[from..].iter_mut().for_each(|(_, weight)| *weight /= sum as f32);
+            fields.push(felt.len());
+        }
+        let feels = (0..blocks(placed.len()))
+            .map(|block| {
+                let of = fields[block * BLOCK]..fields[placed.len().min((block + 1) * BLOCK)];
+                let channels = felt[of].iter().map(|&(channel, _)| channel as usize / BLOCK);
+                [channels.clone().min().unwrap_or(0), channels.max().unwrap_or(0) + 1]
+            })
+            .collect();
+        let n = blocks(placed.len());
+        Self { rule, first, fields, felt, feels, held: vec![[0.0; BLOCK]; n], changed: vec![true; n] }
+    }
+
+    fn len(&self) -> usize {
+        self.fields.len() - 1
+    }
+
+    /// What an afferent feels of these pressures.
+    #[inline(always)]
+    fn feel(&self, afferent: usize, held: &[Block]) -> f32 {
+        self.felt[self.fields[afferent]..self.fields[afferent + 1]]
+            .iter()
+            .map(|&(channel, weight)| held[channel as usize / BLOCK][channel as usize % BLOCK] * weight)
+            .sum()
+    }
+
+    #[inline(always)]
+    fn take(&mut self, held: &[Block], changed: &[bool]) {
+        for block in 0..self.held.len() {
+            let [from, to] = self.feels[block];
+            self.changed[block] = changed[from..to].contains(&true);
+            if self.changed[block] {
+                for afferent in block * BLOCK..self.len().min((block + 1) * BLOCK) {
+                    self.held[block][afferent % BLOCK] = self.feel(afferent, held);
+                }
+            }
+        }
+    }
+
+    fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
+        let all = vec![true; held.len()];
+        self.take(held, &all);
+        self.rule.begin(t, &self.held, out);
+    }
+
+    #[inline(always)]
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+        self.take(held, changed);
+        let from = out.len();
+        self.rule.sample(t, &self.held, &self.changed, out);
+        for spike in &mut out[from..] {
+            spike.train += self.first as u32;
+            spike.value = 1.0;
+        }
+    }
+
+    /// A channel reads something else, and did so before.
+    fn repair(&mut self, channel: usize, from: f32, to: f32) {
+        if R::HEARS_REPAIRED {
+            return;
+        }
+        let block = channel / BLOCK;
+        for afferents in (0..self.held.len()).filter(|&b| (self.feels[b][0]..self.feels[b][1]).contains(&block)) {
+            for afferent in afferents * BLOCK..self.len().min((afferents + 1) * BLOCK) {
+                let field = &self.felt[self.fields[afferent]..self.fields[afferent + 1]];
+                if let Some(&(_, weight)) = field.iter().find(|&&(felt, _)| felt as usize == channel) {
+                    let before = self.held[afferents][afferent % BLOCK];
+                    let now = before + weight * (to - from);
+                    self.rule.repair(afferent, before, now);
+                    self.held[afferents][afferent % BLOCK] = now;
+                }
+            }
+        }
+    }
+}
+
+#[derive(Clone)]
+struct Afferents {
+    sa1: Type<ByTaxel<Slow>>,
+    fa1: Type<fa1::Afferents>,
+    sa2: Type<ByTaxel<Slow>>,
+    fa2: Type<ByTaxel<Fast>>,
+    trains: usize,
+}
+
+impl Afferents {
+    fn new(skin: &Skin, array: &Array, placed: &[Placed]) -> Self {
+        let (range, period_ms) = (skin.range, skin.period_ms);
+        let sa1 = Sa1 { range, period_ms, ..Sa1::default() };
+        let fa1 = Fa1 { range: Some(range), period_ms, decay: Decay::Ms, ..Fa1::default() };
+        let sa2 = Sa2 { range, period_ms, ..Sa2::default() };
+        let fa2 = Fa2 { range, period_ms, ..Fa2::default() };
+        let first = |kind| placed.iter().position(|p| p.kind == kind).unwrap_or(0);
+        let of = |kind| placed.iter().filter(|p| p.kind == kind).collect::<Vec<_>>();
+        let [a, b, c, d] = skin.types().map(|(kind, _, field)| (first(kind), of(kind), field));
+        Self {
+            sa1: Type::new(ByTaxel::new(sa1.filter(), sa1.firing(), range, a.1.len()), array, a.0, &a.1, a.2),
+            fa1: Type::new(fa1::Afferents::new(&fa1, b.1.len()), array, b.0, &b.1, b.2),
+            sa2: Type::new(ByTaxel::new(sa2.filter(), sa2.firing(), range, c.1.len()), array, c.0, &c.1, c.2),
+            fa2: Type::new(ByTaxel::new(fa2.filter(), fa2.firing(), range, d.1.len()), array, d.0, &d.1, d.2),
+            trains: placed.len(),
+        }
+    }
+}
+
+impl Rule for Afferents {
+    fn trains(&self) -> usize {
+        self.trains
+    }
+
+    fn signed(&self) -> bool {
+        false
+    }
+
+    fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>) {
+        self.sa1.begin(t, held, out);
+        self.fa1.begin(t, held, out);
+        self.sa2.begin(t, held, out);
+        self.fa2.begin(t, held, out);
+    }
+
+    #[inline(always)]
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+        let from = out.len();
+        self.sa1.sample(t, held, changed, out);
+        self.fa1.sample(t, held, changed, out);
+        self.sa2.sample(t, held, changed, out);
+        self.fa2.sample(t, held, changed, out);
+        sort_from(out, from);
+    }
+
+    fn repair(&mut self, channel: usize, from: f32, to: f32) {
+        self.fa1.repair(channel, from, to);
+        self.fa2.repair(channel, from, to);
+    }
+
+    fn idle(&self) -> bool {
+        self.sa1.rule.idle() && self.fa1.rule.idle() && self.sa2.rule.idle() && self.fa2.rule.idle()
+    }
+}

@@ -1,0 +1,184 @@
+//! The filter of slowly adapting afferents, and how SA-1 and SA-2 are declared by it.
+
+use super::receptor::{Filter, Lanes, LowPass};
+use super::sampled::BLOCK;
+
+/// `u = lowpass((1 + onset) x - onset y - loss z)`: pressure x, what it was within the last `onset_ms` (y) and within the
+/// last `loss_ms` (z), all low passes; the outer one has `membrane_ms`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slow {
+    onset: f64,
+    loss: f64,
+    recent: LowPass,
+    long: LowPass,
+    membrane: LowPass,
+}
+
+impl Slow {
+    pub(super) fn new(
+        [onset, onset_ms]: [f64; 2],
+        [loss, loss_ms]: [f64; 2],
+        membrane_ms: f64,
+        period_ms: f64,
+    ) -> Self {
+        let low_pass = |tau| LowPass::new(tau, period_ms);
+        Self { onset, loss, recent: low_pass(onset_ms), long: low_pass(loss_ms), membrane: low_pass(membrane_ms) }
+    }
+}
+
+#[derive(Clone)]
+pub(super) struct State {
+    x: Lanes,
+    recent: Lanes,
+    long: Lanes,
+    drive: Lanes,
+}
+
+impl Filter for Slow {
+    type State = State;
+
+    const TELLS_VALUES: bool = true;
+
+    fn settled(&self, x: &Lanes) -> (State, Lanes) {
+        let drive = x.map(|x| (1.0 - self.loss) * x);
+        (State { x: *x, recent: *x, long: *x, drive }, drive)
+    }
+
+    #[inline(always)]
+    fn step(&self, state: &mut State, x: &Lanes, u: &mut Lanes) -> bool {
+        let mut moved = 0;
+        for lane in 0..BLOCK {
+            let (before, now) = (state.x[lane], x[lane]);
+            let recent = self.recent.step(state.recent[lane], before, now);
+            let long = self.long.step(state.long[lane], before, now);
+            let drive = (1.0 + self.onset) * now - self.onset * recent - self.loss * long;
+            let potential = self.membrane.step(u[lane], state.drive[lane], drive);
+            moved |= (before.to_bits() ^ now.to_bits())
+                | (state.recent[lane].to_bits() ^ recent.to_bits())
+                | (state.long[lane].to_bits() ^ long.to_bits())
+                | (u[lane].to_bits() ^ potential.to_bits());
+            state.x[lane] = now;
+            state.recent[lane] = recent;
+            state.long[lane] = long;
+            state.drive[lane] = drive;
+            u[lane] = potential;
+        }
+        moved != 0
+    }
+}
+
+/// Declares a slowly adapting afferent: its words, its name, and the defaults of what differs.
+macro_rules! slowly_adapting {
+    ($(#[$about:meta])* $Kind:ident, threshold: $threshold:expr, onset: $onset:expr, loss: $loss:expr) => {
+        use super::law::Law;
+        use super::receptor::{ByTaxel, Firing};
+        use super::sampled::{Channels, Sampled};
+        use super::slow::Slow;
+        use super::stream::Stream;
+        use $crate::allowed::{Range, ranges};
+        use $crate::parameters::Described;
+        use $crate::{Array, Result};
+
+        $(#[$about])*
+        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub struct $Kind {
+            /// The largest pressure, in the sensor's unit. Default 150 ticks, the ramp of the board's 5.2 kHz preset.
+            pub range: f64,
+            /// Where it begins to fire, a share of `range`.
+            pub threshold: f64,
+            /// How much more a pressure counts while it is new.
+            pub onset: f64,
+            /// How long it counts as new, ms.
+            pub onset_ms: f64,
+            /// Which share of a pressure that lasts is lost in the end.
+            pub loss: f64,
+            /// How long that takes, ms.
+            pub loss_ms: f64,
+            /// The membrane's time constant, ms.
+            pub membrane_ms: f64,
+            /// By how much a spike raises the threshold, a share of `range`.
+            pub jump: f64,
+            /// The time constant with which it sinks again, ms.
+            pub recovery_ms: f64,
+            /// How long after a spike none can come, ms.
+            pub refractory_ms: f64,
+            /// How often events are sampled, ms; frames must come at it, give or take half.
+            pub period_ms: f64,
+        }
+
+        impl Default for $Kind {
+            fn default() -> Self {
+                Self {
+                    range: 150.0,
+                    threshold: $threshold,
+                    onset: $onset,
+                    onset_ms: 200.0,
+                    loss: $loss,
+                    loss_ms: 5000.0,
+                    membrane_ms: 5.0,
+                    jump: 0.15,
+                    recovery_ms: 30.0,
+                    refractory_ms: 2.0,
+                    period_ms: 1.0,
+                }
+            }
+        }
+
+        impl $Kind {
+            ranges! {
+                range: "", Range::ABOVE_0;
+                threshold: "", Range::ABOVE_0;
+                onset: "", Range::FROM_0;
+                onset_ms: "ms", Range::ABOVE_0;
+                loss: "", Range::within(0.0, 1.0);
+                loss_ms: "ms", Range::ABOVE_0;
+                membrane_ms: "ms", Range::ABOVE_0;
+                jump: "", Range::ABOVE_0;
+                recovery_ms: "ms", Range::ABOVE_0;
+                refractory_ms: "ms", Range::FROM_0;
+                period_ms: "ms", Range::WHOLE_US;
+            }
+
+            pub(super) fn filter(&self) -> Slow {
+                Slow::new(
+                    [self.onset, self.onset_ms],
+                    [self.loss, self.loss_ms],
+                    self.membrane_ms,
+                    self.period_ms,
+                )
+            }
+
+            pub(super) fn firing(&self) -> Firing {
+                Firing {
+                    threshold: self.threshold,
+                    jump: self.jump,
+                    recovery_ms: self.recovery_ms,
+                    refractory_ms: self.refractory_ms,
+                    period_ms: self.period_ms,
+                }
+            }
+        }
+
+        impl Law for $Kind {
+            fn described() -> Described {
+                Described::by(&Self::default(), &[], Self::RANGES)
+            }
+
+            fn check(&self) -> Result<()> {
+                self.check_ranges()
+            }
+
+            fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
+                let channels = Channels::new(array).len();
+                let afferents = ByTaxel::new(self.filter(), self.firing(), self.range, channels);
+                Ok(Box::new(Sampled::new(afferents, array, self.period_ms, 0.0)?.steady()))
+            }
+
+            fn signed(&self) -> bool {
+                false
+            }
+        }
+    };
+}
+pub(super) use slowly_adapting;

@@ -1,0 +1,91 @@
+"""The SA-1 afferent: how hard is pressed, as long as it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from taxel._parameters import defaults
+from taxel.encode._encoder import Encoder
+
+__all__ = ["SA1"]
+
+
+_DEFAULT = defaults("sa1")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class SA1(Encoder):
+    """Fire while a taxel is pressed: fastest when it is pressed anew, ever more slowly as that lasts (Merkel).
+
+    Spikes have no sign; one train a taxel. It begins as if the first sample had always been.
+
+    Parameters
+    ----------
+    range : float, in the sensor's unit, above 0
+        The largest pressure; 150 ticks is the ramp of the board's 5.2 kHz preset.
+    threshold : float, above 0
+        Where it begins to fire, a share of `range`.
+    onset : float, 0 or more
+        How much more a pressure counts while it is new.
+    onset_ms : float, ms, above 0
+        How long it counts as new.
+    loss : float, from 0 to 1
+        Which share of a pressure that lasts is lost in the end.
+    loss_ms : float, ms, above 0
+        How long that takes.
+    membrane_ms : float, ms, above 0
+        The membrane's time constant.
+    jump : float, above 0
+        By how much a spike raises the threshold, a share of `range`.
+    recovery_ms : float, ms, above 0
+        The time constant with which it sinks again.
+    refractory_ms : float, ms, 0 or more
+        How long after a spike none can come.
+    period_ms : float, ms, whole us
+        How often events are sampled; frames must come at it, give or take half.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    With x the pressure as a share of `range` (below 0 counts as 0), and L_tau a low pass of first order::
+
+        u = L_membrane((1 + onset) x - onset L_onset(x) - loss L_loss(x))
+        spike where u >= threshold + a, and none came for refractory_ms;  a += jump at it
+        da/dt = -a / recovery_ms
+
+    Between samples x is a straight line, and the moment within a sample counts: so with periods of 0.1 to 2 ms rates
+    agree within 2 % of each other. A spike bears the time of its sample, at most one a sample.
+
+    The threshold is that of Kobayashi, Tsubota and Shinomoto (2009), Front. Comput. Neurosci. 3:9, with one time
+    constant; `refractory_ms` is theirs. By it the rate grows in a straight line with pressure, as SA-1's does
+    (Vega-Bermudez and Johnson 1999, J. Neurophysiol. 81:2701). `onset_ms` is the slower inactivation in the generator
+    of Gerling et al. (2018), PLoS Comput. Biol. 14:e1006264, figure 2. The others are fitted by us: `loss` to a rate
+    that falls by 38 % in the first 12 s of holding (Burgess et al. 1983, J. Neurosci. 3:2652, mean of 21 fibres);
+    `onset`, `membrane_ms` and `recovery_ms` to a threshold of one spike a cycle that is least near 5 Hz; `jump` to
+    some 100 spikes/s where half of `range` is newly pressed; `threshold` to what stands out of a noise of 3 ticks in
+    150.
+
+    Examples
+    --------
+    >>> from taxel import Frames
+    >>> held = Frames([[[0.0]]] + [[[75.0]]] * 50, range(0, 51_000, 1000), unit="ticks")
+    >>> SA1().encode(held)[0]
+    array([ 1.,  4., 10., 20., 30., 41.])
+    """
+
+    name = "sa1"
+
+    range: float = _DEFAULT.range
+    threshold: float = _DEFAULT.threshold
+    onset: float = _DEFAULT.onset
+    onset_ms: float = _DEFAULT.onset_ms
+    loss: float = _DEFAULT.loss
+    loss_ms: float = _DEFAULT.loss_ms
+    membrane_ms: float = _DEFAULT.membrane_ms
+    jump: float = _DEFAULT.jump
+    recovery_ms: float = _DEFAULT.recovery_ms
+    refractory_ms: float = _DEFAULT.refractory_ms
+    period_ms: float = _DEFAULT.period_ms

@@ -1,0 +1,113 @@
+"""A skin: afferents of all four types, each in a place of its own, on one array."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._arguments import instance
+from taxel._parameters import defaults
+from taxel.array import Array
+from taxel.encode._encoder import Encoder
+
+__all__ = ["Afferents", "Skin"]
+
+
+_DEFAULT = defaults("skin")
+
+
+@dataclass(frozen=True, eq=False)
+class Afferents:
+    """Say of each train of a `Skin` what it is and where it stands.
+
+    Attributes
+    ----------
+    kind : array of str, shape (trains,)
+        ``"SA-1"``, ``"FA-1"``, ``"SA-2"`` or ``"FA-2"``.
+    x_mm, y_mm : float array, shape (trains,)
+        To the right and downwards from the middle of the first taxel.
+    """
+
+    kind: NDArray[np.str_]
+    x_mm: NDArray[np.float64]
+    y_mm: NDArray[np.float64]
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def trains(self, kind: str) -> NDArray[np.int64]:
+        """Return the numbers of the trains of one type."""
+        return np.flatnonzero(self.kind == kind)
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Skin(Encoder):
+    """Give an array the afferents of a fingertip: all four types in places that a seed draws, each with a field.
+
+    Trains have no sign, as a nerve's spikes have none: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to
+    the last; `afferents` says what each is and where. Each type is the encoder of its name with its defaults and this
+    `range`; FA-1's threshold decays by the ms.
+
+    Parameters
+    ----------
+    sa1_per_cm2, fa1_per_cm2, sa2_per_cm2, fa2_per_cm2 : float, 0 or more
+        How many of each type a cm^2 of taxels bears; 0 leaves a type out.
+    sa1_field_mm2, fa1_field_mm2, sa2_field_mm2, fa2_field_mm2 : float, mm^2, above 0
+        The field of one of each type: a disc, within which it feels the mean of the taxels, weighed by a Gaussian whose
+        second standard deviation is the edge. Where no taxel's middle lies in it, the taxel beneath.
+    range : float, in the sensor's unit, above 0
+        The largest pressure; 150 ticks is the ramp of the board's 5.2 kHz preset.
+    seed : int, 0 or more
+        What draws the places.
+    period_ms : float, ms, whole us, at most 1
+        How often events are sampled; frames must come at it, give or take half.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense, or more than a million afferents on the array
+
+    Notes
+    -----
+    70, 140 and 25 a cm^2 of SA-1, FA-1 and FA-2, and for SA-2 what these leave of 241 in all: Johansson and Vallbo
+    (1979), J. Physiol. 286:283, in the numbers of Saal et al. (2017), PNAS 114:E5693. Fields: medians of 11.0 mm^2
+    (SA-1) and 12.6 (FA-1), some 5 times (SA-2) and 10 times (FA-2) as large (Johansson and Vallbo 1980, Brain Res.
+    184:353). Their shape is our choice. On an array as coarse as the thesis' (2.67 mm) several afferents stand on each
+    taxel.
+
+    Examples
+    --------
+    >>> skin = Skin(seed=5)
+    >>> tip = Array(10, 10, pitch_mm=1.0)
+    >>> afferents = skin.afferents(tip)
+    >>> [len(afferents.trains(kind)) for kind in ("SA-1", "FA-1", "SA-2", "FA-2")]
+    [70, 140, 6, 25]
+    >>> skin.trains(tip)
+    241
+    """
+
+    name = "skin"
+
+    sa1_per_cm2: float = _DEFAULT.sa1_per_cm2
+    fa1_per_cm2: float = _DEFAULT.fa1_per_cm2
+    sa2_per_cm2: float = _DEFAULT.sa2_per_cm2
+    fa2_per_cm2: float = _DEFAULT.fa2_per_cm2
+    sa1_field_mm2: float = _DEFAULT.sa1_field_mm2
+    fa1_field_mm2: float = _DEFAULT.fa1_field_mm2
+    sa2_field_mm2: float = _DEFAULT.sa2_field_mm2
+    fa2_field_mm2: float = _DEFAULT.fa2_field_mm2
+    range: float = _DEFAULT.range
+    seed: int = _DEFAULT.seed
+    period_ms: float = _DEFAULT.period_ms
+
+    def afferents(self, array: Array) -> Afferents:
+        """Return what each train is, and where, on an array.
+
+        Raises
+        ------
+        ProblemError : no array, or more than a million afferents on it
+        """
+        kind, x, y = _core.skin_afferents(self._json(), instance("array", array, Array)._parts())
+        return Afferents(np.array(kind, dtype="<U4"), np.array(x, dtype=float), np.array(y, dtype=float))

@@ -1,0 +1,81 @@
+"""The FA-2 afferent against its filter as SciPy integrates it, and against what is known of the fibre."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import Array, Events
+from taxel.encode import FA2
+
+from . import oracles
+from .test_sa1 import apart, of, smooth
+
+#: What the laws of all encoders are tried on (test_laws.py).
+EXAMPLES = {
+    "FA-2": FA2(),
+    "FA-2 of coarse samples": FA2(period_ms=0.5, corner_ms=3.0, refractory_ms=0.0),
+}
+
+
+def trains_of(encoder, taxels, of):
+    """The numbers of the trains of some taxels."""
+    return taxels
+
+
+@settings(max_examples=15, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), period=st.sampled_from([0.05, 0.1, 0.2]))
+def test_fa2_is_its_filter_under_its_threshold(seed, period):
+    rng = np.random.default_rng(seed)
+    t, x = smooth(rng, round(100 / period), period)
+    x = x + (8 * np.minimum(t / 20, 1) * np.sin(2 * np.pi * 0.15 * t)).astype(np.float32)
+    e = FA2(period_ms=period, corner_ms=rng.uniform(0.5, 2), jump=rng.uniform(0.002, 0.02))
+    high = [e.corner_ms, 0.0], [e.corner_ms, 1.0]
+    theirs = oracles.afferent(
+        t,
+        x,
+        (np.polymul(high[0], high[0]), np.polymul(np.polymul(high[1], high[1]), [e.membrane_ms, 1.0])),
+        range_=e.range,
+        threshold=e.threshold,
+        jump=e.jump,
+        recovery_ms=e.recovery_ms,
+        refractory_ms=e.refractory_ms,
+        settled=0.0,
+    )
+    assert len(theirs)
+    # A spike that is just missed comes at the next occasion.
+    assert apart(of(e, t, x), theirs, period) <= 0.1
+
+
+def test_it_tells_a_blow_and_its_end_and_no_slow_move_however_large():
+    t = np.arange(0, 1000, 0.2)
+    fast = of(FA2(), t, np.interp(t, [200, 205, 600, 605], [0, 100, 100, 0]))
+    assert len(fast)
+    assert all(200 <= s < 215 or 600 <= s < 615 for s in fast)
+    assert any(s < 215 for s in fast)
+    assert any(s >= 600 for s in fast)
+    assert len(of(FA2(), t, np.interp(t, [200, 400, 600, 800], [0, 150, 150, 0]))) == 0
+
+
+def test_a_step_of_one_tick_in_150_is_silent_and_one_of_four_is_not():
+    t = np.arange(0, 50, 0.2)
+    assert len(of(FA2(), t, 50.0 + (t > 20))) == 0
+    assert len(of(FA2(), t, 50.0 + 4 * (t > 20)))
+
+
+def test_a_value_that_a_state_repaired_is_no_change_and_later_ones_are():
+    array, n = Array(1, 1), 6
+    t = np.arange(n) * 20_000
+    ticks = np.array([50, 150, 50, 150, 51, 149])
+    events = Events(t, np.zeros(n, int), np.zeros(n, int), np.ones(n, bool), array=array, intensity=ticks)
+    all_heard = FA2().encode(events)[0]
+    events.repaired = np.arange(n) < 4
+    heard = FA2().encode(events)[0]
+    assert len(heard)
+    assert heard.tolist() == [s for s in all_heard.tolist() if s >= 80]
+
+
+def test_periods_in_which_it_feels_nothing_are_refused():
+    with pytest.raises(taxel.ProblemError, match="period_ms is 2 ms: must be a whole number of us"):
+        FA2(period_ms=2.0).stream(Array(1, 1))
