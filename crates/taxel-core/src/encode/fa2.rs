@@ -14,8 +14,7 @@ use crate::{Array, Result};
 ///
 /// Two high passes of `corner_ms`, a low pass of `membrane_ms`: `u = lowpass(highpass(highpass(x)))`, x the pressure as a
 /// share of `range`. So thresholds fall by 12 dB an octave up to the best frequency, as those of the channel that it
-/// carries do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). The threshold moves as in `receptor`;
-/// `refractory_ms` is that of Kobayashi et al. (2009). `corner_ms`, `membrane_ms`, `jump` and `recovery_ms` are fitted by
+/// carries do (Bolanowski et al. 1988, J. Acoust. Soc. Am. 84:1680). The threshold moves as [`Sa1`](super::Sa1)'s. `corner_ms`, `membrane_ms`, `jump` and `recovery_ms` are fitted by
 /// us to a threshold of one spike a cycle that is least between 200 and 250 Hz. `threshold` is what a sensor allows: a
 /// step of one tick in 150 stays below it; a finger is far more sensitive. Pressure below 0 counts as 0. One unsigned
 /// train a taxel, at most one spike a sample. Begins as if the first sample had always been.
