@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taxel import Array, SpikeTrains
+from taxel import Array, SceneError, SpikeTrains
 from taxel.information.neighbours import distances_of
 from taxel.metrics import pairwise
 from taxel.spikes import to_ms
@@ -107,6 +107,22 @@ def test_drops_of_one_condition_differ_and_higher_ones_tell_more(folder, fallen)
     high = dropped.played(FEW, Condition(50.0, 200.0, 0.0), 1, folder)
     slanted = dropped.played(FEW, Condition(50.0, 200.0, 30.0), 1, folder)
     assert fallen.events.mean() < slanted.events.mean() < high.events.mean()
+
+
+def test_the_region_holds_the_impact_and_not_a_taxel_of_noise(fallen):
+    """The middle of what answered lies in the middle of the region, in all drops."""
+    risen = fallen.ticks.max(1).astype(int) - fallen.ticks[:, 0]
+    x, y = np.arange(REGION * REGION) % REGION, np.arange(REGION * REGION) // REGION
+    for one in risen:
+        assert np.average(x, weights=one) == pytest.approx(REGION / 2 - 0.5, abs=1.5)
+        assert np.average(y, weights=one) == pytest.approx(REGION / 2 - 0.5, abs=1.5)
+
+
+def test_a_drop_that_nothing_answers_is_said(tmp_path):
+    with pytest.raises(SceneError, match="drop 0: no 3 taxels answered it"):
+        dropped.played(
+            {**FEW, "mass_g": 0.01, "mass_by_g": 0.0, "height_sd_mm": 0.0}, Condition(50.0, 5.0, 0.0), 1, tmp_path
+        )
 
 
 def test_none_is_its_own_neighbour():

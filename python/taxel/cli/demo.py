@@ -29,6 +29,9 @@ def demo(
     train_to: Annotated[
         Path | None, typer.Option("--train", help="Train the readout, write it there, and end.")
     ] = None,
+    drops_to: Annotated[
+        Path | None, typer.Option("--drops", help="Simulate the drops that answers rest on, write them there, and end.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the figures as JSON, and nothing else.")] = False,
 ) -> None:
     """Play scenes on the emulated board, find contact and lift-off while they run, and leave a report.
@@ -40,12 +43,19 @@ def demo(
     Examples: taxel demo --seed 1; taxel demo --scenes 100 --no-clock -o benchmarks/results/demo.json
     """
     console = Console(quiet=as_json)
-    for place, replaced in ((train_to, False), (result, True)):
+    for place, replaced in ((train_to, False), (drops_to, False), (result, True)):
         if place is not None:
             try_whole(place, overwrite=replaced)
     if train_to is not None:
         _train(console, train_to)
         typer.echo(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")
+        return
+    if drops_to is not None:
+        from taxel.demo.naming import write_drops  # noqa: PLC0415
+
+        with console.status("dropping balls") as status:
+            write_drops(drops_to, progress=status.update)
+        typer.echo(json.dumps({"drops": str(drops_to)}) if as_json else f"drops: {drops_to.resolve()}")
         return
     from taxel.demo.showing import show  # noqa: PLC0415  pictures load slowly
 

@@ -19,9 +19,12 @@ import taxel
 from taxel.demo import pictures
 from taxel.demo.hearing import Hearing
 from taxel.demo.judging import GOALS, LABELS, Judged, Row
+from taxel.demo.naming import ANSWERED_MS, QUESTIONS, named
+from taxel.demo.script import script
 from taxel.live import delays
 from taxel.report.charts import STYLE, chart
 from taxel.report.page import render
+from taxel.simulate import Scene
 from taxel.spikes import to_ms, to_us
 from taxel.wire import FRAME_US
 
@@ -87,6 +90,7 @@ def figures(material: Material) -> dict[str, Any]:
         "neuron": hearing.judged.to_dict(),
         "plain_rule": hearing.judged_plain.to_dict(),
         "delay_split_ms": _split(hearing),
+        "which_drop": named(hearing, [act for act in script(material.seed, material.scenes) if isinstance(act, Scene)]),
         "events": len(every),
         "events_per_s": len(every) / seconds,
         "events_per_s_in_first_impacts": _quantiles(impacts),
@@ -146,6 +150,8 @@ def _page(material: Material, values: Mapping[str, Any]) -> str:
             "plain": _table(hearing.judged_plain),
             "footfalls": None if material.footfalls is None else _table(material.footfalls.judged),
         },
+        answered_ms=ANSWERED_MS,
+        which_drop=_which_drop(values["which_drop"]),
         dashpots=_dashpots({1.0: hearing, **material.dashpots}),
         goals=GOALS,
         firsts={label: hearing.judged.row("first", label).touches for label in LABELS},
@@ -250,6 +256,25 @@ def _line(row: Row) -> dict[str, str]:
         "p95": known[1],
         "missed": "missed" if row.found < row.touches else "",
     }
+
+
+def _which_drop(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a line a drop and question: the truth, and the most probable answer after each time."""
+    lines = []
+    for n, drop in enumerate(found["drops"]):
+        for name, question in QUESTIONS.items():
+            said = [
+                {
+                    "says": question.answers[int(np.argmax(one["probable"]))],
+                    "sure": f"{100 * max(one['probable']):.0f} %",
+                    "right": one["right"],
+                }
+                for one in drop["said"].get(name, [])
+            ]
+            lines.append({"drop": n + 1, "of": name, "true": f"{drop['true_mm'][name]:.0f} mm", "said": said})
+    count = len(found["drops"])
+    right = {name: [f"{k} of {count}" for k in counts] for name, counts in found["right"].items()}
+    return {"lines": lines, "right": right, "chance": {name: _share(v) for name, v in found["chance"].items()}}
 
 
 def _dashpots(heard: Mapping[float, Hearing]) -> list[dict[str, str]]:

@@ -127,6 +127,7 @@ def show(
     if result is not None:
         write_whole(result, lambda file: file.write(json.dumps(values, indent=1).encode() + b"\n"), overwrite=True)
     _say(console, hearing, quiet)
+    _say_which(console, values["which_drop"])
     console.print(f"[dim]{time.monotonic() - began:.0f} s in all[/dim]")
     if result is not None:
         console.print(f"figures: {result}")
@@ -168,3 +169,11 @@ def _say(console: Console, hearing: Hearing, quiet: Hearing) -> None:
     within = sum(hearing.judged.false_within.values())
     off = f" ({within} within a press, more than 50 ms off)" if within else ""
     console.print(f"said of nothing: {false} in the scenes{off}, {len(quiet.found)} in {noise_s:.0f} s of noise")
+
+
+def _say_which(console: Console, found: dict[str, Any]) -> None:
+    """Say how often ball and height were named rightly, by time."""
+    count = len(found["drops"])
+    for name, right in found["right"].items():
+        by_time = ", ".join(f"{k} after {ms} ms" for k, ms in zip(right, found["answered_ms"], strict=True))
+        console.print(f"{name} named rightly, of {count} drops: {by_time} (by chance {found['chance'][name]:.0%})")

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from taxel import simulate
+from taxel._core import SceneError
 from taxel._files import write_whole
 from taxel.array import Array
 from taxel.encode import ChangeEvents
@@ -27,6 +28,7 @@ from taxel.studies.runner import Task, code_digest
 from taxel.wire import FRAME_US
 
 __all__ = [
+    "ANSWERED",
     "FRAMES",
     "REGION",
     "TABLE",
@@ -63,6 +65,8 @@ TOY: dict[str, Any] = {"heights_mm": [100.0, 200.0], "slants_deg": [0.0], "drops
 REGION, LENGTH_MS = 16, 50.0
 #: Frames in that time.
 FRAMES = int(LENGTH_MS / to_ms(FRAME_US))
+#: So many taxels that rise in one frame are an impact; one alone may be noise.
+ANSWERED = 3
 #: Ticks: a change above it is an event, as in the board's fast presets.
 NOISE_FLOOR = 3.0
 #: Silence before the first drop: the tare, and some.
@@ -162,7 +166,12 @@ def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator)
 
 
 def _around(events: Events, impacts: Sequence[float]) -> Drops:
-    """Cut out what the host holds of the region around each impact (5.6.2)."""
+    """Cut out what the host holds of the region around each impact (5.6.2).
+
+    Raises
+    ------
+    SceneError : an impact that hardly any taxel answered
+    """
     events = events.sorted()
     assert events.intensity is not None  # the board sends them
     columns, rows = events.array.columns, events.array.rows
@@ -174,12 +183,16 @@ def _around(events: Events, impacts: Sequence[float]) -> Drops:
     counts, lasted = np.zeros(len(impacts), np.int64), np.zeros(len(impacts))
     done = 0
     for k, impact in enumerate(impacts):
-        first = int(np.searchsorted(frame, int(impact / FRAME_US)))
+        at = int(impact / FRAME_US)
+        soon = slice(*np.searchsorted(frame, [at, at + FRAMES]))
+        rises = np.bincount(frame[soon][events.p[soon]] - at, minlength=FRAMES)
+        if rises.max() < ANSWERED:
+            raise SceneError(f"drop {k}: no {ANSWERED} taxels answered it in one frame; drop it from higher")
+        begin = at + int(np.argmax(rises >= ANSWERED))
+        first, end = np.searchsorted(frame, [begin, begin + 1])
         held[index[done:first]] = events.intensity[done:first]
-        begin = int(frame[first])
-        answered = slice(first, int(np.searchsorted(frame, begin, side="right")))
-        x0 = _corner(events.x[answered], columns)
-        y0 = _corner(events.y[answered], rows)
+        x0 = _corner(events.x[first:end], columns)
+        y0 = _corner(events.y[first:end], rows)
         region = (np.arange(y0, y0 + REGION)[:, None] * columns + np.arange(x0, x0 + REGION)).ravel()
         ticks[k, 0] = held[region]
         edges = np.searchsorted(frame, np.arange(begin, begin + FRAMES + 1))

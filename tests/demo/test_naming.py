@@ -1,0 +1,86 @@
+"""Which ball fell from how high: the shipped drops made anew, answers on other boards, and what is said of them."""
+
+import json
+from dataclasses import replace
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+from taxel.demo import naming
+from taxel.demo.hearing import hear
+from taxel.demo.naming import ANSWERED_MS, LOOKED_MS, QUESTIONS, Drops, named, shipped_drops
+from taxel.demo.script import TRAINING_SEED, script
+from taxel.demo.shipped import shipped
+from taxel.simulate import Scene, Silence
+
+#: Drops of a board in the shipped set, and of three boards.
+BOARD, FOLD = naming._DROPS, 3 * naming._DROPS
+
+
+@pytest.fixture(scope="module")
+def hearing():
+    return hear(script(23, 3), shipped(), seed=23)
+
+
+def test_the_shipped_drops_are_what_the_command_writes():
+    """Its last board, made anew, row by row: and no seed of it is one that the demo plays."""
+    kept = json.loads(files("taxel.demo").joinpath("drops.json").read_text())
+    assert kept["looked_ms"] == list(LOOKED_MS)
+    assert len(kept["rows"]) == naming._BOARDS * BOARD
+    seed = naming._FIRST_SEED + naming._BOARDS - 1
+    assert seed >= TRAINING_SEED
+    assert naming.board_of_drops(seed, BOARD) == kept["rows"][-BOARD:]
+    assert len(files("taxel.demo").joinpath("drops.json").read_bytes()) < 100_000
+
+
+@pytest.mark.parametrize(("name", "least"), [("ball", [0.6, 0.65, 0.8, 0.85]), ("height", [0.45, 0.5, 0.8, 0.85])])
+def test_answers_on_other_boards_are_right_as_often_as_they_say(name, least):
+    known = shipped_drops()
+    question = QUESTIONS[name]
+    truth = np.array([question.of(value) for value in getattr(known, question.column)])
+    fold = np.arange(len(truth)) // FOLD
+    for after_ms, at_least in zip(ANSWERED_MS, least, strict=True):
+        probable = np.zeros((len(truth), len(question.answers)))
+        for k in range(fold.max() + 1):
+            rest = Drops(*(column[fold != k] for column in (known.diameter_mm, known.height_mm, known.pictures)))
+            probable[fold == k] = rest.posterior(name, after_ms, known.pictures[fold == k])
+        np.testing.assert_allclose(probable.sum(1), 1.0)
+        right = float(np.mean(probable.argmax(1) == truth))
+        assert right > at_least
+        assert right == pytest.approx(probable.max(1).mean(), abs=0.05)
+
+
+def test_an_answer_rests_only_on_what_came_before_it():
+    known = shipped_drops()
+    changed = known.pictures[:4].copy()
+    changed[:, [t > 2 for t in LOOKED_MS]] += 50
+    for name in QUESTIONS:
+        before, after = (known.posterior(name, 2, pictures) for pictures in (known.pictures[:4], changed))
+        np.testing.assert_array_equal(before, after)
+        assert not np.allclose(known.posterior(name, 5, changed), known.posterior(name, 5, known.pictures[:4]))
+
+
+def test_each_drop_of_a_play_is_named_and_judged(hearing):
+    scenes = [act for act in script(23, 3) if isinstance(act, Scene)]
+    found = named(hearing, scenes)
+    assert [drop["true_mm"]["height"] for drop in found["drops"]] == [s.parameters["drop_mm"] for s in scenes]
+    for name, question in QUESTIONS.items():
+        for k in range(len(ANSWERED_MS)):
+            said = [drop["said"][name][k] for drop in found["drops"]]
+            assert found["right"][name][k] == sum(one["right"] for one in said)
+            for drop, one in zip(found["drops"], said, strict=True):
+                most = int(np.argmax(one["probable"]))
+                edges = [0.0, *question.edges_mm, np.inf]
+                assert one["right"] == (edges[most] < drop["true_mm"][name] <= edges[most + 1])
+    assert all(0 <= drop["felt_ms"] < 2 for drop in found["drops"])
+
+
+def test_a_play_without_drops_and_drops_that_were_not_felt(hearing):
+    quiet = hear([Silence(400.0)], shipped(), seed=3)
+    assert named(quiet, [])["drops"] == []
+    begin = hearing.area.start
+    deaf = replace(hearing, area=hearing.area.between(begin, begin + 1.0))
+    found = named(deaf, [act for act in script(23, 3) if isinstance(act, Scene)])
+    assert [drop["felt_ms"] for drop in found["drops"]] == [None] * 3
+    assert found["right"] == {"ball": [0] * 4, "height": [0] * 4}
