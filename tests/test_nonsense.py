@@ -97,6 +97,7 @@ SOLVED = taxel.learn.ConeX(neuron=taxel.Neuron(tau=5.0), lb=-9.0, ub=9.0).fit([P
 REFUTED = taxel.learn.ConeX().fit([UNSIGNED], [[0.5]])
 SCENE = taxel.simulate.Scene.draw(1)
 LAYER = taxel.simulate.Layer(array=ARRAY)
+CIRCUIT = taxel.simulate.circuit
 REGISTERS = taxel.wire.Registers()
 BYTES = taxel.wire.encode(EVENTS)
 
@@ -650,6 +651,46 @@ SOUND: dict[str, Sound] = {
         sensor={},
         watch=lambda _: None,
     ),
+    "taxel.simulate.circuit.Fabric": plain(CIRCUIT.Fabric, rest_us=0.1, touch_us=1.0, exponent=0.8),
+    "taxel.simulate.circuit.Fabric.conductance": method(CIRCUIT.Fabric(), "conductance", force_n=[0.0, 1.0]),
+    "taxel.simulate.circuit.Fabric.force": method(CIRCUIT.Fabric(), "force", conductance_us=[0.0, 1.0]),
+    "taxel.simulate.circuit.VirtualGround": plain(
+        CIRCUIT.VirtualGround,
+        v_trans=0.5,
+        feedback_kohm=47.0,
+        gain=1e3,
+        offset_mv=2.0,
+        switch_ohm=2.5,
+        wire_ohm=1.0,
+        rail_v=3.3,
+        seed=1,
+    ),
+    "taxel.simulate.circuit.Divider": plain(
+        CIRCUIT.Divider, supply_v=5.0, resistor_kohm=10.0, switch_ohm=2.5, wire_ohm=1.0, idle="floating"
+    ),
+    "taxel.simulate.circuit.Converter": plain(
+        CIRCUIT.Converter,
+        shape="linear",
+        ramp=150,
+        hysteresis_v=0.1,
+        settle_us=0.05,
+        amplifier_us=0.7,
+        discharge_us=0.02,
+        wait_us=0.2,
+        step_us=0.75,
+        line_us=3.0,
+        steps=4,
+    ),
+    "taxel.simulate.circuit.Converter.ticks": method(CIRCUIT.Converter(), "ticks", volts=[[1.4, 2.0]]),
+    "taxel.simulate.circuit.Converter.ramp_volts": method(CIRCUIT.Converter(), "ramp_volts", ticks=[1.0, 9.0]),
+    "taxel.simulate.circuit.Converter.ramp_ticks": method(CIRCUIT.Converter(), "ramp_ticks", volts=[1.0, 9.0]),
+    "taxel.simulate.circuit.Converter.trace": method(
+        CIRCUIT.Converter(), "trace", line_v=[1.4, 1.5, 2.0, 2.5], every_us=0.1, stop_us=6.0
+    ),
+    "taxel.simulate.circuit.Circuit": plain(
+        CIRCUIT.Circuit, readout=CIRCUIT.VirtualGround(), converter=CIRCUIT.Converter()
+    ),
+    "taxel.simulate.circuit.Circuit.ticks": method(CIRCUIT.Circuit(), "ticks", conductance_us=[[1.0, 2.0]]),
     "taxel.simulate.truth": plain(
         taxel.simulate.truth, acts=[taxel.simulate.Silence(10.0)], preset="5.2 kHz", array=None
     ),
@@ -897,6 +938,7 @@ LEFT_OUT = {
     "taxel.live.Panel.listen": "begins a Live, which checks",
     "taxel.live.Live.next": "waits",
     "taxel.live.Live.note": "tried with Live's own tests",
+    "taxel.simulate.circuit.Trace": "a result",
     "taxel.simulate.Contact": "a result",
     "taxel.simulate.Motion": "a result",
     "taxel.simulate.Played": "a result",
@@ -912,7 +954,8 @@ LEFT_OUT = {
 
 def modules() -> list[Any]:
     """The package and the rooms that it offers; the command line has exit codes instead, and tests of its own."""
-    return [taxel, *(room for name in taxel.__all__ if inspect.ismodule(room := getattr(taxel, name)))]
+    rooms = [room for name in taxel.__all__ if inspect.ismodule(room := getattr(taxel, name))]
+    return [taxel, *rooms, taxel.simulate.circuit]
 
 
 def public() -> dict[str, Any]:

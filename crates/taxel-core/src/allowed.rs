@@ -142,7 +142,7 @@ macro_rules! one_number {
         })*
     };
 }
-one_number!(f64 f32 usize u32 u64);
+one_number!(f64 f32 usize u16 u32 u64);
 
 impl<T: Numbers> Numbers for Option<T> {
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64)) {

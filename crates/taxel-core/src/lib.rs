@@ -22,6 +22,8 @@ pub mod events;
 pub mod frames;
 pub mod spikes;
 
+pub mod circuit;
+
 pub mod board;
 pub mod contact;
 pub mod wire;

@@ -17,6 +17,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
             &["allowed"],
             &["parameters", "array"],
             &["events", "frames", "spikes"],
+            &["circuit"],
             &["wire", "contact", "neuron"],
             &["board"],
             &["encode"],
@@ -43,6 +44,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
             &["enter", "convert", "parameters"],
             &[
                 "calibration",
+                "circuit",
                 "cone_x",
                 "detect",
                 "encode",

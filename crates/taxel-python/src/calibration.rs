@@ -2,8 +2,8 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
+use taxel_core::circuit::Ramp;
 use taxel_core::contact::Sensor;
-use taxel_core::contact::sensor::ramp_ticks;
 use taxel_core::{Error, Result, reading};
 
 use crate::convert::{array, slice};
@@ -25,7 +25,7 @@ fn check_law(json: &str) -> PyResult<String> {
 /// Gives what a taxel without spread reads at rest, ticks.
 #[pyfunction]
 fn law_rest(json: &str, ramp: f64) -> PyResult<f64> {
-    Ok(ramp_ticks(law(json).map_err(core)?.volts(0.0), ramp))
+    Ok(Ramp::rc(ramp).ticks(law(json).map_err(core)?.volts(0.0)))
 }
 
 /// Gives forces in N of readings in ticks, each with its rest; or, `back`, the readings of forces.

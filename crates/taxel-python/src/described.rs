@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use taxel_core::circuit::{Chain, Converter, Divider, Fabric, VirtualGround};
 use taxel_core::encode::{Encoder, RunningRange};
 use taxel_core::learn::rivals::{Batch, Rival, Tempotron};
 use taxel_core::learn::{ConeR, ConeX, OnlineConeR};
@@ -31,6 +32,11 @@ fn described(of: &str) -> Option<Described> {
         "online_cone_r" => Some(OnlineConeR::described()),
         "tempotron" => Some(Tempotron::described()),
         "matching" => Some(matching::described()),
+        "fabric" => Some(Fabric::described()),
+        "virtual_ground" => Some(VirtualGround::described()),
+        "divider" => Some(Divider::described()),
+        "converter" => Some(Converter::described()),
+        "circuit" => Some(Chain::described()),
         _ => Encoder::described(of)
             .or_else(|| Rival::described(of))
             .or_else(|| Batch::described(of))
@@ -52,6 +58,11 @@ fn check_parameters(of: &str, parameters: &str) -> PyResult<String> {
             written("OnlineConeR", &cone)
         }
         "tempotron" => checked("Tempotron", parameters, Tempotron::check),
+        "fabric" => checked("Fabric", parameters, Fabric::check),
+        "virtual_ground" => checked("VirtualGround", parameters, VirtualGround::check),
+        "divider" => checked("Divider", parameters, Divider::check),
+        "converter" => checked("Converter", parameters, Converter::check),
+        "circuit" => checked("Circuit", parameters, Chain::check),
         _ if Rival::described(of).is_some() => written(of, &to_rival(parameters)?),
         _ if Batch::described(of).is_some() => written(of, &Batch::from_json(of, parameters).map_err(core)?),
         _ if Encoder::described(of).is_some() => Ok(Encoder::from_json(parameters).map_err(core)?.to_json()),

@@ -6,6 +6,7 @@ mod errors;
 mod knock;
 
 mod calibration;
+mod circuit;
 mod cone_x;
 mod described;
 mod detect;
@@ -32,6 +33,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     knock::register(module)?;
     nouns::register(module)?;
     calibration::register(module)?;
+    circuit::register(module)?;
     cone_x::register(module)?;
     detect::register(module)?;
     encode::register(module)?;

@@ -2,8 +2,10 @@
 
 A scene says what happens to the ball. `play` lets a board feel acts as fast as it goes, `emulate` in real time over
 UDP: acts, a recording again, or the frames of any other sensor. `Board` is the board alone, a frame at a time.
+`taxel.simulate.circuit` is what lies between touch and board: fabric, lines, converter.
 """
 
+from taxel.simulate import circuit
 from taxel.simulate.acts import Act, Contact, Motion, Pictures, Scene, Silence
 from taxel.simulate.board import EmulatorReport, Pipe, Played, Replay, emulate, play, truth
 from taxel.simulate.emulated import NOT_RETURNED, Board, Version2
@@ -28,6 +30,7 @@ __all__ = [
     "Scene",
     "Silence",
     "Version2",
+    "circuit",
     "emulate",
     "play",
     "truth",

@@ -6,11 +6,10 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use crate::allowed::{is_above_0, is_at_least_0};
+use crate::circuit::ramp::RAMP_END_V;
+use crate::circuit::{Fabric, Ramp, VirtualGround};
 use crate::{Error, Result};
 
-/// The supply that the ramp charges towards, and the input at which it ends, V.
-const SUPPLY_V: f64 = 5.0;
-const RAMP_END_V: f64 = 3.0;
 /// The ramp for which `noise_ticks` is stated.
 const STATED_RAMP: f64 = 150.0;
 
@@ -91,19 +90,27 @@ impl Sensor {
     /// Input voltage of a taxel without spread under a force, V.
     #[must_use]
     pub fn volts(&self, force_n: f64) -> f64 {
-        let conductance = self.rest_us + self.touch_us * (force_n.max(0.0) / 0.02).powf(self.exponent);
-        self.v_trans * (1.0 + 1e-3 * self.feedback_kohm * conductance)
+        self.readout().volts_alone(self.fabric().conductance_us(force_n))
     }
 
-    /// Volts that 0.02 N add.
-    fn touch_v(&self) -> f64 {
-        self.v_trans * 1e-3 * self.feedback_kohm * self.touch_us
+    fn fabric(&self) -> Fabric {
+        Fabric { rest_us: self.rest_us, touch_us: self.touch_us, exponent: self.exponent }
+    }
+
+    fn readout(&self) -> VirtualGround {
+        VirtualGround { v_trans: self.v_trans, feedback_kohm: self.feedback_kohm, ..VirtualGround::default() }
+    }
+
+    /// Volts that a microsiemens adds.
+    fn gain_v(&self) -> f64 {
+        self.v_trans * 1e-3 * self.feedback_kohm
     }
 
     /// What a taxel reads under a force, ticks, where it reads `rest` without one; the ramp's end at most.
     #[must_use]
     pub fn reading(&self, force_n: f64, rest: f64, ramp: f64) -> f64 {
-        ramp_ticks(ramp_volts(rest, ramp) + self.touch_v() * (force_n.max(0.0) / 0.02).powf(self.exponent), ramp)
+        let ramp = Ramp::rc(ramp);
+        ramp.ticks(ramp.volts(rest) + self.gain_v() * self.fabric().gained_us(force_n))
     }
 
     /// Force on a taxel that reads `ticks`, N, where it reads `rest` without one: the inverse of [`Sensor::reading`].
@@ -111,23 +118,10 @@ impl Sensor {
     /// 0 at the rest and below; at the ramp's end the least force that it can be.
     #[must_use]
     pub fn force(&self, ticks: f64, rest: f64, ramp: f64) -> f64 {
-        let gained = (ramp_volts(ticks, ramp) - ramp_volts(rest, ramp)).max(0.0);
-        0.02 * (gained / self.touch_v()).powf(self.exponent.recip())
+        let ramp = Ramp::rc(ramp);
+        let gained = (ramp.volts(ticks) - ramp.volts(rest)).max(0.0) / self.gain_v();
+        self.fabric().force_n(self.rest_us + gained)
     }
-}
-
-/// Where the ramp stands after `ticks` of the counter, V: the inverse of [`ramp_ticks`].
-#[must_use]
-pub fn ramp_volts(ticks: f64, ramp: f64) -> f64 {
-    let constant = ramp / (SUPPLY_V / (SUPPLY_V - RAMP_END_V)).ln();
-    -SUPPLY_V * (-ticks.clamp(0.0, ramp) / constant).exp_m1()
-}
-
-/// When the ramp passes a voltage, in ticks of the counter.
-#[must_use]
-pub fn ramp_ticks(volts: f64, ramp: f64) -> f64 {
-    let constant = ramp / (SUPPLY_V / (SUPPLY_V - RAMP_END_V)).ln();
-    if volts >= RAMP_END_V { ramp } else { constant * (SUPPLY_V / (SUPPLY_V - volts.max(0.0))).ln() }
 }
 
 /// An array of taxels, each with its own gain and offset, and the converter that reads them.
@@ -166,7 +160,7 @@ impl Taxels {
             rest_v.push((sensor.volts(0.0) + 1e-3 * sensor.offset_mv * normal()) as f32);
         }
         let ticks_of = (0..=Self::STEPS + 1)
-            .map(|k| ramp_ticks(RAMP_END_V * k as f64 / Self::STEPS as f64, f64::from(ramp)) as f32)
+            .map(|k| Ramp::rc(ramp.into()).ticks(RAMP_END_V * k as f64 / Self::STEPS as f64) as f32)
             .collect();
         Ok(Self {
             rest_v,
@@ -281,17 +275,17 @@ mod tests {
         let sensor = Sensor::default();
         let (rest, touch) = (sensor.volts(0.0), sensor.volts(0.02));
         assert!((touch - rest - 0.1).abs() < 5e-4, "{}", touch - rest);
-        let ticks = ramp_ticks(touch, 150.0) - ramp_ticks(rest, 150.0);
+        let ticks = Ramp::rc(150.0).ticks(touch) - Ramp::rc(150.0).ticks(rest);
         assert!((ticks - 4.5).abs() < 0.1, "{ticks}");
     }
 
     #[test]
     fn a_force_is_read_back_from_its_ticks_up_to_the_ramps_end() {
         let sensor = Sensor::default();
-        let rest = ramp_ticks(sensor.volts(0.0), 150.0);
+        let rest = Ramp::rc(150.0).ticks(sensor.volts(0.0));
         for force in [0.0, 1e-6, 0.02, 0.5, 1.1] {
             let ticks = sensor.reading(force, rest, 150.0);
-            assert!((ticks - ramp_ticks(sensor.volts(force), 150.0)).abs() < 1e-9, "{force} N reads {ticks}");
+            assert!((ticks - Ramp::rc(150.0).ticks(sensor.volts(force))).abs() < 1e-9, "{force} N reads {ticks}");
             assert!((sensor.force(ticks, rest, 150.0) - force).abs() < 1e-9, "{force} N");
         }
         assert!(sensor.force(rest - 5.0, rest, 150.0) == 0.0);
@@ -301,9 +295,8 @@ mod tests {
     #[test]
     fn the_ramp_ends_at_three_volts_near_one_newton() {
         let sensor = Sensor::default();
-        assert!((ramp_ticks(3.0, 150.0) - 150.0).abs() < 1e-9);
         assert!(sensor.volts(1.0) < 3.0 && sensor.volts(1.2) > 3.0);
-        assert!(ramp_ticks(4.0, 150.0) == 150.0);
+        assert!(Ramp::rc(150.0).ticks(sensor.volts(1.2)) == 150.0);
     }
 
     #[test]
@@ -313,7 +306,7 @@ mod tests {
         for force in [0.0, 0.003, 0.02, 0.3, 0.9, 1.08, 2.0] {
             let stress = (force / (2.29 * 2.29)) as f32;
             let got = taxels.ticks(0, taxels.drive(stress));
-            assert!((f64::from(got) - ramp_ticks(sensor.volts(force), 150.0)).abs() < 2e-3, "{force} N: {got}");
+            assert!((f64::from(got) - Ramp::rc(150.0).ticks(sensor.volts(force))).abs() < 2e-3, "{force} N: {got}");
         }
     }
 

@@ -1,0 +1,22 @@
+//! The array's circuit: from what each taxel conducts to the ticks of its counter (thesis 3.4.2, 4.3.2, Appendix 1).
+//!
+//! A [`fabric`] conducts more the harder it is pressed. All taxels share their lines, so the current of one is the
+//! others' too: [`grid`] solves that network exactly. A [`readout`] holds its lines, and by its amplifiers or resistors
+//! each sense line becomes a voltage; a [`converter`] multiplexes these onto its comparators, whose [`ramp`] turns them
+//! into ticks. [`chain`] is all of it, as an emulated board can have it.
+//!
+//! "Driven line" and "sense line" as for the board: columns are driven, one after the other, and all rows are read.
+
+pub mod chain;
+pub mod converter;
+pub mod fabric;
+pub mod grid;
+pub mod ramp;
+pub mod readout;
+
+pub use chain::Chain;
+pub use converter::{Converter, Moment, Scan};
+pub use fabric::Fabric;
+pub use grid::{Grid, Idle};
+pub use ramp::{Ramp, Shape};
+pub use readout::{Divider, VirtualGround};

@@ -1,0 +1,69 @@
+//! What a taxel of piezoresistive fabric conducts under a force.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Result;
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
+
+/// The force at which [`Fabric::touch_us`] is stated, N: the least that the thesis could tell (4.4.1).
+pub const TOUCH_N: f64 = 0.02;
+
+/// A law of conductance, `G = G0 + k F^n`, the same for each taxel. All three are guesses: no maker's curve was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Fabric {
+    /// G0: conductance at rest, uS.
+    pub rest_us: f64,
+    /// What 0.02 N adds, uS; the default is 0.1 V at 1.3 V and 47 kOhm.
+    pub touch_us: f64,
+    /// n.
+    pub exponent: f64,
+}
+
+impl Default for Fabric {
+    fn default() -> Self {
+        Self { rest_us: 0.1, touch_us: 1.64, exponent: 0.7 }
+    }
+}
+
+impl Fabric {
+    ranges! {
+        rest_us: "uS", Range::FROM_0;
+        touch_us: "uS", Range::ABOVE_0;
+        exponent: "", Range::within(0.5, 1.0);
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter, its value and what would be right.
+    pub fn check(&self) -> Result<()> {
+        self.check_ranges()
+    }
+
+    /// Conductance under a force, uS; a force below 0 is none.
+    #[must_use]
+    pub fn conductance_us(&self, force_n: f64) -> f64 {
+        self.rest_us + self.gained_us(force_n)
+    }
+
+    /// What a force adds to the conductance at rest, uS.
+    #[must_use]
+    pub fn gained_us(&self, force_n: f64) -> f64 {
+        self.touch_us * (force_n.max(0.0) / TOUCH_N).powf(self.exponent)
+    }
+
+    /// The force under which it conducts so much, N: the inverse of [`Fabric::conductance_us`]; 0 at rest and below.
+    #[must_use]
+    pub fn force_n(&self, conductance_us: f64) -> f64 {
+        TOUCH_N * ((conductance_us - self.rest_us).max(0.0) / self.touch_us).powf(self.exponent.recip())
+    }
+}

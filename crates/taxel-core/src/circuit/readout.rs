@@ -1,0 +1,202 @@
+//! How lines are held, and what voltage a sense line makes of its current.
+
+use rand::SeedableRng;
+use rand::rngs::StdRng;
+use rand_distr::{Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+
+use super::grid::{Grid, Idle, LEAST_WIRE_OHM};
+use crate::allowed::{Range, ranges};
+use crate::parameters::Described;
+use crate::{Result, Stop, problem};
+
+/// Resistances of switches and wires, ohm.
+const LINE: Range = Range::FROM_0.at_most(1e9);
+
+fn wire_is_sound(wire_ohm: f64) -> Result<()> {
+    if wire_ohm > 0.0 && wire_ohm < LEAST_WIRE_OHM {
+        return Err(problem!("wire_ohm is {wire_ohm} ohm: must be 0, or from {LEAST_WIRE_OHM} to 1e9"));
+    }
+    Ok(())
+}
+
+/// Rows held by transimpedance amplifiers and columns by switches, all at one voltage; the read column is at ground
+/// (thesis 4.3.2). Ideal it gives `V = V_trans (1 + R_f G)` of each taxel by itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VirtualGround {
+    /// Voltage of the lines, V (thesis 4.4.1).
+    pub v_trans: f64,
+    /// Feedback resistor, kOhm (thesis 4.3.2).
+    pub feedback_kohm: f64,
+    /// Open-loop gain of the amplifiers; nothing: without bound. A guess.
+    pub gain: Option<f64>,
+    /// How far the amplifiers' offsets differ: standard deviation, mV.
+    pub offset_mv: f64,
+    /// A column's switch, ohm: an ADG734's (typical).
+    pub switch_ohm: f64,
+    /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
+    pub wire_ohm: f64,
+    /// Where the amplifiers saturate, V.
+    pub rail_v: f64,
+    /// Of the offsets.
+    pub seed: u64,
+}
+
+impl Default for VirtualGround {
+    fn default() -> Self {
+        Self {
+            v_trans: 1.3,
+            feedback_kohm: 47.0,
+            gain: Some(1e5),
+            offset_mv: 0.0,
+            switch_ohm: 2.5,
+            wire_ohm: 0.0,
+            rail_v: 5.0,
+            seed: 0,
+        }
+    }
+}
+
+impl VirtualGround {
+    ranges! {
+        v_trans: "V", Range::ABOVE_0.at_most(1e3);
+        feedback_kohm: "kOhm", Range::ABOVE_0.at_most(1e6);
+        gain: "", Range::FROM_1;
+        offset_mv: "mV", Range::FROM_0.at_most(1e6);
+        switch_ohm: "ohm", LINE;
+        wire_ohm: "ohm", LINE;
+        rail_v: "V", Range::ABOVE_0;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter, its value and what would be right.
+    pub fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        wire_is_sound(self.wire_ohm)
+    }
+
+    /// The same with nothing that makes taxels touch each other.
+    #[must_use]
+    pub fn ideal(&self) -> Self {
+        Self { gain: None, offset_mv: 0.0, switch_ohm: 0.0, wire_ohm: 0.0, ..self.clone() }
+    }
+
+    /// What an amplifier makes of one taxel by itself, V; the rail is left out.
+    #[must_use]
+    pub fn volts_alone(&self, conductance_us: f64) -> f64 {
+        self.v_trans * (1.0 + 1e-3 * self.feedback_kohm * conductance_us)
+    }
+
+    /// What a taxel by itself conducts where the amplifier gives so much, uS: the inverse of the former.
+    #[must_use]
+    pub fn conductance_us_alone(&self, volts: f64) -> f64 {
+        (volts / self.v_trans - 1.0) / (1e-3 * self.feedback_kohm)
+    }
+
+    /// Each amplifier's voltage while each column is read, V, `[row * columns + column]`, as the conductances are.
+    ///
+    /// # Errors
+    ///
+    /// As [`Grid::currents_ua`].
+    pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
+        let feedback_ohm = 1e3 * self.feedback_kohm;
+        // An amplifier's input is its source V_trans A / (1 + A) behind R_f / (1 + A).
+        let share = self.gain.map_or(0.0, |gain| (1.0 + gain).recip());
+        let grid = Grid {
+            rows,
+            columns,
+            sense_ohm: feedback_ohm * share,
+            drive_ohm: self.switch_ohm,
+            wire_ohm: self.wire_ohm,
+            idle: Idle::Held,
+        };
+        let mut draw = StdRng::seed_from_u64(self.seed);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut draw) };
+        let offsets = (0..rows).map(|_| 1e-3 * self.offset_mv * normal());
+        let source: Vec<f64> = offsets.map(|offset| offset * (1.0 - share) - self.v_trans * share).collect();
+        let currents = grid.currents_ua(conductance_us, -self.v_trans, &source, stop)?;
+        let volts = currents.iter().enumerate().map(|(k, current)| {
+            let volts = self.v_trans + source[k / columns] + 1e-6 * (feedback_ohm - grid.sense_ohm) * current;
+            volts.clamp(0.0, self.rail_v)
+        });
+        Ok(volts.collect())
+    }
+}
+
+/// Rows that resistors pull to ground, one driven line at the supply: no amplifier, and currents that go astray
+/// (thesis 3.4.2; Appendix 1, figure 1.1).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Divider {
+    /// Voltage of the driven line, V (thesis 3.4.2).
+    pub supply_v: f64,
+    /// The other half of the divider, kOhm. A guess.
+    pub resistor_kohm: f64,
+    /// A driven line's switch, ohm.
+    pub switch_ohm: f64,
+    /// A line from one taxel to the next, ohm; 0, or 0.001 or more.
+    pub wire_ohm: f64,
+    /// Whether lines that are not driven are held at ground (thesis 3.4.2) or float.
+    pub idle: Idle,
+}
+
+impl Default for Divider {
+    fn default() -> Self {
+        Self { supply_v: 5.0, resistor_kohm: 10.0, switch_ohm: 0.0, wire_ohm: 0.0, idle: Idle::Held }
+    }
+}
+
+impl Divider {
+    ranges! {
+        supply_v: "V", Range::ABOVE_0.at_most(1e3);
+        resistor_kohm: "kOhm", Range::ABOVE_0.at_most(1e6);
+        switch_ohm: "ohm", LINE;
+        wire_ohm: "ohm", LINE;
+    }
+
+    /// Its parameters, with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    ///
+    /// As [`VirtualGround::check`].
+    pub fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        wire_is_sound(self.wire_ohm)
+    }
+
+    /// What the divider makes of one taxel by itself, V.
+    #[must_use]
+    pub fn volts_alone(&self, conductance_us: f64) -> f64 {
+        let ratio = 1e-3 * self.resistor_kohm * conductance_us;
+        self.supply_v * ratio / (1.0 + ratio)
+    }
+
+    /// Each sense line's voltage while each driven line is at the supply, V, as [`VirtualGround::volts`].
+    ///
+    /// # Errors
+    ///
+    /// As [`Grid::currents_ua`].
+    pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
+        let sense_ohm = 1e3 * self.resistor_kohm;
+        let (drive_ohm, wire_ohm, idle) = (self.switch_ohm, self.wire_ohm, self.idle);
+        let grid = Grid { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle };
+        let currents = grid.currents_ua(conductance_us, self.supply_v, &vec![0.0; rows], stop)?;
+        Ok(currents.iter().map(|current| -1e-6 * sense_ohm * current).collect())
+    }
+}

@@ -1,0 +1,146 @@
+//! The array's circuit: voltages of networks, ticks of voltages.
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use taxel_core::circuit::{Converter, Divider, Fabric, Scan, VirtualGround};
+use taxel_core::{Result, Stop};
+
+use crate::convert::{array, slice};
+use crate::enter::enter;
+use crate::parameters::parsed;
+
+type Values<'py> = Bound<'py, PyArray1<f64>>;
+/// us; V of the line, the comparator's input and the ramp; what the comparator says.
+type TraceOut<'py> = (Values<'py>, Values<'py>, Values<'py>, Values<'py>, Bound<'py, PyArray1<bool>>);
+
+/// Gives conductances in uS of forces in N; or, `back`, forces of conductances.
+#[pyfunction]
+fn fabric<'py>(py: Python<'py>, json: &str, given: PyReadonlyArray1<'py, f64>, back: bool) -> PyResult<Values<'py>> {
+    let (fabric, given): (Fabric, _) = (parsed("Fabric", json)?, slice("given", &given)?);
+    let one = |&value: &f64| if back { fabric.force_n(value) } else { fabric.conductance_us(value) };
+    Ok(array(py, given.iter().map(one).collect()))
+}
+
+enum Lines {
+    Held(VirtualGround),
+    Divided(Divider),
+}
+
+impl Lines {
+    fn of(kind: &str, json: &str) -> PyResult<Self> {
+        Ok(if kind == "divider" {
+            Self::Divided(parsed("Divider", json)?)
+        } else {
+            Self::Held(parsed("VirtualGround", json)?)
+        })
+    }
+
+    fn volts_alone(&self, conductance_us: f64) -> f64 {
+        match self {
+            Self::Held(lines) => lines.volts_alone(conductance_us).clamp(0.0, lines.rail_v),
+            Self::Divided(lines) => lines.volts_alone(conductance_us),
+        }
+    }
+
+    fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
+        match self {
+            Self::Held(lines) => lines.volts(rows, columns, conductance_us, stop),
+            Self::Divided(lines) => lines.volts(rows, columns, conductance_us, stop),
+        }
+    }
+}
+
+/// Gives the sense lines' voltages of frame after frame of conductances in uS.
+#[pyfunction]
+fn circuit_volts<'py>(
+    py: Python<'py>,
+    kind: &str,
+    json: &str,
+    shape: (usize, usize),
+    conductance_us: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Values<'py>> {
+    let (lines, (rows, columns)) = (Lines::of(kind, json)?, shape);
+    let frames = slice("conductance", &conductance_us)?;
+    let out = enter(py, |stop| -> Result<Vec<f64>> {
+        let mut out = Vec::with_capacity(frames.len());
+        for frame in frames.chunks((rows * columns).max(1)) {
+            stop.check()?;
+            out.extend(lines.volts(rows, columns, frame, stop)?);
+        }
+        Ok(out)
+    })?;
+    Ok(array(py, out))
+}
+
+/// Gives what each conductance would make by itself.
+#[pyfunction]
+fn circuit_volts_alone<'py>(
+    py: Python<'py>,
+    kind: &str,
+    json: &str,
+    conductance_us: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Values<'py>> {
+    let (lines, given) = (Lines::of(kind, json)?, slice("conductance", &conductance_us)?);
+    Ok(array(py, given.iter().map(|&g| lines.volts_alone(g)).collect()))
+}
+
+/// Gives ticks of frame after frame of voltages; not a number where a comparator had not returned.
+#[pyfunction]
+fn converter_ticks<'py>(
+    py: Python<'py>,
+    json: &str,
+    shape: (usize, usize),
+    volts: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Values<'py>> {
+    let (converter, (rows, columns)): (Converter, _) = (parsed("Converter", json)?, shape);
+    let frames = slice("volts", &volts)?;
+    let out = enter(py, |stop| -> Result<Vec<f64>> {
+        let mut scan = Scan::new(converter, rows, columns)?;
+        let mut out = vec![0.0; frames.len()];
+        let taxels = (rows * columns).max(1);
+        for (volts, ticks) in frames.chunks(taxels).zip(out.chunks_mut(taxels)) {
+            stop.check()?;
+            scan.frame(volts, ticks);
+        }
+        Ok(out)
+    })?;
+    Ok(array(py, out))
+}
+
+/// Gives where the ramp stands after ticks, V; or, `back`, when it passes voltages.
+#[pyfunction]
+fn converter_ramp<'py>(
+    py: Python<'py>,
+    json: &str,
+    given: PyReadonlyArray1<'py, f64>,
+    back: bool,
+) -> PyResult<Values<'py>> {
+    let (ramp, given) = (parsed::<Converter>("Converter", json)?.ramp(), slice("given", &given)?);
+    let one = |&value: &f64| if back { ramp.ticks(value) } else { ramp.volts(value) };
+    Ok(array(py, given.iter().map(one).collect()))
+}
+
+/// Gives what an oscilloscope sees of one comparator.
+#[pyfunction]
+fn converter_trace<'py>(
+    py: Python<'py>,
+    json: &str,
+    line_v: Vec<f64>,
+    every_us: f64,
+    stop_us: f64,
+) -> PyResult<TraceOut<'py>> {
+    let converter: Converter = parsed("Converter", json)?;
+    let seen = enter(py, |_| converter.trace(&line_v, every_us, stop_us))?;
+    let of = |value: fn(&taxel_core::circuit::Moment) -> f64| array(py, seen.iter().map(value).collect());
+    let high = array(py, seen.iter().map(|m| m.high).collect());
+    Ok((of(|m| m.t_us), of(|m| m.line_v), of(|m| m.input_v), of(|m| m.ramp_v), high))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(fabric, module)?)?;
+    module.add_function(wrap_pyfunction!(circuit_volts, module)?)?;
+    module.add_function(wrap_pyfunction!(circuit_volts_alone, module)?)?;
+    module.add_function(wrap_pyfunction!(converter_ticks, module)?)?;
+    module.add_function(wrap_pyfunction!(converter_ramp, module)?)?;
+    module.add_function(wrap_pyfunction!(converter_trace, module)?)
+}

@@ -1,0 +1,408 @@
+"""The array's circuit: fabric, lines with their crosstalk, multiplexer, ramp and comparators, from force to ticks.
+
+A `Fabric` turns force into conductance. `VirtualGround` (the thesis' array) or a `Divider` (its first, of 8 x 8) turns
+the conductances of a whole array into the voltages that their shared lines really give; a `Converter` turns those into
+ticks. `Circuit` is the last two as an emulated board can have them. Arrays are ``(rows, columns)``, or frames of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._arguments import floats, number, numbers, shown
+from taxel._core import ProblemError
+from taxel._parameters import Value, defaults
+
+__all__ = ["Circuit", "Converter", "Divider", "Fabric", "Trace", "VirtualGround"]
+
+Values = NDArray[np.float64]
+
+_FABRIC = defaults("fabric")
+_GROUND = defaults("virtual_ground")
+_DIVIDER = defaults("divider")
+_CONVERTER = defaults("converter")
+_CIRCUIT = defaults("circuit")
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Fabric(Value):
+    """Say what a taxel of piezoresistive fabric conducts under a force: ``rest_us + touch_us (F / 0.02 N)^exponent``.
+
+    Parameters
+    ----------
+    rest_us : float, uS, 0 or more
+        Conductance at rest.
+    touch_us : float, uS, above 0
+        What 0.02 N add; the default makes 0.1 V at 1.3 V and 47 kOhm.
+    exponent : float, from 0.5 to 1
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    All three defaults are guesses around one figure of the thesis (0.02 N are seen at 1.3 V, 4.4.1): no maker's curve
+    of the fabric was found. They are those of the simulated scenes.
+
+    Examples
+    --------
+    >>> Fabric().conductance([0.0, 0.02])
+    array([0.1 , 1.74])
+    """
+
+    rest_us: float = _FABRIC.rest_us
+    touch_us: float = _FABRIC.touch_us
+    exponent: float = _FABRIC.exponent
+
+    _kind = "fabric"
+
+    def conductance(self, force_n: ArrayLike) -> Values:
+        """Return conductances in uS of forces in N, of the same shape; a force below 0 is none.
+
+        Raises
+        ------
+        ProblemError : forces that are not finite
+        """
+        given = _finite("force_n", force_n, "N")
+        return _core.fabric(self._json(), given.ravel(), False).reshape(given.shape)
+
+    def force(self, conductance_us: ArrayLike) -> Values:
+        """Return forces in N of conductances in uS, of the same shape: the inverse; 0 at rest and below.
+
+        Raises
+        ------
+        ProblemError : conductances that are not finite
+        """
+        given = _finite("conductance_us", conductance_us, "uS")
+        return _core.fabric(self._json(), given.ravel(), True).reshape(given.shape)
+
+
+class _Lines(Value):
+    """Share what both ways to hold lines have: voltages of a whole array, and of taxels by themselves."""
+
+    def volts(self, conductance_us: ArrayLike) -> Values:
+        """Return each sense line's voltage while each driven line is read, V, by the exact network.
+
+        Parameters
+        ----------
+        conductance_us : float64, uS, (rows, columns) or (n, rows, columns), 0 to 1e9
+            Rows are sense lines, columns are driven.
+
+        Returns
+        -------
+        float64, V, of the same shape
+
+        Raises
+        ------
+        ProblemError : a conductance that is none (names the taxel), or another shape
+        """
+        given = _pictures("conductance_us", conductance_us, "uS")
+        shape: tuple[int, int] = given.shape[-2:]
+        return _core.circuit_volts(self._kind, self._json(), shape, given.ravel()).reshape(given.shape)
+
+    def volts_alone(self, conductance_us: ArrayLike) -> Values:
+        """Return what taxels would make by themselves on ideal lines, V, of the same shape: no crosstalk.
+
+        Raises
+        ------
+        ProblemError : conductances that are not finite
+        """
+        given = _finite("conductance_us", conductance_us, "uS")
+        return _core.circuit_volts_alone(self._kind, self._json(), given.ravel()).reshape(given.shape)
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class VirtualGround(_Lines):
+    """Hold rows by transimpedance amplifiers and columns by switches, all at one voltage; the read column is grounded.
+
+    Ideal, each taxel gives ``v_trans (1 + feedback_kohm G)`` by itself. Switches, wires and amplifiers that are not
+    ideal let taxels touch each other: `volts` solves that network exactly.
+
+    Parameters
+    ----------
+    v_trans : float, V, above 0, at most 1000
+        Voltage of the lines (thesis 4.4.1).
+    feedback_kohm : float, kOhm, above 0, at most 1000000
+        Feedback resistor (thesis 4.3.2).
+    gain : float, 1 or more, optional
+        Open-loop gain of the amplifiers (a guess); None: without bound.
+    offset_mv : float, mV, from 0 to 1000000
+        How far the amplifiers' offsets differ: standard deviation.
+    switch_ohm : float, ohm, from 0 to 1e9
+        A column's switch: an ADG734's.
+    wire_ohm : float, ohm, from 0 to 1e9
+        A line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
+    rail_v : float, V, above 0
+        Where amplifiers saturate. That the line of one that does is no longer held is left out.
+    seed : int, 0 or more
+        Of the offsets.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    Thesis 4.3.2, figure 4.1. Without wire resistance it takes one dense factor of as many unknowns as rows; with it two
+    voltages a taxel, sparse. The gain is that of slow signals: an amplifier has less of it within 3 us.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> lines = VirtualGround()
+    >>> alone = np.zeros((4, 4)); alone[1, 2] = 20.0
+    >>> lines.volts(alone)[1].round(3)
+    array([1.3  , 1.3  , 2.522, 1.3  ])
+    """
+
+    v_trans: float = _GROUND.v_trans
+    feedback_kohm: float = _GROUND.feedback_kohm
+    gain: float | None = _GROUND.gain
+    offset_mv: float = _GROUND.offset_mv
+    switch_ohm: float = _GROUND.switch_ohm
+    wire_ohm: float = _GROUND.wire_ohm
+    rail_v: float = _GROUND.rail_v
+    seed: int = _GROUND.seed
+
+    _kind = "virtual_ground"
+
+    def ideal(self) -> Self:
+        """Return the same with ideal amplifiers, switches and wires: no crosstalk."""
+        return type(self)(**{**self._values(), "gain": None, "offset_mv": 0.0, "switch_ohm": 0.0, "wire_ohm": 0.0})
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Divider(_Lines):
+    """Pull rows to ground by resistors and put the supply on one driven line after the other: no amplifier.
+
+    Currents go astray by other taxels, so a taxel reads less, or more, than it would by itself.
+
+    Parameters
+    ----------
+    supply_v : float, V, above 0, at most 1000
+        Of the driven line (thesis 3.4.2).
+    resistor_kohm : float, kOhm, above 0, at most 1000000
+        The other half of the divider (a guess).
+    switch_ohm : float, ohm, from 0 to 1e9
+        A driven line's switch.
+    wire_ohm : float, ohm, from 0 to 1e9
+        A line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
+    idle : {"held", "floating"}
+        Whether lines that are not driven are held at ground, as in thesis 3.4.2, or float.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
+
+    Notes
+    -----
+    Thesis 3.4.2 and Appendix 1, figure 1.1. There rows are driven and columns are read: its array is this one turned.
+
+    Examples
+    --------
+    >>> Divider().volts([[100.0]])
+    array([[2.5]])
+    """
+
+    supply_v: float = _DIVIDER.supply_v
+    resistor_kohm: float = _DIVIDER.resistor_kohm
+    switch_ohm: float = _DIVIDER.switch_ohm
+    wire_ohm: float = _DIVIDER.wire_ohm
+    idle: Literal["held", "floating"] = _DIVIDER.idle
+
+    _kind = "divider"
+
+
+class Trace(NamedTuple):
+    """Hold what an oscilloscope sees of one comparator: a point each, arrays of one length."""
+
+    t_us: Values
+    line_v: Values
+    """The sense line that the multiplexer has chosen, V."""
+    input_v: Values
+    """The comparator's input, which settles towards it, V."""
+    ramp_v: Values
+    """V."""
+    high: NDArray[np.bool_]
+    """Whether the comparator says that the ramp has passed."""
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Converter(Value):
+    """Multiplex sense lines onto comparators, wait for the ramp to pass, count ticks.
+
+    Parameters
+    ----------
+    shape : {"rc", "linear"}
+        Of the ramp: charging towards 5 V, or straight; both end at 3 V.
+    ramp : int, ticks, from 1 to 65534
+        How long it rises, in 1/300 us; a line above 3 V reads it.
+    hysteresis_v : float, V, 0 or more
+        Between a comparator's two thresholds (thesis 4.3.2).
+    settle_us : float, us, from 0 to 1000000
+        Time constant of a comparator's input: the default settles to 2 % in 0.2 us (thesis 4.4.1).
+    amplifier_us : float, us, from 0 to 1000000
+        Time constant of the amplifiers, what a column leaves for the next; 0: none. 0.705 if the board's 15 pF lie
+        across its 47 kOhm, which no text says.
+    discharge_us : float, us, from 0 to 1000000
+        Time constant with which the ramp falls back (a guess).
+    wait_us : float, us, from 0 to 1000000
+        From a step's beginning to the ramp's.
+    step_us : float, us, above 0, at most 1000000
+        From one sense line of a channel to its next.
+    line_us : float, us, above 0, at most 1000000
+        From one column to the next.
+    steps : int, from 1 to 65535
+        Sense lines of a channel.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense, a step too short for its ramp, a column too short for its steps
+
+    Notes
+    -----
+    Thesis 4.3.2, figures 4.3 and 4.7. Channel c reads rows ``steps * c`` and following. The times are those of the
+    preset "5.2 kHz".
+
+    Examples
+    --------
+    >>> Converter().ticks([[1.3], [1.4], [2.0], [4.0]]).round(1)
+    array([[ 51.5],
+           [ 56.1],
+           [ 86.4],
+           [150. ]])
+    """
+
+    shape: Literal["rc", "linear"] = _CONVERTER.shape
+    ramp: int = _CONVERTER.ramp
+    hysteresis_v: float = _CONVERTER.hysteresis_v
+    settle_us: float = _CONVERTER.settle_us
+    amplifier_us: float = _CONVERTER.amplifier_us
+    discharge_us: float = _CONVERTER.discharge_us
+    wait_us: float = _CONVERTER.wait_us
+    step_us: float = _CONVERTER.step_us
+    line_us: float = _CONVERTER.line_us
+    steps: int = _CONVERTER.steps
+
+    _kind = "converter"
+
+    def ticks(self, volts: ArrayLike) -> Values:
+        """Return when each comparator says that the ramp has passed, in ticks with their fraction.
+
+        A counter shows the whole ticks below. The frames are scanned one after the other, columns from the first; the
+        first frame finds everything settled.
+
+        Parameters
+        ----------
+        volts : float64, V, (rows, columns) or (n, rows, columns)
+
+        Returns
+        -------
+        float64, ticks, of the same shape
+            `ramp` where the ramp never passed; not a number where a comparator had not returned when its ramp began.
+
+        Raises
+        ------
+        ProblemError : voltages that are not finite, or another shape
+        """
+        given = _pictures("volts", volts, "V")
+        shape: tuple[int, int] = given.shape[-2:]
+        return _core.converter_ticks(self._json(), shape, given.ravel()).reshape(given.shape)
+
+    def ramp_volts(self, ticks: ArrayLike) -> Values:
+        """Return where the ramp stands after so many ticks, V, of the same shape.
+
+        Raises
+        ------
+        ProblemError : ticks that are not finite
+        """
+        given = _finite("ticks", ticks)
+        return _core.converter_ramp(self._json(), given.ravel(), False).reshape(given.shape)
+
+    def ramp_ticks(self, volts: ArrayLike) -> Values:
+        """Return when the ramp passes a voltage, ticks, of the same shape: the inverse; `ramp` at 3 V and above.
+
+        Raises
+        ------
+        ProblemError : voltages that are not finite
+        """
+        given = _finite("volts", volts, "V")
+        return _core.converter_ramp(self._json(), given.ravel(), True).reshape(given.shape)
+
+    def trace(self, line_v: Sequence[float], *, every_us: float = 0.01, stop_us: float = 3.0) -> Trace:
+        """Return what an oscilloscope sees of one comparator while its lines are read, again and again.
+
+        Parameters
+        ----------
+        line_v : sequence of float, V, one a step
+            The sense lines, settled.
+        every_us : float, us, above 0
+            Between two points.
+        stop_us : float, us
+
+        Raises
+        ------
+        ProblemError : not one voltage a step, or more than 1e7 points
+        """
+        lines = floats("line_v", line_v, "V").tolist()
+        every, stop = number("every_us", every_us, "us"), number("stop_us", stop_us, "us")
+        return Trace(*_core.converter_trace(self._json(), lines, every, stop))
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class Circuit(Value):
+    """Put lines and converter together, as an emulated board can have them.
+
+    Parameters
+    ----------
+    readout : VirtualGround, optional
+        None: the defaults.
+    converter : Converter, optional
+        None: the defaults.
+
+    Raises
+    ------
+    ProblemError : one of another kind
+
+    Examples
+    --------
+    >>> Circuit().ticks([[0.1, 1.74]]).round(1)
+    array([[51.8, 56.4]])
+    """
+
+    readout: VirtualGround | None = _CIRCUIT.readout
+    converter: Converter | None = _CIRCUIT.converter
+
+    _kind = "circuit"
+    _nested: ClassVar[dict[str, type[Any]]] = {"readout": VirtualGround, "converter": Converter}
+
+    def ticks(self, conductance_us: ArrayLike) -> Values:
+        """Return ticks of conductances in uS: `VirtualGround.volts`, then `Converter.ticks`.
+
+        Raises
+        ------
+        ProblemError : as theirs
+        """
+        volts = (self.readout or VirtualGround()).volts(conductance_us)
+        return (self.converter or Converter()).ticks(volts)
+
+
+def _finite(name: str, values: ArrayLike, unit: str | None = None) -> Values:
+    given = numbers(name, values, np.float64, unit)
+    if not np.isfinite(given).all():
+        raise ProblemError(f"{name}: must be finite, {shown(given[~np.isfinite(given)][0].item())} is not")
+    return given
+
+
+def _pictures(name: str, values: ArrayLike, unit: str) -> Values:
+    given = _finite(name, values, unit)
+    if given.ndim not in (2, 3) or 0 in given.shape[-2:]:
+        raise ProblemError(f"{name} has shape {given.shape}: must be (rows, columns) or (n, rows, columns)")
+    return given

@@ -1,0 +1,253 @@
+"""The array's circuit: closed forms, Kirchhoff's laws, a nodal solve of our own in NumPy, and ngspice."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel.simulate.circuit import Circuit, Converter, Divider, Fabric, VirtualGround
+
+
+def solved(g_us: np.ndarray, read: int, *, ground: VirtualGround | None = None, divider: Divider | None = None) -> Any:
+    """What the sense lines give, by the plainest nodal analysis: one unknown a node, no structure used.
+
+    Nodes: each crossing's on its sense line and on its driven line (one for the line without wires), and of each sense
+    line its end and the amplifier's output.
+    """
+    rows, columns = g_us.shape
+    of = ground or divider
+    ends = np.arange(rows)
+    outputs, switches = ends + rows, np.arange(columns) + 2 * rows
+    sense, driven = np.repeat(ends[:, None], columns, 1), np.repeat(switches[None], rows, 0)
+    count = 2 * rows + columns
+    if of.wire_ohm:
+        sense = count + np.arange(g_us.size).reshape(rows, columns)
+        driven = sense + g_us.size
+        count += 2 * g_us.size
+    a, b = np.zeros((count, count)), np.zeros(count)
+
+    def tie(p: int, q: int, conductance: float) -> None:
+        for m, n in ((p, q), (q, p)):
+            a[m, m] += conductance
+            a[m, n] -= conductance
+
+    for i, k in np.ndindex(rows, columns):
+        tie(sense[i, k], driven[i, k], 1e-6 * g_us[i, k])
+        if of.wire_ohm:
+            tie(sense[i, k], sense[i, k - 1] if k else ends[i], 1 / of.wire_ohm)
+            tie(driven[i, k], driven[i - 1, k] if i else switches[k], 1 / of.wire_ohm)
+    idle, there = (ground.v_trans, 0.0) if ground is not None else (0.0, divider.supply_v)
+    for k in range(columns):
+        volts = there if k == read else idle
+        if divider is not None and divider.idle == "floating" and k != read:
+            continue
+        if of.switch_ohm:
+            a[switches[k], switches[k]] += 1 / of.switch_ohm
+            b[switches[k]] += volts / of.switch_ohm
+        else:
+            a[switches[k]] = np.eye(count)[switches[k]]
+            b[switches[k]] = volts
+    for i in range(rows):
+        if divider is not None:
+            a[ends[i], ends[i]] += 1e-3 / divider.resistor_kohm
+            a[outputs[i], outputs[i]] = 1.0
+            continue
+        tie(ends[i], outputs[i], 1e-3 / ground.feedback_kohm)
+        # The output's own equation instead of its current: gain (V_trans - input).
+        a[outputs[i]] = 0.0
+        a[outputs[i], outputs[i]], a[outputs[i], ends[i]] = 0.0 if ground.gain is None else 1 / ground.gain, 1.0
+        b[outputs[i]] = ground.v_trans
+    return np.linalg.solve(a, b)[ends if divider is not None else outputs]
+
+
+def every(g_us: np.ndarray, **of: Any) -> np.ndarray:
+    return np.stack([solved(g_us, read, **of) for read in range(g_us.shape[1])], axis=1)
+
+
+def drawn(seed: int, rows: int, columns: int) -> np.ndarray:
+    """Conductances from none to a short circuit's 10 mS, most of them at rest."""
+    random = np.random.default_rng(seed)
+    g = 0.1 * np.exp(random.normal(0, 0.3, (rows, columns)))
+    loaded = random.random((rows, columns)) < 0.3
+    return np.where(loaded, 10.0 ** random.uniform(-1, 4, (rows, columns)), g) * (random.random((rows, columns)) < 0.95)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (5, 3), (4, 7)])
+def test_virtual_ground_equals_a_plain_nodal_solve(seed, rows, columns):
+    random, g = np.random.default_rng(seed), drawn(seed, rows, columns)
+    lines = VirtualGround(
+        v_trans=random.uniform(0.2, 2.5),
+        gain=10.0 ** random.uniform(1, 6) if seed % 3 else None,
+        switch_ohm=random.choice([0.0, 2.5, 300.0]),
+        wire_ohm=random.choice([0.0, 0.5, 40.0]),
+        rail_v=1e9,
+    )
+    wanted = every(g, ground=lines)
+    assert lines.volts(g) == pytest.approx(np.clip(wanted, 0, None), rel=2e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("idle", ["held", "floating"])
+@pytest.mark.parametrize(("rows", "columns"), [(1, 1), (5, 3), (4, 7)])
+def test_dividers_equal_a_plain_nodal_solve(seed, idle, rows, columns):
+    random, g = np.random.default_rng(seed), drawn(seed, rows, columns) + 1e-3
+    lines = Divider(
+        resistor_kohm=10.0 ** random.uniform(-1, 3),
+        switch_ohm=random.choice([0.0, 20.0]),
+        wire_ohm=random.choice([0.0, 0.5, 40.0]),
+        idle=idle,
+    )
+    assert lines.volts(g) == pytest.approx(every(g, divider=lines), rel=2e-6, abs=1e-9)
+
+
+def test_a_taxel_of_four_by_hand():
+    """Lines held, ideal but for a read column's 100 ohm: its node is what its two taxels and the switch make of it."""
+    g = np.array([[100.0, 200.0], [300.0, 400.0]])
+    lines = VirtualGround(v_trans=1.0, feedback_kohm=1.0, gain=None, switch_ohm=100.0)
+    columns = 1e-6 * g.sum(axis=0)
+    node = columns * 100.0 / (1.0 + columns * 100.0)  # V, of a line pulled to 1 V by its taxels, to 0 by its switch
+    wanted = 1.0 + 1e-3 * g * (1.0 - node)
+    assert lines.volts(g) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_ideal_lines_have_no_crosstalk_and_one_loaded_taxel_none_either():
+    g = drawn(3, 9, 12)
+    ideal = VirtualGround(rail_v=1e9).ideal()
+    assert ideal.volts(g) == pytest.approx(ideal.volts_alone(g), rel=1e-12)
+    assert (ideal.gain, ideal.switch_ohm, ideal.rail_v) == (None, 0.0, 1e9)
+    one = np.zeros((4, 5))
+    one[2, 3] = 250.0
+    for idle in ("held", "floating"):
+        lines = Divider(idle=idle)
+        assert lines.volts(one) == pytest.approx(lines.volts_alone(one), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("gain", "switch_ohm", "worst"), [(None, 2.5, 0.008), (1e5, 2.5, 0.010), (None, 50.0, 0.14), (1e3, 2.5, 0.24)]
+)
+def test_the_worst_crosstalk_of_a_loaded_cross(gain, switch_ohm, worst):
+    """16 x 16 at 1 MOhm, a row and a column at 5 kOhm: error of the change above `v_trans`, as measured beforehand."""
+    g = np.full((16, 16), 1.0)
+    g[3], g[:, 5] = 200.0, 200.0
+    lines = VirtualGround(gain=gain, switch_ohm=switch_ohm, rail_v=1e3)
+    change, alone = lines.volts(g) - lines.v_trans, lines.volts_alone(g) - lines.v_trans
+    assert np.abs(change / alone - 1).max() == pytest.approx(worst, rel=0.05)
+
+
+def test_without_virtual_ground_crosstalk_is_much_larger():
+    g = Fabric().conductance(np.where(np.eye(16) > 0, 0.5, 0.01))
+    held = VirtualGround(rail_v=1e3)
+    error = np.abs((held.volts(g) - 1.3) / (held.volts_alone(g) - 1.3) - 1).max()
+    astray = Divider(idle="floating", resistor_kohm=47.0)
+    assert np.abs(astray.volts(g) / astray.volts_alone(g) - 1).max() > 100 * error
+
+
+def test_currents_sum_to_nothing():
+    """Kirchhoff: what the sense lines' resistors take, all in all, is what the driven line gives."""
+    g = drawn(5, 6, 6) + 1e-3
+    lines = Divider(idle="floating")
+    for read in range(6):
+        out = lines.volts(g)[:, read]  # V; through 10 kOhm each
+        # The driven line alone feeds the network: the taxels' currents from it are all that flows.
+        given = (1e-6 * g[:, read] * (5.0 - out)).sum()
+        assert given == pytest.approx((out / 10e3).sum(), rel=1e-9)
+
+
+@pytest.mark.skipif(shutil.which("ngspice") is None, reason="ngspice is not installed")
+@pytest.mark.parametrize("wire_ohm", [0.0, 12.0])
+def test_ngspice_agrees_on_eight_by_eight(tmp_path: Path, wire_ohm: float):
+    g = drawn(8, 8, 8) + 1e-3
+    lines = VirtualGround(gain=2e3, switch_ohm=30.0, wire_ohm=wire_ohm, rail_v=1e9)
+    read = 5
+    parts = ["* eight rows under virtual ground, column 5 read", f"VT t 0 {lines.v_trans}"]
+    number = iter(range(10_000))
+
+    def resistor(p: str, q: str, ohm: float) -> None:
+        parts.append(f"R{next(number)} {p} {q} {ohm:.12g}")
+
+    for i in range(8):
+        parts.append(f"E{i} o{i} 0 t r{i}x {lines.gain}")
+        resistor(f"o{i}", f"r{i}x", 1e3 * lines.feedback_kohm)
+        for k in range(8):
+            row, column = (f"r{i}_{k}", f"c{i}_{k}") if wire_ohm else (f"r{i}x", f"c{k}")
+            resistor(row, column, 1e6 / g[i, k])
+            if wire_ohm:
+                resistor(row, f"r{i}_{k - 1}" if k else f"r{i}x", wire_ohm)
+                resistor(column, f"c{i - 1}_{k}" if i else f"c{k}", wire_ohm)
+    for k in range(8):
+        resistor(f"c{k}", "0" if k == read else "t", lines.switch_ohm)
+    wanted = " ".join(f"v(o{i})" for i in range(8))
+    parts += [".op", ".control", "set numdgt=10", "run", f"print {wanted}", "quit", ".endc", ".end"]
+    deck = tmp_path / "array.cir"
+    deck.write_text("\n".join(parts) + "\n")
+    run = subprocess.run(["ngspice", "-b", str(deck)], capture_output=True, text=True, check=False, timeout=60)
+    said = [line.split("=")[1] for line in run.stdout.splitlines() if line.startswith("v(o")]
+    assert len(said) == 8, run.stdout + run.stderr
+    assert lines.volts(g)[:, read] == pytest.approx(np.array(said, float), rel=1e-5)
+
+
+def test_amplifiers_saturate_and_offsets_are_drawn():
+    assert VirtualGround().volts([[1e4]]) == 5.0
+    spread = VirtualGround(offset_mv=2.0, seed=4)
+    rest = spread.volts(np.zeros((4000, 1)))
+    assert 0.0019 < (rest - 1.3).std() < 0.0021
+    assert (spread.volts(np.zeros((3, 1))) == spread.volts(np.zeros((3, 1)))).all()
+    assert (VirtualGround(offset_mv=2.0, seed=5).volts(np.zeros((3, 1))) != spread.volts(np.zeros((3, 1)))).all()
+
+
+def test_frames_are_solved_one_by_one():
+    g = np.stack([drawn(k, 4, 6) for k in range(3)])
+    for lines in (VirtualGround(), Divider()):
+        assert (lines.volts(g) == np.stack([lines.volts(one) for one in g])).all()
+
+
+def test_a_fabric_s_law_is_inverted():
+    fabric, force = Fabric(exponent=0.55), np.logspace(-6, 2, 30).reshape(5, 6)
+    assert fabric.force(fabric.conductance(force)) == pytest.approx(force, rel=1e-6)
+    assert fabric.conductance(-1.0) == fabric.conductance(0.0) == fabric.rest_us
+    assert fabric.force([0.05]) == 0.0
+
+
+def test_the_circuit_reads_what_the_simulated_sensor_reads():
+    """The scenes' sensor is this circuit with ideal lines, no hysteresis, all settled."""
+    force = np.array([[0.0, 0.02, 0.1, 0.5, 1.0, 3.0]])
+    plain = Circuit(
+        readout=VirtualGround().ideal(), converter=Converter(hysteresis_v=0.0, settle_us=0.0, discharge_us=0.0)
+    )
+    law = taxel.Calibration.law(taxel.Array(1, 6), ramp=150.0)
+    felt = taxel.Frames(force[None].astype(np.float32), [0], unit="N", array=law.array)
+    assert plain.ticks(Fabric().conductance(force)) == pytest.approx(law.readings(felt).values[0], abs=1e-4)
+
+
+def test_a_comparator_sees_its_line_settle_and_the_ramp_pass():
+    seen = Converter(hysteresis_v=0.0).trace([1.4, 2.8, 1.4, 2.8], every_us=0.001, stop_us=3.0)
+    at = np.flatnonzero(np.diff(seen.line_v) > 0)[0] + 1  # the step begins
+    left = (seen.line_v - seen.input_v)[at : at + 201] / 1.4
+    assert left[0] == pytest.approx(1.0, abs=0.03)
+    assert left[200] < 0.02 < left[180]  # 2 % in 0.2 us
+    assert np.count_nonzero(np.diff(seen.high.astype(int)) > 0) == 4
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda: VirtualGround(wire_ohm=1e-5), "wire_ohm is 0.00001 ohm: must be 0, or from 0.001 to 1e9"),
+        (lambda: VirtualGround().volts([[1.0, -2.0]]), "conductance at x 1, y 0 is -2 uS: must be from 0 to 1e9"),
+        (lambda: VirtualGround().volts([1.0]), r"conductance_us has shape \(1,\)"),
+        (lambda: Divider().volts(np.zeros((2, 0))), r"conductance_us has shape \(2, 0\)"),
+        (lambda: Converter(ramp=200), "step_us is 0.75 us: must be 0.8667 or more"),
+        (lambda: Converter().ticks([[np.nan]]), "volts: must be finite"),
+        (lambda: Converter().trace([1.0]), "voltages: 1 of them, must be one a step, 4"),
+        (lambda: Circuit(readout=Divider()), "readout"),
+    ],
+)
+def test_nonsense_is_one_clear_error(wrong, said):
+    with pytest.raises(taxel.ProblemError, match=said):
+        wrong()
