@@ -2,7 +2,7 @@
 
 The spatial van Rossum distance is an inner product, so one table of states a tau serves every sigma. Patterns of 256
 taxels, rises and falls apart, with as many spikes as the drops of the study `drops` have. Beside it
-`taxel.metrics.pairwise`, which knows of no samples, on a tenth of the patterns at one tau and sigma: equal distances,
+`taxel.metrics.pairwise`, which knows of no samples, on half of the patterns at one tau and sigma: equal distances,
 and how much dearer a pair is. CPU time of the process: both use all cores.
 """
 
@@ -83,7 +83,7 @@ def run(*, quick, share=1.0):
     """Measure; quick: few patterns. `share`: of the taus, where the machine is too busy."""
     taus = TAUS_MS[:: max(1, round(1 / share))]
     whole = all_of_them(90, TAUS_MS[:2]) if quick else all_of_them(1800, taus)
-    peer = beside_metrics(20 if quick else 180)
+    peer = beside_metrics(20 if quick else 900)
     return {
         "question": __doc__.splitlines()[0],
         **stamp(),
