@@ -136,6 +136,28 @@ def test_a_picture_shows_what_came(live, panel):
         assert 90 in section(page.pictures[-1], 4, "<u2").reshape(-1, 3)[:, 1]
 
 
+def test_a_source_that_stalled_is_shown_at_its_own_time_again(live, panel):
+    with Client(panel) as page:
+        page.send(type="credit", n=1)
+        for t_us in range(10_000, 400_000, 10_000):
+            send([word(t_us, 3, 5, 40 + t_us // 10_000)], *live.address, seconds=0.01)
+        heard(live, 39)
+        t_us = 0
+        while t_us < 900_000:
+            # Time goes on by the host's clock where nothing comes.
+            page.send(type="credit", n=1)
+            t_us = head(page.until("picture"))[0]["t_us"]
+        send([word(400_000, 4, 5, 99)], *live.address, seconds=0.01)
+        for _ in range(100):
+            page.send(type="credit", n=1)
+            t_us = head(page.until("picture"))[0]["t_us"]
+            if t_us < 700_000:
+                break
+        assert t_us >= 400_000, "not before what was heard"
+        assert head(page.pictures[-1])[0]["flags"] & 4, "columns that never were are forgotten"
+        assert section(page.pictures[-1], 0, "<u2").reshape(64, 64)[5, 4] == 99
+
+
 def test_a_foreign_or_nameless_visitor_is_not_let_in(panel):
     host = "{}:{}".format(*panel.address)
     foreign = "http://evil.example"

@@ -32,6 +32,9 @@ const COUNT_EVERY: Duration = Duration::from_millis(250);
 /// How far behind the host's clock the shown time follows where nothing comes, ms: what comes has come by then.
 const BEHIND_NS: i64 = 40_000_000;
 
+/// So far behind the time shown a source has stalled; less is the network's delay and the clocks' error.
+const STALLED_US: i64 = 200_000;
+
 /// Messages that wait for one client at most.
 const TOLD_WAITING: usize = 256;
 
@@ -223,6 +226,13 @@ impl Hub {
             while let Some(piece) = outlet.next() {
                 let mut lens = lock(&live.lens);
                 live.missing.fetch_add(piece.missing, Ordering::Relaxed);
+                if let (Some(first), Some(latest)) = (piece.changes.first(), lens.latest()) {
+                    // A sensor whose driver stalled is behind what the host's clock made of its silence.
+                    let heard = live.film.range().map_or(first.t, |(_, last)| last.max(first.t));
+                    if heard < latest - STALLED_US {
+                        lens.set_back(heard);
+                    }
+                }
                 let kept = live.film.keep(piece, &lens);
                 if let Some(held) =
                     kept.piece.held.as_ref().filter(|_| kept.piece.missing > 0 || lens.latest().is_none())

@@ -106,6 +106,19 @@ impl Strip {
         }
     }
 
+    /// Forgets what comes after a column.
+    fn cut(&mut self, column: i64) {
+        let Some(reach) = self.reach.filter(|reach| reach.1 > column) else { return };
+        self.reach = Some((reach.0.min(column), column));
+        self.blocks.split_off(&(column.div_euclid(BLOCK) + 1));
+        if let Some(block) = self.blocks.get_mut(&column.div_euclid(BLOCK)) {
+            let k = usize::try_from(column.rem_euclid(BLOCK)).unwrap_or(0);
+            block.raster[(k + 1) * self.rows..].fill(0);
+            let curve = block.curves[k];
+            block.curves[k + 1..].fill(curve);
+        }
+    }
+
     fn mark(&mut self, column: i64, row: usize, up: bool) {
         if self.reach.is_some_and(|(first, _)| column < first) {
             return;
@@ -189,6 +202,8 @@ pub struct Lens {
     /// The column that is not over.
     column: Option<i64>,
     latest: Option<i64>,
+    /// How often time was set back.
+    set_back: u64,
     events: u64,
     sum: u64,
     sum_x: u64,
@@ -212,6 +227,7 @@ impl Lens {
             strip: Strip::new(from.held.len() / columns.max(1), strip_bytes),
             column: None,
             latest: from.latest,
+            set_back: 0,
             events: from.events,
             sum: 0,
             sum_x: 0,
@@ -332,6 +348,23 @@ impl Lens {
         }
         self.column = Some(column);
         self.strip.come_to(column);
+    }
+
+    /// Sets time back where it had been moved on, as in a silence that was none; forward does nothing.
+    pub fn set_back(&mut self, t: i64) {
+        if self.latest.is_none_or(|latest| latest <= t) {
+            return;
+        }
+        self.latest = Some(t);
+        self.column = Some(column_of(t));
+        self.strip.cut(column_of(t));
+        self.set_back += 1;
+    }
+
+    /// How often time was set back.
+    #[must_use]
+    pub fn times_set_back(&self) -> u64 {
+        self.set_back
     }
 
     /// Events were missing: what the taxels hold now.
@@ -546,6 +579,33 @@ mod tests {
         assert_eq!(lens.strip().curve(0).sum, 0);
         lens.advance(FORGET * COLUMN_US);
         assert_eq!(lens.change(), [0; 4]);
+    }
+
+    #[test]
+    fn time_set_back_forgets_what_silence_had_brought_and_goes_on() {
+        let mut once = Lens::new(2, 3, &blank(4), 1 << 20);
+        let mut stalled = once.clone();
+        for t in [0, 40_000] {
+            once.take(&change(t, 1, 60));
+            stalled.take(&change(t, 1, 60));
+        }
+        stalled.advance(9_000_000);
+        stalled.set_back(40_000);
+        stalled.set_back(50_000);
+        for t in [80_000, 81_000] {
+            once.take(&change(t, 2, 70));
+            stalled.take(&change(t, 2, 70));
+        }
+        assert_eq!(stalled.times_set_back(), 1);
+        assert_eq!(stalled.strip().reach(), once.strip().reach());
+        for column in 0..=column_of(81_000) {
+            let (mut a, mut b) = (vec![], vec![]);
+            once.strip().raster(column, &mut a);
+            stalled.strip().raster(column, &mut b);
+            assert_eq!(a, b, "column {column}");
+            let curves = [once.strip().curve(column), stalled.strip().curve(column)];
+            assert_eq!(format!("{:?}", curves[0]), format!("{:?}", curves[1]), "column {column}");
+        }
     }
 
     #[test]

@@ -82,6 +82,7 @@ struct Session {
     restart: bool,
     from: i64,
     rests: Option<u64>,
+    set_back: u64,
     rest_sent: Option<Instant>,
     watched: Option<u32>,
     history: Option<(History, u64)>,
@@ -111,6 +112,7 @@ pub(super) async fn run(socket: WebSocket, hub: Arc<Hub>, end: watch::Receiver<b
         restart: true,
         from: i64::MIN,
         rests: None,
+        set_back: 0,
         rest_sent: None,
         watched: None,
         history: None,
@@ -275,6 +277,10 @@ impl Session {
     }
 
     fn picture(&mut self) -> Option<Vec<u8>> {
+        if let (View::Following, Some(live)) = (&self.view, &self.live) {
+            let set_back = lock(&live.lens).times_set_back();
+            self.restart |= std::mem::replace(&mut self.set_back, set_back) != set_back;
+        }
         let records = self.hub.recorder.file().is_some() || self.hub.state().registers.record;
         let mut flags = if records { RECORDS } else { 0 };
         flags |= if self.restart { RESTART } else { 0 };
