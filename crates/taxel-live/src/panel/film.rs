@@ -214,7 +214,7 @@ impl RingFilm {
     pub fn rate(&self) -> (i64, i64, Vec<u64>) {
         let mut rate = Rate::default();
         let first = self.ring().first;
-        self.changes_from(first, |changes| changes.iter().for_each(|change| rate.take(change.t)));
+        self.changes_from(first, |changes| changes.iter().for_each(|change| rate.take(change.t, 1)));
         rate.said()
     }
 }
@@ -311,7 +311,8 @@ struct Rate {
 }
 
 impl Rate {
-    fn take(&mut self, t: i64) {
+    /// So many more at a time.
+    fn take(&mut self, t: i64, count: u64) {
         let first = *self.first.get_or_insert(t);
         self.step = self.step.max(COLUMN_US);
         loop {
@@ -321,7 +322,7 @@ impl Rate {
                 if bin >= self.bins.len() {
                     self.bins.resize(bin + 1, 0);
                 }
-                self.bins[bin] += 1;
+                self.bins[bin] += count;
                 return;
             }
             self.bins = self.bins.chunks(2).map(|two| two.iter().sum()).collect();
@@ -593,10 +594,13 @@ impl FileFilm {
             changes.clear();
             self.changes(&events, &mut changes);
             for change in &changes {
-                first = Some(first.map_or(change.t, |first: i64| first.min(change.t)));
                 lens.take(change);
                 self.activity.take(change);
-                rate.take(change.t);
+            }
+            for together in changes.chunk_by(|one, next| one.t == next.t) {
+                let t = together[0].t;
+                first = Some(first.map_or(t, |first: i64| first.min(t)));
+                rate.take(t, together.len() as u64);
             }
         }
         self.events = lens.events();

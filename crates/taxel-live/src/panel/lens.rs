@@ -3,7 +3,8 @@
 //! The same for live events and for recordings: a lens that was begun earlier and one that was begun from a keyframe show
 //! the same, as soon as [`FORGET`] columns of time have passed.
 
-use std::collections::BTreeMap;
+use std::collections::VecDeque;
+use std::sync::Arc;
 
 use crate::pipeline::{Change, UNKNOWN};
 
@@ -51,7 +52,8 @@ struct Block {
 #[derive(Debug, Clone)]
 pub struct Strip {
     rows: usize,
-    blocks: BTreeMap<i64, Block>,
+    /// Ascending by number; the newest is asked for nearly always.
+    blocks: VecDeque<(i64, Block)>,
     /// The columns that are known: first and last.
     reach: Option<(i64, i64)>,
     /// Blocks kept at most.
@@ -65,7 +67,7 @@ impl Strip {
         let block = Self::block_bytes(rows);
         Self {
             rows,
-            blocks: BTreeMap::new(),
+            blocks: VecDeque::new(),
             reach: None,
             most: (bytes / block).max(SPAN.unsigned_abs() as usize / BLOCK.unsigned_abs() as usize + 2),
         }
@@ -81,21 +83,34 @@ impl Strip {
         self.reach
     }
 
+    /// Where a block stands, or would.
+    fn place(&self, key: i64) -> Result<usize, usize> {
+        match self.blocks.back() {
+            Some(&(last, _)) if last == key => Ok(self.blocks.len() - 1),
+            _ => self.blocks.binary_search_by_key(&key, |&(key, _)| key),
+        }
+    }
+
     fn block(&mut self, column: i64) -> (&mut Block, usize) {
         let (key, rows) = (column.div_euclid(BLOCK), self.rows);
-        if !self.blocks.contains_key(&key) {
-            if self.blocks.len() >= self.most
-                && let Some((oldest, _)) = self.blocks.pop_first()
-                && let Some(reach) = &mut self.reach
-            {
-                reach.0 = reach.0.max((oldest + 1) * BLOCK);
+        let place = match self.place(key) {
+            Ok(place) => place,
+            Err(mut place) => {
+                if self.blocks.len() >= self.most
+                    && let Some((oldest, _)) = self.blocks.pop_front()
+                {
+                    place = place.saturating_sub(1);
+                    if let Some(reach) = &mut self.reach {
+                        reach.0 = reach.0.max((oldest + 1) * BLOCK);
+                    }
+                }
+                let n = BLOCK.unsigned_abs() as usize;
+                let held = place.checked_sub(1).map_or(NOTHING, |before| self.blocks[before].1.curves[n - 1]);
+                self.blocks.insert(place, (key, Block { raster: vec![0; n * rows], curves: vec![held; n] }));
+                place
             }
-            let n = BLOCK.unsigned_abs() as usize;
-            let held = self.blocks.range(..key).next_back().map_or(NOTHING, |(_, block)| block.curves[n - 1]);
-            self.blocks.insert(key, Block { raster: vec![0; n * rows], curves: vec![held; n] });
-        }
-        let block = self.blocks.get_mut(&key).expect("it was put there");
-        (block, column.rem_euclid(BLOCK).unsigned_abs() as usize)
+        };
+        (&mut self.blocks[place].1, column.rem_euclid(BLOCK).unsigned_abs() as usize)
     }
 
     /// Says that time has come into this column.
@@ -110,8 +125,10 @@ impl Strip {
     fn cut(&mut self, column: i64) {
         let Some(reach) = self.reach.filter(|reach| reach.1 > column) else { return };
         self.reach = Some((reach.0.min(column), column));
-        self.blocks.split_off(&(column.div_euclid(BLOCK) + 1));
-        if let Some(block) = self.blocks.get_mut(&column.div_euclid(BLOCK)) {
+        let key = column.div_euclid(BLOCK);
+        self.blocks.truncate(self.blocks.partition_point(|&(there, _)| there <= key));
+        if let Ok(place) = self.place(key) {
+            let block = &mut self.blocks[place].1;
             let k = usize::try_from(column.rem_euclid(BLOCK)).unwrap_or(0);
             block.raster[(k + 1) * self.rows..].fill(0);
             let curve = block.curves[k];
@@ -147,19 +164,19 @@ impl Strip {
     #[must_use]
     pub fn curve(&self, column: i64) -> Curve {
         let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
-        match self.blocks.range(..=key).next_back() {
-            Some((&there, block)) if there == key => block.curves[k],
-            Some((_, block)) => block.curves.last().copied().unwrap_or(NOTHING),
-            None => NOTHING,
+        match self.place(key) {
+            Ok(place) => self.blocks[place].1.curves[k],
+            Err(0) => NOTHING,
+            Err(place) => self.blocks[place - 1].1.curves.last().copied().unwrap_or(NOTHING),
         }
     }
 
     /// Appends the raster of a column, a byte a row.
     pub fn raster(&self, column: i64, out: &mut Vec<u8>) {
         let (key, k) = (column.div_euclid(BLOCK), column.rem_euclid(BLOCK).unsigned_abs() as usize);
-        match self.blocks.get(&key) {
-            Some(block) => out.extend_from_slice(&block.raster[k * self.rows..(k + 1) * self.rows]),
-            None => out.resize(out.len() + self.rows, 0),
+        match self.place(key).map(|place| &self.blocks[place].1) {
+            Ok(block) => out.extend_from_slice(&block.raster[k * self.rows..(k + 1) * self.rows]),
+            Err(_) => out.resize(out.len() + self.rows, 0),
         }
     }
 
@@ -189,7 +206,8 @@ pub struct Keyframe {
 /// See the module.
 #[derive(Debug, Clone)]
 pub struct Lens {
-    columns: usize,
+    /// Column and row of each taxel: a division a change would take most of its time.
+    at: Arc<[(u32, u32)]>,
     floor: u16,
     held: Vec<u16>,
     rest: Vec<u16>,
@@ -215,16 +233,19 @@ impl Lens {
     /// A lens on an array of so many columns that begins with a keyframe.
     #[must_use]
     pub fn new(columns: u16, floor: u16, from: &Keyframe, strip_bytes: usize) -> Self {
-        let columns = usize::from(columns);
+        let columns = usize::from(columns).max(1);
+        // A sensor has 2^22 taxels at most (recording's limits).
+        #[allow(clippy::cast_possible_truncation)]
+        let at = |taxel: usize| ((taxel % columns) as u32, (taxel / columns) as u32);
         let mut lens = Self {
-            columns,
+            at: (0..from.held.len()).map(at).collect(),
             floor,
             held: from.held.clone(),
             rest: from.rest.clone(),
             lowest: true,
             rests: 1,
             change: vec![0; from.held.len()],
-            strip: Strip::new(from.held.len() / columns.max(1), strip_bytes),
+            strip: Strip::new(from.held.len() / columns, strip_bytes),
             column: None,
             latest: from.latest,
             set_back: 0,
@@ -270,7 +291,8 @@ impl Lens {
         if above == 0 {
             return;
         }
-        let (x, y) = ((taxel % self.columns) as u64 * above, (taxel / self.columns) as u64 * above);
+        let (x, y) = self.at[taxel];
+        let (x, y) = (u64::from(x) * above, u64::from(y) * above);
         if on {
             (self.sum, self.sum_x, self.sum_y, self.area) =
                 (self.sum + above, self.sum_x + x, self.sum_y + y, self.area + 1);
@@ -314,7 +336,7 @@ impl Lens {
             }
             self.weigh(taxel, true);
         }
-        self.strip.mark(column_of(change.t), taxel / self.columns, change.up);
+        self.strip.mark(column_of(change.t), self.at[taxel].1 as usize, change.up);
     }
 
     /// Moves time on; back does nothing.
@@ -453,14 +475,14 @@ pub struct History {
     /// Its index.
     pub taxel: u32,
     last: u16,
-    columns: std::collections::VecDeque<(i64, [u16; 3])>,
+    columns: VecDeque<(i64, [u16; 3])>,
 }
 
 impl History {
     /// Begins to watch a taxel that holds this value.
     #[must_use]
     pub fn new(taxel: u32, held: u16) -> Self {
-        Self { taxel, last: held, columns: std::collections::VecDeque::new() }
+        Self { taxel, last: held, columns: VecDeque::new() }
     }
 
     /// Takes a change, of any taxel.
