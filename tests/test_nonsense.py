@@ -636,10 +636,10 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.Pictures": plain(taxel.simulate.Pictures, values=np.zeros((3, 64, 64)), period_us=192.0),
     "taxel.simulate.Scene": plain(lambda **given: taxel.simulate.Scene(**given).motion(), parameters=SCENE.parameters),
     "taxel.simulate.Scene.draw": plain(taxel.simulate.Scene.draw, seed=1, index=0, left_to_rest=False, array=None),
-    "taxel.simulate.Scene.motion": method(SCENE, "motion", step_us=100.0),
+    "taxel.simulate.Scene.motion": method(SCENE, "motion", step_us=100.0, array=None),
     "taxel.simulate.Scene.replace": lambda: (
         lambda **given: SCENE.replace(**given).motion(),
-        {"drop_mm": 100.0, "foam": {"dashpot_ms": 0.0}, "lead_ms": 5.0},
+        {"foam": {"dashpot_ms": 0.0}, "lead_ms": 5.0},
     ),
     "taxel.simulate.play": plain(
         taxel.simulate.play,

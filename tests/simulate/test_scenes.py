@@ -11,12 +11,20 @@ from taxel.simulate import Pictures, Scene, Silence, play, truth
 FRAME_US = 192.0
 
 
+def high(mm):
+    return {"dropped": {"height_mm": mm}}
+
+
+def dropped(scene):
+    return scene.parameters["bodies"][0]["motion"]["dropped"]
+
+
 def test_a_ball_falls_as_galilei_says():
     """The first contact comes sqrt(2 h / g) after the ball is let go, at sqrt(2 g h)."""
     for index in range(5):
         scene = Scene.draw(3, index)
         first = scene.motion().contacts[0]
-        height = scene.parameters["drop_mm"] * 1e-3
+        height = dropped(scene)["height_mm"] * 1e-3
         assert first.speed_m_s == pytest.approx(math.sqrt(2 * 9.81 * height), rel=2e-3)
         fallen_us = 1e6 * math.sqrt(2 * height / 9.81)
         assert first.start_us == pytest.approx(1e3 * scene.parameters["lead_ms"] + fallen_us, abs=60)
@@ -37,7 +45,7 @@ def test_momentum_of_an_impact_is_what_the_ball_brought_and_took():
     motion = scene.motion(6.0)
     first, second = motion.contacts[:2]
     inside = slice(round(first.start_us / 6.0), round(first.stop_us / 6.0) + 1)
-    mass = scene.parameters["ball"]["mass_g"] * 1e-3
+    mass = scene.parameters["bodies"][0]["mass_g"] * 1e-3
     pushed = float(motion.force_n[inside].sum()) * 6e-6 - mass * 9.81 * 1e-6 * (first.stop_us - first.start_us)
     # The ball leaves a little below the foam's face, where the dashpot frees it, and rises against gravity to it.
     assert pushed == pytest.approx(mass * (first.speed_m_s + second.speed_m_s), rel=0.02)
@@ -50,7 +58,7 @@ def test_a_stronger_dashpot_takes_more_speed():
 
 def test_a_press_reaches_the_force_that_was_drawn():
     scene = Scene.draw(7)
-    press = scene.parameters["ending"]["caught"]["press"]
+    press = dropped(scene)["ending"]["caught"]["press"]
     hand = scene.motion().contacts[-1]
     assert hand.kind == "hand"
     assert press["peak_n"] <= hand.peak_n < 1.3 * press["peak_n"]
@@ -81,8 +89,8 @@ def test_events_come_with_a_touch_and_lie_where_it_is():
     touched = played.events.between(first.start_us, first.start_us + 5_000)
     assert len(touched) > 100
     assert np.mean(touched.p) > 0.95
-    assert np.median(touched.x) * 2.67 == pytest.approx(scene.parameters["x_mm"], abs=6)
-    assert np.median(touched.y) * 2.67 == pytest.approx(scene.parameters["y_mm"], abs=6)
+    assert np.median(touched.x) * 2.67 == pytest.approx(scene.parameters["bodies"][0]["x_mm"], abs=6)
+    assert np.median(touched.y) * 2.67 == pytest.approx(scene.parameters["bodies"][0]["y_mm"], abs=6)
 
 
 def test_the_same_seed_plays_the_same_bytes_and_another_does_not():
@@ -114,11 +122,18 @@ def test_pictures_touch_from_the_empty_one_before_to_the_empty_one_after():
         (lambda: Scene.draw(1, array=64), ProblemError, "array"),
         (lambda: Scene.draw(1, array=Array(8, 8)), SceneError, "too small"),
         (lambda: Scene("ball"), ProblemError, "parameters"),
-        (lambda: Scene({}).motion(), SceneError, "^scene: ball is missing$"),
+        (lambda: Scene({}).motion(), SceneError, "^scene: bodies is missing$"),
         (lambda: Scene.draw(1).replace(colour="red"), ProblemError, "colour"),
-        (lambda: Scene.draw(1).replace(drop_mm=-5).motion(), SceneError, "drop_mm"),
+        (lambda: Scene.draw(1).body(colour="red"), ProblemError, "colour"),
+        (lambda: Scene.draw(1).body(1, x_mm=5.0), ProblemError, "n is 1"),
+        (lambda: Scene.draw(1).body(motion=high(-5)).motion(), SceneError, "height_mm"),
+        (lambda: Scene.draw(1).body(x_mm=500.0).motion(), SceneError, "off the array"),
+        (lambda: Scene.draw(1).body(mass_g=-1.0).motion(), SceneError, "mass_g is -1 g: must be above 0"),
+        (lambda: Scene.draw(1).body(mass_g=None, material="cheese").motion(), SceneError, "material is .cheese."),
+        (lambda: Scene.draw(1).body(motion={"thrown": {}}).motion(), SceneError, "dropped"),
+        (lambda: Scene.draw(1).replace(slant_deg=5.0).motion(), SceneError, "columns"),
         (lambda: Scene.draw(1).replace(foam={"poisson": 0.5}).motion(), SceneError, "poisson"),
-        (lambda: Scene.draw(1).replace(drop_mm=800, foam={"modulus_kpa": 5}).motion(), SceneError, "bottoms out"),
+        (lambda: Scene.draw(1).body(motion=high(800)).replace(foam={"modulus_kpa": 5}).motion(), SceneError, "bottoms out"),
         (lambda: Scene.draw(1).motion(0), SceneError, "step"),
         (lambda: Scene.draw(1).motion("fast"), ProblemError, "step_us"),
         (lambda: Pictures(np.zeros((2, 3)), 2000), ProblemError, "shape"),

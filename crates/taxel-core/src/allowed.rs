@@ -35,6 +35,12 @@ impl Range {
     /// 1 or more.
     pub const FROM_1: Self = Self { least: 1.0, ..Self::FROM_0 };
 
+    /// Above a value and finite.
+    #[must_use]
+    pub const fn above(least: f64) -> Self {
+        Self { least, ..Self::FINITE }
+    }
+
     /// Both ends in.
     #[must_use]
     pub const fn within(least: f64, most: f64) -> Self {

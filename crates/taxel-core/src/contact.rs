@@ -1,27 +1,44 @@
 //! Simulated touch: what a ball on foam does to the taxels beneath, frame by frame.
 //!
-//! A rigid ball sinks into independent columns of foam ([`foam`]); the foam's lower face, where the taxels lie, feels
-//! the surface's pressure smoothed by the layer ([`layer`], [`footprint`]); fabric, amplifier and ramp turn force into
-//! ticks of the converter ([`sensor`]). A [`scene`] says what happens, a [`stage`] plays scenes into frames. The touch
-//! itself is known to a fraction of a frame, so that detections can be held against it.
-//!
-//! Good for foam that does not widen when pressed (Poisson ratio near 0): there the columns, smoothed by the layer and
-//! scaled to the right force, lie within a few per cent of the bonded layer's full solution.
+//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] says ([`motion`]), pushed back by a law worked out once
+//! ([`push`]). What lies under them is reckoned in one of two ways, which a scene chooses: `layer`, foam bonded to the
+//! board, for any bodies ([`bonded`]); `columns`, independent columns whose pressure the layer smooths, for one ball that
+//! moves straight up and down on foam that hardly widens (Poisson ratio up to 0.1): there it lies within a few per cent
+//! of the layer, and is the fastest ([`foam`], [`footprint`]). Fabric, amplifier and ramp turn stress at the foam's base
+//! into ticks of the converter ([`sensor`]); a [`stage`] plays scenes into frames. The touch itself is known to a
+//! fraction of a frame, so that detections can be held against it.
 
+use crate::allowed::{Parameter, Range};
+use crate::{Error, Result};
+
+pub mod body;
 pub mod bonded;
 pub mod foam;
 pub mod footprint;
 pub mod layer;
 pub mod motion;
+pub mod push;
 pub mod scene;
 pub mod sensor;
+pub mod shape;
 pub mod stage;
 mod waves;
 
+pub use body::{Along, Body, Ending, Material, Move, Press};
 pub use bonded::Bonded;
 pub use foam::Foam;
 pub use footprint::Footprint;
-pub use motion::{Contact, Kind, Motion};
-pub use scene::{Ball, Ending, Press, Scene};
+pub use motion::{Contact, Kind, Motion, Track};
+pub use push::Push;
+pub use scene::{Scene, Surface};
 pub use sensor::{Sensor, Taxels};
+pub use shape::Shape;
 pub use stage::{Act, Pictures, Prepared, Stage};
+
+/// Refuses a value of a scene that lies outside; `place` says whose it is.
+fn within(place: &str, name: &'static str, value: f64, unit: &'static str, range: Range) -> Result<()> {
+    Parameter { name, unit, range }.check(&value).map_err(|error| match error {
+        Error::Problem(text) => Error::Scene(format!("{place}: {text}")),
+        other => other,
+    })
+}

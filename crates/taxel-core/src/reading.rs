@@ -73,7 +73,11 @@ fn in_words(place: String, there: Option<&Value>, said: &str) -> Unfit {
     let wanted = said.split_once(", expected ").map_or("", |(_, wanted)| wanted);
     let is = |right: &str| there.map_or(format!(": {right}"), |value| format!(" is {}: {right}", shown(value)));
     if let Some(name) = quoted("unknown field ") {
-        return Unfit { place: beside(&place, name), said: format!(" is not known: there is {}", choice(wanted)) };
+        let meant = nearest(name, wanted).map_or(String::new(), |near| format!(" (did you mean {near}?)"));
+        return Unfit {
+            place: beside(&place, name),
+            said: format!(" is not known{meant}: there is {}", choice(wanted)),
+        };
     }
     if let Some(name) = quoted("missing field ") {
         let dot = if place.is_empty() { "" } else { "." };
@@ -97,6 +101,29 @@ fn beside(place: &str, name: &str) -> String {
         "" => name.to_owned(),
         group => format!("{group}.{name}"),
     }
+}
+
+/// Of several names in backticks the one that is meant by another, where one is near.
+fn nearest<'a>(name: &str, wanted: &'a str) -> Option<&'a str> {
+    let most = 1 + name.chars().count() / 4;
+    let near = wanted.split('`').skip(1).step_by(2).map(|known| (edits(name, known), known));
+    near.filter(|(edits, _)| *edits <= most).min_by_key(|(edits, _)| *edits).map(|(_, known)| known)
+}
+
+/// How many letters must be put in, taken out or changed to make one word of another (Levenshtein).
+fn edits(from: &str, to: &str) -> usize {
+    let to: Vec<char> = to.chars().collect();
+    let mut row: Vec<usize> = (0..=to.len()).collect();
+    for (n, letter) in from.chars().enumerate() {
+        let mut before = row[0];
+        row[0] = n + 1;
+        for (k, other) in to.iter().enumerate() {
+            let changed = before + usize::from(letter != *other);
+            before = row[k + 1];
+            row[k + 1] = changed.min(row[k] + 1).min(before + 1);
+        }
+    }
+    row[to.len()]
 }
 
 /// A value as an error shows it: as JSON has it, not long, None for nothing.
@@ -211,6 +238,13 @@ mod tests {
             assert!(said(&text).starts_with(&format!("whole: {words}")), "{}", said(&text));
         }
         assert_eq!(said("7"), "whole is 7: must be values by name");
+    }
+
+    #[test]
+    fn the_name_that_was_meant_is_said() {
+        assert_eq!((edits("kitten", "sitting"), edits("", "abc"), edits("flaw", "lawn")), (3, 3, 2));
+        assert!(said(r#"{"tau": 1, "smal": 2}"#).contains("smal is not known (did you mean small?): there is"));
+        assert!(!said(r#"{"tau": 1, "wings": 2}"#).contains("mean"));
     }
 
     #[test]

@@ -8,7 +8,7 @@ use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use serde::Deserialize;
 use taxel_core::board::{Board, Faults, Flaws, IntensityWord, Play, Played, Previous, Version2, opening};
-use taxel_core::contact::{Act, Bonded, Contact, Foam, Motion, Pictures, Scene, Sensor, Taxels};
+use taxel_core::contact::{Act, Bonded, Contact, Foam, Motion, Pictures, Scene, Sensor, Taxels, Track};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, Error, Result, Stop, reading};
 use taxel_live::address::of_text;
@@ -24,7 +24,7 @@ use crate::parameters::parsed;
 #[derive(FromPyObject)]
 enum ActIn<'py> {
     Silence(f64),
-    Ball(String),
+    Scene(String),
     Pictures(PyReadonlyArray1<'py, f32>, f64),
 }
 
@@ -35,7 +35,7 @@ fn scene(json: &str) -> Result<Scene> {
 fn to_act(act: ActIn<'_>) -> PyResult<Act> {
     Ok(match act {
         ActIn::Silence(ms) => Act::Silence { ms },
-        ActIn::Ball(json) => Act::Ball(scene(&json).map_err(core)?),
+        ActIn::Scene(json) => Act::Scene(scene(&json).map_err(core)?),
         ActIn::Pictures(values, period_us) => {
             Act::Pictures(Pictures { values: slice("values", &values)?.to_vec(), period_us })
         }
@@ -53,8 +53,8 @@ fn to_sensor(json: &str) -> PyResult<Sensor> {
 /// Touches as Python gets them: kind, start and stop in us, speed in m/s, peak force in N.
 type ContactsOut = Vec<(String, f64, f64, f64, f64)>;
 
-/// Depth in mm and force in N at even steps, and touches.
-type MotionOut<'py> = (Bound<'py, PyArray1<f32>>, Bound<'py, PyArray1<f32>>, ContactsOut);
+/// By body: place in mm, depth in mm and force in N at even steps; and touches.
+type MotionOut<'py> = (Vec<[Bound<'py, PyArray1<f32>>; 4]>, ContactsOut);
 
 fn from_contacts(contacts: &[Contact]) -> ContactsOut {
     contacts.iter().map(|c| (c.kind.name().to_owned(), c.start_us, c.stop_us, c.speed_m_s, c.peak_n)).collect()
@@ -67,12 +67,23 @@ fn draw_scene(parts: ArrayParts, seed: u64, index: u32, left_to_rest: bool) -> P
     serde_json::to_string(&scene).map_err(|error| core(Error::Scene(error.to_string())))
 }
 
-/// Works a scene out: depth in mm and force in N at even steps, and its touches.
+/// Refuses a scene that makes no sense on an array, and taxels that make none; nothing is worked out.
 #[pyfunction]
-fn motion<'py>(py: Python<'py>, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
-    let motion = enter(py, |_| Motion::of(&scene(json)?, step_us))?;
+fn check_scene(parts: ArrayParts, json: &str, sensor: &str) -> PyResult<()> {
+    let felt = to_array(parts)?;
+    scene(json).and_then(|scene| scene.check(&felt)).map_err(core)?;
+    to_sensor(sensor)?.check().map_err(core)
+}
+
+/// Works a scene out: each body's way at even steps, and the touches.
+#[pyfunction]
+fn motion<'py>(py: Python<'py>, parts: ArrayParts, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
+    let felt = to_array(parts)?;
+    let motion = enter(py, |_| Motion::of(&scene(json)?, &felt, step_us))?;
     let contacts = from_contacts(&motion.contacts);
-    Ok((array(py, motion.depth_mm), array(py, motion.force_n), contacts))
+    let column = |values| array(py, values);
+    let out = |t: Track| [t.x_mm, t.y_mm, t.depth_mm, t.force_n].map(column);
+    Ok((motion.tracks.into_iter().map(out).collect(), contacts))
 }
 
 /// Works acts out without playing them: touches in us of the board's clock, force in N by frame.
@@ -362,6 +373,7 @@ fn json(report: &Report) -> String {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(draw_scene, module)?)?;
+    module.add_function(wrap_pyfunction!(check_scene, module)?)?;
     module.add_function(wrap_pyfunction!(motion, module)?)?;
     module.add_function(wrap_pyfunction!(truth, module)?)?;
     module.add_function(wrap_pyfunction!(play, module)?)?;

@@ -6,8 +6,9 @@ import json
 import secrets
 import sys
 from collections import deque
-from collections.abc import Iterable
-from dataclasses import asdict
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, replace
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, Self
 
@@ -19,7 +20,7 @@ from taxel._core import ProblemError
 from taxel._opening import open_any
 from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED, endless, script
-from taxel.simulate import Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Version2
+from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, SceneFile, Version2
 from taxel.simulate import emulate as run
 from taxel.wire import Registers
 
@@ -31,6 +32,9 @@ def emulate(
     port: Annotated[int, typer.Option(min=1, max=65_535, help="Where the datagrams go.")] = 5208,
     host: Annotated[str, typer.Option(help="To which machine, by name or address.")] = "127.0.0.1",
     scenes: Annotated[int | None, typer.Option(min=0, help="How many scenes; else until Ctrl-C.")] = None,
+    scene: Annotated[
+        Path | None, typer.Option(help="Play the scene of this .toml instead of drawn ones, again and again.")
+    ] = None,
     seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Draws scenes, taxels, noise.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recording again instead of scenes.")] = None,
     speed: Annotated[float, typer.Option(help="Of the replay: 2 in half the time.")] = 1.0,
@@ -39,9 +43,14 @@ def emulate(
     ] = False,
     noise_floor: Annotated[int, typer.Option(min=0, max=255, help="Of a pipe: a change above it makes an event.")] = 3,
     tare: Annotated[
-        float, typer.Option(min=0, max=60, help="How long the noise floor is 0 before the start marker, s.")
-    ] = 0.05,
-    preset: Annotated[str, typer.Option(help='The registers: "5.2 kHz", "2 kHz", "20.8 kHz".')] = "5.2 kHz",
+        float | None,
+        typer.Option(
+            min=0, max=60, help="How long the noise floor is 0 before the start marker, s; else 0.05 or the scene's."
+        ),
+    ] = None,
+    preset: Annotated[
+        str | None, typer.Option(help='The registers: "5.2 kHz" (or the scene\'s), "2 kHz", "20.8 kHz".')
+    ] = None,
     wire: Annotated[
         int | None,
         typer.Option(min=1, max=2, help="The version of the wire that the board speaks; else its registers'."),
@@ -91,15 +100,23 @@ def emulate(
     after its first frame, is tared with a noise floor of 0, then takes the preset's floor and marks the start. --truth
     is what taxel train learns from: contact and lift, by the board's clock (t_us) and by this machine's (host_ns).
 
-    --replay plays a recording again. --pipe takes any other sensor's frames from standard input: one line of JSON
+    --scene plays a scene from a file instead of drawn ones. --replay plays a recording again. --pipe takes any other sensor's frames from standard input: one line of JSON
     (rows, columns, rate, bits), then uint16, little-endian, row by row.
 
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
+    if scene is not None and (replay is not None or pipe or rest):
+        raise ProblemError("--scene: leave out --replay, --pipe and --rest")
     if (replay is not None or pipe) and (scenes is not None or labels is not None or rest):
         raise ProblemError("--scenes, --truth and --rest are of scenes: leave them out with --replay or --pipe")
     if replay is not None and pipe:
         raise ProblemError("--replay and --pipe: give one of them")
+    written = None if scene is None else SceneFile.open(scene)
+    if written is not None:
+        seed = written.seed if seed is None else seed
+        tare = written.tare_ms / 1e3 if tare is None else tare
+        preset = written.preset if preset is None else preset
+    tare, preset = 0.05 if tare is None else tare, "5.2 kHz" if preset is None else preset
     # Wrong ones are said before anything else is.
     Registers.preset(preset)
     seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
@@ -109,6 +126,8 @@ def emulate(
         touch, said = _again(replay, speed)
     elif pipe:
         touch, said = _piped(noise_floor)
+    elif written is not None:
+        touch, said = _written(written, scenes, 1e3 * tare), f"{scene}, seed {seed}"
     else:
         touch, said = _scenes(seed, scenes, 1e3 * tare, rest)
     console.print(f"{said}, to {host}:{port}", soft_wrap=True)
@@ -140,6 +159,8 @@ def emulate(
                     seed=seed,
                     preset=preset,
                     tare_ms=1e3 * tare,
+                    array=None if written is None else written.array,
+                    sensor=None if written is None else written.sensor,
                     wire=None if wire is None else 2 if wire == 2 else 1,
                     version_2=Version2(board, session, round(1e3 * hold), round(1e3 * heartbeat), round(1e3 * states)),
                     flaws=flaws,
@@ -191,6 +212,15 @@ def _scenes(seed: int, scenes: int | None, tare_ms: float, rest: bool) -> tuple[
     if scenes is None:
         return endless(seed, tare_ms=tare_ms, left_to_rest=rest), f"seed {seed}: scenes until Ctrl-C"
     return script(seed, scenes, tare_ms=tare_ms, left_to_rest=rest), f"seed {seed}: {scenes} scene(s)"
+
+
+def _written(written: SceneFile, scenes: int | None, tare_ms: float) -> Iterator[Act]:
+    """Yield silence for the tare, and a scene from a file again and again."""
+    before, scene, after = replace(written, tare_ms=tare_ms).acts()
+    yield before
+    for _ in count() if scenes is None else range(scenes):
+        yield scene
+        yield after
 
 
 def _say(report: EmulatorReport, in_time: bool) -> None:

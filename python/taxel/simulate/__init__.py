@@ -1,15 +1,16 @@
-"""Simulated touch: a ball on foam, and the emulated board that feels it.
+"""Simulated touch: bodies on foam, and the emulated board that feels them.
 
-A scene says what happens to the ball. `play` lets a board feel acts as fast as it goes, `emulate` in real time over
+A scene says what happens to the bodies. `play` lets a board feel acts as fast as it goes, `emulate` in real time over
 UDP: acts, a recording again, or the frames of any other sensor. `Board` is the board alone, a frame at a time.
 `taxel.simulate.circuit` is what lies between touch and board: fabric, lines, converter.
 """
 
 from taxel.simulate import circuit
-from taxel.simulate.acts import Act, Contact, Motion, Pictures, Scene, Silence
+from taxel.simulate.acts import Act, Contact, Motion, Pictures, Scene, Silence, Track
 from taxel.simulate.board import EmulatorReport, Pipe, Played, Replay, emulate, play, truth
 from taxel.simulate.emulated import NOT_RETURNED, Board, Version2
 from taxel.simulate.layer import Layer, Pressed
+from taxel.simulate.scene_file import SceneFile
 from taxel.simulate.trouble import Faults, Flaws
 
 __all__ = [
@@ -28,7 +29,9 @@ __all__ = [
     "Pressed",
     "Replay",
     "Scene",
+    "SceneFile",
     "Silence",
+    "Track",
     "Version2",
     "circuit",
     "emulate",

@@ -1,9 +1,9 @@
-"""What the emulated board is shown: silence, a ball, pictures."""
+"""What the emulated board is shown: silence, bodies, pictures."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -15,14 +15,14 @@ from taxel._arguments import flag, number, numbers, parameters, shown, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 
-__all__ = ["Act", "Contact", "Motion", "Pictures", "Scene", "Silence"]
+__all__ = ["Act", "Contact", "Motion", "Pictures", "Scene", "Silence", "Track"]
 
 
 class Contact(NamedTuple):
     """One touch, as it really was: from the moment when force leaves zero to that when it returns there."""
 
     kind: str
-    """"first", "bounce", "hand", "rest" (stayed until it was lifted) or "pictures"."""
+    """"first", "bounce", "hand", "rest" (stayed until it was lifted), "roll", "slide" or "pictures"."""
     start_us: float
     stop_us: float
     speed_m_s: float
@@ -31,14 +31,31 @@ class Contact(NamedTuple):
     """The largest force; 0 where nobody knows it."""
 
 
+class Track(NamedTuple):
+    """A body's way, at even steps."""
+
+    x_mm: NDArray[np.float32]
+    """Where its middle is, right of the first taxel."""
+    y_mm: NDArray[np.float32]
+    depth_mm: NDArray[np.float32]
+    """Of its lowest point below the foam's face; negative above it."""
+    force_n: NDArray[np.float32]
+    """On the foam."""
+
+
 class Motion(NamedTuple):
     """A scene, worked out at even steps."""
 
     step_us: float
-    depth_mm: NDArray[np.float32]
-    """Below the foam's face; negative above it."""
-    force_n: NDArray[np.float32]
+    tracks: list[Track]
+    """One a body."""
     contacts: list[Contact]
+    """Of all bodies, by time."""
+
+    @property
+    def force_n(self) -> NDArray[np.float32]:
+        """The force of all bodies on the foam."""
+        return np.sum([track.force_n for track in self.tracks], axis=0, dtype=np.float32)
 
 
 @dataclass(frozen=True)
@@ -52,30 +69,42 @@ class Silence:
 
 
 class Scene:
-    """Describe a ball dropped on foam over the array, and what becomes of it.
+    """Describe bodies over foam on the array, and what becomes of them.
 
     Parameters
     ----------
     parameters : mapping
-        As `parameters` of a drawn scene holds them: ball (radius_mm, mass_g), foam (modulus_kpa, thickness_mm, poisson,
-        yield_strain, densification_strain, exponent, damping_s_m, dashpot_ms), x_mm and y_mm from the first taxel,
-        drop_mm, lead_ms and tail_ms of silence, and the ending: ``{"caught": {"after", "press": {...}}}`` or
-        ``{"left_to_rest": {"rest_ms", "lift_mm_s"}}``.
+        As `parameters` of a drawn scene holds them, and as a file has them (see `SceneFile`):
+
+        - ``bodies``, a list; of each: ``shape`` (``{"sphere": {"radius_mm"}}``, ``{"cylinder": {"radius_mm", "length_mm",
+          "axis_deg"}}``, ``{"edge": {"slope_deg", "length_mm", "axis_deg"}}`` or ``{"height_map": {"heights_mm",
+          "pitch_mm"}}``), ``x_mm`` and ``y_mm`` from the first taxel, where it first touches, ``mass_g`` or ``material``
+          ("steel", "glass", "rubber", "plastic", "wood"), ``stiffness_n_mm`` of one that gives, ``friction``,
+          ``rolling_friction``, ``after_ms`` and ``motion``.
+        - ``motion`` is ``{"dropped": {"height_mm", "ending"}}``, ``{"pressed": {"peak_n" or "depth_mm", "speed_mm_s",
+          "hold_ms", "wait_ms"}}``, or ``{"rolled" or "slid": {"speed_mm_s", "toward_deg", "for_ms", "press_n"}}``; an
+          ``ending`` is ``{"caught": {"after", "press"}}`` or ``{"left_to_rest": {"rest_ms", "lift_mm_s"}}``.
+        - ``foam``: modulus_kpa, thickness_mm, poisson, yield_strain, densification_strain, exponent, damping_s_m,
+          dashpot_ms.
+        - ``surface``: "layer", foam bonded to the board, for any bodies; or "columns", for one ball that moves straight up
+          and down on foam with poisson up to 0.1: the fastest.
+        - ``slant_deg``, ``downhill_deg``: how far the array is tilted, and which way; ``lead_ms``, ``tail_ms``.
 
     Raises
     ------
-    SceneError : when it is played, and a parameter makes no sense or the ball bottoms out
+    SceneError : when it is played, and a parameter makes no sense, a body is off the array or bottoms out
 
     Notes
     -----
-    Columns of Gibson and Ashby's foam with Hunt and Crossley's damping and a dashpot; the layer's base stress reaches
-    the taxels. Modulus, damping and dashpot are guesses.
+    Gibson and Ashby's foam with Hunt and Crossley's damping and a dashpot; the layer's base stress reaches the taxels.
+    Modulus, damping, dashpot and friction are guesses. A body moves by the force that it would meet alone; bodies that
+    press side by side are reckoned together in what the taxels feel.
 
     Examples
     --------
     >>> scene = Scene.draw(seed=1)
     >>> scene
-    Scene(ball of 35 mm and 36 g from 196 mm, caught after 4 impacts)
+    Scene(sphere dropped)
     >>> [contact.kind for contact in scene.motion().contacts]
     ['first', 'bounce', 'bounce', 'bounce', 'hand']
     """
@@ -103,20 +132,23 @@ class Scene:
 
     def replace(self, **changes: Any) -> Scene:
         """Return the scene with parameters changed; a mapping changes some of a part, as ``foam={"dashpot_ms": 0}``."""
-        unknown = [name for name in changes if name not in self.parameters]
-        if unknown:
-            raise ProblemError(f"{unknown[0]}: a scene has {', '.join(self.parameters)}")
-        merged = dict(self.parameters)
-        for name, change in changes.items():
-            before = merged[name]
-            both = isinstance(change, Mapping) and isinstance(before, Mapping) and name != "ending"
-            merged[name] = {**before, **change} if both else change
-        return Scene(merged)
+        return Scene(_replaced("a scene", self.parameters, changes))
 
-    def motion(self, step_us: float = 48.0) -> Motion:
-        """Work the scene out; by default in quarters of a frame of 5208 Hz."""
-        depth, force, contacts = _core.motion(self._part(), number("step_us", step_us, "us"))
-        return Motion(float(step_us), depth, force, [Contact(*contact) for contact in contacts])
+    def body(self, n: int = 0, **changes: Any) -> Scene:
+        """Return the scene with parameters of body `n` changed, as ``x_mm=80``; a mapping changes some of a part.
+
+        Raises
+        ------
+        ProblemError : no such body, or a parameter that it has not
+        """
+        bodies = list(self.parameters["bodies"])
+        bodies[whole("n", n, 0, len(bodies) - 1)] = _replaced("a body", bodies[n], changes, _BODY)
+        return Scene({**self.parameters, "bodies": bodies})
+
+    def motion(self, step_us: float = 48.0, *, array: Array | None = None) -> Motion:
+        """Work the scene out; by default in quarters of a frame of 5208 Hz, over the thesis' array."""
+        tracks, contacts = _core.motion(Array._of(array)._parts(), self._part(), number("step_us", step_us, "us"))
+        return Motion(float(step_us), [Track(*track) for track in tracks], [Contact(*contact) for contact in contacts])
 
     def _part(self) -> str:
         return parameters(self.parameters)
@@ -127,10 +159,38 @@ class Scene:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        ball, ending = self.parameters["ball"], self.parameters["ending"]
-        end = f"caught after {ending['caught']['after']} impacts" if "caught" in ending else "left to rest"
-        drop = self.parameters["drop_mm"]
-        return f"Scene(ball of {ball['radius_mm']:.0f} mm and {ball['mass_g']:g} g from {drop:.0f} mm, {end})"
+        bodies = self.parameters.get("bodies", [])
+        said = [f"{_only(body, 'shape')} {_only(body, 'motion')}" for body in bodies]
+        return f"Scene({', '.join(said)})"
+
+
+#: What a body may be given beside what it has.
+_BODY = ("mass_g", "material", "stiffness_n_mm", "friction", "rolling_friction", "after_ms")
+
+
+def _only(body: object, part: str) -> str:
+    """Return the one name in a part of a body."""
+    named = body.get(part) if isinstance(body, Mapping) else None
+    return "/".join(map(str, named)) if isinstance(named, Mapping) else "?"
+
+
+def _replaced(what: str, before: Mapping[str, Any], changes: Mapping[str, Any], more: Sequence[str] = ()) -> dict[str, Any]:
+    """Return parameters with some changed; parts are merged to any depth, but for one of several kinds."""
+    merged = dict(before)
+    for name, change in changes.items():
+        if name not in before and name not in more:
+            raise ProblemError(f"{name}: {what} has {', '.join(dict.fromkeys([*before, *more]))}")
+        merged[name] = _merged(merged.get(name), change)
+    return merged
+
+
+def _merged(before: Any, change: Any) -> Any:
+    if not (isinstance(before, Mapping) and isinstance(change, Mapping)):
+        return change
+    # A group of one is a kind with its parameters; another kind takes its place.
+    if len(before) == len(change) == 1 and set(before) != set(change) and isinstance(next(iter(before.values())), Mapping):
+        return change
+    return {**before, **{name: _merged(before.get(name), value) for name, value in change.items()}}
 
 
 class Pictures:

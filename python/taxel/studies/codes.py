@@ -73,7 +73,8 @@ def realise(params: dict[str, Any], seed: int) -> list[list[float]]:
     """Return the times of each train's spikes since contact, ms: ON trains of the taxels, then OFF ones."""
     random = np.random.default_rng([seed, 232])
     x, y = (32 * 2.67 + random.uniform(-2.67, 2.67, 2)).tolist()
-    scene = Scene.draw(seed).replace(ball={"radius_mm": params["radius_mm"]}, drop_mm=params["drop_mm"], x_mm=x, y_mm=y)
+    ball: dict[str, Any] = {"shape": {"sphere": {"radius_mm": params["radius_mm"]}}, "x_mm": x, "y_mm": y}
+    scene = Scene.draw(seed).body(**ball, motion={"dropped": {"height_mm": params["drop_mm"]}})
     acts: list[Act] = [Silence(60.0), scene]
     contact = truth(acts)[0][0].start_us
     events = play(acts, seed=seed).events

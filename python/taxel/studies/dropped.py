@@ -150,17 +150,25 @@ def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator)
     x, y = ((n - 1) * array.pitch_mm / 2 + rng.normal(0, p["place_sd_mm"]) for n in (array.columns, array.rows))
     return Scene(
         {
-            "ball": {
-                "radius_mm": condition.ball_mm / 2,
-                "mass_g": float(p["mass_g"] + rng.uniform(-1, 1) * p["mass_by_g"]),
-            },
+            "surface": "columns",
             "foam": {},
-            "x_mm": float(x),
-            "y_mm": float(y),
-            "drop_mm": float(height),
+            "bodies": [
+                {
+                    "shape": {"sphere": {"radius_mm": condition.ball_mm / 2}},
+                    "mass_g": float(p["mass_g"] + rng.uniform(-1, 1) * p["mass_by_g"]),
+                    "x_mm": float(x),
+                    "y_mm": float(y),
+                    "motion": {
+                        "dropped": {
+                            "height_mm": float(height),
+                            "ending": {
+                                "left_to_rest": {"rest_ms": fall_ms + LENGTH_MS + _AFTER_MS, "lift_mm_s": _HAND_MM_S}
+                            },
+                        }
+                    },
+                }
+            ],
             "lead_ms": float(rng.uniform(0, _LEAD_MS)),
-            "ending": {"left_to_rest": {"rest_ms": fall_ms + LENGTH_MS + _AFTER_MS, "lift_mm_s": _HAND_MM_S}},
-            "tail_ms": 0.0,
         }
     )
 

@@ -96,8 +96,9 @@ def drawn(params: dict[str, Any], seed: int, scenes: int, folder: Path) -> list[
     rows: list[tuple[str, str, int]] = []
     for k in range(scenes):
         kind = k % 2
-        scene = Scene.draw(seed, k).replace(
-            ball={"radius_mm": params["radii_mm"][kind]}, drop_mm=float(rng.uniform(*params["drop_mm"]))
+        scene = Scene.draw(seed, k).body(
+            shape={"sphere": {"radius_mm": params["radii_mm"][kind]}},
+            motion={"dropped": {"height_mm": float(rng.uniform(*params["drop_mm"]))}},
         )
         acts: list[Act] = [Silence(60.0), scene]
         falls = [c for c in truth(acts)[0] if c.kind in ("first", "bounce")]

@@ -381,6 +381,18 @@ impl Bonded {
         }
     }
 
+    /// How many taxels lie beneath.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.array.0 * self.array.1
+    }
+
+    /// From one cell to the next, mm.
+    #[must_use]
+    pub fn pitch_mm(&self) -> f64 {
+        self.pitch_mm
+    }
+
     /// The area of a cell, mm^2.
     #[must_use]
     pub fn area_mm2(&self) -> f64 {

@@ -4,8 +4,9 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{is_above_0, is_at_least_0};
-use crate::{Error, Result};
+use super::within;
+use crate::Result;
+use crate::allowed::Range;
 
 /// Open-cell foam: elastic, then collapsing, then dense (Gibson and Ashby, *Cellular Solids*, chapter 5).
 ///
@@ -58,32 +59,15 @@ impl Foam {
     ///
     /// `Scene`, naming the parameter.
     pub fn check(&self) -> Result<()> {
-        let wrong =
-            |name: &str, value: f64, right: &str| Err(Error::Scene(format!("foam: {name} is {value}: {right}")));
-        if !is_above_0(self.modulus_kpa) {
-            return wrong("modulus_kpa", self.modulus_kpa, "must be above 0");
-        }
-        if !is_above_0(self.thickness_mm) {
-            return wrong("thickness_mm", self.thickness_mm, "must be above 0");
-        }
-        if !(0.0..0.5).contains(&self.poisson) {
-            return wrong("poisson", self.poisson, "must be from 0 to below 0.5");
-        }
-        if !(is_above_0(self.yield_strain) && self.yield_strain < self.densification_strain - SOLID) {
-            return wrong("yield_strain", self.yield_strain, "must be above 0 and well below densification_strain");
-        }
-        if !(is_above_0(self.densification_strain) && self.densification_strain <= 1.0) {
-            return wrong("densification_strain", self.densification_strain, "must be above 0, at most 1");
-        }
-        if !(self.exponent > 1.0 && self.exponent < 2.0) {
-            return wrong("exponent", self.exponent, "must be above 1 and below 2");
-        }
-        if !is_at_least_0(self.damping_s_m) {
-            return wrong("damping_s_m", self.damping_s_m, "must be 0 or more");
-        }
-        if !is_at_least_0(self.dashpot_ms) {
-            return wrong("dashpot_ms", self.dashpot_ms, "must be 0 or more");
-        }
+        let of = |name, value, unit, range| within("foam", name, value, unit, range);
+        of("modulus_kpa", self.modulus_kpa, "kPa", Range::ABOVE_0)?;
+        of("thickness_mm", self.thickness_mm, "mm", Range::ABOVE_0)?;
+        of("poisson", self.poisson, "", Range::FROM_0.below(0.5))?;
+        of("densification_strain", self.densification_strain, "", Range::ABOVE_0.at_most(1.0))?;
+        of("yield_strain", self.yield_strain, "", Range::ABOVE_0.below(self.densification_strain - SOLID))?;
+        of("exponent", self.exponent, "", Range::above(1.0).below(2.0))?;
+        of("damping_s_m", self.damping_s_m, "s/m", Range::FROM_0)?;
+        of("dashpot_ms", self.dashpot_ms, "ms", Range::FROM_0)?;
         Ok(())
     }
 

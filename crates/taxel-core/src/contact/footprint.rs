@@ -34,10 +34,9 @@ impl Footprint {
     ///
     /// # Errors
     ///
-    /// `Scene` where the foam makes no sense, or the ball is smaller than the foam is thick.
+    /// `Scene` where the foam makes no sense.
     pub fn new(foam: &Foam, radius_mm: f64) -> Result<Self> {
         foam.check()?;
-        super::scene::check_radius(radius_mm, foam)?;
         let deepest = foam.floor_mm();
         let step = 14.0 / foam.thickness_mm / WAVES as f64;
         let waves: Vec<f64> = (0..WAVES).map(|k| (k as f64 + 0.5) * step).collect();

@@ -1,10 +1,12 @@
-//! How the ball moves, and when it really touched.
+//! How bodies move, and when they really touched.
 
 use serde::{Deserialize, Serialize};
 
-use super::scene::{Ending, Scene};
+use super::body::{Along, Body, Ending, Move, Press};
+use super::shape::turned;
+use super::{Bonded, Push, Scene, Surface};
 use crate::spikes::us;
-use crate::{Error, Result};
+use crate::{Array, Error, Result};
 
 /// Gravity, mm/ms^2.
 const GRAVITY: f64 = 9.81e-3;
@@ -12,7 +14,9 @@ const GRAVITY: f64 = 9.81e-3;
 const INNER: u32 = 8;
 /// How far above the foam a hand begins and ends a press, mm.
 const CLEAR_MM: f64 = 2.0;
-/// A ball that is still bouncing, or has come to rest, this long after it was let go is not caught any more, ms.
+/// How fast a hand sets down and lifts what is to roll or slide, mm/ms.
+const SET_DOWN: f64 = 0.05;
+/// A body that is still bouncing, or has come to rest, this long after it was let go is not caught any more, ms.
 const PATIENCE_MS: f64 = 5_000.0;
 
 /// What kind of touch it was.
@@ -27,6 +31,10 @@ pub enum Kind {
     Hand,
     /// An impact after which the ball stayed until a hand lifted it.
     Rest,
+    /// Set down, rolling, and lifted.
+    Roll,
+    /// Set down, sliding, and lifted.
+    Slide,
     /// Pictures laid over the array.
     Pictures,
 }
@@ -40,6 +48,8 @@ impl Kind {
             Self::Bounce => "bounce",
             Self::Hand => "hand",
             Self::Rest => "rest",
+            Self::Roll => "roll",
+            Self::Slide => "slide",
             Self::Pictures => "pictures",
         }
     }
@@ -60,90 +70,265 @@ pub struct Contact {
     pub peak_n: f64,
 }
 
-/// A scene, worked out: depth and force at even steps, and the touches in it.
+/// A body's way, at even steps.
 #[derive(Debug, Clone, Default)]
-pub struct Motion {
-    /// Depth below the foam's face, mm; negative above it.
+pub struct Track {
+    /// Where its middle is, mm right of the first taxel.
+    pub x_mm: Vec<f32>,
+    /// Where, mm below the first taxel.
+    pub y_mm: Vec<f32>,
+    /// Depth of its lowest point below the foam's face, mm; negative above it.
     pub depth_mm: Vec<f32>,
     /// Force on the foam, N.
     pub force_n: Vec<f32>,
+}
+
+/// A scene, worked out.
+#[derive(Debug, Clone, Default)]
+pub struct Motion {
+    /// Each body's way; all have the same number of steps.
+    pub tracks: Vec<Track>,
+    /// How each body is pushed back.
+    pub pushes: Vec<Push>,
     /// The touches, by time; us from the scene's start.
     pub contacts: Vec<Contact>,
 }
 
 impl Motion {
-    /// Plays a scene in steps of `step_us`; entry k holds the state k steps after its start.
+    /// Plays a scene in steps of `step_us`; entry k of a track holds the state k steps after its start.
     ///
     /// # Errors
     ///
-    /// `Scene` where its parameters make no sense, the ball bottoms out, or comes to rest before it can be caught.
-    pub fn of(scene: &Scene, step_us: f64) -> Result<Self> {
-        scene.check()?;
+    /// `Scene` where its parameters make no sense, a body bottoms out, or comes to rest before it can be caught.
+    pub fn of(scene: &Scene, array: &Array, step_us: f64) -> Result<Self> {
+        scene.check(array)?;
+        Self::on(scene, Self::layer(scene, array)?.as_mut(), step_us)
+    }
+
+    /// The scene's foam, bonded, where it is reckoned so.
+    ///
+    /// # Errors
+    ///
+    /// `Scene` where the foam makes no sense.
+    pub fn layer(scene: &Scene, array: &Array) -> Result<Option<Bonded>> {
+        match scene.surface {
+            Surface::Layer => Bonded::new(&scene.foam, array).map(Some),
+            Surface::Columns => Ok(None),
+        }
+    }
+
+    /// As [`Motion::of`], of a scene that was checked, on its foam.
+    ///
+    /// # Errors
+    ///
+    /// As [`Motion::of`].
+    pub fn on(scene: &Scene, mut layer: Option<&mut Bonded>, step_us: f64) -> Result<Self> {
         if !(step_us.is_finite() && step_us > 0.0 && step_us <= 1000.0) {
             return Err(Error::Scene(format!("step is {step_us} us: must be above 0, at most 1000")));
         }
-        let mut play = Player::new(scene, step_us * 1e-3);
-        play.wait(scene.lead_ms);
-        play.let_go();
-        match &scene.ending {
-            Ending::Caught { after, press } => {
-                play.fall_until_caught(*after)?;
-                play.wait(press.wait_ms);
-                let (speed, deep) = (press.speed_mm_s * 1e-3, scene.foam.depth_of(scene.ball.radius_mm, press.peak_n));
-                play.hand(-CLEAR_MM, deep, speed, Kind::Hand);
-                play.hand(deep, deep, press.hold_ms, Kind::Hand);
-                play.hand(deep, -CLEAR_MM, speed, Kind::Hand);
-            }
-            Ending::LeftToRest { rest_ms, lift_mm_s } => {
-                play.fall_for(*rest_ms)?;
-                play.hand(play.depth, -CLEAR_MM, lift_mm_s * 1e-3, Kind::Rest);
-            }
+        let mut players = vec![];
+        for (n, body) in scene.bodies.iter().enumerate() {
+            let push = Push::of(&scene.foam, body, layer.as_deref_mut())?;
+            let mut player = Player::new(scene, body, push, step_us * 1e-3);
+            player.play().map_err(|error| match error {
+                Error::Scene(text) if scene.bodies.len() > 1 => Error::Scene(format!("bodies[{n}]: {text}")),
+                other => other,
+            })?;
+            players.push(player);
         }
-        play.wait(scene.tail_ms);
-        Ok(play.motion)
+        let over = players.iter().map(|player| player.now).max().unwrap_or(0);
+        let mut motion = Self::default();
+        for mut player in players {
+            player.wait_steps(u64::from(over - player.now));
+            player.wait(scene.tail_ms);
+            motion.tracks.push(player.track);
+            motion.pushes.push(player.push);
+            motion.contacts.append(&mut player.contacts);
+        }
+        motion.contacts.sort_by(|a, b| a.start_us.total_cmp(&b.start_us));
+        Ok(motion)
+    }
+
+    /// How many steps there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.tracks.first().map_or(0, |track| track.force_n.len())
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Force of all bodies on the foam after `k` steps, N.
+    #[must_use]
+    pub fn force_n(&self, k: usize) -> f32 {
+        self.tracks.iter().map(|track| track.force_n[k]).sum()
     }
 }
 
 struct Player<'a> {
     scene: &'a Scene,
+    body: &'a Body,
+    push: Push,
     inner_ms: f64,
     /// Steps of `inner_ms` since the start.
     now: u32,
+    /// How far its middle is below where it would touch, mm: the depth of one that does not give.
     depth: f64,
     speed: f64,
     /// Force before it is cut off at 0, N.
     raw: f64,
     touching: bool,
-    motion: Motion,
+    /// Its middle, mm; its speed along the foam, and that of its lowest point by its turning, mm/ms.
+    place: [f64; 2],
+    along: [f64; 2],
+    turning: [f64; 2],
+    track: Track,
+    contacts: Vec<Contact>,
 }
 
 impl<'a> Player<'a> {
-    fn new(scene: &'a Scene, step_ms: f64) -> Self {
-        let motion = Motion::default();
+    fn new(scene: &'a Scene, body: &'a Body, push: Push, step_ms: f64) -> Self {
         let inner_ms = step_ms / f64::from(INNER);
-        let mut player =
-            Self { scene, inner_ms, now: 0, depth: -scene.drop_mm, speed: 0.0, raw: 0.0, touching: false, motion };
+        let height = match &body.motion {
+            Move::Dropped { height_mm, .. } => height_mm * scene.slant_deg.to_radians().cos(),
+            _ => CLEAR_MM,
+        };
+        let mut player = Self {
+            scene,
+            body,
+            push,
+            inner_ms,
+            now: 0,
+            depth: -height,
+            speed: 0.0,
+            raw: 0.0,
+            touching: false,
+            place: [body.x_mm, body.y_mm],
+            along: [0.0; 2],
+            turning: [0.0; 2],
+            track: Track::default(),
+            contacts: vec![],
+        };
         player.hand_out();
         player
     }
 
-    fn hand_out(&mut self) {
-        self.motion.depth_mm.push(self.depth as f32);
-        self.motion.force_n.push(self.raw.max(0.0) as f32);
+    fn play(&mut self) -> Result<()> {
+        self.wait(self.scene.lead_ms + self.body.after_ms);
+        let body = self.body;
+        match &body.motion {
+            Move::Dropped { height_mm, ending } => {
+                self.let_go(*height_mm);
+                match ending {
+                    Ending::Caught { after, press } => {
+                        self.fall_until_caught(*after)?;
+                        self.press(press)?;
+                    }
+                    Ending::LeftToRest { rest_ms, lift_mm_s } => {
+                        self.fall_for(*rest_ms)?;
+                        // The touch that a hand is about to end, if the body lies still by then.
+                        if self.touching
+                            && let Some(last) = self.contacts.last_mut()
+                        {
+                            last.kind = Kind::Rest;
+                        }
+                        self.hand(self.depth, -CLEAR_MM, lift_mm_s * 1e-3, Kind::Rest);
+                    }
+                }
+                Ok(())
+            }
+            Move::Pressed(press) => self.press(press),
+            Move::Rolled(along) => self.go(along, Kind::Roll),
+            Move::Slid(along) => self.go(along, Kind::Slide),
+        }
     }
 
-    /// Holds the ball clear of the foam.
+    /// Waits, then presses by hand and lifts.
+    fn press(&mut self, press: &Press) -> Result<()> {
+        self.wait(press.wait_ms);
+        let speed = press.speed_mm_s * 1e-3;
+        let deep = match (press.peak_n, press.depth_mm) {
+            (Some(force), _) => self.push.down_mm(force),
+            (None, depth) => self.push.down_of_depth_mm(depth.unwrap_or(0.0)),
+        };
+        self.reachable(deep)?;
+        self.hand(-CLEAR_MM, deep, speed, Kind::Hand);
+        self.hand(deep, deep, press.hold_ms, Kind::Hand);
+        self.hand(deep, -CLEAR_MM, speed, Kind::Hand);
+        Ok(())
+    }
+
+    /// Sets the body down, lets it go or pushes it along, and lifts it.
+    fn go(&mut self, along: &Along, kind: Kind) -> Result<()> {
+        let weight = self.mass() * GRAVITY * self.scene.slant_deg.to_radians().cos();
+        let deep = self.push.down_mm(along.press_n.unwrap_or(weight));
+        self.reachable(deep)?;
+        self.hand(-CLEAR_MM, deep, SET_DOWN, kind);
+        self.speed = 0.0;
+        let (sin, cos) = along.toward_deg.to_radians().sin_cos();
+        self.along = [cos, sin].map(|part| part * along.speed_mm_s * 1e-3);
+        if along.press_n.is_some() {
+            self.hand(deep, deep, along.for_ms, kind);
+        } else {
+            if kind == Kind::Roll {
+                // What rolls does not slip where it can turn: a ball each way, a cylinder across its axis.
+                let (ball, _, axis_deg) = self.body.shape.turns();
+                let free = if ball > 0.0 { self.along } else { only_across(self.along, axis_deg) };
+                self.turning = free.map(|part| -part);
+            }
+            self.fall_for(along.for_ms)?;
+        }
+        self.along = [0.0; 2];
+        self.hand(self.depth, -CLEAR_MM, SET_DOWN, kind);
+        Ok(())
+    }
+
+    fn reachable(&self, deep: f64) -> Result<()> {
+        if deep < self.push.floor_mm() {
+            return Ok(());
+        }
+        Err(Error::Scene(format!(
+            "the body is to be pressed through all of the {} mm of foam; press it less, or take stiffer foam",
+            self.scene.foam.thickness_mm
+        )))
+    }
+
+    fn mass(&self) -> f64 {
+        self.body.mass_g().unwrap_or(0.0)
+    }
+
+    fn hand_out(&mut self) {
+        let Self { track, push, .. } = self;
+        track.x_mm.push(self.place[0] as f32);
+        track.y_mm.push(self.place[1] as f32);
+        track.depth_mm.push(push.depth_mm(self.depth) as f32);
+        track.force_n.push(self.raw.max(0.0) as f32);
+    }
+
+    /// Holds the body clear of the foam.
     fn wait(&mut self, ms: f64) {
+        self.wait_steps((ms / self.inner_ms).round() as u64);
+    }
+
+    fn wait_steps(&mut self, steps: u64) {
         self.depth = -CLEAR_MM;
         self.speed = 0.0;
-        for _ in 0..(ms / self.inner_ms).round() as u64 {
+        (self.along, self.turning) = ([0.0; 2], [0.0; 2]);
+        for _ in 0..steps {
             self.arrive(self.depth, 0.0, Kind::Hand);
         }
     }
 
-    fn let_go(&mut self) {
-        self.depth = -self.scene.drop_mm;
+    /// Lets the body go so high above where it will touch.
+    fn let_go(&mut self, height_mm: f64) {
+        let (sin, cos) = self.scene.slant_deg.to_radians().sin_cos();
+        let (down_y, down_x) = self.scene.downhill_deg.to_radians().sin_cos();
+        self.depth = -height_mm * cos;
         self.speed = 0.0;
+        self.place = [self.body.x_mm - height_mm * sin * down_x, self.body.y_mm - height_mm * sin * down_y];
     }
 
     fn fall_until_caught(&mut self, after: u32) -> Result<()> {
@@ -151,14 +336,14 @@ impl<'a> Player<'a> {
         loop {
             let rising = self.speed < 0.0;
             self.fall()?;
-            let bounced = self.motion.contacts.len() >= after as usize && !self.touching;
+            let bounced = self.contacts.len() >= after as usize && !self.touching;
             if bounced && rising && self.speed >= 0.0 && self.depth < 0.0 {
                 return Ok(());
             }
             if f64::from(self.now - began) * self.inner_ms > PATIENCE_MS {
                 return Err(Error::Scene(format!(
                     "the ball comes to rest after {} impacts: it cannot be caught after {after}; drop it from higher or catch it earlier",
-                    self.motion.contacts.len()
+                    self.contacts.len()
                 )));
             }
         }
@@ -168,37 +353,62 @@ impl<'a> Player<'a> {
         for _ in 0..(ms / self.inner_ms).round() as u64 {
             self.fall()?;
         }
-        // The touch that a hand is about to end, if the ball lies still by then.
-        if self.touching
-            && let Some(last) = self.motion.contacts.last_mut()
-        {
-            last.kind = Kind::Rest;
-        }
         Ok(())
     }
 
-    /// One step of a ball that nothing holds: semi-implicit, the losses implicit in speed.
+    /// One step of a body that nothing holds: semi-implicit, the losses implicit in speed.
     fn fall(&mut self) -> Result<()> {
-        let (dt, mass) = (self.inner_ms, self.scene.ball.mass_g);
+        let (dt, mass) = (self.inner_ms, self.mass());
+        let (tilt_sin, tilt_cos) = self.scene.slant_deg.to_radians().sin_cos();
         // N/g is mm/ms^2.
         let (elastic, loss) = self.foam(self.depth);
-        let mut speed = (self.speed + dt * (GRAVITY - elastic / mass)) / (1.0 + dt * loss / mass);
+        let gravity = GRAVITY * tilt_cos;
+        let mut speed = (self.speed + dt * (gravity - elastic / mass)) / (1.0 + dt * loss / mass);
         if elastic + loss * speed <= 0.0 {
-            speed = self.speed + dt * GRAVITY;
+            speed = self.speed + dt * gravity;
         }
         let depth = self.depth + dt * speed;
-        if depth >= self.scene.foam.floor_mm() {
+        if depth >= self.push.floor_mm() {
             return Err(Error::Scene(format!(
                 "the ball bottoms out: {:.0} g at {:.2} m/s crush {} mm of foam at {} kPa; drop it from lower, or take stiffer foam",
                 mass, speed, self.scene.foam.thickness_mm, self.scene.foam.modulus_kpa
             )));
         }
-        let kind = if self.motion.contacts.is_empty() { Kind::First } else { Kind::Bounce };
+        let kind = if self.contacts.is_empty() { Kind::First } else { Kind::Bounce };
+        let (down_y, down_x) = self.scene.downhill_deg.to_radians().sin_cos();
+        self.along[0] += dt * GRAVITY * tilt_sin * down_x;
+        self.along[1] += dt * GRAVITY * tilt_sin * down_y;
+        self.rub(dt * self.raw.max(0.0) / mass);
         self.arrive(depth, speed, kind);
         Ok(())
     }
 
-    /// Moves the ball by hand from one depth to another at a speed in mm/ms; where both are one, holds it for `pace` ms.
+    /// Friction, where the normal force changes speed by `push` in this step: of sliding, as much as stops the slip at
+    /// most, then of rolling.
+    fn rub(&mut self, push: f64) {
+        if push <= 0.0 {
+            return;
+        }
+        let (first, second, axis_deg) = self.body.shape.turns();
+        let turns = [first, second];
+        let by_axis = |v: [f64; 2]| <[f64; 2]>::from(turned(v[0], v[1], axis_deg));
+        let (along, turning) = (by_axis(self.along), by_axis(self.turning));
+        let stop: [f64; 2] = std::array::from_fn(|k| -(along[k] + turning[k]) / (1.0 + turns[k]));
+        let size = stop[0].hypot(stop[1]);
+        let share = if size > self.body.friction * push { self.body.friction * push / size } else { 1.0 };
+        let mut along: [f64; 2] = std::array::from_fn(|k| along[k] + share * stop[k]);
+        let mut turning: [f64; 2] = std::array::from_fn(|k| turning[k] + share * turns[k] * stop[k]);
+        let speed = along[0].hypot(along[1]);
+        if first + second > 0.0 && speed > 0.0 {
+            let left = (1.0 - self.body.rolling_friction * push / speed).max(0.0);
+            along = along.map(|v| v * left);
+            turning = turning.map(|v| v * left);
+        }
+        let back = |v: [f64; 2]| <[f64; 2]>::from(turned(v[0], v[1], -axis_deg));
+        (self.along, self.turning) = (back(along), back(turning));
+    }
+
+    /// Moves the body by hand from one depth to another at a speed in mm/ms; where both are one, holds it for `pace` ms.
     fn hand(&mut self, from: f64, to: f64, pace: f64, kind: Kind) {
         let ms = if from == to { pace } else { (to - from).abs() / pace };
         let steps = (ms / self.inner_ms).round().max(1.0) as u64;
@@ -210,7 +420,7 @@ impl<'a> Player<'a> {
 
     /// Elastic force at a depth, N, and loss for each mm/ms of speed, N ms/mm.
     fn foam(&self, depth: f64) -> (f64, f64) {
-        let (elastic, stiffness) = self.scene.foam.force(self.scene.ball.radius_mm, depth);
+        let (elastic, stiffness) = self.push.force(depth);
         (elastic, self.scene.foam.damping_s_m * elastic + self.scene.foam.dashpot_ms * stiffness)
     }
 
@@ -226,16 +436,18 @@ impl<'a> Player<'a> {
             let at = us(self.inner_ms) * (f64::from(self.now) + share);
             if touching {
                 let (start_us, stop_us) = (at, f64::INFINITY);
-                self.motion.contacts.push(Contact { kind, start_us, stop_us, speed_m_s: speed, peak_n: 0.0 });
-            } else if let Some(contact) = self.motion.contacts.last_mut() {
+                self.contacts.push(Contact { kind, start_us, stop_us, speed_m_s: speed, peak_n: 0.0 });
+            } else if let Some(contact) = self.contacts.last_mut() {
                 contact.stop_us = at;
             }
         }
-        if touching && let Some(contact) = self.motion.contacts.last_mut() {
+        if touching && let Some(contact) = self.contacts.last_mut() {
             contact.peak_n = contact.peak_n.max(raw);
         }
         (self.depth, self.speed, self.raw, self.touching) =
             (depth, speed, if depth > 0.0 { raw } else { 0.0 }, touching);
+        self.place[0] += self.inner_ms * self.along[0];
+        self.place[1] += self.inner_ms * self.along[1];
         self.now += 1;
         if self.now.is_multiple_of(INNER) {
             self.hand_out();
@@ -243,27 +455,47 @@ impl<'a> Player<'a> {
     }
 }
 
+/// The part of a velocity across an axis.
+fn only_across(velocity: [f64; 2], axis_deg: f64) -> [f64; 2] {
+    let (_, across) = turned(velocity[0], velocity[1], axis_deg);
+    turned(0.0, across, -axis_deg).into()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::{Ball, Foam, Press};
+    use super::super::{Foam, Shape};
     use super::*;
 
     const QUARTER_US: f64 = 48.0;
 
-    fn dropped(foam: Foam, radius_mm: f64, drop_mm: f64, after: u32) -> Scene {
-        Scene {
-            ball: Ball { radius_mm, mass_g: 36.0 },
-            foam,
+    fn body(shape: Shape, mass_g: f64, motion: Move) -> Body {
+        Body {
+            shape,
             x_mm: 80.0,
             y_mm: 80.0,
-            drop_mm,
-            lead_ms: 20.0,
-            ending: Ending::Caught {
-                after,
-                press: Press { peak_n: 1.0, speed_mm_s: 50.0, hold_ms: 100.0, wait_ms: 50.0 },
-            },
-            tail_ms: 20.0,
+            mass_g: Some(mass_g),
+            material: None,
+            stiffness_n_mm: None,
+            friction: 0.6,
+            rolling_friction: 0.0,
+            after_ms: 0.0,
+            motion,
         }
+    }
+
+    fn alone(surface: Surface, foam: Foam, body: Body) -> Scene {
+        let bodies = vec![body];
+        Scene { surface, foam, bodies, slant_deg: 0.0, downhill_deg: 0.0, lead_ms: 20.0, tail_ms: 20.0 }
+    }
+
+    fn dropped(foam: Foam, radius_mm: f64, height_mm: f64, after: u32) -> Scene {
+        let press = Press { peak_n: Some(1.0), depth_mm: None, speed_mm_s: 50.0, hold_ms: 100.0, wait_ms: 50.0 };
+        let motion = Move::Dropped { height_mm, ending: Ending::Caught { after, press } };
+        alone(Surface::Columns, foam, body(Shape::Sphere { radius_mm }, 36.0, motion))
+    }
+
+    fn play(scene: &Scene, step_us: f64) -> Result<Motion> {
+        Motion::of(scene, &Array::thesis(), step_us)
     }
 
     fn undamped() -> Foam {
@@ -272,7 +504,7 @@ mod tests {
 
     #[test]
     fn without_losses_the_ball_comes_back_as_fast_as_it_fell() {
-        let motion = Motion::of(&dropped(undamped(), 30.0, 120.0, 3), QUARTER_US).unwrap();
+        let motion = play(&dropped(undamped(), 30.0, 120.0, 3), QUARTER_US).unwrap();
         let speeds: Vec<f64> = motion.contacts[..3].iter().map(|c| c.speed_m_s).collect();
         let fallen = (2.0 * GRAVITY * 120.0_f64).sqrt();
         for speed in speeds {
@@ -286,7 +518,7 @@ mod tests {
         for (chi, low, high) in [(0.25, 0.72, 0.81), (0.5, 0.56, 0.66), (1.0, 0.37, 0.47)] {
             for (radius, drop, modulus) in [(25.0, 100.0, 60.0), (35.0, 200.0, 60.0), (30.0, 150.0, 100.0)] {
                 let foam = Foam { damping_s_m: chi, dashpot_ms: 0.0, modulus_kpa: modulus, ..Foam::default() };
-                let motion = Motion::of(&dropped(foam, radius, drop, 2), QUARTER_US).unwrap();
+                let motion = play(&dropped(foam, radius, drop, 2), QUARTER_US).unwrap();
                 let ratio = motion.contacts[1].speed_m_s / motion.contacts[0].speed_m_s;
                 assert!((low..=high).contains(&ratio), "chi {chi}, R {radius}: {ratio}");
             }
@@ -298,10 +530,10 @@ mod tests {
         // E 60 kPa, 36 g: contact 14 to 19 ms, depth 7.2 to 9.8 of 10 mm, peak 12 N to 70 where the solid is pressed.
         for (radius, drop) in [(25.0, 100.0), (25.0, 200.0), (35.0, 100.0), (35.0, 200.0)] {
             let foam = Foam { dashpot_ms: 0.0, ..Foam::default() };
-            let motion = Motion::of(&dropped(foam, radius, drop, 2), QUARTER_US).unwrap();
+            let motion = play(&dropped(foam, radius, drop, 2), QUARTER_US).unwrap();
             let first = &motion.contacts[0];
             let ms = 1e-3 * (first.stop_us - first.start_us);
-            let deepest = motion.depth_mm.iter().fold(0.0_f32, |a, b| a.max(*b));
+            let deepest = motion.tracks[0].depth_mm.iter().fold(0.0_f32, |a, b| a.max(*b));
             assert!((13.0..19.5).contains(&ms), "{ms} ms");
             assert!((7.2..9.8).contains(&deepest), "{deepest} mm");
             assert!((11.0..75.0).contains(&first.peak_n), "{} N", first.peak_n);
@@ -311,7 +543,7 @@ mod tests {
     #[test]
     fn truth_does_not_hang_on_the_step() {
         let scene = dropped(Foam::default(), 28.0, 150.0, 4);
-        let (coarse, fine) = (Motion::of(&scene, 48.0).unwrap(), Motion::of(&scene, 6.0).unwrap());
+        let (coarse, fine) = (play(&scene, 48.0).unwrap(), play(&scene, 6.0).unwrap());
         for (a, b) in coarse.contacts.iter().zip(&fine.contacts).take(2) {
             assert!((a.start_us - b.start_us).abs() < 40.0 && (a.stop_us - b.stop_us).abs() < 40.0, "{a:?} {b:?}");
         }
@@ -321,9 +553,9 @@ mod tests {
 
     #[test]
     fn force_is_zero_outside_touches_and_only_there() {
-        let motion = Motion::of(&dropped(Foam::default(), 30.0, 150.0, 3), QUARTER_US).unwrap();
+        let motion = play(&dropped(Foam::default(), 30.0, 150.0, 3), QUARTER_US).unwrap();
         assert_eq!(motion.contacts.iter().filter(|c| c.kind == Kind::Hand).count(), 1);
-        for (k, force) in motion.force_n.iter().enumerate() {
+        for (k, force) in motion.tracks[0].force_n.iter().enumerate() {
             let at = k as f64 * QUARTER_US;
             let inside = motion.contacts.iter().any(|c| c.start_us < at && at < c.stop_us);
             assert_eq!(*force > 0.0, inside, "at {at} us: {force} N");
@@ -332,27 +564,30 @@ mod tests {
 
     #[test]
     fn the_dashpot_frees_the_ball_before_it_is_out_of_the_foam() {
-        let motion = Motion::of(&dropped(Foam::default(), 30.0, 150.0, 2), QUARTER_US).unwrap();
+        let motion = play(&dropped(Foam::default(), 30.0, 150.0, 2), QUARTER_US).unwrap();
         let left = (motion.contacts[0].stop_us / QUARTER_US) as usize;
-        assert!(motion.depth_mm[left] > 0.2, "{}", motion.depth_mm[left]);
+        assert!(motion.tracks[0].depth_mm[left] > 0.2, "{}", motion.tracks[0].depth_mm[left]);
     }
 
     #[test]
     fn a_ball_left_alone_comes_to_rest_at_its_weight() {
-        let scene = Scene {
-            ending: Ending::LeftToRest { rest_ms: 1500.0, lift_mm_s: 50.0 },
-            ..dropped(Foam::default(), 30.0, 120.0, 2)
-        };
-        let motion = Motion::of(&scene, QUARTER_US).unwrap();
+        let ending = Ending::LeftToRest { rest_ms: 1500.0, lift_mm_s: 50.0 };
+        let mut scene = dropped(Foam::default(), 30.0, 120.0, 2);
+        scene.bodies[0].motion = Move::Dropped { height_mm: 120.0, ending };
+        let motion = play(&scene, QUARTER_US).unwrap();
         let last = motion.contacts.last().unwrap();
         assert_eq!(last.kind, Kind::Rest);
         let still = ((20.0 + 1400.0) * 1e3 / QUARTER_US) as usize;
-        assert!((f64::from(motion.force_n[still]) - 36.0 * GRAVITY).abs() < 2e-3, "{} N", motion.force_n[still]);
+        assert!(
+            (f64::from(motion.tracks[0].force_n[still]) - 36.0 * GRAVITY).abs() < 2e-3,
+            "{} N",
+            motion.tracks[0].force_n[still]
+        );
     }
 
     #[test]
     fn a_press_reaches_its_force() {
-        let motion = Motion::of(&dropped(Foam::default(), 30.0, 120.0, 2), QUARTER_US).unwrap();
+        let motion = play(&dropped(Foam::default(), 30.0, 120.0, 2), QUARTER_US).unwrap();
         let hand = motion.contacts.last().unwrap();
         assert!((1.0..1.3).contains(&hand.peak_n), "{}", hand.peak_n);
         assert!((hand.speed_m_s - 0.05).abs() < 1e-3);
@@ -361,11 +596,117 @@ mod tests {
     #[test]
     fn what_cannot_be_played_is_said() {
         let soft = Foam { modulus_kpa: 5.0, ..Foam::default() };
-        let text = Motion::of(&dropped(soft, 30.0, 400.0, 2), QUARTER_US).unwrap_err().to_string();
+        let text = play(&dropped(soft, 30.0, 400.0, 2), QUARTER_US).unwrap_err().to_string();
         assert!(text.contains("bottoms out"), "{text}");
         let tired = Foam { damping_s_m: 5.0, ..Foam::default() };
-        let text = Motion::of(&dropped(tired, 30.0, 100.0, 9), QUARTER_US).unwrap_err().to_string();
+        let text = play(&dropped(tired, 30.0, 100.0, 9), QUARTER_US).unwrap_err().to_string();
         assert!(text.contains("comes to rest"), "{text}");
-        assert!(Motion::of(&dropped(Foam::default(), 30.0, 100.0, 2), f64::NAN).is_err());
+        assert!(play(&dropped(Foam::default(), 30.0, 100.0, 2), f64::NAN).is_err());
+    }
+
+    fn ball(motion: Move) -> Body {
+        body(Shape::Sphere { radius_mm: 20.0 }, 36.0, motion)
+    }
+
+    fn along(for_ms: f64) -> Along {
+        Along { speed_mm_s: 60.0, toward_deg: 30.0, for_ms, press_n: None }
+    }
+
+    /// Speed along the foam so long after the scene's start, over 5 ms, mm/s.
+    fn speed_at(scene: &Scene, ms: f64) -> f64 {
+        let motion = play(scene, QUARTER_US).unwrap();
+        let track = &motion.tracks[0];
+        let end = (ms * 1e3 / QUARTER_US) as usize;
+        let moved = |v: &[f32]| f64::from(v[end] - v[end - 100]);
+        1e3 * moved(&track.x_mm).hypot(moved(&track.y_mm)) / (0.1 * QUARTER_US)
+    }
+
+    #[test]
+    fn a_ball_that_slides_ends_rolling_at_five_sevenths_of_its_speed() {
+        // Whatever the friction: angular momentum about the point of contact is kept.
+        for friction in [0.1, 0.6] {
+            let mut scene = alone(Surface::Columns, Foam::default(), ball(Move::Slid(along(400.0))));
+            scene.surface = Surface::Layer;
+            scene.bodies[0].friction = friction;
+            let speed = speed_at(&scene, 365.0);
+            assert!((speed / 60.0 - 5.0 / 7.0).abs() < 2e-3, "{friction}: {speed} mm/s");
+        }
+    }
+
+    #[test]
+    fn a_block_that_slides_stops_where_coulomb_says() {
+        let flat = Shape::HeightMap { heights_mm: vec![vec![0.0; 2]; 2], pitch_mm: 20.0 };
+        let mut scene = alone(Surface::Layer, Foam::default(), body(flat, 80.0, Move::Slid(along(200.0))));
+        scene.bodies[0].friction = 0.3;
+        let motion = play(&scene, QUARTER_US).unwrap();
+        let track = &motion.tracks[0];
+        let moved = |v: &[f32]| f64::from(v[v.len() - 1] - v[0]);
+        let way = moved(&track.x_mm).hypot(moved(&track.y_mm));
+        let coulomb = 0.06_f64.powi(2) / (2.0 * 0.3 * GRAVITY);
+        assert!((way / coulomb - 1.0).abs() < 0.03, "{way} mm, {coulomb}");
+        assert!((moved(&track.y_mm) / moved(&track.x_mm) - 30f64.to_radians().tan()).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_ball_rolls_down_a_slant_at_five_sevenths_of_gravity_and_slides_down_a_slippery_one() {
+        for (friction, share) in [(0.6, 5.0 / 7.0), (0.0, 1.0)] {
+            let mut scene =
+                alone(Surface::Layer, Foam::default(), ball(Move::Rolled(Along { speed_mm_s: 1.0, ..along(300.0) })));
+            (scene.slant_deg, scene.downhill_deg, scene.bodies[0].friction) = (5.0, 30.0, friction);
+            let speed = speed_at(&scene, 350.0) - speed_at(&scene, 150.0);
+            let expected = 1e3 * share * GRAVITY * 5f64.to_radians().sin() * 200.0;
+            assert!((speed / expected - 1.0).abs() < 0.01, "{friction}: {speed} of {expected} mm/s");
+        }
+    }
+
+    #[test]
+    fn a_cylinder_rolls_across_its_axis_and_slides_along_it() {
+        let shape = Shape::Cylinder { radius_mm: 15.0, length_mm: 30.0, axis_deg: 120.0 };
+        let scene = |toward_deg| {
+            let along = Along { toward_deg, ..along(120.0) };
+            alone(Surface::Layer, Foam::default(), body(shape.clone(), 60.0, Move::Rolled(along)))
+        };
+        assert!((speed_at(&scene(30.0), 165.0) / 60.0 - 1.0).abs() < 1e-3, "{}", speed_at(&scene(30.0), 165.0));
+        assert!(speed_at(&scene(120.0), 165.0) < 0.1);
+    }
+
+    #[test]
+    fn a_fall_on_a_slant_meets_it_where_it_should() {
+        let mut scene =
+            alone(Surface::Layer, Foam::default(), ball(Move::Dropped { height_mm: 100.0, ending: Ending::default() }));
+        (scene.slant_deg, scene.downhill_deg) = (25.0, 90.0);
+        let motion = play(&scene, QUARTER_US).unwrap();
+        let first = &motion.contacts[0];
+        assert!((first.start_us - 20e3 - 1e3 * (2.0 * 100.0 / GRAVITY).sqrt()).abs() < 300.0, "{first:?}");
+        let normal = (2.0 * GRAVITY * 100.0).sqrt() * 25f64.to_radians().cos();
+        assert!((first.speed_m_s / normal - 1.0).abs() < 5e-3, "{first:?}");
+        let k = (first.start_us / QUARTER_US) as usize;
+        assert!((motion.tracks[0].y_mm[k] - 80.0).abs() < 0.5 && (motion.tracks[0].x_mm[k] - 80.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_ball_that_gives_is_off_sooner_and_without_bottoming_out() {
+        // A tennis ball: 56 g from 0.6 m. A rigid one would press the solid.
+        let motion = Move::Dropped { height_mm: 600.0, ending: Ending::LeftToRest { rest_ms: 420.0, lift_mm_s: 50.0 } };
+        let mut scene = alone(Surface::Layer, Foam::default(), body(Shape::Sphere { radius_mm: 33.0 }, 56.0, motion));
+        let rigid = play(&scene, QUARTER_US).unwrap().contacts[0].peak_n;
+        scene.bodies[0].stiffness_n_mm = Some(25.0);
+        let motion = play(&scene, QUARTER_US).unwrap();
+        let first = &motion.contacts[0];
+        let ms = 1e-3 * (first.stop_us - first.start_us);
+        assert!((4.0..16.0).contains(&ms) && first.peak_n < 0.8 * rigid, "{first:?}, rigid {rigid} N");
+        assert!(motion.tracks[0].depth_mm.iter().all(|d| *d <= 10.0));
+    }
+
+    #[test]
+    fn columns_and_layer_agree_where_columns_are_allowed() {
+        let columns = dropped(Foam::default(), 30.0, 120.0, 2);
+        let layer = Scene { surface: Surface::Layer, ..columns.clone() };
+        let (a, b) = (play(&columns, QUARTER_US).unwrap(), play(&layer, QUARTER_US).unwrap());
+        assert_eq!(a.contacts.len(), b.contacts.len(), "{:?} {:?}", a.contacts, b.contacts);
+        let long = |c: &Contact| c.stop_us - c.start_us;
+        for (a, b) in a.contacts.iter().zip(&b.contacts).take(2) {
+            assert!((long(a) / long(b) - 1.0).abs() < 0.1 && (a.peak_n / b.peak_n - 1.0).abs() < 0.25, "{a:?} {b:?}");
+        }
     }
 }

@@ -1,88 +1,64 @@
-//! What happens to the ball, drawn by a seed.
+//! What happens on the array: as it is written, or drawn by a seed.
 
 use rand::Rng;
 use rand::SeedableRng;
 use rand::rngs::StdRng;
 use serde::{Deserialize, Serialize};
 
-use super::Foam;
-use crate::allowed::is_above_0;
+use super::body::WAIT;
+use super::{Body, Ending, Foam, Move, Press, Shape, within};
+use crate::allowed::Range;
 use crate::{Array, Error, Result};
 
 /// How far from the array's edge drawn scenes stay, mm: within it the layer's influence would be cut off.
 const MARGIN_MM: f64 = 36.0;
 
-/// A rigid ball.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Ball {
-    /// mm.
-    pub radius_mm: f64,
-    /// g.
-    pub mass_g: f64,
-}
-
-/// A press by hand.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Press {
-    /// Force while held, N.
-    pub peak_n: f64,
-    /// How fast the hand goes down and up, mm/s.
-    pub speed_mm_s: f64,
-    /// How long it holds, ms.
-    pub hold_ms: f64,
-    /// Between the catch and the press, ms.
-    pub wait_ms: f64,
-}
-
-/// What becomes of the ball.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// How what lies under bodies is reckoned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Ending {
-    /// A hand catches it at the top of its flight after so many impacts, presses it into the foam and lifts it.
-    Caught {
-        /// Impacts before the catch, the first one counted.
-        after: u32,
-        /// What the hand does then.
-        press: Press,
-    },
-    /// Nobody catches it; a hand lifts it after a while.
-    LeftToRest {
-        /// From the drop to the lift, ms.
-        rest_ms: f64,
-        /// How fast the hand lifts, mm/s.
-        lift_mm_s: f64,
-    },
+pub enum Surface {
+    /// Foam bonded to the board: any bodies.
+    #[default]
+    Layer,
+    /// Independent columns, smoothed by the layer and tabulated: the fastest. One ball that moves straight up and down on
+    /// foam whose Poisson ratio is 0.1 at most.
+    Columns,
 }
 
-/// A ball dropped on the array, and what becomes of it.
+/// Bodies over the array, the foam that they touch, and what becomes of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// The ball.
-    pub ball: Ball,
-    /// The foam that it falls on.
+    /// How what lies under them is reckoned.
+    #[serde(default)]
+    pub surface: Surface,
+    /// The foam on the array.
+    #[serde(default)]
     pub foam: Foam,
-    /// Where, mm to the right of the first taxel.
-    pub x_mm: f64,
-    /// Where, mm below the first taxel.
-    pub y_mm: f64,
-    /// From how high above the foam, mm.
-    pub drop_mm: f64,
-    /// Before it is let go, ms.
+    /// The bodies; where several lie over a taxel, the lowest one touches.
+    pub bodies: Vec<Body>,
+    /// How far the array is tilted, degrees: what falls on it falls by its slant.
+    #[serde(default)]
+    pub slant_deg: f64,
+    /// Which way is downhill: from the rows' direction (x) towards the columns' (y), degrees.
+    #[serde(default)]
+    pub downhill_deg: f64,
+    /// Before anything happens, ms.
+    #[serde(default)]
     pub lead_ms: f64,
-    /// What becomes of it.
-    pub ending: Ending,
     /// After all is over, ms.
+    #[serde(default)]
     pub tail_ms: f64,
 }
 
-pub(super) fn check_radius(radius_mm: f64, foam: &Foam) -> Result<()> {
-    if !(radius_mm.is_finite() && radius_mm > foam.thickness_mm && radius_mm <= 60.0) {
-        let thick = foam.thickness_mm;
-        return Err(Error::Scene(format!(
-            "ball: radius_mm is {radius_mm}: must be above {thick} (the foam), at most 60"
-        )));
-    }
-    Ok(())
+/// Foam widens when it is pressed; columns do not, and up to here that hardly shows.
+const WIDENS: f64 = 0.1;
+
+pub(super) fn columns_take_one_ball() -> Error {
+    Error::Scene(format!(
+        "surface is \"columns\": must be \"layer\" for all but one sphere, thicker than the foam, that moves straight up and \
+         down on foam with poisson up to {WIDENS}"
+    ))
 }
 
 impl Scene {
@@ -107,77 +83,69 @@ impl Scene {
                 array.rows, array.columns, array.pitch_mm
             )));
         }
-        let ball = Ball { radius_mm: between(25.0, 35.0), mass_g: 36.0 };
+        let shape = Shape::Sphere { radius_mm: between(25.0, 35.0) };
         let foam = Foam { modulus_kpa: between(50.0, 75.0), damping_s_m: between(0.1, 0.3), ..Foam::default() };
         let (x_mm, y_mm) = (MARGIN_MM + between(0.0, width), MARGIN_MM + between(0.0, height));
-        let (drop_mm, lead_ms) = (between(100.0, 200.0), between(50.0, 250.0));
+        let (height_mm, lead_ms) = (between(100.0, 200.0), between(50.0, 250.0));
         let ending = if left_to_rest {
             Ending::LeftToRest { rest_ms: between(1_500.0, 2_500.0), lift_mm_s: between(20.0, 100.0) }
         } else {
             Ending::Caught {
                 after: between(2.0, 4.999) as u32,
                 press: Press {
-                    peak_n: between(0.2_f64.ln(), 5.0_f64.ln()).exp(),
+                    peak_n: Some(between(0.2_f64.ln(), 5.0_f64.ln()).exp()),
+                    depth_mm: None,
                     speed_mm_s: between(20.0, 100.0),
                     hold_ms: between(100.0, 300.0),
                     wait_ms: between(100.0, 250.0),
                 },
             }
         };
-        Ok(Self { ball, foam, x_mm, y_mm, drop_mm, lead_ms, ending, tail_ms: 150.0 })
+        let body = Body {
+            shape,
+            x_mm,
+            y_mm,
+            mass_g: Some(36.0),
+            material: None,
+            stiffness_n_mm: None,
+            friction: 0.6,
+            rolling_friction: 0.03,
+            after_ms: 0.0,
+            motion: Move::Dropped { height_mm, ending },
+        };
+        let (surface, bodies) = (Surface::Columns, vec![body]);
+        Ok(Self { surface, foam, bodies, slant_deg: 0.0, downhill_deg: 0.0, lead_ms, tail_ms: 150.0 })
     }
 
-    /// Checks that the scene can be played.
+    /// Checks that the scene can be played on an array.
     ///
     /// # Errors
     ///
     /// `Scene`, naming the parameter.
-    pub fn check(&self) -> Result<()> {
+    pub fn check(&self, array: &Array) -> Result<()> {
         self.foam.check()?;
-        check_radius(self.ball.radius_mm, &self.foam)?;
-        let waits = |x: f64| (0.0..=60_000.0).contains(&x);
-        let wrong =
-            |name: &str, value: f64, right: &str| Err(Error::Scene(format!("scene: {name} is {value}: {right}")));
-        if !is_above_0(self.ball.mass_g) {
-            return wrong("mass_g", self.ball.mass_g, "must be above 0");
+        within("scene", "lead_ms", self.lead_ms, "ms", WAIT)?;
+        within("scene", "tail_ms", self.tail_ms, "ms", WAIT)?;
+        within("scene", "slant_deg", self.slant_deg, "degrees", Range::within(0.0, 80.0))?;
+        within("scene", "downhill_deg", self.downhill_deg, "degrees", Range::FINITE)?;
+        if self.bodies.is_empty() {
+            return Err(Error::Scene("scene: bodies is empty: must be one or more".to_owned()));
         }
-        if !(is_above_0(self.drop_mm) && self.drop_mm <= 2_000.0) {
-            return wrong("drop_mm", self.drop_mm, "must be above 0, at most 2000");
+        for (n, body) in self.bodies.iter().enumerate() {
+            let place = format!("bodies[{n}]");
+            body.check(&place)?;
+            let last = |count: u16| Range::within(0.0, f64::from(count - 1) * array.pitch_mm);
+            let off = |error: Error| Error::Scene(format!("{error} (the body is off the array)"));
+            within(&place, "x_mm", body.x_mm, "mm", last(array.columns)).map_err(off)?;
+            within(&place, "y_mm", body.y_mm, "mm", last(array.rows)).map_err(off)?;
         }
-        for (name, place) in [("x_mm", self.x_mm), ("y_mm", self.y_mm)] {
-            if !place.is_finite() {
-                return wrong(name, place, "must be finite");
-            }
-        }
-        for (name, ms) in [("lead_ms", self.lead_ms), ("tail_ms", self.tail_ms)] {
-            if !waits(ms) {
-                return wrong(name, ms, "must be 0 to 60000");
-            }
-        }
-        match &self.ending {
-            Ending::Caught { after, press } => {
-                if *after == 0 {
-                    return wrong("after", 0.0, "must be 1 impact or more");
-                }
-                if !(is_above_0(press.peak_n) && press.peak_n <= 100.0) {
-                    return wrong("peak_n", press.peak_n, "must be above 0, at most 100");
-                }
-                if !(press.speed_mm_s >= 1.0 && press.speed_mm_s <= 2_000.0) {
-                    return wrong("speed_mm_s", press.speed_mm_s, "must be 1 to 2000");
-                }
-                for (name, ms) in [("hold_ms", press.hold_ms), ("wait_ms", press.wait_ms)] {
-                    if !waits(ms) {
-                        return wrong(name, ms, "must be 0 to 60000");
-                    }
-                }
-            }
-            Ending::LeftToRest { rest_ms, lift_mm_s } => {
-                if !waits(*rest_ms) {
-                    return wrong("rest_ms", *rest_ms, "must be 0 to 60000");
-                }
-                if !(*lift_mm_s >= 1.0 && *lift_mm_s <= 2_000.0) {
-                    return wrong("lift_mm_s", *lift_mm_s, "must be 1 to 2000");
-                }
+        if self.surface == Surface::Columns {
+            let [Body { shape: Shape::Sphere { radius_mm }, motion, .. }] = self.bodies.as_slice() else {
+                return Err(columns_take_one_ball());
+            };
+            let straight = matches!(motion, Move::Dropped { .. } | Move::Pressed(_)) && self.slant_deg == 0.0;
+            if !straight || self.foam.poisson > WIDENS || *radius_mm <= self.foam.thickness_mm || *radius_mm > 60.0 {
+                return Err(columns_take_one_ball());
             }
         }
         Ok(())
@@ -204,7 +172,7 @@ mod tests {
             for dashpot_ms in [0.0, 0.3, 1.0] {
                 let mut scene = Scene::draw(&array, 11, index, index % 4 == 0).unwrap();
                 scene.foam.dashpot_ms = dashpot_ms;
-                let motion = super::super::Motion::of(&scene, 48.0).unwrap();
+                let motion = super::super::Motion::of(&scene, &array, 48.0).unwrap();
                 assert!(motion.contacts.iter().all(|c| c.stop_us.is_finite()));
             }
         }
@@ -213,10 +181,19 @@ mod tests {
     #[test]
     fn the_hardest_drop_does_not_bottom_out() {
         let mut scene = Scene::draw(&Array::thesis(), 1, 0, false).unwrap();
-        scene.ball.radius_mm = 25.0;
-        scene.drop_mm = 200.0;
+        scene.bodies[0].shape = Shape::Sphere { radius_mm: 25.0 };
+        if let Move::Dropped { height_mm, .. } = &mut scene.bodies[0].motion {
+            *height_mm = 200.0;
+        }
         scene.foam = Foam { modulus_kpa: 50.0, damping_s_m: 0.1, dashpot_ms: 0.0, ..Foam::default() };
-        super::super::Motion::of(&scene, 48.0).unwrap();
+        super::super::Motion::of(&scene, &Array::thesis(), 48.0).unwrap();
+    }
+
+    fn dropped(scene: &mut Scene) -> (&mut f64, &mut u32, &mut Press) {
+        match &mut scene.bodies[0].motion {
+            Move::Dropped { height_mm, ending: Ending::Caught { after, press } } => (height_mm, after, press),
+            other => panic!("{other:?}"),
+        }
     }
 
     type Spoil = fn(&mut Scene);
@@ -224,27 +201,28 @@ mod tests {
     #[test]
     fn each_nonsense_parameter_is_named() {
         let good = Scene::draw(&Array::thesis(), 1, 0, false).unwrap();
-        let wrong: [(&str, Spoil); 7] = [
-            ("radius_mm", |s| s.ball.radius_mm = 5.0),
-            ("mass_g", |s| s.ball.mass_g = 0.0),
-            ("drop_mm", |s| s.drop_mm = -1.0),
-            ("x_mm", |s| s.x_mm = f64::NAN),
+        good.check(&Array::thesis()).unwrap();
+        let wrong: [(&str, Spoil); 14] = [
+            ("radius_mm", |s| s.bodies[0].shape = Shape::Sphere { radius_mm: -5.0 }),
+            ("\"layer\"", |s| s.bodies[0].shape = Shape::Sphere { radius_mm: 5.0 }),
+            ("\"layer\"", |s| s.foam.poisson = 0.2),
+            ("\"layer\"", |s| s.slant_deg = 20.0),
+            ("\"layer\"", |s| s.bodies.push(s.bodies[0].clone())),
+            ("mass_g", |s| s.bodies[0].mass_g = Some(0.0)),
+            ("mass_g", |s| s.bodies[0].mass_g = None),
+            ("height_mm", |s| *dropped(s).0 = -1.0),
+            ("x_mm", |s| s.bodies[0].x_mm = f64::NAN),
+            ("off the array", |s| s.bodies[0].y_mm = 169.0),
             ("lead_ms", |s| s.lead_ms = -1.0),
-            ("after", |s| {
-                if let Ending::Caught { after, .. } = &mut s.ending {
-                    *after = 0
-                }
-            }),
-            ("peak_n", |s| {
-                if let Ending::Caught { press, .. } = &mut s.ending {
-                    press.peak_n = 0.0
-                }
-            }),
+            ("after", |s| *dropped(s).1 = 0),
+            ("peak_n", |s| dropped(s).2.peak_n = Some(0.0)),
+            ("depth_mm", |s| dropped(s).2.depth_mm = Some(1.0)),
         ];
         for (name, spoil) in wrong {
             let mut scene = good.clone();
             spoil(&mut scene);
-            assert!(scene.check().unwrap_err().to_string().contains(name), "{name}");
+            let text = scene.check(&Array::thesis()).unwrap_err().to_string();
+            assert!(text.contains(name), "{name}: {text}");
         }
         assert!(Scene::draw(&Array::new(8, 8, 2.67, "small").unwrap(), 1, 0, false).is_err());
     }

@@ -5,7 +5,8 @@ use rand::{Rng, RngCore, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
-use crate::allowed::{is_above_0, is_at_least_0};
+use super::within;
+use crate::allowed::Range;
 use crate::circuit::ramp::RAMP_END_V;
 use crate::circuit::{Fabric, Ramp, VirtualGround};
 use crate::{Error, Result};
@@ -64,25 +65,18 @@ impl Sensor {
     ///
     /// `Scene`, naming the parameter.
     pub fn check(&self) -> Result<()> {
-        for (name, value, right, sound) in [
-            (
-                "v_trans",
-                self.v_trans,
-                "must be above 0 and below 3 V",
-                is_above_0(self.v_trans) && self.v_trans < RAMP_END_V,
-            ),
-            ("feedback_kohm", self.feedback_kohm, "must be above 0", is_above_0(self.feedback_kohm)),
-            ("rest_us", self.rest_us, "must be 0 or more", is_at_least_0(self.rest_us)),
-            ("touch_us", self.touch_us, "must be above 0", is_above_0(self.touch_us)),
-            ("exponent", self.exponent, "must be from 0.5 to 1", (0.5..=1.0).contains(&self.exponent)),
-            ("side_mm", self.side_mm, "must be above 0", is_above_0(self.side_mm)),
-            ("gain_spread", self.gain_spread, "must be 0 or more", is_at_least_0(self.gain_spread)),
-            ("offset_mv", self.offset_mv, "must be 0 or more", is_at_least_0(self.offset_mv)),
-            ("noise_ticks", self.noise_ticks, "must be 0 or more", is_at_least_0(self.noise_ticks)),
+        for (name, value, unit, range) in [
+            ("v_trans", self.v_trans, "V", Range::ABOVE_0.below(RAMP_END_V)),
+            ("feedback_kohm", self.feedback_kohm, "kOhm", Range::ABOVE_0),
+            ("rest_us", self.rest_us, "uS", Range::FROM_0),
+            ("touch_us", self.touch_us, "uS", Range::ABOVE_0),
+            ("exponent", self.exponent, "", Range::within(0.5, 1.0)),
+            ("side_mm", self.side_mm, "mm", Range::ABOVE_0),
+            ("gain_spread", self.gain_spread, "", Range::FROM_0),
+            ("offset_mv", self.offset_mv, "mV", Range::FROM_0),
+            ("noise_ticks", self.noise_ticks, "ticks", Range::FROM_0),
         ] {
-            if !sound {
-                return Err(Error::Scene(format!("sensor: {name} is {value}: {right}")));
-            }
+            within("sensor", name, value, unit, range)?;
         }
         Ok(())
     }

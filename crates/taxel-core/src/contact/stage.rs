@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Contact, Footprint, Kind, Motion, Scene, Taxels};
+use super::bonded::MOST_SWEPT;
+use super::push::Sinking;
+use super::{Bonded, Contact, Footprint, Kind, Motion, Scene, Shape, Taxels, Track};
 use crate::spikes::us;
 use crate::{Array, Error, Result};
 
@@ -24,8 +26,8 @@ pub enum Act {
         /// ms.
         ms: f64,
     },
-    /// A ball is dropped.
-    Ball(Scene),
+    /// Bodies touch it.
+    Scene(Scene),
     /// Pictures are laid over it.
     Pictures(Pictures),
 }
@@ -82,7 +84,8 @@ struct Part {
 #[derive(Debug)]
 enum What {
     Silence,
-    Ball { motion: Motion, footprint: Footprint, reach: [Vec<Reached>; GROUPS], pressed: [bool; GROUPS] },
+    Columns { track: Track, footprint: Footprint, reach: [Vec<Reached>; GROUPS], pressed: [bool; GROUPS] },
+    Layer(Box<Felt>),
     Pictures { pictures: Pictures, count: usize },
 }
 
@@ -154,7 +157,8 @@ impl Stage {
         let mut force = Vec::with_capacity(self.frames());
         for part in &self.parts {
             match &part.what {
-                What::Ball { motion, .. } => force.extend((0..part.frames).map(|k| motion.force_n[GROUPS * k])),
+                What::Columns { track, .. } => force.extend((0..part.frames).map(|k| track.force_n[GROUPS * k])),
+                What::Layer(felt) => force.extend((0..part.frames).map(|k| felt.motion.force_n(GROUPS * k))),
                 What::Silence | What::Pictures { .. } => force.resize(force.len() + part.frames, 0.0),
             }
         }
@@ -179,18 +183,17 @@ impl Stage {
         let Some(part) = self.parts.get_mut(self.part) else { return Ok(false) };
         match &mut part.what {
             What::Silence => {}
-            What::Ball { motion, footprint, reach, pressed } => {
-                let lag = FABRIC_US / (self.frame_us / GROUPS as f64) - 0.5;
+            What::Columns { track, footprint, reach, pressed } => {
                 for group in 0..GROUPS {
-                    let place = ((GROUPS * self.frame + group) as f64 - lag).max(0.0);
-                    let (before, share) = ((place as usize).min(motion.force_n.len() - 2), place.fract() as f32);
+                    let place = place(self.frame, group, self.frame_us);
+                    let (before, share) = ((place as usize).min(track.force_n.len() - 2), place.fract() as f32);
                     let between = |v: &[f32]| v[before] + share * (v[before + 1] - v[before]);
-                    let force = between(&motion.force_n);
+                    let force = between(&track.force_n);
                     if force == 0.0 && !pressed[group] {
                         continue;
                     }
                     pressed[group] = force > 0.0;
-                    footprint.profile(f64::from(between(&motion.depth_mm)), &mut self.profile);
+                    footprint.profile(f64::from(between(&track.depth_mm)), &mut self.profile);
                     self.drive.clear();
                     self.drive.extend(self.profile.iter().map(|stress| self.taxels.drive(stress * force)));
                     for at in &reach[group] {
@@ -198,6 +201,12 @@ impl Stage {
                         let drive = self.drive[ring] + at.share * (self.drive[ring + 1] - self.drive[ring]);
                         self.clean[index] = self.taxels.ticks(index, drive);
                     }
+                }
+            }
+            What::Layer(felt) => {
+                for group in 0..GROUPS {
+                    let place = place(self.frame, group, self.frame_us);
+                    felt.show(group, place, &self.taxels, &mut self.clean);
                 }
             }
             What::Pictures { pictures, count } => {
@@ -219,6 +228,155 @@ impl Stage {
     }
 }
 
+/// When a group of lines is read that shows the touch of `GROUPS` steps a frame.
+fn place(frame: usize, group: usize, frame_us: f64) -> f64 {
+    let lag = FABRIC_US / (frame_us / GROUPS as f64) - 0.5;
+    ((GROUPS * frame + group) as f64 - lag).max(0.0)
+}
+
+/// One ball that moves straight up and down on columns.
+fn straight(scene: &Scene, track: Track, array: &Array) -> Result<What> {
+    let body = &scene.bodies[0];
+    let (x_mm, y_mm) = (body.x_mm, body.y_mm);
+    let Shape::Sphere { radius_mm } = body.shape else { return Err(super::scene::columns_take_one_ball()) };
+    let footprint = Footprint::new(&scene.foam, radius_mm)?;
+    let mut reach = [const { Vec::new() }; GROUPS];
+    for y in 0..array.rows {
+        for x in 0..array.columns {
+            let across = f64::from(x) * array.pitch_mm - x_mm;
+            let along = f64::from(y) * array.pitch_mm - y_mm;
+            if let Some((ring, share)) = Footprint::ring(across.hypot(along)) {
+                let group = GROUPS * usize::from(x) / usize::from(array.columns);
+                reach[group].push(Reached { index: array.index(x, y) as u32, ring: ring as u32, share });
+            }
+        }
+    }
+    Ok(What::Columns { track, footprint, reach, pressed: [false; GROUPS] })
+}
+
+/// Bodies on the bonded layer, as the taxels feel them.
+///
+/// The layer is solved at even steps, one a frame for a ball or two, fewer where more taxels are touched than sweeps
+/// solve in time; between them stress follows straight lines.
+#[derive(Debug)]
+struct Felt {
+    layer: Bonded,
+    shapes: Vec<Shape>,
+    motion: Motion,
+    sinking: Sinking,
+    /// From one solution to the next, in steps of the motion.
+    every: usize,
+    /// The latest solutions, by their number; the newest last.
+    solved: Vec<Solved>,
+    pressure: Vec<f64>,
+    pressed: [bool; GROUPS],
+    columns: usize,
+}
+
+#[derive(Debug, Default)]
+struct Solved {
+    number: usize,
+    touches: bool,
+    /// Stress at the base by taxel, MPa.
+    base: Vec<f32>,
+}
+
+/// So many frames lie between two solutions where a whole array is touched.
+const SELDOM: usize = 3;
+
+impl Felt {
+    fn new(scene: &Scene, layer: Bonded, motion: Motion, array: &Array) -> Self {
+        let shapes: Vec<Shape> = scene.bodies.iter().map(|body| body.shape.clone()).collect();
+        let mut felt = Self {
+            layer,
+            shapes,
+            motion,
+            sinking: Sinking::default(),
+            every: GROUPS,
+            solved: vec![],
+            pressure: vec![],
+            pressed: [false; GROUPS],
+            columns: usize::from(array.columns),
+        };
+        let most = (0..felt.motion.len()).step_by(50 * GROUPS).map(|k| felt.sink(k)).max().unwrap_or(0);
+        if most > MOST_SWEPT {
+            felt.every = SELDOM * GROUPS;
+        }
+        felt.layer.forget();
+        felt
+    }
+
+    /// Finds the cells that are touched after `k` steps; how many there are.
+    fn sink(&mut self, k: usize) -> usize {
+        let bodies: Vec<(&Shape, (f64, f64), f64)> = self
+            .shapes
+            .iter()
+            .zip(&self.motion.tracks)
+            .map(|(shape, track)| {
+                let depth = if track.force_n[k] > 0.0 { f64::from(track.depth_mm[k]) } else { 0.0 };
+                (shape, (f64::from(track.x_mm[k]), f64::from(track.y_mm[k])), depth)
+            })
+            .collect();
+        self.sinking.find(&self.layer, &bodies);
+        self.sinking.cells.len()
+    }
+
+    /// The solution of a number, solved where it is not known yet; the one after it may be asked for next.
+    fn solve(&mut self, number: usize) {
+        if self.solved.iter().any(|solved| solved.number == number) {
+            return;
+        }
+        let mut solved = if self.solved.len() < 3 { Solved::default() } else { self.solved.remove(0) };
+        let k = (number * self.every).min(self.motion.len() - 1);
+        solved.number = number;
+        solved.touches = self.sink(k) > 0;
+        if solved.touches {
+            // What is lost on the way raises the force above that of a body at rest.
+            let gain: Vec<f64> = (0..self.shapes.len())
+                .map(|n| {
+                    let track = &self.motion.tracks[n];
+                    let rest = self.motion.pushes[n].force_at_depth(f64::from(track.depth_mm[k]));
+                    if rest > 0.0 { f64::from(track.force_n[k]) / rest } else { 0.0 }
+                })
+                .collect();
+            self.pressure.clear();
+            let pressed = self.layer.press(&self.sinking.cells);
+            self.pressure.extend(pressed.iter().zip(&self.sinking.whose).map(|(p, n)| p * gain[*n as usize]));
+            self.layer.arrive(&self.sinking.cells, &self.pressure, &mut solved.base);
+        } else {
+            self.layer.forget();
+            solved.base.clear();
+            solved.base.resize(self.layer.taxels(), 0.0);
+        }
+        self.solved.push(solved);
+    }
+
+    /// Puts what a group of lines reads, `place` steps after the start, into `clean`.
+    fn show(&mut self, group: usize, place: f64, taxels: &Taxels, clean: &mut [f32]) {
+        let number = place as usize / self.every;
+        let share = (place / self.every as f64 - number as f64) as f32;
+        self.solve(number);
+        self.solve(number + 1);
+        let of = |number: usize| self.solved.iter().find(|solved| solved.number == number).expect("solved above");
+        let (now, next) = (of(number), of(number + 1));
+        if !now.touches && !next.touches && !self.pressed[group] {
+            return;
+        }
+        self.pressed[group] = now.touches || next.touches;
+        let edge = |group: usize| (group * self.columns).div_ceil(GROUPS);
+        let rows = clean.len() / self.columns;
+        for row in 0..rows {
+            for index in row * self.columns + edge(group)..row * self.columns + edge(group + 1) {
+                let stress = now.base[index] + share * (next.base[index] - now.base[index]);
+                clean[index] = taxels.ticks(index, if stress > FAINT_MPA { taxels.drive(stress) } else { 0.0 });
+            }
+        }
+    }
+}
+
+/// Stress that no taxel feels, MPa: a millionth of a newton on it, a hundred-thousandth of what the thesis could tell.
+const FAINT_MPA: f32 = 2e-7;
+
 fn part(array: &Array, frame_us: f64, act: &Act) -> Result<(Part, Vec<Contact>)> {
     match act {
         Act::Silence { ms } => {
@@ -227,26 +385,19 @@ fn part(array: &Array, frame_us: f64, act: &Act) -> Result<(Part, Vec<Contact>)>
             }
             Ok((Part { frames: (us(*ms) / frame_us).round() as usize, what: What::Silence }, vec![]))
         }
-        Act::Ball(scene) => {
-            let mut motion = Motion::of(scene, frame_us / GROUPS as f64)?;
-            if motion.force_n.len() < 2 {
+        Act::Scene(scene) => {
+            scene.check(array)?;
+            let mut layer = Motion::layer(scene, array)?;
+            let mut motion = Motion::on(scene, layer.as_mut(), frame_us / GROUPS as f64)?;
+            if motion.len() < 2 {
                 return Err(Error::Scene(format!("scene: shorter than a quarter of a frame, {frame_us} us")));
             }
-            let footprint = Footprint::new(&scene.foam, scene.ball.radius_mm)?;
-            let mut reach = [const { Vec::new() }; GROUPS];
-            for y in 0..array.rows {
-                for x in 0..array.columns {
-                    let across = f64::from(x) * array.pitch_mm - scene.x_mm;
-                    let along = f64::from(y) * array.pitch_mm - scene.y_mm;
-                    if let Some((ring, share)) = Footprint::ring(across.hypot(along)) {
-                        let group = GROUPS * usize::from(x) / usize::from(array.columns);
-                        reach[group].push(Reached { index: array.index(x, y) as u32, ring: ring as u32, share });
-                    }
-                }
-            }
-            let contacts = std::mem::take(&mut motion.contacts);
-            let frames = motion.force_n.len().div_ceil(GROUPS);
-            Ok((Part { frames, what: What::Ball { motion, footprint, reach, pressed: [false; GROUPS] } }, contacts))
+            let (contacts, frames) = (std::mem::take(&mut motion.contacts), motion.len().div_ceil(GROUPS));
+            let what = match layer {
+                Some(layer) => What::Layer(Box::new(Felt::new(scene, layer, motion, array))),
+                None => straight(scene, motion.tracks.swap_remove(0), array)?,
+            };
+            Ok((Part { frames, what }, contacts))
         }
         Act::Pictures(pictures) => {
             let size = array.len();
@@ -302,7 +453,7 @@ mod tests {
     }
 
     fn ball(index: u32) -> Act {
-        Act::Ball(Scene::draw(&Array::thesis(), 1, index, false).unwrap())
+        Act::Scene(Scene::draw(&Array::thesis(), 1, index, false).unwrap())
     }
 
     #[test]

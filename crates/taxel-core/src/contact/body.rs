@@ -1,0 +1,264 @@
+//! A body, and what becomes of it.
+
+use serde::{Deserialize, Serialize};
+
+use super::Shape;
+use super::within;
+use crate::allowed::Range;
+use crate::{Error, Result};
+
+/// What a body is made of: its weight where no mass is given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Material {
+    /// 7.85 g/cm^3.
+    Steel,
+    /// 2.5 g/cm^3.
+    Glass,
+    /// 1.2 g/cm^3, solid.
+    Rubber,
+    /// 1.05 g/cm^3, solid polystyrene.
+    Plastic,
+    /// 0.6 g/cm^3.
+    Wood,
+}
+
+impl Material {
+    fn grams_per_mm3(self) -> f64 {
+        1e-3 * match self {
+            Self::Steel => 7.85,
+            Self::Glass => 2.5,
+            Self::Rubber => 1.2,
+            Self::Plastic => 1.05,
+            Self::Wood => 0.6,
+        }
+    }
+}
+
+/// A body over the array.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Body {
+    /// What it looks like from below.
+    pub shape: Shape,
+    /// Where its middle first touches, mm right of the first taxel.
+    pub x_mm: f64,
+    /// Where, mm below the first taxel.
+    pub y_mm: f64,
+    /// g; of a solid body of `material` where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mass_g: Option<f64>,
+    /// What it is made of, where no mass is given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<Material>,
+    /// N/mm of a body that gives, as a hollow ball does; rigid where it is left out. A tennis ball has some 25.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stiffness_n_mm: Option<f64>,
+    /// Of sliding on the foam, as a share of the force. A guess.
+    #[serde(default = "sliding", skip_serializing_if = "is_sliding")]
+    pub friction: f64,
+    /// Of rolling, as a share of the force: what foam that rises late takes. A guess.
+    #[serde(default = "rolling", skip_serializing_if = "is_rolling")]
+    pub rolling_friction: f64,
+    /// How long after the scene's beginning its own begins, ms.
+    #[serde(default, skip_serializing_if = "is_at_once")]
+    pub after_ms: f64,
+    /// What it does.
+    pub motion: Move,
+}
+
+fn sliding() -> f64 {
+    0.6
+}
+
+fn rolling() -> f64 {
+    0.03
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_sliding(value: &f64) -> bool {
+    *value == sliding()
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_rolling(value: &f64) -> bool {
+    *value == rolling()
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_at_once(value: &f64) -> bool {
+    *value == 0.0
+}
+
+/// What a body does.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Move {
+    /// It falls, and bounces.
+    Dropped {
+        /// From how high above where it touches, mm.
+        height_mm: f64,
+        /// What becomes of it.
+        #[serde(default)]
+        ending: Ending,
+    },
+    /// A hand presses it into the foam and lifts it.
+    Pressed(Press),
+    /// It is set down and rolls.
+    Rolled(Along),
+    /// It is set down and slides; a round one begins to roll where friction makes it.
+    Slid(Along),
+}
+
+/// What becomes of a body that fell.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Ending {
+    /// A hand catches it at the top of its flight after so many impacts, presses it into the foam and lifts it.
+    Caught {
+        /// Impacts before the catch, the first one counted.
+        after: u32,
+        /// What the hand does then.
+        press: Press,
+    },
+    /// Nobody catches it; a hand lifts it after a while.
+    LeftToRest {
+        /// From the drop to the lift, ms.
+        rest_ms: f64,
+        /// How fast the hand lifts, mm/s.
+        lift_mm_s: f64,
+    },
+}
+
+impl Default for Ending {
+    fn default() -> Self {
+        Self::LeftToRest { rest_ms: 1_000.0, lift_mm_s: 50.0 }
+    }
+}
+
+/// A press by hand.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Press {
+    /// Force while held, N.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peak_n: Option<f64>,
+    /// Depth while held, mm: in place of the force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_mm: Option<f64>,
+    /// How fast the hand goes down and up, mm/s.
+    pub speed_mm_s: f64,
+    /// How long it holds, ms.
+    pub hold_ms: f64,
+    /// Before it, ms: between the catch and the press.
+    #[serde(default)]
+    pub wait_ms: f64,
+}
+
+/// A way along the foam.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Along {
+    /// How fast it begins, mm/s.
+    pub speed_mm_s: f64,
+    /// Which way: from the rows' direction (x) towards the columns' (y), degrees.
+    #[serde(default)]
+    pub toward_deg: f64,
+    /// For how long, ms; then a hand lifts it.
+    pub for_ms: f64,
+    /// A hand presses it with so many N and keeps its speed; where it is left out, it lies there by its weight, and
+    /// friction slows it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub press_n: Option<f64>,
+}
+
+impl Body {
+    /// Its mass, g, where that is known.
+    #[must_use]
+    pub fn mass_g(&self) -> Option<f64> {
+        self.mass_g.or_else(|| Some(self.material?.grams_per_mm3() * self.shape.volume_mm3()?))
+    }
+
+    /// Checks that it makes sense; `place` names it.
+    ///
+    /// # Errors
+    ///
+    /// `Scene`, naming the parameter.
+    pub fn check(&self, place: &str) -> Result<()> {
+        self.shape.check(&format!("{place}.shape"))?;
+        within(place, "x_mm", self.x_mm, "mm", Range::FINITE)?;
+        within(place, "y_mm", self.y_mm, "mm", Range::FINITE)?;
+        if let Some(mass) = self.mass_g {
+            within(place, "mass_g", mass, "g", Range::ABOVE_0)?;
+        }
+        if let Some(stiffness) = self.stiffness_n_mm {
+            within(place, "stiffness_n_mm", stiffness, "N/mm", Range::ABOVE_0)?;
+        }
+        within(place, "friction", self.friction, "", Range::within(0.0, 10.0))?;
+        within(place, "rolling_friction", self.rolling_friction, "", Range::within(0.0, 10.0))?;
+        within(place, "after_ms", self.after_ms, "ms", WAIT)?;
+        let moves = |name: &str| format!("{place}.motion.{name}");
+        match &self.motion {
+            Move::Dropped { height_mm, ending } => {
+                let place = moves("dropped");
+                within(&place, "height_mm", *height_mm, "mm", Range::ABOVE_0.at_most(2_000.0))?;
+                match ending {
+                    Ending::Caught { after, press } => {
+                        within(&place, "after", f64::from(*after), "impacts", Range::FROM_1)?;
+                        press.check(&place)?;
+                    }
+                    Ending::LeftToRest { rest_ms, lift_mm_s } => {
+                        within(&place, "rest_ms", *rest_ms, "ms", WAIT)?;
+                        within(&place, "lift_mm_s", *lift_mm_s, "mm/s", HAND)?;
+                    }
+                }
+            }
+            Move::Pressed(press) => press.check(&moves("pressed"))?,
+            Move::Rolled(along) => {
+                along.check(&moves("rolled"))?;
+                if self.shape.turns().0 + self.shape.turns().1 == 0.0 {
+                    return Err(Error::Scene(format!("{place}: only a sphere or a cylinder rolls; let it be slid")));
+                }
+            }
+            Move::Slid(along) => along.check(&moves("slid"))?,
+        }
+        let free = match &self.motion {
+            Move::Dropped { .. } => true,
+            Move::Rolled(along) | Move::Slid(along) => along.press_n.is_none(),
+            Move::Pressed(_) => false,
+        };
+        if free && self.mass_g().is_none() {
+            return Err(Error::Scene(format!(
+                "{place}: mass_g is missing: a body that moves freely needs one{}",
+                if self.shape.volume_mm3().is_some() { ", or a material" } else { "" }
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// Waits, ms, and speeds of a hand, mm/s.
+pub(super) const WAIT: Range = Range::within(0.0, 60_000.0);
+const HAND: Range = Range::within(1.0, 2_000.0);
+
+impl Press {
+    fn check(&self, place: &str) -> Result<()> {
+        match (self.peak_n, self.depth_mm) {
+            (Some(force), None) => within(place, "peak_n", force, "N", Range::ABOVE_0.at_most(2_000.0))?,
+            (None, Some(depth)) => within(place, "depth_mm", depth, "mm", Range::ABOVE_0)?,
+            _ => return Err(Error::Scene(format!("{place}: must have peak_n or depth_mm, and not both"))),
+        }
+        within(place, "speed_mm_s", self.speed_mm_s, "mm/s", HAND)?;
+        within(place, "hold_ms", self.hold_ms, "ms", WAIT)?;
+        within(place, "wait_ms", self.wait_ms, "ms", WAIT)
+    }
+}
+
+impl Along {
+    fn check(&self, place: &str) -> Result<()> {
+        within(place, "speed_mm_s", self.speed_mm_s, "mm/s", Range::within(1.0, 10_000.0))?;
+        within(place, "toward_deg", self.toward_deg, "degrees", Range::FINITE)?;
+        within(place, "for_ms", self.for_ms, "ms", WAIT)?;
+        self.press_n.map_or(Ok(()), |force| within(place, "press_n", force, "N", Range::ABOVE_0.at_most(2_000.0)))
+    }
+}

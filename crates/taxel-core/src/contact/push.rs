@@ -1,0 +1,214 @@
+//! How hard foam pushes back at a body that sinks straight in.
+
+use super::body::Body;
+use super::bonded::{Bonded, Cell};
+use super::{Foam, Shape};
+use crate::Result;
+
+/// Depths at which a table holds the force, evenly spaced in the square root of depth.
+const DEPTHS: usize = 160;
+/// Neighbours on each side over which the table is smoothed.
+const SMOOTH: usize = 2;
+/// Places within a cell (columns, rows) at which the force of a body is worked out: spread evenly, two in no row.
+const PLACES: [(f64, f64); 9] = [
+    (0.056, 0.5),
+    (0.167, 0.833),
+    (0.278, 0.167),
+    (0.389, 0.611),
+    (0.5, 0.944),
+    (0.611, 0.278),
+    (0.722, 0.722),
+    (0.833, 0.056),
+    (0.944, 0.389),
+];
+
+/// Elastic force by how far a body's middle has come down since it touched.
+///
+/// A body that gives (`stiffness_n_mm`) is a spring in series: it comes down by the foam's depth and what it is squeezed.
+#[derive(Debug, Clone)]
+pub enum Push {
+    /// A rigid ball on columns, in closed form.
+    Columns {
+        /// What it sinks into.
+        foam: Foam,
+        /// mm.
+        radius_mm: f64,
+    },
+    /// Any other, worked out once.
+    Table {
+        /// How far the body has come down, mm, its face's depth in the foam, mm, and force, N; all rise.
+        entries: Vec<[f64; 3]>,
+    },
+}
+
+impl Push {
+    /// The law of a body on `foam`; `layer` is that foam, bonded, where it is not taken for columns.
+    ///
+    /// # Errors
+    ///
+    /// `Scene` where foam and ball do not fit columns.
+    pub fn of(foam: &Foam, body: &Body, layer: Option<&mut Bonded>) -> Result<Self> {
+        let give = body.stiffness_n_mm.map_or(0.0, f64::recip);
+        let mut forces: Box<dyn FnMut(f64) -> f64> = match (layer, &body.shape) {
+            (None, Shape::Sphere { radius_mm }) => {
+                let (foam, radius_mm) = (foam.clone(), *radius_mm);
+                if give == 0.0 {
+                    return Ok(Self::Columns { foam, radius_mm });
+                }
+                Box::new(move |depth| foam.force(radius_mm, depth).0)
+            }
+            (None, _) => return Err(super::scene::columns_take_one_ball()),
+            (Some(layer), shape) => {
+                let (mut sinking, shape, at) = (Sinking::default(), shape.clone(), (body.x_mm, body.y_mm));
+                // The rim of a touch passes from cell to cell in steps, which are the grid's and not the foam's: the mean
+                // over places within a cell has them no more.
+                Box::new(move |depth| {
+                    let mut sum = 0.0;
+                    for (right, down) in PLACES {
+                        let place = (at.0 + (right - 0.5) * layer.pitch_mm(), at.1 + (down - 0.5) * layer.pitch_mm());
+                        sinking.find(layer, &[(&shape, place, depth)]);
+                        layer.forget();
+                        sum += layer.press(&sinking.cells).iter().sum::<f64>() * layer.area_mm2();
+                    }
+                    sum / PLACES.len() as f64
+                })
+            }
+        };
+        let depth = |k: usize| foam.floor_mm() * (k as f64 / (DEPTHS - 1) as f64).powi(2);
+        let force: Vec<f64> = (0..DEPTHS).map(|k| if k == 0 { 0.0 } else { forces(depth(k)) }).collect();
+        let mut entries = vec![[0.0; 3]];
+        for k in 1..DEPTHS {
+            // By power of the depth, which is nearly one and the same, so that a mean over neighbours bends nothing.
+            let around = SMOOTH.min(k - 1).min(DEPTHS - 1 - k);
+            let logs: f64 = (k - around..=k + around).map(|n| force[n].max(f64::MIN_POSITIVE).ln()).sum();
+            let smooth = if force[k - around] > 0.0 { (logs / (2 * around + 1) as f64).exp() } else { force[k] };
+            // Force never falls with depth.
+            let smooth = smooth.max(entries[k - 1][2]);
+            entries.push([depth(k) + give * smooth, depth(k), smooth]);
+        }
+        Ok(Self::Table { entries })
+    }
+
+    /// Force, N, and how it grows, N/mm, of a body that has come down so far.
+    #[must_use]
+    pub fn force(&self, down_mm: f64) -> (f64, f64) {
+        match self {
+            Self::Columns { foam, radius_mm } => foam.force(*radius_mm, down_mm),
+            Self::Table { entries } => {
+                if down_mm <= 0.0 {
+                    return (0.0, 0.0);
+                }
+                let ([from, _, low], [to, _, high]) = around(entries, 0, down_mm);
+                let slope = (high - low) / (to - from);
+                (low + slope * (down_mm.min(to) - from), slope)
+            }
+        }
+    }
+
+    /// Force where the face lies at a depth, N.
+    #[must_use]
+    pub fn force_at_depth(&self, depth_mm: f64) -> f64 {
+        self.force(self.down_of_depth_mm(depth_mm)).0
+    }
+
+    /// How deep the face of a body lies that has come down so far, mm; above the foam as it is.
+    #[must_use]
+    pub fn depth_mm(&self, down_mm: f64) -> f64 {
+        match self {
+            Self::Table { entries } if down_mm > 0.0 => {
+                let ([from, low, _], [to, high, _]) = around(entries, 0, down_mm);
+                low + (high - low) * ((down_mm - from) / (to - from)).min(1.0)
+            }
+            _ => down_mm,
+        }
+    }
+
+    /// How far down a force holds the body, mm.
+    #[must_use]
+    pub fn down_mm(&self, force_n: f64) -> f64 {
+        match self {
+            Self::Columns { foam, radius_mm } => foam.depth_of(*radius_mm, force_n),
+            Self::Table { entries } => {
+                let ([from, _, low], [to, _, high]) = around(entries, 2, force_n);
+                if high > low { from + (to - from) * ((force_n - low) / (high - low)).clamp(0.0, 1.0) } else { to }
+            }
+        }
+    }
+
+    /// How far down a body's middle is whose face lies at a depth, mm.
+    #[must_use]
+    pub fn down_of_depth_mm(&self, depth_mm: f64) -> f64 {
+        match self {
+            Self::Columns { .. } => depth_mm,
+            Self::Table { entries } => {
+                let ([from, low, _], [to, high, _]) = around(entries, 1, depth_mm);
+                from + (to - from) * ((depth_mm - low) / (high - low)).clamp(0.0, 1.0)
+            }
+        }
+    }
+
+    /// How far down a body is that has gone through all of the foam, mm.
+    #[must_use]
+    pub fn floor_mm(&self) -> f64 {
+        match self {
+            Self::Columns { foam, .. } => foam.floor_mm(),
+            Self::Table { entries } => entries[entries.len() - 1][0],
+        }
+    }
+}
+
+/// The entries between which a value of one column lies; the last two beyond them.
+fn around(entries: &[[f64; 3]], column: usize, value: f64) -> ([f64; 3], [f64; 3]) {
+    let after = entries.partition_point(|e| e[column] < value).clamp(1, entries.len() - 1);
+    (entries[after - 1], entries[after])
+}
+
+/// Which cells bodies have sunk into, and whose each is.
+#[derive(Debug, Default)]
+pub(super) struct Sinking {
+    pub cells: Vec<Cell>,
+    pub whose: Vec<u32>,
+    /// By cell of the grid: how far, and whose.
+    grid: Vec<(f64, u32)>,
+}
+
+impl Sinking {
+    /// Finds them of bodies given by shape, place of the middle and depth of the lowest point, all in mm.
+    pub fn find(&mut self, layer: &Bonded, bodies: &[(&Shape, (f64, f64), f64)]) {
+        let (rows, columns) = layer.shape();
+        let nothing = (f64::NEG_INFINITY, 0);
+        self.grid.resize(rows * columns, nothing);
+        let (mut left, mut right, mut top, mut bottom) = (columns, 0, rows, 0);
+        for (n, (shape, (x, y), depth)) in bodies.iter().enumerate() {
+            if *depth <= 0.0 {
+                continue;
+            }
+            let above = -layer.bulge() * depth;
+            let (rx, ry) = shape.reach_mm(depth - above);
+            let across = layer.between(x - rx, x + rx, columns);
+            for row in layer.between(y - ry, y + ry, rows) {
+                for column in across.clone() {
+                    let height = shape.height_mm(layer.place_mm(column) - x, layer.place_mm(row) - y);
+                    let at = &mut self.grid[row * columns + column];
+                    if depth - height > above.max(at.0) {
+                        *at = (depth - height, n as u32);
+                    }
+                }
+                (top, bottom) = (top.min(row), bottom.max(row + 1));
+            }
+            (left, right) = (left.min(across.start), right.max(across.end));
+        }
+        self.cells.clear();
+        self.whose.clear();
+        for y in top..bottom {
+            for x in left..right {
+                let at = &mut self.grid[y * columns + x];
+                if at.0 > f64::NEG_INFINITY {
+                    self.cells.push(Cell { x: x as u32, y: y as u32, sunk_mm: at.0 });
+                    self.whose.push(at.1);
+                    *at = nothing;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,80 @@
+"""``taxel simulate``: a scene from a file, as a recording, as a film."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+
+from taxel._core import ProblemError
+from taxel.cli._app import app
+
+__all__ = ["simulate"]
+
+
+@app.command()
+def simulate(
+    scene: Annotated[Path, typer.Argument(help="A scene: a .toml; the page *Scenes* says what may stand in it.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write what a host hears: .mcap, .lsa, .npz, .csv or .h5.")
+    ] = None,
+    movie: Annotated[
+        Path | None, typer.Option(help="Draw a film: .gif, or another that matplotlib's writers know, as .mp4.")
+    ] = None,
+    slower: Annotated[float, typer.Option(min=0.1, max=1000, help="The film runs so many times slower.")] = 10.0,
+    labels: Annotated[
+        Path | None, typer.Option("--truth", help="Write what really happens when to this CSV, label,t_us.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Draws taxels and noise; else the file's.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace such files where they exist.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Play a scene from a file to the emulated board, as fast as it goes; without -o and --movie only check it.
+
+    Example: taxel simulate scene.toml -o touch.mcap --movie touch.gif
+    """
+    import taxel  # noqa: PLC0415  the command line starts quickly
+    from taxel._files import try_whole, write_whole  # noqa: PLC0415
+    from taxel.plot.film import film  # noqa: PLC0415
+    from taxel.simulate import SceneFile, play, truth  # noqa: PLC0415
+    from taxel.wire import Registers  # noqa: PLC0415
+
+    said = SceneFile.open(scene)
+    seed = said.seed if seed is None else seed
+    wanted = [path for path in (output, movie, labels) if path is not None]
+    if len({path.resolve() for path in wanted}) < len(wanted):
+        raise ProblemError("--output, --movie and --truth: must be different files")
+    for path in wanted:
+        try_whole(path, overwrite=overwrite)
+    contacts, force = truth(said.acts(), preset=said.preset, array=said.array)
+    about: dict[str, Any] = {"scene": str(scene), "seed": seed, "contacts": [contact._asdict() for contact in contacts]}
+    about["peak_n"] = float(force.max())
+    lines = [f"{scene}: {len(contacts)} touch(es), at most {force.max():.3g} N"]
+    bar = Progress(console=Console(stderr=True, quiet=as_json), transient=True)
+    with bar:
+        if output is not None or movie is not None:
+            task = bar.add_task("playing", total=1.0)
+            played = play(said.acts(), seed=seed, watch=lambda share: bar.update(task, completed=share), **said.options)
+            bar.update(task, completed=1.0)
+            about["events"] = len(played.events)
+        if output is not None:
+            lost = taxel.convert(played.events, output, overwrite=overwrite)
+            lines.append(f"{len(played.events)} events written to {output}")
+            lines += [f"  a {output.suffix} cannot hold: {what}" for what in lost]
+        if movie is not None:
+            task = bar.add_task("drawing", total=1.0)
+            frame_us = Registers.preset(said.preset).frame_us
+            film(played.events, movie, force, frame_us=frame_us, slower=slower, overwrite=overwrite,
+                 watch=lambda share: bar.update(task, completed=share))  # fmt: skip
+            lines.append(f"film written to {movie}")
+    if labels is not None:
+        with_ends = sorted([(c.start_us, "contact") for c in contacts] + [(c.stop_us, "lift") for c in contacts])
+        rows = "".join(f"{label},{round(t)}\n" for t, label in with_ends)
+        write_whole(labels, lambda file: file.write(f"label,t_us\n{rows}".encode()), overwrite=overwrite)
+        lines.append(f"truth written to {labels}")
+    about["written"] = [str(path) for path in wanted]
+    typer.echo(json.dumps(about) if as_json else "\n".join(lines))

@@ -1,0 +1,143 @@
+"""What taxels read, as a film."""
+
+from __future__ import annotations
+
+import io
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from matplotlib import animation
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from taxel._arguments import number
+from taxel._core import ProblemError
+from taxel._files import write_whole
+from taxel.events import Events
+from taxel.spikes import to_ms
+from taxel.wire import FRAME_US
+
+__all__ = ["film"]
+
+#: Pictures a second of the film.
+_RATE_HZ = 20
+#: No longer: a film is looked at.
+_MOST = 2_000
+
+
+def film(
+    events: Events,
+    path: str | os.PathLike[str],
+    force_n: NDArray[np.float32] | None = None,
+    *,
+    frame_us: float = FRAME_US,
+    slower: float = 10.0,
+    overwrite: bool = False,
+    watch: Callable[[float], object] = lambda _: None,
+) -> Path:
+    """Draw what the taxels held over time, above their rest, and the force on the foam beside it.
+
+    Parameters
+    ----------
+    events : Events
+        With intensities and a start marker.
+    path : path
+        A .gif always works (Pillow writes it); .mp4 and others where matplotlib finds a writer, as ffmpeg.
+    force_n : float32, optional
+        The true force by frame of the board.
+    frame_us : float, us
+        How long such a frame is.
+    slower : float, above 0
+        The film runs so many times slower than the touch.
+    overwrite : bool
+        Whether an existing file may be replaced.
+    watch : function, optional
+        Called with the share that is drawn.
+
+    Raises
+    ------
+    ProblemError : no event, no intensities, a kind that no writer knows, or a film of more than 2000 pictures
+    FileExistsError : the file is there already
+    """
+    place = Path(path)
+    if not number("slower", slower) > 0:
+        raise ProblemError(f"slower is {slower:g}: must be above 0")
+    writer = _writer(place)
+    if not len(events) or events.intensity is None:
+        raise ProblemError("events: nothing to draw; a film is of events with intensities")
+    begin = events.markers[0][0] if events.markers else int(events.t[0])
+    period_us = 1e6 / _RATE_HZ / slower
+    times = np.arange(begin, int(events.t[-1]) + period_us, period_us)
+    if len(times) > _MOST:
+        raise ProblemError(f"{len(times)} pictures: at most {_MOST}; choose slower below {slower * _MOST / len(times):.3g}")
+    events = events.sorted()
+    rows, columns = events.array.shape
+    held = np.zeros(rows * columns)
+    rest: NDArray[np.float64] | None = None
+    index = events.array.index(events.x, events.y)
+    ends = np.searchsorted(events.t, times, side="right")
+
+    figure = Figure(figsize=(5.0, 5.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    above, below = figure.subplots(2, 1, height_ratios=[5, 1])
+    pitch = events.array.pitch_mm
+    image = above.imshow(
+        np.zeros((rows, columns)), cmap="magma", vmin=0, vmax=_most(events), interpolation="nearest",
+        extent=(-pitch / 2, (columns - 0.5) * pitch, (rows - 0.5) * pitch, -pitch / 2),
+    )  # fmt: skip
+    figure.colorbar(image, ax=above, label="ticks above rest")
+    above.set(xlabel="x (mm)", ylabel="y (mm)")
+    if force_n is None:
+        counts = np.diff(ends, prepend=0)
+        below.plot(to_ms(times - begin), counts)
+        below.set(xlabel="time since the start marker (ms)", ylabel="events")
+    else:
+        truth = np.arange(len(force_n)) * frame_us
+        below.plot(to_ms(truth - begin), force_n)
+        below.set(xlabel="time since the start marker (ms)", ylabel="force (N)", xlim=(0, to_ms(times[-1] - begin)))
+    cursor = below.axvline(0.0, color="0.5")
+
+    def write(file: io.BufferedIOBase) -> None:
+        nonlocal rest
+        # Writers want a name with an ending of its own; the whole file is moved to its place by its bytes.
+        with tempfile.TemporaryDirectory() as folder:
+            film = Path(folder) / f"film{place.suffix.lower()}"
+            done = 0
+            with writer.saving(figure, str(film), dpi=80):
+                for n, (t, end) in enumerate(zip(times, ends, strict=True)):
+                    assert events.intensity is not None  # asked above
+                    held[index[done:end]] = np.asarray(events.intensity)[done:end]
+                    done = end
+                    if rest is None:
+                        rest = held.copy()
+                    # A taxel that was not heard of before the start is at rest until it speaks.
+                    rest = np.where(rest == 0, held, rest)
+                    image.set_data(np.clip(held - rest, 0, None).reshape(rows, columns))
+                    cursor.set_xdata([to_ms(t - begin)] * 2)
+                    writer.grab_frame()
+                    watch((n + 1) / len(times))
+            file.write(film.read_bytes())
+
+    return write_whole(place, write, overwrite=overwrite)  # type: ignore[arg-type]
+
+
+def _writer(place: Path) -> animation.AbstractMovieWriter:
+    if place.suffix.lower() == ".gif":
+        return animation.PillowWriter(fps=_RATE_HZ)
+    if place.suffix.lower() in (".mp4", ".webm", ".mkv", ".mov") and animation.writers.is_available("ffmpeg"):
+        return animation.FFMpegWriter(fps=_RATE_HZ)
+    raise ProblemError(f"{place}: must end in .gif; .mp4, .webm, .mkv and .mov need the program ffmpeg")
+
+
+def _most(events: Events) -> float:
+    """Return how far the taxels rise, ticks: of those that spoke, above the least that each said."""
+    assert events.intensity is not None  # asked before
+    index = events.array.index(events.x, events.y)
+    values = np.asarray(events.intensity, np.float64)
+    least = np.full(events.array.rows * events.array.columns, np.inf)
+    np.minimum.at(least, index, values)
+    return max(1.0, float((values - least[index]).max()))

@@ -1,0 +1,161 @@
+"""Scenes that a user writes: a file in TOML with bodies, foam, taxels and seed."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from taxel import _core
+from taxel._arguments import number, text, whole
+from taxel._arguments import path as checked_path
+from taxel._core import SceneError
+from taxel.array import Array
+from taxel.simulate.acts import Act, Scene, Silence
+from taxel.wire import Registers
+
+__all__ = ["SceneFile"]
+
+#: What a file may hold beside what a scene holds.
+_OWN = ("seed", "preset", "tare_ms", "array", "taxels")
+_SCENE = ("surface", "foam", "bodies", "slant_deg", "downhill_deg", "lead_ms", "tail_ms")
+_TAXELS = ("v_trans", "feedback_kohm", "rest_us", "touch_us", "exponent", "side_mm", "gain_spread", "offset_mv", "noise_ticks")
+#: Silence between the tare and the scene, and after it, ms.
+_BEFORE_MS, _AFTER_MS = 250.0, 100.0
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """Hold what a scene file says.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> said = '''
+    ... seed = 3
+    ... [[bodies]]
+    ... shape.sphere.radius_mm = 15
+    ... x_mm = 80
+    ... y_mm = 80
+    ... mass_g = 40
+    ... motion.dropped.height_mm = 120
+    ... '''
+    >>> with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
+    ...     _ = file.write(said), file.flush()
+    ...     opened = SceneFile.open(file.name)
+    >>> opened.scene
+    Scene(sphere dropped)
+    >>> [round(contact.start_us) for contact in opened.scene.motion().contacts][:1]
+    [156400]
+    """
+
+    scene: Scene
+    seed: int = 0
+    """Draws the taxels' spread and their noise."""
+    preset: str = "5.2 kHz"
+    """The board's registers."""
+    tare_ms: float = 50.0
+    array: Array = field(default_factory=Array.thesis)
+    sensor: Mapping[str, float] = field(default_factory=dict)
+    """What differs from the usual taxels, as in `play`."""
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str]) -> SceneFile:
+        """Read and check a file.
+
+        Parameters
+        ----------
+        path : path of a .toml
+            The keys of a `Scene`, and beside them ``seed``, ``preset``, ``tare_ms``, ``array`` (rows, columns, pitch_mm)
+            and ``taxels`` (as `sensor` of `play`). The heights of a height map may be a ``file`` beside it: rows of
+            numbers in mm, with commas or blanks between them.
+
+        Raises
+        ------
+        SceneError : no TOML, an unknown key, a value that makes no sense; names the file and the place
+        OSError : a file that cannot be read
+        """
+        place = Path(checked_path("path", path))
+        try:
+            said = tomllib.loads(place.read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise SceneError(f"{place}: not TOML: {error}") from None
+        try:
+            return cls._of(said, place.parent)
+        except _core.Error as error:
+            raise SceneError(f"{place}: {error}") from None
+
+    @classmethod
+    def _of(cls, said: Mapping[str, Any], folder: Path) -> SceneFile:
+        _known("", said, (*_OWN, *_SCENE))
+        of = said.get("array", {})
+        _known("array", of, ("rows", "columns", "pitch_mm"))
+        thesis = Array.thesis()
+        array = Array(
+            of.get("rows", thesis.rows), of.get("columns", thesis.columns), pitch_mm=of.get("pitch_mm", thesis.pitch_mm)
+        ) if of else thesis  # fmt: skip
+        sensor = said.get("taxels", {})
+        _known("taxels", sensor, _TAXELS)
+        if "bodies" not in said:
+            raise SceneError("bodies is missing: write [[bodies]] and what one is")
+        scene = Scene({name: said[name] for name in _SCENE if name in said} | {"bodies": _bodies(said["bodies"], folder)})
+        # Says what makes no sense before anything is played.
+        _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
+        preset = text("preset", said.get("preset", cls.preset))
+        Registers.preset(preset)
+        return cls(
+            scene,
+            whole("seed", said.get("seed", cls.seed), 0),
+            preset,
+            number("tare_ms", said.get("tare_ms", cls.tare_ms)),
+            array,
+            sensor,
+        )
+
+    def acts(self) -> list[Act]:
+        """Return silence for the tare, the scene, and a little silence: what `play` and `emulate` take."""
+        return [Silence(self.tare_ms + _BEFORE_MS), self.scene, Silence(_AFTER_MS)]
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """What `play` and `emulate` take beside acts and seed."""
+        return {"preset": self.preset, "tare_ms": self.tare_ms, "array": self.array, "sensor": self.sensor}
+
+
+def _known(place: str, said: object, names: tuple[str, ...] | list[str]) -> None:
+    """Refuse a key that is not known, with the one that was meant."""
+    if not isinstance(said, Mapping):
+        raise SceneError(f"{place} is {json.dumps(said, default=str)}: must be a table")
+    for name in said:
+        if name not in names:
+            near = difflib.get_close_matches(name, names, 1)
+            meant = f" (did you mean {near[0]}?)" if near else ""
+            raise SceneError(f"{place}{'.' * bool(place)}{name} is not known{meant}: there is {', '.join(names)}")
+
+
+def _bodies(said: Any, folder: Path) -> Any:
+    """Return bodies with the height maps that lie in files."""
+    if not isinstance(said, list):
+        raise SceneError(f"bodies is {json.dumps(said, default=str)}: must be written [[bodies]], once a body")
+    bodies = []
+    for n, body in enumerate(said):
+        shape = body.get("shape") if isinstance(body, Mapping) else None
+        relief = shape.get("height_map") if isinstance(shape, Mapping) else None
+        if isinstance(relief, Mapping) and "file" in relief:
+            place = folder / str(relief["file"])
+            try:
+                rows = place.read_text(encoding="utf-8").replace(",", " ").splitlines()
+                heights = np.loadtxt(rows, ndmin=2).tolist()
+            except ValueError as error:
+                raise SceneError(f"bodies[{n}].shape.height_map.file {place}: {error}") from None
+            rest = {name: value for name, value in relief.items() if name != "file"}
+            body = {**body, "shape": {**shape, "height_map": {"heights_mm": heights, **rest}}}  # noqa: PLW2901
+        bodies.append(body)
+    return bodies
