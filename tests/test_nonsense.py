@@ -641,6 +641,10 @@ SOUND: dict[str, Sound] = {
         lambda **given: SCENE.replace(**given).motion(),
         {"foam": {"dashpot_ms": 0.0}, "lead_ms": 5.0},
     ),
+    "taxel.simulate.Scene.body": lambda: (
+        lambda n, **given: SCENE.body(n, **given).motion(),
+        {"n": 0, "x_mm": 80.0, "mass_g": 30.0},
+    ),
     "taxel.simulate.play": plain(
         taxel.simulate.play,
         acts=[taxel.simulate.Silence(10.0)],
@@ -880,6 +884,9 @@ for encoder in laws.ENCODERS.values():
 
 #: What is not tried, and why.
 LEFT_OUT = {
+    "taxel.simulate.Track": "what Scene.motion returns",
+    "taxel.simulate.SceneFile": "what SceneFile.open returns",
+    "taxel.simulate.SceneFile.open": "reads files; tried in tests/simulate/test_scene_files.py",
     "taxel.simulate.Pressed": "what Layer.press returns",
     "taxel.Error": "raised, not called",
     "taxel.FormatError": "raised, not called",

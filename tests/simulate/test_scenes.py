@@ -133,7 +133,11 @@ def test_pictures_touch_from_the_empty_one_before_to_the_empty_one_after():
         (lambda: Scene.draw(1).body(motion={"thrown": {}}).motion(), SceneError, "dropped"),
         (lambda: Scene.draw(1).replace(slant_deg=5.0).motion(), SceneError, "columns"),
         (lambda: Scene.draw(1).replace(foam={"poisson": 0.5}).motion(), SceneError, "poisson"),
-        (lambda: Scene.draw(1).body(motion=high(800)).replace(foam={"modulus_kpa": 5}).motion(), SceneError, "bottoms out"),
+        (
+            lambda: Scene.draw(1).body(motion=high(800)).replace(foam={"modulus_kpa": 5}).motion(),
+            SceneError,
+            "bottoms out",
+        ),
         (lambda: Scene.draw(1).motion(0), SceneError, "step"),
         (lambda: Scene.draw(1).motion("fast"), ProblemError, "step_us"),
         (lambda: Pictures(np.zeros((2, 3)), 2000), ProblemError, "shape"),

@@ -99,6 +99,7 @@ for _command in (
     "live",
     "merge",
     "record",
+    "simulate",
     "study",
     "train",
     "view",

@@ -20,7 +20,7 @@ from taxel._core import ProblemError
 from taxel._opening import open_any
 from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED, endless, script
-from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, SceneFile, Version2
+from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
 from taxel.wire import Registers
 
@@ -100,26 +100,20 @@ def emulate(
     after its first frame, is tared with a noise floor of 0, then takes the preset's floor and marks the start. --truth
     is what taxel train learns from: contact and lift, by the board's clock (t_us) and by this machine's (host_ns).
 
-    --scene plays a scene from a file instead of drawn ones. --replay plays a recording again. --pipe takes any other sensor's frames from standard input: one line of JSON
-    (rows, columns, rate, bits), then uint16, little-endian, row by row.
+    --scene plays a scene from a file instead of drawn ones. --replay plays a recording again. --pipe takes any other
+    sensor's frames from standard input: one line of JSON (rows, columns, rate, bits), then uint16, little-endian, row
+    by row.
 
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
-    if scene is not None and (replay is not None or pipe or rest):
-        raise ProblemError("--scene: leave out --replay, --pipe and --rest")
-    if (replay is not None or pipe) and (scenes is not None or labels is not None or rest):
-        raise ProblemError("--scenes, --truth and --rest are of scenes: leave them out with --replay or --pipe")
-    if replay is not None and pipe:
-        raise ProblemError("--replay and --pipe: give one of them")
+    _together(scene=scene, replay=replay, pipe=pipe, rest=rest, drawn=scenes is not None or labels is not None)
     written = None if scene is None else SceneFile.open(scene)
-    if written is not None:
-        seed = written.seed if seed is None else seed
-        tare = written.tare_ms / 1e3 if tare is None else tare
-        preset = written.preset if preset is None else preset
-    tare, preset = 0.05 if tare is None else tare, "5.2 kHz" if preset is None else preset
+    said_by = written or SceneFile(Scene({}))
+    tare = said_by.tare_ms / 1e3 if tare is None else tare
+    preset = said_by.preset if preset is None else preset
     # Wrong ones are said before anything else is.
     Registers.preset(preset)
-    seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
+    seed = (secrets.randbelow(TRAINING_SEED) if written is None else written.seed) if seed is None else seed
     flaws, faults = _flaws(flaw or [], seed), _faults(fault or [], seed)
     console = Console(stderr=True, quiet=as_json)
     if replay is not None:
@@ -159,8 +153,8 @@ def emulate(
                     seed=seed,
                     preset=preset,
                     tare_ms=1e3 * tare,
-                    array=None if written is None else written.array,
-                    sensor=None if written is None else written.sensor,
+                    array=said_by.array,
+                    sensor=said_by.sensor,
                     wire=None if wire is None else 2 if wire == 2 else 1,
                     version_2=Version2(board, session, round(1e3 * hold), round(1e3 * heartbeat), round(1e3 * states)),
                     flaws=flaws,
@@ -192,6 +186,16 @@ def emulate(
         typer.echo(json.dumps({**about, **asdict(report)}))
     else:
         _say(report, in_time=not pipe)
+
+
+def _together(*, scene: Path | None, replay: Path | None, pipe: bool, rest: bool, drawn: bool) -> None:
+    """Refuse options that do not go together; `drawn` ones are of scenes."""
+    if replay is not None and pipe:
+        raise ProblemError("--replay and --pipe: give one of them")
+    if scene is not None and (replay is not None or pipe or rest):
+        raise ProblemError("--scene: leave out --replay, --pipe and --rest")
+    if (replay is not None or pipe) and (drawn or rest):
+        raise ProblemError("--scenes, --truth and --rest are of scenes: leave them out with --replay or --pipe")
 
 
 def _again(replay: Path, speed: float) -> tuple[Any, str]:

@@ -39,7 +39,7 @@ def simulate(
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
     from taxel._files import try_whole, write_whole  # noqa: PLC0415
-    from taxel.plot.film import film  # noqa: PLC0415
+    from taxel.plot.film import film, writer_of  # noqa: PLC0415
     from taxel.simulate import SceneFile, play, truth  # noqa: PLC0415
     from taxel.wire import Registers  # noqa: PLC0415
 
@@ -48,6 +48,8 @@ def simulate(
     wanted = [path for path in (output, movie, labels) if path is not None]
     if len({path.resolve() for path in wanted}) < len(wanted):
         raise ProblemError("--output, --movie and --truth: must be different files")
+    if movie is not None:
+        writer_of(movie)
     for path in wanted:
         try_whole(path, overwrite=overwrite)
     contacts, force = truth(said.acts(), preset=said.preset, array=said.array)

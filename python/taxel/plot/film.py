@@ -10,8 +10,10 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib import animation
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
 from taxel._arguments import number
@@ -21,7 +23,7 @@ from taxel.events import Events
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
 
-__all__ = ["film"]
+__all__ = ["film", "writer_of"]
 
 #: Pictures a second of the film.
 _RATE_HZ = 20
@@ -66,14 +68,16 @@ def film(
     place = Path(path)
     if not number("slower", slower) > 0:
         raise ProblemError(f"slower is {slower:g}: must be above 0")
-    writer = _writer(place)
+    writer = writer_of(place)
     if not len(events) or events.intensity is None:
         raise ProblemError("events: nothing to draw; a film is of events with intensities")
     begin = events.markers[0][0] if events.markers else int(events.t[0])
     period_us = 1e6 / _RATE_HZ / slower
     times = np.arange(begin, int(events.t[-1]) + period_us, period_us)
     if len(times) > _MOST:
-        raise ProblemError(f"{len(times)} pictures: at most {_MOST}; choose slower below {slower * _MOST / len(times):.3g}")
+        raise ProblemError(
+            f"{len(times)} pictures: at most {_MOST}; choose slower below {slower * _MOST / len(times):.3g}"
+        )
     events = events.sorted()
     rows, columns = events.array.shape
     held = np.zeros(rows * columns)
@@ -81,24 +85,13 @@ def film(
     index = events.array.index(events.x, events.y)
     ends = np.searchsorted(events.t, times, side="right")
 
-    figure = Figure(figsize=(5.0, 5.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    above, below = figure.subplots(2, 1, height_ratios=[5, 1])
-    pitch = events.array.pitch_mm
-    image = above.imshow(
-        np.zeros((rows, columns)), cmap="magma", vmin=0, vmax=_most(events), interpolation="nearest",
-        extent=(-pitch / 2, (columns - 0.5) * pitch, (rows - 0.5) * pitch, -pitch / 2),
-    )  # fmt: skip
-    figure.colorbar(image, ax=above, label="ticks above rest")
-    above.set(xlabel="x (mm)", ylabel="y (mm)")
+    figure, image, below = _stage(events, times)
     if force_n is None:
-        counts = np.diff(ends, prepend=0)
-        below.plot(to_ms(times - begin), counts)
-        below.set(xlabel="time since the start marker (ms)", ylabel="events")
+        below.plot(to_ms(times - begin), np.diff(ends, prepend=0))
+        below.set(ylabel="events")
     else:
-        truth = np.arange(len(force_n)) * frame_us
-        below.plot(to_ms(truth - begin), force_n)
-        below.set(xlabel="time since the start marker (ms)", ylabel="force (N)", xlim=(0, to_ms(times[-1] - begin)))
+        below.plot(to_ms(np.arange(len(force_n)) * frame_us - begin), force_n)
+        below.set(ylabel="force (N)")
     cursor = below.axvline(0.0, color="0.5")
 
     def write(file: io.BufferedIOBase) -> None:
@@ -125,12 +118,35 @@ def film(
     return write_whole(place, write, overwrite=overwrite)  # type: ignore[arg-type]
 
 
-def _writer(place: Path) -> animation.AbstractMovieWriter:
+def writer_of(place: Path) -> animation.AbstractMovieWriter:
+    """Return what writes a film of that name.
+
+    Raises
+    ------
+    ProblemError : no writer knows that kind
+    """
     if place.suffix.lower() == ".gif":
         return animation.PillowWriter(fps=_RATE_HZ)
     if place.suffix.lower() in (".mp4", ".webm", ".mkv", ".mov") and animation.writers.is_available("ffmpeg"):
         return animation.FFMpegWriter(fps=_RATE_HZ)
     raise ProblemError(f"{place}: must end in .gif; .mp4, .webm, .mkv and .mov need the program ffmpeg")
+
+
+def _stage(events: Events, times: NDArray[np.float64]) -> tuple[Figure, AxesImage, Axes]:
+    """Return a figure, the picture of the taxels in it, and the axes of what happens over time."""
+    figure = Figure(figsize=(5.0, 5.6), layout="constrained")
+    FigureCanvasAgg(figure)
+    above, below = figure.subplots(2, 1, height_ratios=[5, 1])
+    rows, columns = events.array.shape
+    pitch = events.array.pitch_mm
+    image = above.imshow(
+        np.zeros((rows, columns)), cmap="magma", vmin=0, vmax=_most(events), interpolation="nearest",
+        extent=(-pitch / 2, (columns - 0.5) * pitch, (rows - 0.5) * pitch, -pitch / 2),
+    )  # fmt: skip
+    figure.colorbar(image, ax=above, label="ticks above rest")
+    above.set(xlabel="x (mm)", ylabel="y (mm)")
+    below.set(xlabel="time since the start marker (ms)", xlim=(0, to_ms(times[-1] - times[0])))
+    return figure, image, below
 
 
 def _most(events: Events) -> float:

@@ -55,7 +55,8 @@ class Motion(NamedTuple):
     @property
     def force_n(self) -> NDArray[np.float32]:
         """The force of all bodies on the foam."""
-        return np.sum([track.force_n for track in self.tracks], axis=0, dtype=np.float32)
+        force: NDArray[np.float32] = np.sum([track.force_n for track in self.tracks], axis=0, dtype=np.float32)
+        return force
 
 
 @dataclass(frozen=True)
@@ -76,18 +77,18 @@ class Scene:
     parameters : mapping
         As `parameters` of a drawn scene holds them, and as a file has them (see `SceneFile`):
 
-        - ``bodies``, a list; of each: ``shape`` (``{"sphere": {"radius_mm"}}``, ``{"cylinder": {"radius_mm", "length_mm",
-          "axis_deg"}}``, ``{"edge": {"slope_deg", "length_mm", "axis_deg"}}`` or ``{"height_map": {"heights_mm",
-          "pitch_mm"}}``), ``x_mm`` and ``y_mm`` from the first taxel, where it first touches, ``mass_g`` or ``material``
-          ("steel", "glass", "rubber", "plastic", "wood"), ``stiffness_n_mm`` of one that gives, ``friction``,
-          ``rolling_friction``, ``after_ms`` and ``motion``.
+        - ``bodies``, a list; of each: ``shape`` (``{"sphere": {"radius_mm"}}``, ``{"cylinder": {"radius_mm",
+          "length_mm", "axis_deg"}}``, ``{"edge": {"slope_deg", "length_mm", "axis_deg"}}`` or ``{"height_map":
+          {"heights_mm", "pitch_mm"}}``), ``x_mm`` and ``y_mm`` from the first taxel, where it first touches,
+          ``mass_g`` or ``material`` ("steel", "glass", "rubber", "plastic", "wood"), ``stiffness_n_mm`` of one that
+          gives, ``friction``, ``rolling_friction``, ``after_ms`` and ``motion``.
         - ``motion`` is ``{"dropped": {"height_mm", "ending"}}``, ``{"pressed": {"peak_n" or "depth_mm", "speed_mm_s",
           "hold_ms", "wait_ms"}}``, or ``{"rolled" or "slid": {"speed_mm_s", "toward_deg", "for_ms", "press_n"}}``; an
           ``ending`` is ``{"caught": {"after", "press"}}`` or ``{"left_to_rest": {"rest_ms", "lift_mm_s"}}``.
         - ``foam``: modulus_kpa, thickness_mm, poisson, yield_strain, densification_strain, exponent, damping_s_m,
           dashpot_ms.
-        - ``surface``: "layer", foam bonded to the board, for any bodies; or "columns", for one ball that moves straight up
-          and down on foam with poisson up to 0.1: the fastest.
+        - ``surface``: "layer", foam bonded to the board, for any bodies; or "columns", for one ball that moves straight
+          up and down on foam with poisson up to 0.1: the fastest.
         - ``slant_deg``, ``downhill_deg``: how far the array is tilted, and which way; ``lead_ms``, ``tail_ms``.
 
     Raises
@@ -142,7 +143,8 @@ class Scene:
         ProblemError : no such body, or a parameter that it has not
         """
         bodies = list(self.parameters["bodies"])
-        bodies[whole("n", n, 0, len(bodies) - 1)] = _replaced("a body", bodies[n], changes, _BODY)
+        n = whole("n", n, 0, len(bodies) - 1)
+        bodies[n] = _replaced("a body", bodies[n], changes, _BODY)
         return Scene({**self.parameters, "bodies": bodies})
 
     def motion(self, step_us: float = 48.0, *, array: Array | None = None) -> Motion:
@@ -174,7 +176,9 @@ def _only(body: object, part: str) -> str:
     return "/".join(map(str, named)) if isinstance(named, Mapping) else "?"
 
 
-def _replaced(what: str, before: Mapping[str, Any], changes: Mapping[str, Any], more: Sequence[str] = ()) -> dict[str, Any]:
+def _replaced(
+    what: str, before: Mapping[str, Any], changes: Mapping[str, Any], more: Sequence[str] = ()
+) -> dict[str, Any]:
     """Return parameters with some changed; parts are merged to any depth, but for one of several kinds."""
     merged = dict(before)
     for name, change in changes.items():
@@ -188,7 +192,11 @@ def _merged(before: Any, change: Any) -> Any:
     if not (isinstance(before, Mapping) and isinstance(change, Mapping)):
         return change
     # A group of one is a kind with its parameters; another kind takes its place.
-    if len(before) == len(change) == 1 and set(before) != set(change) and isinstance(next(iter(before.values())), Mapping):
+    if (
+        len(before) == len(change) == 1
+        and set(before) != set(change)
+        and isinstance(next(iter(before.values())), Mapping)
+    ):
         return change
     return {**before, **{name: _merged(before.get(name), value) for name, value in change.items()}}
 

@@ -100,8 +100,8 @@ class Layer:
             raise ProblemError("sunk_mm: must be finite")
         pressure, base = self._core.press(sunk.reshape(-1))
         on = _KPA * pressure.reshape(sunk.shape)
-        # kPa mm^2 is mN.
-        force = float(on.sum()) * self.array.pitch_mm**2 / 1000.0
+        # MPa mm^2 is N.
+        force = float(pressure.sum()) * self.array.pitch_mm**2
         return Pressed(on, _KPA * base.reshape(sunk.shape).astype(np.float64), force)
 
     def forget(self) -> None:

@@ -26,7 +26,17 @@ __all__ = ["SceneFile"]
 #: What a file may hold beside what a scene holds.
 _OWN = ("seed", "preset", "tare_ms", "array", "taxels")
 _SCENE = ("surface", "foam", "bodies", "slant_deg", "downhill_deg", "lead_ms", "tail_ms")
-_TAXELS = ("v_trans", "feedback_kohm", "rest_us", "touch_us", "exponent", "side_mm", "gain_spread", "offset_mv", "noise_ticks")
+_TAXELS = (
+    "v_trans",
+    "feedback_kohm",
+    "rest_us",
+    "touch_us",
+    "exponent",
+    "side_mm",
+    "gain_spread",
+    "offset_mv",
+    "noise_ticks",
+)
 #: Silence between the tare and the scene, and after it, ms.
 _BEFORE_MS, _AFTER_MS = 250.0, 100.0
 
@@ -53,7 +63,7 @@ class SceneFile:
     >>> opened.scene
     Scene(sphere dropped)
     >>> [round(contact.start_us) for contact in opened.scene.motion().contacts][:1]
-    [156400]
+    [156409]
     """
 
     scene: Scene
@@ -73,9 +83,9 @@ class SceneFile:
         Parameters
         ----------
         path : path of a .toml
-            The keys of a `Scene`, and beside them ``seed``, ``preset``, ``tare_ms``, ``array`` (rows, columns, pitch_mm)
-            and ``taxels`` (as `sensor` of `play`). The heights of a height map may be a ``file`` beside it: rows of
-            numbers in mm, with commas or blanks between them.
+            The keys of a `Scene`, and beside them ``seed``, ``preset``, ``tare_ms``, ``array`` (rows, columns,
+            pitch_mm) and ``taxels`` (as `sensor` of `play`). The heights of a height map may be a ``file`` beside it:
+            rows of numbers in mm, with commas or blanks between them.
 
         Raises
         ------
@@ -105,7 +115,9 @@ class SceneFile:
         _known("taxels", sensor, _TAXELS)
         if "bodies" not in said:
             raise SceneError("bodies is missing: write [[bodies]] and what one is")
-        scene = Scene({name: said[name] for name in _SCENE if name in said} | {"bodies": _bodies(said["bodies"], folder)})
+        scene = Scene(
+            {name: said[name] for name in _SCENE if name in said} | {"bodies": _bodies(said["bodies"], folder)}
+        )
         # Says what makes no sense before anything is played.
         _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
         preset = text("preset", said.get("preset", cls.preset))
@@ -146,7 +158,7 @@ def _bodies(said: Any, folder: Path) -> Any:
         raise SceneError(f"bodies is {json.dumps(said, default=str)}: must be written [[bodies]], once a body")
     bodies = []
     for n, body in enumerate(said):
-        shape = body.get("shape") if isinstance(body, Mapping) else None
+        shape: Any = body.get("shape") if isinstance(body, Mapping) else None
         relief = shape.get("height_map") if isinstance(shape, Mapping) else None
         if isinstance(relief, Mapping) and "file" in relief:
             place = folder / str(relief["file"])

@@ -99,8 +99,11 @@ impl Push {
                     return (0.0, 0.0);
                 }
                 let ([from, _, low], [to, _, high]) = around(entries, 0, down_mm);
-                let slope = (high - low) / (to - from);
-                (low + slope * (down_mm.min(to) - from), slope)
+                let share = ((down_mm - from) / (to - from)).min(1.0);
+                let after = entries.partition_point(|e| e[0] < down_mm).clamp(1, entries.len() - 1);
+                // A dashpot feels the slope, so that it does not jump from entry to entry.
+                let (before, next) = (slope(entries, after - 1), slope(entries, after));
+                (low + (high - low) * share, before + (next - before) * share)
             }
         }
     }
@@ -155,6 +158,12 @@ impl Push {
             Self::Table { entries } => entries[entries.len() - 1][0],
         }
     }
+}
+
+/// How force grows at an entry, N/mm: over both sides of it.
+fn slope(entries: &[[f64; 3]], k: usize) -> f64 {
+    let (before, after) = (entries[k.saturating_sub(1)], entries[(k + 1).min(entries.len() - 1)]);
+    (after[2] - before[2]) / (after[0] - before[0])
 }
 
 /// The entries between which a value of one column lies; the last two beyond them.

@@ -364,11 +364,13 @@ impl Felt {
         }
         self.pressed[group] = now.touches || next.touches;
         let edge = |group: usize| (group * self.columns).div_ceil(GROUPS);
-        let rows = clean.len() / self.columns;
-        for row in 0..rows {
-            for index in row * self.columns + edge(group)..row * self.columns + edge(group + 1) {
-                let stress = now.base[index] + share * (next.base[index] - now.base[index]);
-                clean[index] = taxels.ticks(index, if stress > FAINT_MPA { taxels.drive(stress) } else { 0.0 });
+        let lines = edge(group)..edge(group + 1);
+        let by_row = now.base.chunks_exact(self.columns).zip(next.base.chunks_exact(self.columns));
+        for (row, ((now, next), clean)) in by_row.zip(clean.chunks_exact_mut(self.columns)).enumerate() {
+            for column in lines.clone() {
+                let stress = now[column] + share * (next[column] - now[column]);
+                let drive = if stress > FAINT_MPA { taxels.drive(stress) } else { 0.0 };
+                clean[column] = taxels.ticks(row * self.columns + column, drive);
             }
         }
     }

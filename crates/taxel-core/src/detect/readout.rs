@@ -343,7 +343,10 @@ mod tests {
                 "readout: version 2, this taxel reads version 1 only",
             ),
             (&good.replace("\"run_threshold\"", "\"threshold\""), "readout: threshold is not known: there is"),
-            (&good.replace("\"neurons\"", "\"neuron\""), "readout: neuron is not known: there is"),
+            (
+                &good.replace("\"neurons\"", "\"neuron\""),
+                "readout: neuron is not known (did you mean neurons?): there is",
+            ),
             (&good.replace("contact_area", "contact_are"), "readout: encoder contact_are: must be one of"),
             (&good.replace("\"noise_floor\": 3.0", "\"noise_floor\": -3.0"), "readout: noise_floor is -3"),
             (&good.replace("\"run_threshold\": 0.9", "\"run_threshold\": 0"), "readout: run_threshold is 0"),

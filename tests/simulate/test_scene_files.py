@@ -1,0 +1,214 @@
+"""Scene files: what they say, what they refuse, and what the command line makes of them."""
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import taxel
+from taxel import SceneError
+from taxel.simulate import Scene, SceneFile, Silence, play, truth
+
+ROOT = Path(__file__).parents[2]
+BALL = """
+seed = 5
+[[bodies]]
+shape.sphere.radius_mm = 15
+x_mm = 70
+y_mm = 90
+mass_g = 30
+motion.dropped = { height_mm = 60, ending.left_to_rest = { rest_ms = 180, lift_mm_s = 100 } }
+"""
+
+
+def write(folder, text):
+    place = folder / "scene.toml"
+    place.write_text(text)
+    return place
+
+
+def run(*arguments):
+    return subprocess.run(
+        [sys.executable, "-c", "from taxel.cli import main; main()", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def example():
+    page = (ROOT / "docs" / "scenes.md").read_text()
+    return re.findall(r"```toml\n(.*?)```", page, re.S)[0]
+
+
+def test_the_pages_example_plays_and_its_bodies_touch_where_they_should(tmp_path):
+    file = SceneFile.open(write(tmp_path, example()))
+    contacts, force = truth(file.acts(), preset=file.preset, array=file.array)
+    assert {"first", "roll"} <= {contact.kind for contact in contacts}
+    assert force.max() > 5
+    events = play(file.acts(), seed=file.seed, **file.options).events
+    events = events.between(events.markers[0][0], int(events.t[-1]))
+    near = [np.hypot(events.x * 2.67 - x, events.y * 2.67 - y) < 30 for x, y in ((50, 60), (95, 110))]
+    assert all(n.sum() > 150 for n in near)
+    assert np.mean(near[0] | near[1]) > 0.9
+
+
+def test_every_key_of_the_page_is_known_and_every_key_is_on_the_page():
+    page = (ROOT / "docs" / "scenes.md").read_text()
+    drawn = Scene.draw(1).parameters
+    for name in (*drawn, *drawn["foam"], *drawn["bodies"][0]):
+        assert name in page, name
+
+
+def test_two_bodies_far_apart_do_what_each_does_alone():
+    one = Scene.draw(3).replace(surface="layer", lead_ms=0.0).body(x_mm=50.0, y_mm=50.0)
+    other = Scene.draw(4).replace(surface="layer", lead_ms=0.0).body(x_mm=120.0, y_mm=120.0)
+    foam = one.parameters["foam"]
+    both = one.replace(bodies=[*one.parameters["bodies"], *other.replace(foam=foam).parameters["bodies"]])
+    starts = sorted(c.start_us for scene in (one, other.replace(foam=foam)) for c in scene.motion().contacts)
+    assert [c.start_us for c in both.motion().contacts] == starts
+    quiet = {"noise_ticks": 0.0, "gain_spread": 0.0, "offset_mv": 0.0}
+    alone, together = (play([Silence(100.0), s], seed=1, sensor=quiet).events for s in (one, both))
+    left = [e.x.astype(int) + e.y < 50 for e in (alone, together)]
+    assert left[0].sum() > 1000
+    assert abs(left[0].sum() - left[1].sum()) < 0.01 * left[0].sum()
+
+
+def test_bodies_side_by_side_share_the_foam():
+    """Two blocks edge to edge press as one twice as wide, under the same depth: the joint has no rim."""
+
+    def block(x, columns):
+        return {
+            "shape": {"height_map": {"heights_mm": [[0.0] * columns] * 9, "pitch_mm": 2.67}},
+            "x_mm": x, "y_mm": 80.0, "motion": {"pressed": {"depth_mm": 0.4, "speed_mm_s": 50, "hold_ms": 20}},
+        }  # fmt: skip
+
+    quiet = {"noise_ticks": 0.0, "gain_spread": 0.0, "offset_mv": 0.0}
+    pitch = 2.67
+
+    def held(*bodies):
+        scene = Scene({"bodies": list(bodies), "foam": {"modulus_kpa": 1000.0, "dashpot_ms": 0.0}})
+        events = play([Silence(100.0), scene], seed=1, sensor=quiet).events
+        picture = np.zeros((64, 64))
+        for event in range(len(events)):
+            if events.t[event] < 100_000 + 40_000 + 18_000:
+                picture[events.y[event], events.x[event]] = events.intensity[event]
+        return picture
+
+    two = held(block(26 * pitch, 9), block(34 * pitch, 9))
+    one = held(block(30 * pitch, 17))
+    assert one.max() > 60
+    assert np.abs(two - one).max() <= 2
+
+
+def test_a_height_map_may_lie_in_a_file(tmp_path):
+    (tmp_path / "sole.csv").write_text("0, 1, 0\n0, 2, 0\n1 1 1\n")
+    text = BALL.replace("shape.sphere.radius_mm = 15", 'shape.height_map = { file = "sole.csv", pitch_mm = 8 }')
+    body = SceneFile.open(write(tmp_path, text)).scene.parameters["bodies"][0]
+    assert body["shape"]["height_map"] == {"heights_mm": [[0, 1, 0], [0, 2, 0], [1, 1, 1]], "pitch_mm": 8}
+    (tmp_path / "sole.csv").write_text("0, 1, 0\n0, 2\n")
+    with pytest.raises(SceneError, match=r"sole\.csv"):
+        SceneFile.open(tmp_path / "scene.toml")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("x_mm = 70", "x_mm = 700"), r"bodies\[0\]: x_mm is 700 mm.*off the array"),
+        (("mass_g = 30", "mass_g = -30"), r"mass_g is -30 g: must be above 0"),
+        (("mass_g = 30", ""), "mass_g is missing: .* or a material"),
+        (("mass_g = 30", 'material = "cheese"'), r'material is "cheese": must be "steel"'),
+        (("radius_mm", "radus_mm"), r"radus_mm is not known \(did you mean radius_mm\?\)"),
+        (("mass_g", "mass"), r"bodies\[0\].mass is not known"),
+        (("x_mm", "x_mn"), r"did you mean x_mm\?"),
+        (("seed = 5", "sede = 5"), r"sede is not known \(did you mean seed\?\)"),
+        (("seed = 5", "seed = 1.5"), "seed is 1.5"),
+        (("seed = 5", 'preset = "9 kHz"'), "preset"),
+        (("seed = 5", "foam.modulus_kpa = -1"), "modulus_kpa is -1 kPa: must be above 0"),
+        (("seed = 5", "foam.modulus = 1"), r"foam.modulus is not known"),
+        (("seed = 5", "taxels.exponent = 3"), "exponent is 3"),
+        (("seed = 5", "taxels.noise = 3"), "taxels.noise is not known"),
+        (("seed = 5", "array.rows = 0"), "rows"),
+        (("seed = 5", "array = 3"), "array is 3: must be a table"),
+        (("[[bodies]]", "[bodies]"), r"bodies is .*\[\[bodies\]\]"),
+        (("height_mm = 60", "height_mm = 1e9"), "height_mm is 1e9 mm"),
+        (("motion.dropped", "motion.thrown"), "dropped"),
+        (("seed = 5", "seed = "), "not TOML"),
+        (("seed = 5", 'surface = "columns"\nslant_deg = 5'), "must be .layer."),
+    ],
+)
+def test_what_makes_no_sense_gets_one_line_with_the_place(tmp_path, change, said):
+    assert change[0] in BALL
+    with pytest.raises(SceneError, match=said) as caught:
+        SceneFile.open(write(tmp_path, BALL.replace(*change)))
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / "scene.toml"))
+
+
+def test_an_empty_file_is_told_what_is_missing(tmp_path):
+    with pytest.raises(SceneError, match="bodies is missing"):
+        SceneFile.open(write(tmp_path, ""))
+
+
+def test_the_command_line_writes_recording_truth_and_film_and_replaces_none(tmp_path):
+    scene = write(tmp_path, BALL)
+    out, labels, film = tmp_path / "touch.npz", tmp_path / "touch.csv", tmp_path / "touch.gif"
+    wanted = (scene, "-o", out, "--truth", labels, "--movie", film, "--slower", 2)
+    done = run("simulate", *wanted, "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    about = json.loads(done.stdout)
+    events = taxel.open(out).events
+    assert len(events) == about["events"] > 1000
+    rows = labels.read_text().splitlines()
+    assert rows[0] == "label,t_us"
+    assert [row.split(",")[0] for row in rows[1:3]] == ["contact", "lift"]
+    with Image.open(film) as picture:
+        assert picture.format == "GIF"
+        assert picture.n_frames > 5
+        first = np.asarray(picture.convert("L"), float)
+        picture.seek(picture.n_frames // 2)
+        assert np.abs(np.asarray(picture.convert("L"), float) - first).max() > 50
+    before = {path: path.read_bytes() for path in (out, labels, film)}
+    again = run("simulate", *wanted)
+    assert again.returncode != 0
+    assert again.stdout == ""
+    assert len(again.stderr.splitlines()) == 1
+    assert {path: path.read_bytes() for path in before} == before
+    assert run("simulate", *wanted, "--overwrite").returncode == 0
+    assert out.read_bytes() == before[out]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["missing.toml"], "missing.toml"),
+        (["scene.toml", "--movie", "film.bmp"], "must end in .gif"),
+        (["scene.toml", "-o", "a.npz", "--movie", "a.npz"], "different files"),
+    ],
+)
+def test_the_command_line_says_what_is_wrong(tmp_path, monkeypatch, arguments, said):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, BALL)
+    done = run("simulate", *arguments)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == [tmp_path / "scene.toml"]
+
+
+def test_the_emulator_plays_a_scene_from_a_file(tmp_path):
+    scene = write(tmp_path, BALL)
+    labels = tmp_path / "truth.csv"
+    done = run("emulate", "--scene", scene, "--scenes", 1, "--port", 9, "--truth", labels, "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["seed"] == tomllib.loads(BALL)["seed"]
+    file = SceneFile.open(scene)
+    expected = [round(c.start_us) for c in truth(file.acts())[0]]
+    written = [int(row.split(",")[1]) for row in labels.read_text().splitlines() if row.startswith("contact")]
+    assert written == expected
