@@ -83,7 +83,7 @@ def test_an_existing_folder_is_not_touched(toy):
 def test_the_demo_never_plays_what_the_readout_was_trained_on():
     ended = CliRunner().invoke(app, ["demo", "--seed", str(TRAINING_SEED)])
     assert ended.exit_code == 2
-    drawn = {Scene.draw(TRAINING_SEED + n).parameters["x_mm"] for n in range(8)}
+    drawn = {Scene.draw(TRAINING_SEED + n).parameters["bodies"][0]["x_mm"] for n in range(8)}
     assert len(drawn) == 8
 
 

@@ -64,7 +64,9 @@ def test_an_answer_rests_only_on_what_came_before_it():
 def test_each_drop_of_a_play_is_named_and_judged(hearing):
     scenes = [act for act in script(23, 3) if isinstance(act, Scene)]
     found = named(hearing, scenes)
-    assert [drop["true_mm"]["height"] for drop in found["drops"]] == [s.parameters["drop_mm"] for s in scenes]
+    assert [drop["true_mm"]["height"] for drop in found["drops"]] == [
+        s.parameters["bodies"][0]["motion"]["dropped"]["height_mm"] for s in scenes
+    ]
     for name, question in QUESTIONS.items():
         for k in range(len(ANSWERED_MS)):
             said = [drop["said"][name][k] for drop in found["drops"]]

@@ -114,14 +114,20 @@ def look(events: Events, tare: Tare, begin_us: float) -> NDArray[np.int64]:
     return found
 
 
+def _sizes(scene: Scene) -> tuple[float, float]:
+    """Return the diameter of a drawn scene's ball and the height that it falls from, mm."""
+    ball = scene.parameters["bodies"][0]
+    return 2 * ball["shape"]["sphere"]["radius_mm"], ball["motion"]["dropped"]["height_mm"]
+
+
 def board_of_drops(seed: int, count: int) -> list[list[float | int]]:
     """Drop balls on one board; return a row a drop that was felt: diameter, height, then its pictures."""
     scenes = []
     for n in range(count):
         scene = Scene.draw(seed, n)
-        fall_ms = float(np.sqrt(2 * scene.parameters["drop_mm"] / 9.81e-3))
+        fall_ms = float(np.sqrt(2 * _sizes(scene)[1] / 9.81e-3))
         ending = {"left_to_rest": {"rest_ms": fall_ms + _AFTER_FALL_MS, "lift_mm_s": _LIFT_MM_S}}
-        scenes.append(scene.replace(lead_ms=20.0, tail_ms=10.0, ending=ending))
+        scenes.append(scene.body(motion={"dropped": {"ending": ending}}).replace(lead_ms=20.0, tail_ms=10.0))
     acts: list[Silence | Scene] = [Silence(100.0), *scenes]
     events = play(acts, seed=seed).events
     tare = Tare.take(events, stop_us=events.markers[0][0])
@@ -131,9 +137,12 @@ def board_of_drops(seed: int, count: int) -> list[list[float | int]]:
     for scene, contact in zip(scenes, firsts, strict=True):
         told = rises[(rises >= contact.start_us - FRAME_US) & (rises < contact.stop_us)]
         if len(told):
-            at = scene.parameters
-            sizes = [round(2 * at["ball"]["radius_mm"], 1), round(at["drop_mm"], 1)]
-            rows.append([*sizes, *look(events.sorted(), tare, float(told[0])).ravel().tolist()])
+            rows.append(
+                [
+                    *(round(size, 1) for size in _sizes(scene)),
+                    *look(events.sorted(), tare, float(told[0])).ravel().tolist(),
+                ]
+            )
     return rows
 
 
@@ -189,7 +198,7 @@ def named(hearing: Hearing, scenes: Sequence[Scene]) -> dict[str, Any]:
     pictures = []
     for scene, contact in zip(scenes, firsts, strict=True):
         felt = hearing.first_input(contact, "contact")
-        true = {"ball": 2 * scene.parameters["ball"]["radius_mm"], "height": scene.parameters["drop_mm"]}
+        true = dict(zip(QUESTIONS, _sizes(scene), strict=True))
         late = None if felt is None else to_ms(felt - contact.start_us)
         drops.append({"true_mm": true, "felt_ms": late, "said": {}})
         if felt is not None:
