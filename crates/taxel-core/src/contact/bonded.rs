@@ -300,13 +300,15 @@ impl Bonded {
         };
         way.clear();
         way.resize(cells.len(), 0.0);
-        let (mut last, mut keeps) = (1.0, 0.0);
+        let (mut last, mut keeps, mut known) = (1.0, 0.0, false);
         // The layer's stiffness under a wide touch: what a gap that is left is worth.
         let stiffness = 1.0 / self.surface[0];
         for _ in 0..MOST_TURNS {
-            carried(pressure, gap);
-            for (gap, wanted) in gap.iter_mut().zip(wanted.iter()) {
-                *gap -= wanted;
+            if !known {
+                carried(pressure, gap);
+                for (gap, wanted) in gap.iter_mut().zip(wanted.iter()) {
+                    *gap -= wanted;
+                }
             }
             if pressure.iter().all(|p| *p == 0.0) {
                 // Nothing is pressed yet: begin where a wide touch would.
@@ -336,19 +338,27 @@ impl Bonded {
             let step = down / bend;
             let (mut moved, mut largest) = (0.0_f64, 0.0_f64);
             keeps = 1.0;
+            // As long as no cell leaves or joins, gaps follow the pressures in proportion.
+            known = true;
             for k in 0..gap.len() {
                 let was = pressure[k];
+                known &= was >= step * way[k];
                 pressure[k] = (was - step * way[k]).max(0.0);
                 if pressure[k] == 0.0 && gap[k] < 0.0 {
                     // Overlap where nothing presses: it joins, and directions begin anew.
                     pressure[k] = -step * gap[k];
-                    keeps = 0.0;
+                    (keeps, known) = (0.0, false);
                 }
                 moved = moved.max((pressure[k] - was).abs());
                 largest = largest.max(pressure[k]);
             }
             if moved <= self.tolerance * largest {
                 return;
+            }
+            if known {
+                for (gap, pushed) in gap.iter_mut().zip(pushed.iter()) {
+                    *gap -= step * pushed;
+                }
             }
         }
     }

@@ -282,7 +282,7 @@ struct Solved {
 }
 
 /// So many frames lie between two solutions where a whole array is touched.
-const SELDOM: usize = 3;
+const SELDOM: usize = 4;
 
 impl Felt {
     fn new(scene: &Scene, layer: Bonded, motion: Motion, array: &Array) -> Self {
