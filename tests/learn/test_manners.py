@@ -59,7 +59,7 @@ def test_a_learner_has_a_file_in_each_place_and_nothing_is_left_out():
     kinds = {kind._kind for kind in LEARNERS.values()}
     assert kinds == files - {"certificate"}, "python/taxel/learn/NAME.py with _kind NAME, a line in learn/__init__.py"
     registered = set(_core.rule_names()) | set(_core.batch_names())
-    ours = {"cone_x", "cone_r", "online_cone_r", "tempotron"}
+    ours = {"cone_x", "cone_r", "online_cone_r", "stdp", "tempotron"}
     assert kinds - ours == registered, "a line in a registry of crates/taxel-core/src/learn/rivals.rs"
     for name in kinds:
         assert (root / f"tests/learn/test_{name}.py").exists(), f"tests/learn/test_{name}.py"

@@ -9,9 +9,11 @@ mod fit;
 mod online;
 pub mod rivals;
 mod statement;
+mod stdp;
 
 pub use cone::{ConeR, ConeRFit, ConeRProblem, ConeX, ConeXFit, ConeXProblem, Horizon, Shares};
 pub use engines::{DualActiveSet, Multipliers, Ray, RowId, Verdict};
 pub use fit::{Engine, Fit, Left, Round, Status};
 pub use online::OnlineConeR;
 pub use statement::{Bound, Bounds, Certificate, Divisor, Margin, Norm, Parts, Row, Stated};
+pub use stdp::{Stdp, StdpNeuron};

@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use taxel_core::circuit::{Chain, Converter, Divider, Fabric, VirtualGround};
 use taxel_core::encode::{Encoder, RunningRange};
 use taxel_core::learn::rivals::{Batch, Rival, Tempotron};
-use taxel_core::learn::{ConeR, ConeX, OnlineConeR};
+use taxel_core::learn::{ConeR, ConeX, OnlineConeR, Stdp};
 use taxel_core::metrics::{Metric, matching};
 use taxel_core::neuron::Neuron;
 use taxel_core::parameters::Described;
@@ -30,6 +30,7 @@ fn described(of: &str) -> Option<Described> {
         "cone_x" => Some(ConeX::described()),
         "cone_r" => Some(ConeR::described()),
         "online_cone_r" => Some(OnlineConeR::described()),
+        "stdp" => Some(Stdp::described()),
         "tempotron" => Some(Tempotron::described()),
         "matching" => Some(matching::described()),
         "fabric" => Some(Fabric::described()),
@@ -57,6 +58,7 @@ fn check_parameters(of: &str, parameters: &str) -> PyResult<String> {
             OnlineConeR::new(&cone, window).map_err(core)?;
             written("OnlineConeR", &cone)
         }
+        "stdp" => checked("STDP", parameters, Stdp::check),
         "tempotron" => checked("Tempotron", parameters, Tempotron::check),
         "fabric" => checked("Fabric", parameters, Fabric::check),
         "virtual_ground" => checked("VirtualGround", parameters, VirtualGround::check),

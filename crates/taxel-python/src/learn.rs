@@ -4,7 +4,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use serde_json::{Map, Value};
 use taxel_core::learn as core_learn;
-use taxel_core::learn::{ConeR, ConeRFit, Engine, Fit, Left, Round, Shares, Status};
+use taxel_core::learn::{ConeR, ConeRFit, Engine, Fit, Left, Round, Shares, Status, Stdp, StdpNeuron};
 use taxel_core::problem;
 
 use crate::convert::{SpikesIn, array, slice, to_spikes};
@@ -134,6 +134,38 @@ impl OnlineConeR {
     }
 }
 
+/// A neuron with spike-timing-dependent plasticity, in one stream of time.
+#[pyclass(frozen, name = "STDP")]
+struct Plastic(Shared<StdpNeuron>);
+
+#[pymethods]
+impl Plastic {
+    #[new]
+    fn new(parameters: &str, trains: usize) -> PyResult<Self> {
+        let parameters: Stdp = parsed("STDP", parameters)?;
+        Ok(Self(Shared::new(StdpNeuron::new(&parameters, trains).map_err(core)?)))
+    }
+
+    #[getter]
+    fn weights<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        array(py, self.0.look(py, |neuron| neuron.weights().to_vec()))
+    }
+
+    fn set_weights(&self, py: Python<'_>, weights: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
+        let weights = slice("weights", &weights)?;
+        self.0.enter(py, |neuron, _| neuron.set_weights(weights))
+    }
+
+    fn rest(&self, py: Python<'_>) {
+        self.0.look(py, StdpNeuron::rest);
+    }
+
+    fn push<'py>(&self, py: Python<'py>, piece: SpikesIn<'_>, learn: bool) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let piece = to_spikes(piece)?;
+        Ok(array(py, self.0.enter(py, |neuron, stop| neuron.push(&piece, learn, stop))?))
+    }
+}
+
 /// Weights of an earlier fit, and its multipliers where it was of the same rows.
 type StartIn<'py> = (PyReadonlyArray1<'py, f64>, Option<MultipliersIn<'py>>);
 
@@ -160,5 +192,6 @@ fn fit_out(py: Python<'_>, found: ConeRFit) -> FitOut<'_> {
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<ConeRProblem>()?;
-    module.add_class::<OnlineConeR>()
+    module.add_class::<OnlineConeR>()?;
+    module.add_class::<Plastic>()
 }

@@ -18,6 +18,7 @@ from taxel.learn.psd import PSD as PSD
 from taxel.learn.resume import ReSuMe as ReSuMe
 from taxel.learn.skim import SKIM as SKIM
 from taxel.learn.span import SPAN as SPAN
+from taxel.learn.stdp import STDP as STDP
 from taxel.learn.tempotron import Tempotron as Tempotron
 
 # The lines above are the registry: a learner is one of them.

@@ -69,25 +69,37 @@ def tasks(p: Parameters) -> list[Task]:
     ]
 
 
-def realise(params: dict[str, Any], seed: int) -> list[list[float]]:
-    """Return the times of each train's spikes since contact, ms: ON trains of the taxels, then OFF ones."""
+def drop(radius_mm: float, drop_mm: float, listen_ms: float, seed: int) -> tuple[Frames, float]:
+    """Return what the taxels under an impact read above rest, a frame each 192 us, and when the ball touches, us.
+
+    Frames begin before contact, so that afferents have settled.
+    """
     random = np.random.default_rng([seed, 232])
     x, y = (32 * 2.67 + random.uniform(-2.67, 2.67, 2)).tolist()
-    ball: dict[str, Any] = {"shape": {"sphere": {"radius_mm": params["radius_mm"]}}, "x_mm": x, "y_mm": y}
-    scene = Scene.draw(seed).body(**ball, motion={"dropped": {"height_mm": params["drop_mm"]}})
+    ball: dict[str, Any] = {"shape": {"sphere": {"radius_mm": radius_mm}}, "x_mm": x, "y_mm": y}
+    scene = Scene.draw(seed).body(**ball, motion={"dropped": {"height_mm": drop_mm}})
     acts: list[Act] = [Silence(60.0), scene]
     contact = truth(acts)[0][0].start_us
     events = play(acts, seed=seed).events
     tare = Tare.take(events, stop_us=events.markers[0][0])
-    # Whole frames before contact on, so that the afferents have settled.
     start = int(contact) - 50 * PERIOD_US
-    stop = int(contact + 1000.0 * (params["listen_ms"] + 2.0))
+    stop = int(contact + 1000.0 * (listen_ms + 2.0))
     frames = tare.off(Frames.from_events(events, PERIOD_US, start, stop))
     middle = 32 - SIDE // 2
-    frames = frames.region(slice(middle, middle + SIDE), slice(middle, middle + SIDE))
+    return frames.region(slice(middle, middle + SIDE), slice(middle, middle + SIDE)), contact
+
+
+def since_contact(trains: SpikeTrains, contact_us: float, listen_ms: float) -> list[list[float]]:
+    """Return the times of each train's spikes within so long after contact, ms."""
+    since = [times - contact_us * 1e-3 for times in trains]
+    return [[round(float(t), 4) for t in times[(times >= 0) & (times < listen_ms)]] for times in since]
+
+
+def realise(params: dict[str, Any], seed: int) -> list[list[float]]:
+    """Return the times of each train's spikes since contact, ms: ON trains of the taxels, then OFF ones."""
+    frames, contact = drop(params["radius_mm"], params["drop_mm"], params["listen_ms"], seed)
     trains = FA1(period_ms=PERIOD_US * 1e-3).encode(frames).split_by_sign()
-    since = [times - contact * 1e-3 for times in trains]
-    return [[round(float(t), 4) for t in times[(times >= 0) & (times < params["listen_ms"])]] for times in since]
+    return since_contact(trains, contact, params["listen_ms"])
 
 
 def summarise(p: Parameters, rows: Sequence[Row]) -> Said:

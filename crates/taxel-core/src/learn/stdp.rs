@@ -1,0 +1,338 @@
+//! Spike-timing-dependent plasticity: a neuron that finds a pattern which repeats in its inputs, without being told.
+//!
+//! After Masquelier, Guyonneau and Thorpe (2008), PLoS ONE 3:e1377. Since its last spike the neuron's potential is
+//!
+//! `p = T (k1 exp(-s/tau_m) - k2 (exp(-s/tau_m) - exp(-s/tau_s))) + sum w K (exp(-u/tau_m) - exp(-u/tau_s))`,
+//!
+//! s the time since that spike, u the time since each input spike after it, K such that one input adds its weight at
+//! most. It fires where p rises to T. Both parts are sums of the same two exponentials, so two numbers are the state, and
+//! crossings are found between inputs as well as at them. A spike at time t changes the weight of each input whose last
+//! spike came d before it by `a_plus exp(-d/tau_plus)`; the first input spike that comes d after it by
+//! `-a_minus exp(-d/tau_minus)`; weights stay from 0 to 1. Each pair of neighbours counts once, as in the authors'
+//! program (so Hathway and Goodman 2018, ReScience 4(1):6, who found that other pairings do not learn).
+
+use serde::{Deserialize, Serialize};
+
+use crate::allowed::{Range, one_weight_a_train, ranges};
+use crate::parameters::Described;
+use crate::{Result, SpikeTrains, Stop, problem};
+
+/// Parameters of the rule and its neuron; defaults are the published ones, for some 2000 inputs of 64 spikes/s.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Stdp {
+    /// T, in weights.
+    pub threshold: f64,
+    /// The membrane's time constant, ms.
+    pub tau_m: f64,
+    /// The synapses' time constant, ms.
+    pub tau_s: f64,
+    /// Height of the spike, thresholds.
+    pub k1: f64,
+    /// Depth of what follows it, thresholds.
+    pub k2: f64,
+    /// The most that a weight gains at once.
+    pub a_plus: f64,
+    /// The most that a weight loses at once.
+    pub a_minus: f64,
+    /// Time constant of gains, ms.
+    pub tau_plus: f64,
+    /// Time constant of losses, ms.
+    pub tau_minus: f64,
+    /// All weights at first.
+    pub initial: f64,
+}
+
+impl Default for Stdp {
+    fn default() -> Self {
+        let a_plus = 0.03125;
+        Self {
+            threshold: 500.0,
+            tau_m: 10.0,
+            tau_s: 2.5,
+            k1: 2.0,
+            k2: 4.0,
+            a_plus,
+            a_minus: 0.85 * a_plus,
+            tau_plus: 16.8,
+            tau_minus: 33.7,
+            initial: 0.475,
+        }
+    }
+}
+
+impl Stdp {
+    ranges! {
+        threshold: "", Range::ABOVE_0;
+        tau_m: "ms", Range::ABOVE_0;
+        tau_s: "ms", Range::ABOVE_0;
+        k1: "", Range::FROM_0;
+        k2: "", Range::FROM_0;
+        a_plus: "", Range::within(0.0, 1.0);
+        a_minus: "", Range::within(0.0, 1.0);
+        tau_plus: "ms", Range::ABOVE_0;
+        tau_minus: "ms", Range::ABOVE_0;
+        initial: "", Range::within(0.0, 1.0);
+    }
+
+    /// The parameters with their defaults and ranges.
+    #[must_use]
+    pub fn described() -> Described {
+        Described::by(&Self::default(), &[], Self::RANGES)
+    }
+
+    /// Checks every parameter.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter, its value and what would be right.
+    pub fn check(&self) -> Result<()> {
+        self.check_ranges()?;
+        if self.tau_s >= self.tau_m {
+            return Err(problem!("tau_s is {} ms: must be below tau_m, {} ms", self.tau_s, self.tau_m));
+        }
+        Ok(())
+    }
+
+    /// K: by how much the difference of the exponentials of one input is scaled to a height of 1.
+    fn scale(&self) -> f64 {
+        let ratio = self.tau_m / self.tau_s;
+        let peak = ratio.ln() / (ratio - 1.0);
+        1.0 / ((-peak).exp() - (-peak * ratio).exp())
+    }
+}
+
+/// The neuron at work, in one stream of time.
+#[derive(Debug, Clone)]
+pub struct StdpNeuron {
+    parameters: Stdp,
+    scale: f64,
+    weights: Vec<f64>,
+    /// When each input last spiked, ms.
+    last: Vec<f64>,
+    /// When the neuron last fired, ms.
+    fired: f64,
+    /// Since when `slow` and `fast` have decayed, ms.
+    now: f64,
+    /// What decays by tau_m, and by tau_s: the potential is their sum.
+    slow: f64,
+    fast: f64,
+    /// Whether the potential came below the threshold since the last spike.
+    armed: bool,
+}
+
+impl StdpNeuron {
+    /// A neuron at rest, all weights as they are at first.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where a parameter makes no sense.
+    pub fn new(parameters: &Stdp, trains: usize) -> Result<Self> {
+        parameters.check()?;
+        Ok(Self {
+            scale: parameters.scale(),
+            weights: vec![parameters.initial; trains],
+            last: vec![f64::NEG_INFINITY; trains],
+            fired: f64::NEG_INFINITY,
+            now: f64::NEG_INFINITY,
+            slow: 0.0,
+            fast: 0.0,
+            armed: true,
+            parameters: parameters.clone(),
+        })
+    }
+
+    /// The weights, one a train.
+    #[must_use]
+    pub fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// Begins anew with these weights, at rest.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where they are not one a train, from 0 to 1.
+    pub fn set_weights(&mut self, weights: &[f64]) -> Result<()> {
+        one_weight_a_train(weights, self.weights.len())?;
+        if let Some(n) = weights.iter().position(|w| !(0.0..=1.0).contains(w)) {
+            return Err(problem!("weights[{n}] is {}: must be from 0 to 1", weights[n]));
+        }
+        self.weights.copy_from_slice(weights);
+        self.rest();
+        Ok(())
+    }
+
+    /// Forgets the inputs and spikes that came so far, and keeps the weights.
+    pub fn rest(&mut self) {
+        self.last.fill(f64::NEG_INFINITY);
+        (self.fired, self.now) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        (self.slow, self.fast, self.armed) = (0.0, 0.0, true);
+    }
+
+    /// Takes the next piece of the stream; gives the neuron's spikes in it, ms. Where not to `learn`, weights stay.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for another number of trains or a piece that begins before the last one's end (nothing is taken then),
+    /// `Interrupted` where asked to stop (what came before stays taken).
+    pub fn push(&mut self, piece: &SpikeTrains, learn: bool, stop: Stop<'_>) -> Result<Vec<f64>> {
+        if piece.len() != self.weights.len() {
+            return Err(problem!("piece of {} trains: must be {}, as before", piece.len(), self.weights.len()));
+        }
+        if piece.start < self.now {
+            return Err(problem!("piece from {} ms: must begin at {} ms or later", piece.start, self.now));
+        }
+        let mut spikes: Vec<(f64, u32)> = Vec::with_capacity(piece.times.len());
+        for train in 0..piece.len() {
+            spikes.extend(piece.train(train).iter().map(|&t| (t, train as u32)));
+        }
+        spikes.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut out = vec![];
+        for (k, &(t, train)) in spikes.iter().enumerate() {
+            if k % 65_536 == 0 {
+                stop.check()?;
+            }
+            self.pass(t, learn, &mut out);
+            self.hear(t, train as usize, learn);
+        }
+        self.pass(piece.stop, learn, &mut out);
+        Ok(out)
+    }
+
+    /// Lets time go on until `t`, firing where the potential rises to the threshold.
+    fn pass(&mut self, t: f64, learn: bool, out: &mut Vec<f64>) {
+        let Stdp { threshold, tau_m, tau_s, .. } = self.parameters;
+        loop {
+            let since = if self.now.is_finite() { t - self.now } else { 0.0 };
+            let (slow, fast) = (self.slow * (-since / tau_m).exp(), self.fast * (-since / tau_s).exp());
+            if self.armed
+                && let Some(at) = self.crossing(since, slow, fast)
+            {
+                self.fire(self.now + at, learn);
+                out.push(self.fired);
+                continue;
+            }
+            (self.slow, self.fast, self.now) = (slow, fast, t);
+            self.armed |= slow + fast < threshold;
+            return;
+        }
+    }
+
+    /// How long after `now` the potential rises to the threshold, where it does within `since`, at whose end its parts are
+    /// `slow` and `fast`. It is below the threshold now, and has one turning point at most.
+    #[inline]
+    fn crossing(&self, since: f64, slow: f64, fast: f64) -> Option<f64> {
+        let Stdp { threshold, tau_m, tau_s, .. } = self.parameters;
+        let falls = |slow: f64, fast: f64| slow / tau_m + fast / tau_s >= 0.0;
+        let mut until = since;
+        if slow + fast < threshold {
+            // Between two values below it may pass the threshold only where it first rises and then falls.
+            if falls(self.slow, self.fast) || !falls(slow, fast) {
+                return None;
+            }
+            until = (-(self.fast * tau_m) / (self.slow * tau_s)).ln() * tau_m * tau_s / (tau_m - tau_s);
+            if self.at(until) < threshold {
+                return None;
+            }
+        }
+        let mut from = 0.0;
+        loop {
+            let middle = 0.5 * (from + until);
+            if middle <= from || middle >= until {
+                return Some(until);
+            }
+            if self.at(middle) < threshold { from = middle } else { until = middle }
+        }
+    }
+
+    /// The potential so long after `now`.
+    fn at(&self, since: f64) -> f64 {
+        self.slow * (-since / self.parameters.tau_m).exp() + self.fast * (-since / self.parameters.tau_s).exp()
+    }
+
+    fn fire(&mut self, t: f64, learn: bool) {
+        let Stdp { threshold, k1, k2, a_plus, tau_plus, .. } = self.parameters;
+        if learn {
+            for (weight, &last) in self.weights.iter_mut().zip(&self.last) {
+                if last > self.fired {
+                    *weight = (*weight + a_plus * ((last - t) / tau_plus).exp()).min(1.0);
+                }
+            }
+        }
+        (self.fired, self.now) = (t, t);
+        (self.slow, self.fast) = (threshold * (k1 - k2), threshold * k2);
+        self.armed = k1 < 1.0;
+    }
+
+    #[inline]
+    fn hear(&mut self, t: f64, train: usize, learn: bool) {
+        let Stdp { a_minus, tau_minus, .. } = self.parameters;
+        let weight = &mut self.weights[train];
+        self.slow += *weight * self.scale;
+        self.fast -= *weight * self.scale;
+        if learn && self.fired.is_finite() && self.last[train] < self.fired {
+            *weight = (*weight - a_minus * ((self.fired - t) / tau_minus).exp()).max(0.0);
+        }
+        self.last[train] = t;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn trains(times: &[&[f64]], start: f64, stop: f64) -> SpikeTrains {
+        let mut offsets = vec![0];
+        for train in times {
+            offsets.push(offsets.last().unwrap() + train.len());
+        }
+        SpikeTrains { times: times.concat(), offsets, values: None, start, stop }
+    }
+
+    fn never() -> Stop<'static> {
+        Stop::never()
+    }
+
+    #[test]
+    fn one_input_adds_its_weight_at_most() {
+        let parameters = Stdp::default();
+        let neuron = StdpNeuron {
+            slow: parameters.scale(),
+            fast: -parameters.scale(),
+            ..StdpNeuron::new(&parameters, 1).unwrap()
+        };
+        let highest = (0..100_000).map(|k| neuron.at(f64::from(k) * 1e-3)).fold(0.0, f64::max);
+        assert!((highest - 1.0).abs() < 1e-6, "{highest}");
+    }
+
+    #[test]
+    fn it_fires_between_inputs_where_the_potential_peaks_above_the_threshold() {
+        // Ten inputs at once peak at 10 x 0.475 = 4.75, tau_m tau_s / (tau_m - tau_s) ln(tau_m / tau_s) = 4.62 ms later.
+        let inputs: Vec<&[f64]> = vec![&[5.0]; 10];
+        for (threshold, fires) in [(4.74, true), (4.76, false)] {
+            let parameters = Stdp { threshold, ..Stdp::default() };
+            let mut neuron = StdpNeuron::new(&parameters, 10).unwrap();
+            let spikes = neuron.push(&trains(&inputs, 0.0, 200.0), true, never()).unwrap();
+            assert_eq!(spikes.len(), usize::from(fires), "{threshold}");
+            if fires {
+                let after = spikes[0] - 5.0;
+                assert!(after > 4.3 && after <= 4.621, "{after}");
+                let gained = 0.475 + parameters.a_plus * (-after / parameters.tau_plus).exp();
+                assert!(neuron.weights().iter().all(|w| (w - gained).abs() < 1e-12));
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_input_after_a_spike_loses_and_the_next_does_not() {
+        let mut inputs: Vec<&[f64]> = vec![&[5.0]; 10];
+        inputs.push(&[20.0, 30.0]);
+        let parameters = Stdp { threshold: 4.0, ..Stdp::default() };
+        let mut neuron = StdpNeuron::new(&parameters, 11).unwrap();
+        let spikes = neuron.push(&trains(&inputs, 0.0, 200.0), true, never()).unwrap();
+        assert_eq!(spikes.len(), 1);
+        let lost = 0.475 - parameters.a_minus * ((spikes[0] - 20.0) / parameters.tau_minus).exp();
+        assert!((neuron.weights()[10] - lost).abs() < 1e-12);
+    }
+}
