@@ -16,6 +16,7 @@ import taxel
 from taxel import ProblemError, wire
 from taxel.demo.script import endless, script
 from taxel.simulate import Board, Faults, Flaws, Pipe, Replay, Silence, Version2, emulate, play, truth
+from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.wire import Registers
 
 
@@ -310,6 +311,34 @@ def test_taxels_have_flaws_by_their_own_seeds(listener):
             emulate(heard.to, Replay(still), flaws=nonsense)
     with pytest.raises(ProblemError, match="no flaw"):
         Flaws(seeds={"cold": 1})
+
+
+@pytest.mark.parametrize("switch_ohm", [0.0, 50.0])
+def test_taxels_that_share_a_switch_pull_each_other_down(listener, switch_ohm):
+    """A pressed column through 50 ohm, by hand; the rest of the array, and a column by ideal lines, as they were."""
+    heard, pressed = Heard(listener), np.full((64, 64), 49.0)
+    pressed[:, 5] = 140.0
+    still = taxel.Frames(np.stack([pressed] * 3), [0, 1000, 2000], unit="ticks")
+    plain = Converter(hysteresis_v=0.0, settle_us=0.0, discharge_us=0.0)
+    volts = plain.ramp_volts([140.5])[0]
+    gained = (volts / 1.3 - 1) / 47e3
+    wanted = int(plain.ramp_ticks(1.3 + (volts - 1.3) / (1 + switch_ohm * 64 * gained)))
+    assert wanted == 140 if switch_ohm == 0 else wanted < 135
+    lines = VirtualGround(gain=None, switch_ohm=switch_ohm)
+    emulate(heard.to, Replay(still), wire=2, circuit=Circuit(readout=lines, converter=plain))
+    decoder = taxel.wire_v2.Decoder()
+    for datagram in heard.all():
+        decoder.push(datagram)
+    assert (decoder.held[:, 5] == wanted).all()
+    assert (np.delete(decoder.held, 5, axis=1) == 49).all()
+
+
+def test_a_circuit_that_is_not_the_sensor_s_is_refused():
+    to, still = "127.0.0.1:9", taxel.Frames(np.ones((2, 64, 64)), [0, 1000], unit="ticks")
+    with pytest.raises(ProblemError, match=r"v_trans is 0.5: must be the sensor's, 1.3"):
+        emulate(to, [Silence(60.0)], circuit=Circuit(readout=VirtualGround(v_trans=0.5)))
+    with pytest.raises(ProblemError, match="circuit is 3"):
+        emulate(to, Replay(still), circuit=3)
 
 
 def test_a_source_of_frames_is_heard_as_a_board_is(tmp_path):

@@ -1,11 +1,11 @@
-"""Figures 4.3, 4.6 and 4.7: what the thesis says of the circuit comes out, and what is taken over is not judged."""
+"""Figures 3.3, 3.5, 4.3, 4.6 and 4.7: what the thesis says comes out, and what is taken over is not judged."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from taxel.studies import fig4_3, fig4_6, fig4_7
+from taxel.studies import fabric_array, fig3_3, fig3_5, fig4_3, fig4_6, fig4_7
 from taxel.studies.study import Study
 
 
@@ -43,3 +43,32 @@ def test_the_input_settles_in_time_unless_the_capacitors_lie_across_the_amplifie
     assert max(abs(t) for t in plain["left_ticks"]) < 0.05
     assert max(slow["left_ticks"]) > 3
     assert said["impact"]["moved_us"] == pytest.approx(50, abs=1)
+
+
+def test_a_pair_of_neurons_fires_once_for_each_step_that_lasts(tmp_path):
+    said, statements = found(fig3_3.STUDY, tmp_path)
+    assert said["steps"] == said["spikes"]
+    assert said["wrong"] == 0
+    assert said["active"] > 20
+    assert [s["holds"] for s in statements.values()] == [True]
+
+
+def test_a_sphere_is_pressed_to_its_force_and_felt_by_the_taxels_beneath():
+    """The pressure on the taxels carries the force; dividers read most where it is."""
+    p = fabric_array.SENSOR
+    depth = fabric_array.depth_of(65.0, 4.0, p["foam_kpa"], p["foam_mm"])
+    depths, felt = fabric_array.pressed(p, 65.0, depth, 7.5, 0.0)
+    assert felt[-1].sum() * 7.5**2 / 1000 == pytest.approx(4.0, rel=0.01)
+    frames = fabric_array.read({**p, "noise_v": 0.0, "gain_spread": 0.0}, depths, felt, np.array([0.0, depth]), 1)
+    taxel = np.unravel_index(frames.values[1].argmax(), (8, 8))
+    assert taxel[0] in (3, 4)
+    assert taxel[1] in (4, 5)
+    assert frames.values[0].max() == pytest.approx(frames.values[0].min(), abs=1e-6)
+
+
+def test_two_spheres_give_trials_of_both_and_errors_by_epoch(tmp_path):
+    said, statements = found(fig3_5.STUDY, tmp_path)
+    (line,) = said["forces"]
+    assert min(line["counts"]) > 2
+    assert all(0 <= e <= 1 for e in line["error"])
+    assert [s["holds"] for s in statements.values()] == [None, None]

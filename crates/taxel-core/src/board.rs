@@ -5,6 +5,7 @@
 
 mod afferents;
 mod counts;
+mod crossed;
 mod flaws;
 mod network;
 mod outbox;
@@ -18,6 +19,7 @@ use scan::Lfsr;
 use serde::{Deserialize, Serialize};
 
 pub use counts::BoardCounts;
+pub use crossed::Crossed;
 pub use flaws::{Flaw, Flawed, Flaws};
 pub use network::{Faults, Network, NetworkCounts};
 pub use play::{Armed, Play, Played};

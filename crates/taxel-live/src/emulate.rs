@@ -12,7 +12,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
-use taxel_core::board::{Board, BoardCounts, Faults, Flawed, Flaws, Network, NetworkCounts};
+use taxel_core::board::{Board, BoardCounts, Crossed, Faults, Flawed, Flaws, Network, NetworkCounts};
+use taxel_core::circuit::Chain;
 use taxel_core::wire::Command;
 use taxel_core::{Array, Stop};
 
@@ -82,6 +83,8 @@ pub struct EmulatorOptions {
     pub marks_stop: bool,
     /// What the network does to datagrams.
     pub faults: Option<Faults>,
+    /// The circuit that the taxels share, where it is not ideal; flaws come after it.
+    pub circuit: Option<Chain>,
     /// What is wrong with the taxels.
     pub flaws: Option<Flaws>,
     /// The board is reset so often, s of its time.
@@ -107,6 +110,7 @@ impl EmulatorOptions {
             arms: false,
             marks_stop: false,
             faults: None,
+            circuit: None,
             flaws: None,
             reset_every_s: None,
             drift_ppm: 0.0,
@@ -147,6 +151,7 @@ pub struct Emulator {
     control: Control,
     sync: Option<Sync>,
     network: Option<Network>,
+    crossed: Option<Crossed>,
     flawed: Option<Flawed>,
     options: EmulatorOptions,
 }
@@ -169,12 +174,14 @@ impl Emulator {
             return Err(taxel_core::problem!("drift of {} ppm: must lie within 100000 of 0", options.drift_ppm).into());
         }
         let network = options.faults.map(Network::new).transpose()?;
+        let circuit = options.circuit.clone();
+        let crossed = circuit.map(|chain| Crossed::new(chain, board.registers(), array)).transpose()?;
         let flawed = options.flaws.map(|flaws| Flawed::new(flaws, array)).transpose()?;
         let sender = Sender::open_from(options.source_port, options.to, options.segment)?;
         let line = options.line.as_ref().map(|(link, baud)| Line::open(link, *baud)).transpose()?;
         let control = Control::open(options.control, line, &board)?;
         let sync = options.sync.as_ref().map(|(path, overwrite)| Sync::open(path, *overwrite)).transpose()?;
-        Ok(Self { board, array: array.clone(), sender, control, sync, network, flawed, options })
+        Ok(Self { board, array: array.clone(), sender, control, sync, network, crossed, flawed, options })
     }
 
     /// Where commands are taken, if anywhere.
@@ -236,6 +243,15 @@ impl Emulator {
             }
             if let Some(sync) = &mut self.sync {
                 sync.follow(since_us, self.board.registers().record);
+            }
+            if let Some(crossed) = &mut self.crossed
+                && !last
+            {
+                match crossed.read(self.board.registers(), &mut ticks, stop) {
+                    // Being asked to stop is no error here; the loop sees it.
+                    Err(taxel_core::Error::Interrupted) => continue,
+                    read => read?,
+                }
             }
             if let Some(flawed) = &mut self.flawed
                 && !last

@@ -8,9 +8,10 @@ use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use serde::Deserialize;
 use taxel_core::board::{Board, Faults, Flaws, IntensityWord, Play, Played, Previous, Version2, opening};
+use taxel_core::circuit::Chain;
 use taxel_core::contact::{Act, Bonded, Contact, Foam, Motion, Pictures, Scene, Sensor, Taxels, Track};
 use taxel_core::wire::Registers;
-use taxel_core::{Array, Error, Result, Stop, reading};
+use taxel_core::{Array, Error, Result, Stop, problem, reading};
 use taxel_live::address::of_text;
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Feed, Replay, Report, Scenes, Touch};
@@ -152,6 +153,7 @@ struct Chosen {
     line: Option<(PathBuf, u32)>,
     sync: Option<(PathBuf, bool)>,
     faults: Option<Faults>,
+    circuit: Option<Chain>,
     flaws: Option<Flaws>,
     reset_every_s: Option<f64>,
     drift_ppm: f64,
@@ -224,6 +226,16 @@ fn emulate(
     let (frame_us, step) = (registers.frame_us(), u16::from(registers.noise_floor) + 1);
     let real_time = !matches!(touch, TouchIn::Pipe(..));
     let sensor = to_sensor(sensor)?;
+    if let (TouchIn::Acts(_), Some(Chain { readout, .. })) = (&touch, &chosen.circuit) {
+        for (name, circuits, sensors) in [
+            ("v_trans", readout.v_trans, sensor.v_trans),
+            ("feedback_kohm", readout.feedback_kohm, sensor.feedback_kohm),
+        ] {
+            if circuits != sensors {
+                return Err(core(problem!("circuit: {name} is {circuits}: must be the sensor's, {sensors}")));
+            }
+        }
+    }
     let mut touch = match touch {
         TouchIn::Acts(iterator) => {
             let taxels = Taxels::new(&sensor, array.len(), registers.ramp, seed).map_err(core)?;
@@ -255,6 +267,7 @@ fn emulate(
             arms: tare_ms.is_some(),
             marks_stop: tare_ms.is_some(),
             faults: chosen.faults,
+            circuit: chosen.circuit,
             flaws: chosen.flaws,
             reset_every_s: chosen.reset_every_s,
             drift_ppm: chosen.drift_ppm,

@@ -22,6 +22,7 @@ from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED, endless, script
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
+from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.wire import Registers
 
 __all__ = ["emulate"]
@@ -64,6 +65,14 @@ def emulate(
     ] = 1000.0,
     reset_every: Annotated[float | None, typer.Option(min=0.001, help="The board is reset so often, s.")] = None,
     drift: Annotated[float, typer.Option(help="The board's clock runs faster by so much, parts per million.")] = 0.0,
+    circuit: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Taxels share lines: gain, switch_ohm, wire_ohm, offset_mv, hysteresis_v, settle_us, amplifier_us; "
+            "one of them puts in the whole circuit, the others as usual. Takes the board below 5.2 kHz.",
+        ),
+    ] = None,
     flaw: Annotated[
         list[str] | None,
         typer.Option(
@@ -115,6 +124,7 @@ def emulate(
     Registers.preset(preset)
     seed = (secrets.randbelow(TRAINING_SEED) if written is None else written.seed) if seed is None else seed
     flaws, faults = _flaws(flaw or [], seed), _faults(fault or [], seed)
+    lines = _circuit(circuit or [], seed)
     console = Console(stderr=True, quiet=as_json)
     if replay is not None:
         touch, said = _again(replay, speed)
@@ -157,6 +167,7 @@ def emulate(
                     sensor=said_by.sensor,
                     wire=None if wire is None else 2 if wire == 2 else 1,
                     version_2=Version2(board, session, round(1e3 * hold), round(1e3 * heartbeat), round(1e3 * states)),
+                    circuit=lines,
                     flaws=flaws,
                     faults=faults,
                     reset_every_s=reset_every,
@@ -263,6 +274,18 @@ def _flaws(said: list[str], seed: int) -> Flaws | None:
         sizes[name] = _number("flaw", name, size)
         seeds[name] = int(_number("flaw", name, own)) if own else seed
     return Flaws(**sizes, seeds=seeds) if sizes else None
+
+
+def _circuit(said: list[str], seed: int) -> Circuit | None:
+    readout: dict[str, Any] = {"seed": seed}
+    converter: dict[str, Any] = {}
+    homes = dict.fromkeys(("gain", "switch_ohm", "wire_ohm", "offset_mv"), readout)
+    homes |= dict.fromkeys(("hysteresis_v", "settle_us", "amplifier_us"), converter)
+    for name, value in _pairs("circuit", said).items():
+        if name not in homes:
+            raise ProblemError(f"--circuit {name}: must be one of {', '.join(homes)}")
+        homes[name][name] = _number("circuit", name, value)
+    return Circuit(readout=VirtualGround(**readout), converter=Converter(**converter)) if said else None
 
 
 def _faults(said: list[str], seed: int) -> Faults | None:

@@ -21,6 +21,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording import Recording
 from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence
+from taxel.simulate.circuit import Circuit
 from taxel.simulate.emulated import Version2
 from taxel.simulate.trouble import Faults, Flaws
 from taxel.spikes import to_ms
@@ -332,6 +333,7 @@ def emulate(
     previous: Literal["last_sent", "last_sample"] = "last_sent",
     intensity: Literal["value", "difference", "nothing"] = "value",
     version_2: Version2 | None = None,
+    circuit: Circuit | None = None,
     flaws: Flaws | None = None,
     faults: Faults | None = None,
     reset_every_s: float | None = None,
@@ -366,6 +368,10 @@ def emulate(
         As in `Board`.
     version_2 : Version2, optional
         How it speaks version 2.
+    circuit : Circuit, optional
+        Lines that its taxels share, settling, comparators with hysteresis; left out, each taxel reads by itself. Of
+        acts its voltage and resistor must be the sensor's; the converter's times are the registers', and flaws come
+        after it. One core then keeps about 2 kHz of 64 x 64 taxels.
     flaws : Flaws, optional
         What is wrong with its taxels.
     faults : Faults, optional
@@ -420,6 +426,7 @@ def emulate(
         "control": None if control is None else text("control", control),
         "line": None if line is None else (str(Path(checked_path("line", line))), whole("baud", baud, 300, 4_000_000)),
         "sync": None if sync is None else (str(Path(checked_path("sync", sync))), bool(overwrite)),
+        "circuit": None if circuit is None else instance("circuit", circuit, Circuit)._plain(),
         "flaws": None if flaws is None else instance("flaws", flaws, Flaws)._parts(),
         "faults": None if faults is None else instance("faults", faults, Faults)._parts(),
         "reset_every_s": None if reset_every_s is None else number("reset_every_s", reset_every_s),

@@ -16,6 +16,8 @@ __all__ = ["STUDIES", "load"]
 
 #: One line on every study, by name, in the order of the page; "fig6.1" lies in ``fig6_1.py``. They load when asked for.
 STUDIES = {
+    "fig3.3": "the fabric array's readout, thresholded, as spikes of Izhikevich pairs: one a rise, one a fall",
+    "fig3.5": "two spheres told apart by a Tempotron from first spikes of the fabric array",
     "fig4.3": "single-slope conversion: the time until the ramp passes grows with the input",
     "fig4.6": "a taxel's voltage against its load at two line voltages: sensitivity against range",
     "fig4.7": "the transducer's answer to an impact, and settling while four channels are multiplexed",
