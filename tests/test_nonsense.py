@@ -359,6 +359,8 @@ SOUND: dict[str, Sound] = {
     "taxel.encode.Encoder.stream": method(LEVELS, "stream", array=ARRAY),
     "taxel.encode.Encoder.trains": method(LEVELS, "trains", array=ARRAY),
     "taxel.encode.Encoder.with_tare": method(LEVELS, "with_tare", tare=TARE),
+    "taxel.encode.Skin.afferents": method(taxel.encode.Skin(), "afferents", array=ARRAY),
+    "taxel.encode.Afferents.trains": method(taxel.encode.Skin().afferents(ARRAY), "trains", kind="SA-1"),
     "taxel.encode.EncoderStream": plain(taxel.encode.EncoderStream, encoder=LEVELS, array=ARRAY),
     "taxel.encode.EncoderStream.push": fresh(lambda: LEVELS.stream(ARRAY), "push", x=FRAMES),
     "taxel.encode.EncoderStream.advance": fresh(lambda: LEVELS.stream(ARRAY), "advance", t_us=5),
@@ -415,6 +417,9 @@ SOUND: dict[str, Sound] = {
         neuron=taxel.Neuron(tau=5.0),
         **CONE_OPTIONS,
     ),
+    "taxel.learn.STDP": plain(taxel.learn.STDP, **taxel.learn.STDP().get_params()),
+    "taxel.learn.STDP.partial_fit": fresh(taxel.learn.STDP, "partial_fit", piece=PLAIN),
+    "taxel.learn.STDP.predict": method(taxel.learn.STDP().fit([PLAIN]), "predict", patterns=[PLAIN]),
     "taxel.learn.OnlineConeR": plain(taxel.learn.OnlineConeR, window=3, neuron=taxel.Neuron(tau=5.0), **CONE_OPTIONS),
     "taxel.learn.OnlineConeR.partial_fit": lambda: (
         taxel.learn.OnlineConeR(neuron=taxel.Neuron(tau=5.0), window=3, ub=1.0).partial_fit,
@@ -884,6 +889,8 @@ for encoder in laws.ENCODERS.values():
 
 #: What is not tried, and why.
 LEFT_OUT = {
+    "taxel.encode.Afferents": "what Skin.afferents returns",
+    "taxel.learn.STDP.fit": "does not look at its targets; its patterns are tried in tests/learn/test_stdp.py",
     "taxel.simulate.Track": "what Scene.motion returns",
     "taxel.simulate.SceneFile": "what SceneFile.open returns",
     "taxel.simulate.SceneFile.open": "reads files; tried in tests/simulate/test_scene_files.py",

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import instance
+from taxel._arguments import instance, shown
+from taxel._core import ProblemError
 from taxel._parameters import defaults
 from taxel.array import Array
 from taxel.encode._encoder import Encoder
@@ -17,6 +18,8 @@ __all__ = ["Afferents", "Skin"]
 
 
 _DEFAULT = defaults("skin")
+#: The types of afferents, in the order of a skin's trains.
+KINDS = ("SA-1", "FA-1", "SA-2", "FA-2")
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +42,14 @@ class Afferents:
         return len(self.kind)
 
     def trains(self, kind: str) -> NDArray[np.int64]:
-        """Return the numbers of the trains of one type."""
+        """Return the numbers of the trains of one type.
+
+        Raises
+        ------
+        ProblemError : no such type
+        """
+        if not isinstance(kind, str) or kind not in KINDS:
+            raise ProblemError(f"kind is {shown(kind)}: must be one of {', '.join(KINDS)}")
         return np.flatnonzero(self.kind == kind)
 
 
