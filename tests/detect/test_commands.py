@@ -235,7 +235,7 @@ def test_a_table_of_one_recording_needs_no_name(tmp_path: Path, capsys) -> None:
         (("detect", "9.npz", "--readout", "touch.json", "--tare", "tare.json", "--frame-us", "0"), "--frame-us is 0"),
         (("detect", "9.npz", "--readout", "touch.json", "--truth", "recipe.toml"), "recipe.toml, line 1"),
         (("encode", "1.npz", "out.txt", "--encoder", "fa1"), "out.txt: spikes are written to a .npz"),
-        (("encode", "1.npz", "out.npz", "--encoder", "fa2"), "encoder fa2: must be one of"),
+        (("encode", "1.npz", "out.npz", "--encoder", "fa9"), "encoder fa9: must be one of"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings=2"), "wings"),
         (("encode", "1.npz", "out.npz", "--encoder", "fa1", "--set", "wings"), "--set wings: must be KEY=VALUE"),
         (
