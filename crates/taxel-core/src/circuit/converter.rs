@@ -414,8 +414,8 @@ mod tests {
         let slow = Converter { discharge_us: 5.0, ..at_once() };
         let read = frames(slow, &[&volts, &volts], 1);
         assert!(read[0][0].is_finite() && read[0][1].is_nan() && read[1][0].is_nan(), "{read:?}");
-        // Saturated lines never trip, so nothing has to return.
-        let read = frames(Converter { discharge_us: 5.0, ..at_once() }, &[&[4.0; 8], &[4.0; 8]], 1);
+        // What lies above the ramp even where it begins charged never trips, so nothing has to return.
+        let read = frames(Converter { discharge_us: 5.0, ..at_once() }, &[&[4.9; 8], &[4.9; 8]], 1);
         assert!(read.concat().iter().all(|&t| t == 150.0), "{read:?}");
         let quick = frames(Converter { discharge_us: 0.02, ..at_once() }, &[&volts, &volts], 1);
         assert!(quick.concat().iter().all(|t| (t - quick[0][0]).abs() < 0.01), "{quick:?}");
