@@ -65,7 +65,7 @@ class SA1(Encoder):
     of Gerling et al. (2018), PLoS Comput. Biol. 14:e1006264, figure 2. The others are fitted by us: `loss` to a rate
     that falls by 38 % in the first 12 s of holding (Burgess et al. 1983, J. Neurosci. 3:2652, mean of 21 fibres);
     `onset`, `membrane_ms` and `recovery_ms` to a threshold of one spike a cycle that is least near 5 Hz; `jump` to
-    some 100 spikes/s where half of `range` is newly pressed; `threshold` to what stands out of a noise of 3 ticks in
+    some 200 spikes/s where half of `range` is newly pressed; `threshold` to what stands out of a noise of 3 ticks in
     150.
 
     Examples
@@ -73,7 +73,8 @@ class SA1(Encoder):
     >>> from taxel import Frames
     >>> held = Frames([[[0.0]]] + [[[75.0]]] * 50, range(0, 51_000, 1000), unit="ticks")
     >>> SA1().encode(held)[0]
-    array([ 1.,  4., 10., 20., 30., 41.])
+    array([ 1.,  3.,  5.,  7.,  9., 11., 13., 15., 17., 21., 26., 31., 36.,
+           41., 46.])
     """
 
     name = "sa1"

@@ -60,7 +60,7 @@ class SA2(Encoder):
     >>> from taxel import Frames
     >>> held = Frames([[[0.0]]] + [[[75.0]]] * 50, range(0, 51_000, 1000), unit="ticks")
     >>> SA2().encode(held)[0]
-    array([ 2.,  8., 20., 35.])
+    array([ 2.,  4.,  7., 11., 16., 24., 33., 42.])
     """
 
     name = "sa2"

@@ -12,7 +12,7 @@ slowly_adapting! {
     /// constant of inactivation in the generator of Gerling et al. (2018, PLoS Comput. Biol. 14:e1006264, figure 2);
     /// `refractory_ms` that of Kobayashi et al. The others are fitted by us: `loss` to a rate that falls by 38 %
     /// in the first 12 s of holding (Burgess et al. 1983, J. Neurosci. 3:2652, 21 fibres); `onset`, `membrane_ms` and
-    /// `recovery_ms` to a threshold of one spike a cycle that is least near 5 Hz; `jump` to some 100 spikes/s where half
+    /// `recovery_ms` to a threshold of one spike a cycle that is least near 5 Hz; `jump` to some 200 spikes/s where half
     /// of the range is newly pressed; `threshold` to what stands out of a noise of 3 ticks in 150. Pressure below 0
     /// counts as 0. One unsigned train a taxel, at most one spike a sample. Begins as if the first sample had always been.
     Sa1, threshold: 0.04, onset: 1.0, loss: 0.5
