@@ -14,6 +14,7 @@ mod read;
 mod recorder;
 mod rest;
 mod said;
+mod sending;
 mod shared;
 mod tap;
 
@@ -38,6 +39,8 @@ pub use options::{LiveOptions, Record};
 pub use read::Ear;
 use recorder::Recorder;
 pub use said::{Lines, Said, Sink};
+use sending::Sending;
+pub use sending::{Destination, Sent};
 use shared::{Shared, Shown};
 pub use tap::{Change, Outlet, Piece, UNKNOWN};
 
@@ -59,8 +62,8 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// `Socket` where the port is taken, `File` where the file exists or cannot be created, `Core(Problem)` for options
-    /// that make no sense.
+    /// `Socket` where the port is taken, `File` where the file exists or cannot be created, or a destination cannot be
+    /// opened, `Core(Problem)` for options that make no sense.
     pub fn start(address: SocketAddr, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
         for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
             if !(frames.is_finite() && frames >= 0.0) {
@@ -71,6 +74,9 @@ impl Live {
             return Err(taxel_core::problem!("readout_events is 0: must be 1 or more").into());
         }
         options.registers.check(&options.array)?;
+        if let (Ear::Deaf, Some(to)) = (&ear, options.send.first()) {
+            return Err(taxel_core::problem!("send to {to} without a readout: nothing would be said").into());
+        }
         match &ear {
             Ear::Taring(stretch_us, _) if *stretch_us <= 0 => {
                 return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
@@ -78,6 +84,7 @@ impl Live {
             Ear::Taring(_, readout) => readout.check()?,
             Ear::Deaf | Ear::Reading(_) => {}
         }
+        let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
         // The socket first: where the port is taken no empty file is left behind.
         let receiver = Receiver::bind(address, options.capture)?;
         let recorder =
@@ -93,6 +100,7 @@ impl Live {
             wished: AtomicBool::new(false),
             records: AtomicBool::new(false),
             listeners: Mutex::default(),
+            sending: sending.iter().map(Sending::line).collect(),
             registers: Mutex::new(options.registers),
             options: options.clone(),
             begun: Instant::now(),
@@ -108,7 +116,9 @@ impl Live {
         let decode_options = options.clone();
         live.spawn("taxel-decode", move || decode::run(&theirs, sender, &decode_options, listens))?;
         if listens {
-            let reader = read::Reader::new(ear, sinks, say, &options);
+            // Who drives something is not to wait for a callback.
+            let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
+            let reader = read::Reader::new(ear, sending.chain(sinks).collect(), say, &options);
             live.spawn("taxel-readout", move || reader.run(&shared))?;
         }
         Ok(live)

@@ -18,7 +18,7 @@ use taxel_live::pipeline::{Ear, Handle, Lines, Live as Pipeline, LiveOptions, Re
 
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
-use crate::errors::{ProblemError, core};
+use crate::errors::{ProblemError, core, live};
 use crate::parameters::parsed;
 
 /// What Python may choose; everything else is as Rust has it.
@@ -34,6 +34,8 @@ struct Chosen {
     kernel_buffer_bytes: Option<usize>,
     queue_bytes: Option<usize>,
     gro: Option<bool>,
+    /// Where detections go as lines.
+    send: Vec<String>,
 }
 
 impl Chosen {
@@ -123,6 +125,7 @@ impl Live {
                 gro: chosen.gro.unwrap_or(usual.capture.gro),
             },
             record,
+            send: chosen.send.iter().map(|to| to.parse()).collect::<Result<_, _>>().map_err(live)?,
             ..usual
         };
         let mut sinks: Vec<Box<dyn Sink>> = vec![];

@@ -58,7 +58,8 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
 
 def exit_code(summary: Summary, array: Array) -> int:
     """Return the exit code that what was heard deserves."""
-    if summary.nothing_came or summary.lost or summary.counters["events_dropped"]:
+    unsent = any(one["lost"] for one in summary.counters["sent"])
+    if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent:
         return OUTSIDE
     return WRONG_INPUT if outside(summary.counters, array) else 0
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections import deque
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console, Group
@@ -55,6 +55,14 @@ def live(
     record: Annotated[Path | None, typer.Option(help="Keep everything in a new file (.mcap or .lsa).")] = None,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
     guard_frames: Annotated[float, typer.Option(min=0.0, help="In silence, frames behind the host's clock.")] = 5.0,
+    send: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WHERE",
+            help="Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be "
+            "repeated.",
+        ),
+    ] = None,
     report: Annotated[
         Path | None,
         typer.Option(help="With --record: a folder for a page: potential, weights, errors, the worst events."),
@@ -71,13 +79,15 @@ def live(
     """Listen to a board and say what a readout detects, while it happens; with --panel, show it in a browser.
 
     Shows rates, losses and latency. With --json each detection is one line, written by the thread that made it: label;
-    t_us, known_us and said_us of the board's clock; slope_mv_per_ms; said_ns by this computer's. Exit code 3 where
-    nothing came or something was lost after it had arrived, 2 where the board has more taxels than the array.
+    t_us, known_us and said_us of the board's clock; slope_mv_per_ms; said_ns by this computer's. --send sends the same
+    lines elsewhere; who reads them too slowly loses some, and is told how many. Exit code 3 where nothing came or
+    something was lost after it had arrived, 2 where the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
+    Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
     Example: taxel live --panel --control 127.0.0.1:5209
     """
-    _together(readout, panel=panel, of_a_readout=tare is not None or report is not None, of_a_panel=folder is not None)
+    _together(readout, panel=panel, of_a_readout=bool(tare or report or send), of_a_panel=folder is not None)
     heard = None if readout is None else Readout.load(readout)
     rest = _tare(tare)
     _fresh(rest, save_tare, None if panel else control)
@@ -99,6 +109,7 @@ def live(
             record=record,
             guard_frames=guard_frames,
             lines=as_json,
+            send=send or (),
         ) as pipeline:
             # Whoever reads our lines and has enough is as good an end as Ctrl-C.
             shows: Panel | None = None
@@ -121,6 +132,7 @@ def live(
     if report is not None and heard is not None and summary.path is not None:
         _report(report, heard, summary.path, taken if taken is not None else rest)
         console.print(f"report: {report / 'report.html'}", soft_wrap=True)
+    _unsent(summary)
     if not as_json:
         _say(summary, guard_frames)
     elif summary.nothing_came or summary.lost:
@@ -159,12 +171,22 @@ def _say(summary: Summary, guard_frames: float) -> None:
     typer.echo(summary.verdict)
 
 
+def _unsent(summary: Summary) -> None:
+    """Say what did not reach those to whom it was sent."""
+    for one in summary.counters["sent"]:
+        if one["lost"]:
+            why = one["trouble"] or "read too slowly"
+            typer.echo(
+                f"taxel: {one['lost']} of {one['sent'] + one['lost']} lines did not go to {one['to']}: {why}", err=True
+            )
+
+
 def _together(readout: Path | None, *, panel: bool, of_a_readout: bool, of_a_panel: bool) -> None:
     """Refuse options that nothing would use."""
     if readout is None and not panel:
         raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to look")
     if readout is None and of_a_readout:
-        raise ProblemError("--tare and --report belong to a readout: give --readout FILE")
+        raise ProblemError("--tare, --report and --send belong to a readout: give --readout FILE")
     if of_a_panel and not panel:
         raise ProblemError("--folder belongs to the panel: give --panel")
 
@@ -228,12 +250,13 @@ def _tare(said: str | None) -> Tare | float | None:
     return seconds
 
 
-def _state(now: dict[str, object], shown: deque[Said]) -> Text:
+def _state(now: dict[str, Any], shown: deque[Said]) -> Text:
     """Return the last detections, the newest last, each with how long after `known` it was said."""
     if now["taring"]:
         return Text("taking a tare: leave the sensor at rest")
     lines = [
         f"{s.t / 1e6:10.4f} s  {s.label:<16} said {to_ms(s.said - s.known):.2f} ms after it was known" for s in shown
     ]
+    sent = "".join(f"\n{one['lost']} lines lost to {one['to']}" for one in now["sent"] if one["lost"])
     dropped = f"\n{now['events_dropped']} events dropped before the readout" if now["events_dropped"] else ""
-    return Text("\n".join(lines) + dropped)
+    return Text("\n".join(lines) + dropped + sent)

@@ -134,6 +134,10 @@ class Live:
         Called with each `Said` in the thread that made it; what it raises ends the way and is raised by `next`.
     lines : bool
         Write each detection to the standard output as one line of JSON, from the thread that made it.
+    send : str or sequence of str
+        Send each detection as such a line to "udp:HOST:PORT" (a datagram a line), "pipe:PATH" (a named pipe that is
+        there) or "serial:PATH@BAUD", from the thread that made it. Up to 1024 lines wait for who reads slowly; what
+        finds no room, or nobody who reads, is lost and counted, and nothing waits for it.
     kernel_buffer_bytes, queue_bytes, readout_events : int, optional
         How much may wait in the kernel, before the decoder and before the readout.
     gro : bool, optional
@@ -179,6 +183,7 @@ class Live:
         gap_frames: float = 1.0,
         say: Callable[[Said], object] | None = None,
         lines: bool = False,
+        send: str | Sequence[str] = (),
         kernel_buffer_bytes: int | None = None,
         queue_bytes: int | None = None,
         readout_events: int | None = None,
@@ -200,14 +205,16 @@ class Live:
             "guard_frames": number("guard_frames", guard_frames),
             "gap_frames": number("gap_frames", gap_frames),
             "gro": None if gro is None else flag("gro", gro),
+            "send": [text("send", to) for to in ([send] if isinstance(send, str) else several("send", send))],
             **{name: None if size is None else whole(name, size, 0, 2**31 - 1) for name, size in sizes.items()},
         }
         #: What is needed to begin again on another address.
         self._how: dict[str, Any] = {
             "array": self.array, "registers": registers, "differences": differences, "readout": readout, "tare": tare,
             "record": record, "compression": compression, "overwrite": overwrite, "guard_frames": guard_frames,
-            "say": say, "lines": lines, "kernel_buffer_bytes": kernel_buffer_bytes, "queue_bytes": queue_bytes,
-            "readout_events": readout_events, "gro": gro,
+            "gap_frames": gap_frames, "say": say, "lines": lines, "send": send,
+            "kernel_buffer_bytes": kernel_buffer_bytes, "queue_bytes": queue_bytes, "readout_events": readout_events,
+            "gro": gro,
         }  # fmt: skip
         self._labels = None if readout is None else list(json.loads(readout.to_json())["neurons"])
         if say is not None and not callable(say):
@@ -267,13 +274,14 @@ class Live:
         `wire_late` (events of version 2 that came when time had gone on without them), `events`, `read_out`,
         `events_dropped`,
         `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence
-        that was none, because events came later than the guard), `detections_dropped`, `decode_latency` and
+        that was none, because events came later than the guard), `detections_dropped`, `sent` (of each destination: to,
+        sent, lost, waiting, trouble), `decode_latency` and
         `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
         drift_ppm, or None), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
 
         Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
         `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +
-        events_dropped.
+        events_dropped; detections = sent + lost + waiting of each destination.
         """
         if self._summary is not None:
             return self._summary.counters

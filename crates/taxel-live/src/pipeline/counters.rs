@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 use taxel_core::wire;
 
+use super::sending::Sent;
 use crate::capture;
 use crate::clock::Offset;
 use crate::latency::Quantiles;
@@ -48,6 +49,8 @@ pub struct Counters {
     pub wrong: u64,
     /// Detections that [`Live::next`](super::Live::next) was too slow for; the sinks had them.
     pub detections_dropped: u64,
+    /// What went to each destination: `sent + lost + waiting = detections`.
+    pub sent: Vec<Sent>,
     /// From the kernel's stamp to the end of decoding, a datagram each.
     pub decode_latency: Quantiles,
     /// From `known` to said, by the board's clock.

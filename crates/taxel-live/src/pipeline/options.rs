@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use taxel_core::Array;
 use taxel_core::wire::Registers;
 
+use super::sending::Destination;
 use crate::capture::ReceiverOptions;
 use crate::recording::Compression;
 
@@ -27,6 +28,8 @@ pub struct LiveOptions {
     pub capture: ReceiverOptions,
     /// Where everything is kept, if anywhere.
     pub record: Option<Record>,
+    /// Where detections go as lines, besides to the sinks.
+    pub send: Vec<Destination>,
 }
 
 impl LiveOptions {
@@ -42,6 +45,7 @@ impl LiveOptions {
             readout_events: 1 << 20,
             capture: ReceiverOptions::default(),
             record: None,
+            send: vec![],
         }
     }
 }

@@ -13,6 +13,28 @@ pub struct Said {
     pub said: i64,
 }
 
+impl Said {
+    /// A line of JSON with the keys of `taxel detect --json` and when it was said, its end included.
+    ///
+    /// # Errors
+    ///
+    /// Where it cannot be written as JSON.
+    pub fn line(&self) -> std::io::Result<Vec<u8>> {
+        let Self { detection, said_ns, said } = self;
+        let mut line = serde_json::to_vec(&serde_json::json!({
+            "label": detection.label,
+            "t_us": detection.t,
+            "known_us": detection.known,
+            "slope_mv_per_ms": detection.slope,
+            "repaired": detection.repaired,
+            "said_us": said,
+            "said_ns": said_ns,
+        }))?;
+        line.push(b'\n');
+        Ok(line)
+    }
+}
+
 /// Takes detections in the thread that made them; what it does there, the next detection waits for.
 pub trait Sink: Send {
     /// One was said.
@@ -29,24 +51,13 @@ impl<F: FnMut(&Said) -> std::io::Result<()> + Send> Sink for F {
     }
 }
 
-/// Writes each detection as a line of JSON, with the keys of `taxel detect --json` and when it was said.
+/// Writes each detection as a line ([`Said::line`]).
 #[derive(Debug)]
 pub struct Lines<W>(pub W);
 
 impl<W: std::io::Write + Send> Sink for Lines<W> {
     fn take(&mut self, said: &Said) -> std::io::Result<()> {
-        let Said { detection, said_ns, said } = said;
-        let mut line = serde_json::to_vec(&serde_json::json!({
-            "label": detection.label,
-            "t_us": detection.t,
-            "known_us": detection.known,
-            "slope_mv_per_ms": detection.slope,
-            "repaired": detection.repaired,
-            "said_us": said,
-            "said_ns": said_ns,
-        }))?;
-        line.push(b'\n');
-        self.0.write_all(&line)?;
+        self.0.write_all(&said.line()?)?;
         self.0.flush()
     }
 }

@@ -1,7 +1,7 @@
 //! What the threads of a pipeline share, and what they show to those who look on.
 
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Instant;
 
 use crossbeam_channel as channel;
@@ -14,6 +14,7 @@ use super::handover::Handover;
 use super::options::LiveOptions;
 use super::recorder::Recorder;
 use super::said::Said;
+use super::sending::Line;
 use super::tap::Outlet;
 use crate::capture::Receiver;
 use crate::latency::Latencies;
@@ -49,6 +50,8 @@ pub(super) struct Shared {
     pub(super) records: AtomicBool,
     /// Those who hear detections beside [`Live::next`](super::Live::next); who is too slow misses some.
     pub(super) listeners: Mutex<Vec<channel::Sender<Said>>>,
+    /// Where detections go.
+    pub(super) sending: Vec<Arc<Line>>,
     /// What the registers hold now, which may not be what they held at the beginning.
     pub(super) registers: Mutex<Registers>,
     /// The version of the wire that the board was told to speak, since this was looked at last; 0: nothing was said.
@@ -85,6 +88,7 @@ impl Shared {
             capture: self.receiver.counts(),
             decode_latency: shown.decode_latency.quantiles(),
             said_latency: shown.said_latency.quantiles(),
+            sent: self.sending.iter().map(|line| line.counts()).collect(),
             seconds: self.begun.elapsed().as_secs_f64(),
             ..shown.counters.clone()
         }

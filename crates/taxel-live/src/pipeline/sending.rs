@@ -1,0 +1,351 @@
+//! Detections on their way to other programs and machines: a line of JSON each, by UDP, into a pipe, over a serial line.
+//!
+//! A line leaves from the thread that made it where there is room; what finds none waits, bounded, for a thread of its own.
+//! Who reads too slowly, or not at all, loses lines, which are counted; nobody waits for him.
+
+use std::collections::VecDeque;
+use std::fmt::{self, Display, Formatter};
+use std::fs::File;
+use std::io::{self, ErrorKind, Write};
+use std::net::{SocketAddr, UdpSocket};
+use std::os::fd::{AsRawFd, RawFd};
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+use taxel_core::problem;
+
+use super::said::{Said, Sink};
+use crate::locked::lock;
+use crate::{Error, Result, address};
+
+/// Lines that wait at most.
+const WAITING: usize = 1024;
+
+/// How often a line that broke is tried again, and the end looked for.
+const AGAIN: Duration = Duration::from_millis(250);
+
+/// How long, at the end, who reads slowly is waited for.
+const LAST: Duration = Duration::from_secs(1);
+
+/// Of a serial line, where no speed is named.
+const BAUD: u32 = 115_200;
+
+/// Where detections go: `udp:HOST:PORT`, `pipe:PATH` (a named pipe), `serial:PATH` or `serial:PATH@BAUD`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Destination {
+    /// A datagram a line.
+    Udp(SocketAddr),
+    /// A named pipe that is there; lines that come while nobody reads are lost.
+    Pipe(PathBuf),
+    /// A serial line, 8 data bits, no parity, 1 stop bit; opened again where it was pulled.
+    Serial(PathBuf, u32),
+}
+
+impl FromStr for Destination {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text.split_once(':') {
+            Some(("udp", place)) => Ok(Self::Udp(address::of_text(place)?)),
+            Some(("pipe", place)) if !place.is_empty() => Ok(Self::Pipe(place.into())),
+            Some(("serial", place)) if !place.is_empty() => {
+                let (place, baud) = match place.rsplit_once('@') {
+                    None => (place, BAUD),
+                    Some((place, baud)) => match baud.parse() {
+                        Ok(baud) if baud > 0 && !place.is_empty() => (place, baud),
+                        _ => return Err(problem!("send to {text:?}: {baud:?} is no speed, as 115200").into()),
+                    },
+                };
+                Ok(Self::Serial(place.into(), baud))
+            }
+            _ => Err(problem!("send to {text:?}: must be udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD").into()),
+        }
+    }
+}
+
+impl Display for Destination {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Udp(address) => write!(f, "udp:{address}"),
+            Self::Pipe(path) => write!(f, "pipe:{}", path.display()),
+            Self::Serial(path, baud) => write!(f, "serial:{}@{baud}", path.display()),
+        }
+    }
+}
+
+/// What went to a destination.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
+pub struct Sent {
+    /// Which.
+    pub to: String,
+    /// Lines that the system took whole.
+    pub sent: u64,
+    /// Lines that found no room, or nobody who reads.
+    pub lost: u64,
+    /// Lines that wait.
+    pub waiting: u64,
+    /// What the system said last where lines were lost for another reason than too slow a reader.
+    pub trouble: Option<String>,
+}
+
+/// Sends each detection to one destination.
+pub(super) struct Sending {
+    line: Arc<Line>,
+    thread: Option<JoinHandle<()>>,
+}
+
+/// What the thread that makes detections shares with the one that sends what waits.
+pub(super) struct Line {
+    to: Destination,
+    state: Mutex<State>,
+    came: Condvar,
+}
+
+struct State {
+    device: Option<Device>,
+    waiting: VecDeque<Vec<u8>>,
+    /// Bytes of the first that have gone already.
+    gone: usize,
+    counts: Sent,
+    closed: bool,
+}
+
+enum Device {
+    Udp(UdpSocket, SocketAddr),
+    File(File),
+    Serial(serialport::TTYPort),
+}
+
+impl Sending {
+    /// Opens the destination and begins.
+    ///
+    /// # Errors
+    ///
+    /// `File` or `Socket` where it cannot be opened, `Core(Problem)` where it is no pipe. That nobody reads a pipe yet is none.
+    pub(super) fn open(to: &Destination) -> Result<Self> {
+        let device = Device::open(to)?;
+        let counts = Sent { to: to.to_string(), ..Sent::default() };
+        let state = State { device, waiting: VecDeque::new(), gone: 0, counts, closed: false };
+        let line = Arc::new(Line { to: to.clone(), state: Mutex::new(state), came: Condvar::new() });
+        let theirs = Arc::clone(&line);
+        let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || theirs.send_what_waits());
+        Ok(Self { line, thread: Some(thread.map_err(Error::socket("thread"))?) })
+    }
+
+    /// What may be looked at while it works, and after.
+    pub(super) fn line(&self) -> Arc<Line> {
+        Arc::clone(&self.line)
+    }
+}
+
+impl Sink for Sending {
+    fn take(&mut self, said: &Said) -> io::Result<()> {
+        let mut state = lock(&self.line.state);
+        if state.device.is_none() && matches!(self.line.to, Destination::Pipe(_)) {
+            // Somebody may read by now; a serial line takes longer to open, and is the other thread's.
+            state.opened(Device::open(&self.line.to));
+        }
+        if state.device.is_none() || state.waiting.len() >= WAITING {
+            state.counts.lost += 1;
+            return Ok(());
+        }
+        state.waiting.push_back(said.line()?);
+        if state.waiting.len() == 1 {
+            state.write();
+        }
+        if !state.waiting.is_empty() {
+            self.line.came.notify_one();
+        }
+        Ok(())
+    }
+}
+
+impl Drop for Sending {
+    fn drop(&mut self) {
+        lock(&self.line.state).closed = true;
+        self.line.came.notify_one();
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Line {
+    /// What went there up to now.
+    pub(super) fn counts(&self) -> Sent {
+        let state = lock(&self.state);
+        Sent { waiting: state.waiting.len() as u64, ..state.counts.clone() }
+    }
+
+    /// The thread's whole life: wait until something waits, then until there is room for it.
+    fn send_what_waits(&self) {
+        let mut closed_at = None;
+        let mut state = lock(&self.state);
+        loop {
+            if state.closed {
+                let since = *closed_at.get_or_insert_with(Instant::now);
+                if state.waiting.is_empty() || since.elapsed() >= LAST {
+                    state.lose(None);
+                    return;
+                }
+            }
+            match state.device.as_ref().filter(|_| !state.waiting.is_empty()).map(Device::descriptor) {
+                Some(descriptor) => {
+                    drop(state);
+                    wait_for_room(descriptor, Duration::from_millis(20));
+                    state = lock(&self.state);
+                    state.write();
+                }
+                None => {
+                    state = self.came.wait_timeout(state, AGAIN).unwrap_or_else(PoisonError::into_inner).0;
+                    if state.device.is_none() && !state.closed {
+                        // A serial line may take its time: nobody waits meanwhile.
+                        drop(state);
+                        let opened = Device::open(&self.to);
+                        state = lock(&self.state);
+                        state.opened(opened);
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl State {
+    /// The destination was tried again.
+    fn opened(&mut self, tried: Result<Option<Device>>) {
+        match tried {
+            Ok(Some(device)) => self.device = Some(device),
+            Ok(None) => self.counts.trouble = Some("nobody reads".to_owned()),
+            Err(error) => self.counts.trouble = Some(error.to_string()),
+        }
+    }
+
+    /// Hands over what there is room for.
+    fn write(&mut self) {
+        while let (Some(device), Some(line)) = (&mut self.device, self.waiting.front()) {
+            match device.write(&line[self.gone..]) {
+                Ok(n) if self.gone + n < line.len() => self.gone += n,
+                Ok(_) => {
+                    self.waiting.pop_front();
+                    self.gone = 0;
+                    self.counts.sent += 1;
+                }
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => return,
+                Err(error) if matches!(device, Device::Udp(..)) => {
+                    // A datagram that the system refuses says nothing of the next.
+                    self.waiting.pop_front();
+                    self.counts.lost += 1;
+                    self.counts.trouble = Some(error.to_string());
+                }
+                Err(error) => {
+                    let why = if error.kind() == ErrorKind::BrokenPipe {
+                        "nobody reads any more".to_owned()
+                    } else {
+                        error.to_string()
+                    };
+                    self.device = None;
+                    self.lose(Some(why));
+                }
+            }
+        }
+    }
+
+    /// Gives up what waits: late, it would only mislead.
+    fn lose(&mut self, why: Option<String>) {
+        self.counts.lost += self.waiting.len() as u64;
+        self.counts.trouble = why.or(self.counts.trouble.take());
+        self.waiting.clear();
+        self.gone = 0;
+    }
+}
+
+impl Device {
+    /// Opens a destination; `None` for a pipe that nobody reads.
+    fn open(to: &Destination) -> Result<Option<Self>> {
+        match to {
+            Destination::Udp(address) => {
+                let any = if address.is_ipv4() { "0.0.0.0:0" } else { "[::]:0" };
+                let socket = UdpSocket::bind(any).and_then(|s| s.set_nonblocking(true).map(|()| s));
+                Ok(Some(Self::Udp(socket.map_err(Error::socket(to))?, *address)))
+            }
+            Destination::Pipe(path) => {
+                if !std::fs::metadata(path).map_err(Error::file(path))?.file_type().is_fifo() {
+                    return Err(problem!("{}: is no named pipe; mkfifo makes one", path.display()).into());
+                }
+                match File::options().write(true).custom_flags(libc::O_NONBLOCK).open(path) {
+                    Ok(file) => Ok(Some(Self::File(file))),
+                    Err(error) if error.raw_os_error() == Some(libc::ENXIO) => Ok(None),
+                    Err(error) => Err(Error::file(path)(error)),
+                }
+            }
+            Destination::Serial(path, baud) => Ok(Some(Self::Serial(serial(path, *baud)?))),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        match self {
+            Self::Udp(socket, address) => socket.send_to(bytes, *address),
+            Self::File(file) => file.write(bytes),
+            Self::Serial(port) => port.write(bytes),
+        }
+    }
+
+    fn descriptor(&self) -> RawFd {
+        match self {
+            Self::Udp(socket, _) => socket.as_raw_fd(),
+            Self::File(file) => file.as_raw_fd(),
+            Self::Serial(port) => port.as_raw_fd(),
+        }
+    }
+}
+
+/// A serial line that takes what it has room for, and never waits.
+fn serial(path: &Path, baud: u32) -> Result<serialport::TTYPort> {
+    let place = path.display().to_string();
+    let opened = serialport::new(place, baud).timeout(Duration::ZERO).open_native();
+    let port = opened.map_err(|error| Error::file(path)(error.into()))?;
+    // SAFETY: a descriptor that `port` holds open, and a flag.
+    if unsafe { libc::fcntl(port.as_raw_fd(), libc::F_SETFL, libc::O_NONBLOCK) } != 0 {
+        return Err(Error::file(path)(io::Error::last_os_error()));
+    }
+    Ok(port)
+}
+
+/// Waits until something can be written, or will fail; no longer than `most`.
+fn wait_for_room(descriptor: RawFd, most: Duration) {
+    let mut asked = libc::pollfd { fd: descriptor, events: libc::POLLOUT, revents: 0 };
+    let most = i32::try_from(most.as_millis()).unwrap_or(i32::MAX);
+    // SAFETY: one entry, on our stack. A descriptor that was closed meanwhile is an answer of its own, and nothing is done
+    // with it here.
+    unsafe { libc::poll(&raw mut asked, 1, most) };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn destinations_are_read_as_they_are_written() {
+        for (text, said) in [
+            ("udp:127.0.0.1:9000", "udp:127.0.0.1:9000"),
+            ("udp:[::1]:9", "udp:[::1]:9"),
+            ("pipe:/tmp/out", "pipe:/tmp/out"),
+            ("serial:/dev/ttyACM0", "serial:/dev/ttyACM0@115200"),
+            ("serial:/dev/ttyACM0@9600", "serial:/dev/ttyACM0@9600"),
+        ] {
+            assert_eq!(text.parse::<Destination>().unwrap().to_string(), said);
+        }
+        for text in
+            ["", "udp", "udp:", "udp:9000", "pipe:", "serial:", "serial:/dev/x@", "serial:/dev/x@fast", "file:x"]
+        {
+            assert!(text.parse::<Destination>().is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,191 @@
+"""Detections on their way to other programs: the lines of --json, lost where nobody reads, never waited for."""
+
+import json
+import os
+import pty
+import socket
+import subprocess
+import time
+import tty
+from pathlib import Path
+
+import pytest
+
+import taxel
+from taxel.live import Live
+
+from .test_live import LOOPBACK, SMALL, command, free_port, play, presses, touch, wait_for
+
+LONG_BEFORE_ANY = {"guard_frames": 1e6}
+KEYS = {"label", "t_us", "known_us", "slope_mv_per_ms", "repaired", "said_us", "said_ns"}
+
+
+def listen(send: object, record: Path) -> Live:
+    return Live(0, host=LOOPBACK, array=SMALL, readout=touch(), send=send, record=record, **LONG_BEFORE_ANY)
+
+
+def the_same(lines: list[bytes], record: Path) -> None:
+    """What was sent is what the recording says was said."""
+    said, kept = [json.loads(line) for line in lines], taxel.open(record).detections
+    assert all(set(one) == KEYS for one in said)
+    assert [one["label"] for one in said] == list(kept.label)
+    assert [one["t_us"] for one in said] == kept.t.tolist()
+    assert [one["known_us"] for one in said] == kept.known.tolist()
+
+
+def everything(read: int) -> list[bytes]:
+    """Read a descriptor until its other end is closed."""
+    got = b""
+    while piece := os.read(read, 65_536):
+        got += piece
+    return got.splitlines()
+
+
+def test_a_detection_goes_by_udp_and_into_a_pipe(tmp_path: Path) -> None:
+    record, pipe = tmp_path / "said.mcap", tmp_path / "said.pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind((LOOPBACK, 0))
+        other.settimeout(30)
+        with listen([f"udp:{LOOPBACK}:{other.getsockname()[1]}", f"pipe:{pipe}"], record) as live:
+            wait_for(live, 0)
+            wait_for(live, play(presses(6), live.address[1]))
+            counts = live.stop().counters
+        datagrams = [other.recv(65_536) for _ in range(counts["detections"])]
+    os.set_blocking(reader, True)
+    lines = everything(reader)
+    os.close(reader)
+    assert counts["detections"] == 6
+    assert [line + b"\n" for line in lines] == datagrams, "one format"
+    the_same(lines, record)
+    assert [(one["sent"], one["lost"], one["waiting"]) for one in counts["sent"]] == [(6, 0, 0)] * 2
+
+
+def test_a_detection_drives_a_serial_line(tmp_path: Path) -> None:
+    ours, theirs = pty.openpty()
+    tty.setraw(theirs)
+    name = os.ttyname(theirs)
+    os.close(theirs)
+    with listen(f"serial:{name}@9600", tmp_path / "said.mcap") as live:
+        wait_for(live, play(presses(3), live.address[1]))
+        counts = live.stop().counters
+    got = b""
+    while got.count(b"\n") < 3:
+        got += os.read(ours, 4096)
+    os.close(ours)
+    the_same(got.splitlines(), tmp_path / "said.mcap")
+    assert counts["sent"] == [{"to": f"serial:{name}@9600", "sent": 3, "lost": 0, "waiting": 0, "trouble": None}]
+
+
+def test_who_does_not_read_loses_lines_and_holds_nothing(tmp_path: Path) -> None:
+    """A pipe takes 64 KiB, 1024 lines wait, the rest is lost and counted: what went is whole, nothing else is lost."""
+    pipe, presses_made = tmp_path / "slow", 1500
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    with listen(f"pipe:{pipe}", tmp_path / "said.mcap") as live:
+        wait_for(live, 0)
+        events, until = presses(presses_made), time.monotonic() + 60
+        for k in range(0, len(events), 20 * 50):
+            play(events[k : k + 20 * 50], live.address[1])
+        while (
+            live.counters["events"] < len(events) or sum(live.counters["sent"][0][k] for k in ("waiting", "lost")) == 0
+        ):
+            assert time.monotonic() < until, live.counters
+            time.sleep(0.01)
+        before = live.counters
+        assert before["capture"]["dropped_by_queue"] == before["events_dropped"] == 0
+        counts = live.stop().counters
+    os.set_blocking(reader, True)
+    lines = everything(reader)
+    os.close(reader)
+    (sent,) = counts["sent"]
+    assert counts["detections"] == presses_made == sent["sent"] + sent["lost"]
+    assert sent["lost"] > 0
+    assert sent["waiting"] == 0
+    assert len([line for line in lines if line.endswith(b"}")]) == sent["sent"], (
+        "whole lines, and as many as were counted"
+    )
+
+
+def test_a_reader_that_comes_late_hears_what_is_said_from_then_on(tmp_path: Path) -> None:
+    pipe, events = tmp_path / "later", presses(8)
+    os.mkfifo(pipe)
+    with listen(f"pipe:{pipe}", tmp_path / "said.mcap") as live:
+        n = play(events[: 4 * 20], live.address[1])
+        wait_for(live, n)
+        until = time.monotonic() + 30
+        while live.counters["sent"][0]["lost"] < 3:
+            assert time.monotonic() < until, live.counters
+            time.sleep(0.002)
+        lost = live.counters["sent"][0]["lost"]
+        assert live.counters["sent"][0]["trouble"] == "nobody reads"
+        reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+        wait_for(live, n + play(events[4 * 20 :], live.address[1]))
+        counts = live.stop().counters
+    os.set_blocking(reader, True)
+    lines = everything(reader)
+    os.close(reader)
+    assert counts["sent"][0]["sent"] == len(lines) == 8 - counts["sent"][0]["lost"]
+    assert counts["sent"][0]["lost"] in (lost, lost + 1), "one may be said before the reader is seen"
+    kept = taxel.open(tmp_path / "said.mcap").detections
+    assert [json.loads(line)["t_us"] for line in lines] == kept.t[-len(lines) :].tolist()
+
+
+@pytest.mark.parametrize(
+    ("to", "kind", "said"),
+    [
+        ("nowhere", taxel.ProblemError, "must be udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD"),
+        ("udp:9000", taxel.ProblemError, "must be a host and a port"),
+        ("serial:/dev/null@fast", taxel.ProblemError, "'fast'".replace("'", '"')),
+        ("pipe:/dev/null", taxel.ProblemError, "/dev/null: is no named pipe; mkfifo makes one"),
+        ("pipe:/no/such/pipe", FileNotFoundError, "/no/such/pipe"),
+        ("serial:/no/such/line", OSError, "/no/such/line"),
+        (7, taxel.ProblemError, "send is 7"),
+        ([7], taxel.ProblemError, "send is 7"),
+    ],
+)
+def test_a_destination_that_is_none_is_refused(to: object, kind: type[Exception], said: str) -> None:
+    with pytest.raises(kind) as refused:
+        Live(0, host=LOOPBACK, array=SMALL, readout=touch(), send=to)  # type: ignore[arg-type]
+    assert said in str(refused.value)
+
+
+def test_without_a_readout_nothing_is_sent() -> None:
+    with pytest.raises(taxel.ProblemError, match=r"send to udp:127\.0\.0\.1:9 without a readout"):
+        Live(0, host=LOOPBACK, send="udp:127.0.0.1:9")
+
+
+def test_taxel_live_sends_and_says_what_was_lost(tmp_path: Path) -> None:
+    port, pipe = free_port(), tmp_path / "nobody"
+    os.mkfifo(pipe)
+    touch().save(tmp_path / "touch.json")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind((LOOPBACK, 0))
+        other.settimeout(30)
+        arguments = command("live", "--readout", tmp_path / "touch.json", "--array", "4x4", "--host", LOOPBACK)
+        arguments += [
+            "--port",
+            str(port),
+            "--send",
+            f"udp:{LOOPBACK}:{other.getsockname()[1]}",
+            "--send",
+            f"pipe:{pipe}",
+            "--guard-frames",
+            "1e6",
+        ]
+        with subprocess.Popen([*arguments, "--seconds", "6"], stderr=subprocess.PIPE, text=True) as process:
+            assert process.stderr is not None
+            while "listening" not in process.stderr.readline():
+                assert process.poll() is None
+            play(presses(3), port)
+            line = json.loads(other.recv(65_536))
+            told = process.stderr.read()
+    assert set(line) == KEYS
+    assert f"taxel: 3 of 3 lines did not go to pipe:{pipe}: nobody reads" in told
+    assert process.returncode == 3
+    said = subprocess.run(
+        command("live", "--panel", "--send", "udp:127.0.0.1:9"), capture_output=True, text=True, check=False
+    )
+    assert said.stderr == "taxel: --tare, --report and --send belong to a readout: give --readout FILE\n"
+    assert said.returncode == 2
