@@ -1,4 +1,4 @@
-"""Which ball fell from how high: the shipped drops made anew, answers on other boards, and what is said of them."""
+"""Which ball fell from how high on which slant: the shipped drops made anew, answers on other boards, what is said."""
 
 import json
 from dataclasses import replace
@@ -13,6 +13,8 @@ from taxel.demo.naming import ANSWERED_MS, LOOKED_MS, QUESTIONS, Drops, named, s
 from taxel.demo.script import TRAINING_SEED, script
 from taxel.demo.shipped import shipped
 from taxel.simulate import Scene, Silence
+from taxel.spikes import to_ms
+from taxel.wire import FRAME_US
 
 #: Drops of a board in the shipped set, and of three boards.
 BOARD, FOLD = naming._DROPS, 3 * naming._DROPS
@@ -34,7 +36,14 @@ def test_the_shipped_drops_are_what_the_command_writes():
     assert len(files("taxel.demo").joinpath("drops.json").read_bytes()) < 100_000
 
 
-@pytest.mark.parametrize(("name", "least"), [("ball", [0.6, 0.65, 0.8, 0.85]), ("height", [0.45, 0.5, 0.8, 0.85])])
+@pytest.mark.parametrize(
+    ("name", "least"),
+    [
+        ("ball", [0.58, 0.65, 0.8, 0.85]),
+        ("height", [0.45, 0.5, 0.8, 0.85]),
+        ("slant", [0.5, 0.58, 0.83, 0.88]),
+    ],
+)
 def test_answers_on_other_boards_are_right_as_often_as_they_say(name, least):
     known = shipped_drops()
     question = QUESTIONS[name]
@@ -43,7 +52,8 @@ def test_answers_on_other_boards_are_right_as_often_as_they_say(name, least):
     for after_ms, at_least in zip(ANSWERED_MS, least, strict=True):
         probable = np.zeros((len(truth), len(question.answers)))
         for k in range(fold.max() + 1):
-            rest = Drops(*(column[fold != k] for column in (known.diameter_mm, known.height_mm, known.pictures)))
+            columns = known.diameter_mm, known.height_mm, known.slant_deg, known.pictures
+            rest = Drops(*(column[fold != k] for column in columns))
             probable[fold == k] = rest.posterior(name, after_ms, known.pictures[fold == k])
         np.testing.assert_allclose(probable.sum(1), 1.0)
         right = float(np.mean(probable.argmax(1) == truth))
@@ -61,21 +71,34 @@ def test_an_answer_rests_only_on_what_came_before_it():
         assert not np.allclose(known.posterior(name, 5, changed), known.posterior(name, 5, known.pictures[:4]))
 
 
+def test_the_middle_moves_down_the_slant_and_not_on_a_level_array():
+    """By more the steeper: what tells a slant apart from a lower fall."""
+    known = shipped_drops()
+    moved = known.pictures[:, -1, -1] / 100
+    level, slanted = moved[known.slant_deg == 0], moved[known.slant_deg > 0]
+    assert abs(np.median(level)) < 0.1
+    assert np.median(slanted) > 0.5
+    assert np.corrcoef(known.slant_deg[known.slant_deg > 0], slanted)[0, 1] > 0.5
+
+
 def test_each_drop_of_a_play_is_named_and_judged(hearing):
     scenes = [act for act in script(23, 3) if isinstance(act, Scene)]
     found = named(hearing, scenes)
-    assert [drop["true_mm"]["height"] for drop in found["drops"]] == [
+    assert [drop["true"]["height"] for drop in found["drops"]] == [
         s.parameters["bodies"][0]["motion"]["dropped"]["height_mm"] for s in scenes
     ]
+    assert [drop["true"]["slant"] for drop in found["drops"]] == [s.parameters["slant_deg"] for s in scenes]
+    assert [drop["true"]["slant"] > 0 for drop in found["drops"]] == [False, True, False]
     for name, question in QUESTIONS.items():
         for k in range(len(ANSWERED_MS)):
             said = [drop["said"][name][k] for drop in found["drops"]]
             assert found["right"][name][k] == sum(one["right"] for one in said)
             for drop, one in zip(found["drops"], said, strict=True):
                 most = int(np.argmax(one["probable"]))
-                edges = [0.0, *question.edges_mm, np.inf]
-                assert one["right"] == (edges[most] < drop["true_mm"][name] <= edges[most + 1])
-    assert all(0 <= drop["felt_ms"] < 2 for drop in found["drops"])
+                edges = [-1.0, *question.edges, np.inf]
+                assert one["right"] == (edges[most] < drop["true"][name] <= edges[most + 1])
+    # A stamp is its frame's start, which may lie before the touch.
+    assert all(-to_ms(FRAME_US) < drop["felt_ms"] < 2 for drop in found["drops"])
 
 
 def test_a_play_without_drops_and_drops_that_were_not_felt(hearing):
@@ -85,4 +108,4 @@ def test_a_play_without_drops_and_drops_that_were_not_felt(hearing):
     deaf = replace(hearing, area=hearing.area.between(begin, begin + 1.0))
     found = named(deaf, [act for act in script(23, 3) if isinstance(act, Scene)])
     assert [drop["felt_ms"] for drop in found["drops"]] == [None] * 3
-    assert found["right"] == {"ball": [0] * 4, "height": [0] * 4}
+    assert found["right"] == {"ball": [0] * 4, "height": [0] * 4, "slant": [0] * 4}

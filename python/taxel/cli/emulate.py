@@ -19,7 +19,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from taxel._core import ProblemError
 from taxel._opening import open_any
 from taxel.cli._app import app
-from taxel.demo.script import TRAINING_SEED, endless, script
+from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
@@ -115,7 +115,7 @@ def emulate(
 
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
-    _together(scene=scene, replay=replay, pipe=pipe, rest=rest, drawn=scenes is not None or labels is not None)
+    _together(scene=scene, replay=replay, pipe=pipe, rest=rest, counted=scenes is not None or labels is not None)
     written = None if scene is None else SceneFile.open(scene)
     said_by = written or SceneFile(Scene({}))
     tare = said_by.tare_ms / 1e3 if tare is None else tare
@@ -199,13 +199,13 @@ def emulate(
         _say(report, in_time=not pipe)
 
 
-def _together(*, scene: Path | None, replay: Path | None, pipe: bool, rest: bool, drawn: bool) -> None:
-    """Refuse options that do not go together; `drawn` ones are of scenes."""
+def _together(*, scene: Path | None, replay: Path | None, pipe: bool, rest: bool, counted: bool) -> None:
+    """Refuse options that do not go together; `counted`: a number of scenes, or their truth, was asked for."""
     if replay is not None and pipe:
         raise ProblemError("--replay and --pipe: give one of them")
     if scene is not None and (replay is not None or pipe or rest):
         raise ProblemError("--scene: leave out --replay, --pipe and --rest")
-    if (replay is not None or pipe) and (drawn or rest):
+    if (replay is not None or pipe) and (counted or rest):
         raise ProblemError("--scenes, --truth and --rest are of scenes: leave them out with --replay or --pipe")
 
 
@@ -224,9 +224,10 @@ def _piped(noise_floor: int) -> tuple[Any, str]:
 
 def _scenes(seed: int, scenes: int | None, tare_ms: float, rest: bool) -> tuple[Any, str]:
     """Return scenes to play, and what they are."""
+    draw = left_to_rest if rest else drawn
     if scenes is None:
-        return endless(seed, tare_ms=tare_ms, left_to_rest=rest), f"seed {seed}: scenes until Ctrl-C"
-    return script(seed, scenes, tare_ms=tare_ms, left_to_rest=rest), f"seed {seed}: {scenes} scene(s)"
+        return endless(seed, tare_ms=tare_ms, draw=draw), f"seed {seed}: scenes until Ctrl-C"
+    return script(seed, scenes, tare_ms=tare_ms, draw=draw), f"seed {seed}: {scenes} scene(s)"
 
 
 def _written(written: SceneFile, scenes: int | None, tare_ms: float) -> Iterator[Act]:

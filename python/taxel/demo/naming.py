@@ -1,7 +1,7 @@
-"""What could be said of a drop so soon after its contact: which ball, from how high.
+"""What could be said of a drop so soon after its contact: which ball, from how high, on which slant.
 
 The answers rest on drops that were simulated beforehand and come with taxel (``drops.json``, written by
-``taxel demo --drops``): balls, heights, places, foams and boards that the demo never plays.
+``taxel demo --drops``): balls, heights, slants, places, foams and boards that the demo never plays.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from taxel._files import write_whole
 from taxel.demo.hearing import Hearing
-from taxel.demo.script import TRAINING_SEED
+from taxel.demo.script import SLANTS_DEG, TRAINING_SEED, drawn, fall_ms
 from taxel.encode import ContactArea
 from taxel.events import Events
 from taxel.information import LDA
@@ -49,19 +49,27 @@ class Question:
     """One thing to be said of a drop."""
 
     column: str
-    edges_mm: tuple[float, ...]
+    unit: str
+    edges: tuple[float, ...]
     answers: tuple[str, ...]
 
-    def of(self, value_mm: float) -> int:
+    def of(self, value: float) -> int:
         """Return the number of the right answer."""
-        return int(np.searchsorted(self.edges_mm, value_mm))
+        return int(np.searchsorted(self.edges, value))
 
 
-#: The demo's balls are 50 to 70 mm wide and fall from 100 to 200 mm; none falls on a slant.
+#: The demo's balls are 50 to 70 mm wide and fall from 100 to 200 mm, on a level array or on one tilted by 10 to 30.
 QUESTIONS = {
-    "ball": Question("diameter_mm", (60.0,), ("50 to 60 mm", "60 to 70 mm")),
-    "height": Question("height_mm", (133.0, 167.0), ("100 to 133 mm", "133 to 167 mm", "167 to 200 mm")),
+    "ball": Question("diameter_mm", "mm", (60.0,), ("50 to 60 mm", "60 to 70 mm")),
+    "height": Question("height_mm", "mm", (133.0, 167.0), ("100 to 133 mm", "133 to 167 mm", "167 to 200 mm")),
+    "slant": Question(
+        "slant_deg", "degrees", (SLANTS_DEG[0] - 0.5, 20.0), ("level", "10 to 20 degrees", "20 to 30 degrees")
+    ),
 }
+#: Of a picture: loaded taxels, their sum, the largest, and how far along the rows their middle has moved.
+_NUMBERS = 4
+#: That is kept in hundredths of a taxel.
+_MOVED = 100
 
 
 @dataclass(frozen=True)
@@ -70,13 +78,15 @@ class Drops:
 
     Attributes
     ----------
-    diameter_mm, height_mm : float64, shape (drops,)
-    pictures : int64, shape (drops, times of `LOOKED_MS`, 3)
-        Loaded taxels; ticks above rest, summed; the largest.
+    diameter_mm, height_mm, slant_deg : float64, shape (drops,)
+    pictures : int64, shape (drops, times of `LOOKED_MS`, 4)
+        Loaded taxels; ticks above rest, summed; the largest; how far along the rows, the way that the array falls,
+        their middle has moved since the first picture, in hundredths of a taxel.
     """
 
     diameter_mm: NDArray[np.float64]
     height_mm: NDArray[np.float64]
+    slant_deg: NDArray[np.float64]
     pictures: NDArray[np.int64]
 
     def posterior(self, name: str, after_ms: float, pictures: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -94,39 +104,47 @@ class Drops:
 
 
 def _features(pictures: NDArray[np.int64], after_ms: float) -> NDArray[np.float64]:
-    seen = pictures[:, [k for k, t in enumerate(LOOKED_MS) if t <= after_ms]]
-    return np.log1p(seen.reshape(len(seen), -1).astype(np.float64))
+    seen = pictures[:, [k for k, t in enumerate(LOOKED_MS) if t <= after_ms]].astype(np.float64)
+    held, moved = np.log1p(seen[:, :, :-1]), seen[:, 1:, -1] / _MOVED
+    return np.concatenate([held.reshape(len(seen), -1), moved], axis=1)
 
 
 def look(events: Events, tare: Tare, begin_us: float) -> NDArray[np.int64]:
-    """Return what the host's picture holds at each time of `LOOKED_MS` after the first rise, shape (times, 3)."""
+    """Return what the host's picture holds at each time of `LOOKED_MS` after the first rise, shape (times, 4)."""
     assert events.intensity is not None  # the board sends them
     index = events.array.index(events.x, events.y)
-    rest, found = tare.rest.ravel(), np.zeros((len(LOOKED_MS), 3), np.int64)
+    rest, found = tare.rest.ravel(), np.zeros((len(LOOKED_MS), _NUMBERS), np.int64)
+    x = np.arange(len(rest)) % events.array.columns
+    first = middle = None
     begin = int(np.searchsorted(events.t, begin_us - FRAME_US))
     for k, t in enumerate(LOOKED_MS):
         seen = slice(begin, int(np.searchsorted(events.t, begin_us + to_us(t))))
         held = np.full(len(rest), np.nan)
         held[index[seen]] = events.intensity[seen]
         above = np.nan_to_num(held - rest)
-        above = above[above > _ABOVE]
-        found[k] = len(above), round(float(above.sum())), round(float(above.max(initial=0.0)))
+        loaded = above > _ABOVE
+        if loaded.any():
+            middle = float(np.average(x[loaded], weights=above[loaded]))
+            first = middle if first is None else first
+        moved = 0.0 if first is None or middle is None else middle - first
+        above = above[loaded]
+        found[k] = len(above), round(float(above.sum())), round(float(above.max(initial=0.0))), round(_MOVED * moved)
     return found
 
 
-def _sizes(scene: Scene) -> tuple[float, float]:
-    """Return the diameter of a drawn scene's ball and the height that it falls from, mm."""
+def _truth(scene: Scene) -> tuple[float, float, float]:
+    """Return the diameter of a drawn scene's ball, the height that it falls from, mm, and the slant, degrees."""
     ball = scene.parameters["bodies"][0]
-    return 2 * ball["shape"]["sphere"]["radius_mm"], ball["motion"]["dropped"]["height_mm"]
+    diameter, height = 2 * ball["shape"]["sphere"]["radius_mm"], ball["motion"]["dropped"]["height_mm"]
+    return diameter, height, scene.parameters["slant_deg"]
 
 
 def board_of_drops(seed: int, count: int) -> list[list[float | int]]:
-    """Drop balls on one board; return a row a drop that was felt: diameter, height, then its pictures."""
+    """Drop balls on one board; return a row a drop that was felt: diameter, height, slant, then its pictures."""
     scenes = []
     for n in range(count):
-        scene = Scene.draw(seed, n)
-        fall_ms = float(np.sqrt(2 * _sizes(scene)[1] / 9.81e-3))
-        ending = {"left_to_rest": {"rest_ms": fall_ms + _AFTER_FALL_MS, "lift_mm_s": _LIFT_MM_S}}
+        scene = drawn(seed, n)
+        ending = {"left_to_rest": {"rest_ms": fall_ms(scene) + _AFTER_FALL_MS, "lift_mm_s": _LIFT_MM_S}}
         scenes.append(scene.body(motion={"dropped": {"ending": ending}}).replace(lead_ms=20.0, tail_ms=10.0))
     acts: list[Silence | Scene] = [Silence(100.0), *scenes]
     events = play(acts, seed=seed).events
@@ -139,7 +157,7 @@ def board_of_drops(seed: int, count: int) -> list[list[float | int]]:
         if len(told):
             rows.append(
                 [
-                    *(round(size, 1) for size in _sizes(scene)),
+                    *(round(value, 1) for value in _truth(scene)),
                     *look(events.sorted(), tare, float(told[0])).ravel().tolist(),
                 ]
             )
@@ -172,12 +190,12 @@ def shipped_drops() -> Drops:
     """Return the drops that come with the demo."""
     rows = json.loads(files("taxel.demo").joinpath("drops.json").read_text(encoding="utf-8"))["rows"]
     table = np.array(rows, np.float64)
-    pictures = table[:, 2:].astype(np.int64).reshape(len(table), len(LOOKED_MS), 3)
-    return Drops(table[:, 0], table[:, 1], pictures)
+    pictures = table[:, 3:].astype(np.int64).reshape(len(table), len(LOOKED_MS), _NUMBERS)
+    return Drops(table[:, 0], table[:, 1], table[:, 2], pictures)
 
 
 def named(hearing: Hearing, scenes: Sequence[Scene]) -> dict[str, Any]:
-    """Say of each scene's first impact which ball fell from how high, by time since it was felt.
+    """Say of each scene's first impact which ball fell from how high on which slant, by time since it was felt.
 
     Parameters
     ----------
@@ -188,9 +206,9 @@ def named(hearing: Hearing, scenes: Sequence[Scene]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``answered_ms``; ``drops``, each with the truth (mm), how late it was felt (ms; None where it was not) and by
-        question the answers' probabilities and whether the most probable is right, by time; ``right``, how many of all
-        drops, by question and time; ``chance``, the share of the answer that the shipped drops have most of.
+        ``answered_ms``; ``drops``, each with the truth (mm, degrees), how late it was felt (ms; None where it was not)
+        and by question the answers' probabilities and whether the most probable is right, by time; ``right``, how many
+        of all drops, by question and time; ``chance``, the share of the answer that the shipped drops have most of.
     """
     known = shipped_drops()
     firsts = [contact for contact in hearing.contacts if contact.kind == "first"]
@@ -198,16 +216,16 @@ def named(hearing: Hearing, scenes: Sequence[Scene]) -> dict[str, Any]:
     pictures = []
     for scene, contact in zip(scenes, firsts, strict=True):
         felt = hearing.first_input(contact, "contact")
-        true = dict(zip(QUESTIONS, _sizes(scene), strict=True))
+        true = dict(zip(QUESTIONS, _truth(scene), strict=True))
         late = None if felt is None else to_ms(felt - contact.start_us)
-        drops.append({"true_mm": true, "felt_ms": late, "said": {}})
+        drops.append({"true": true, "felt_ms": late, "said": {}})
         if felt is not None:
             pictures.append(look(hearing.events, hearing.tare, felt))
     heard = [one for one in drops if one["felt_ms"] is not None]
     for name, question in QUESTIONS.items() if heard else ():
         for t in ANSWERED_MS:
             for one, p in zip(heard, known.posterior(name, t, np.array(pictures)), strict=True):
-                right = bool(p.argmax() == question.of(one["true_mm"][name]))
+                right = bool(p.argmax() == question.of(one["true"][name]))
                 one["said"].setdefault(name, []).append({"probable": p.round(4).tolist(), "right": right})
     return {
         "answered_ms": list(ANSWERED_MS),

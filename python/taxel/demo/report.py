@@ -38,7 +38,7 @@ GUESSES = (
     ("Noise of half a tick, floor of 3", "carry idle events and the weakest touch that is heard"),
     ("Taxels that differ: gain by a fifth, offset by 20 mV", "a sensor that drifts or sticks would do worse"),
     ("Force on a taxel to the power 0.7", "no maker's curve was found"),
-    ("A rigid ball on independent columns of foam", "good where the foam does not widen (Poisson ratio 0)"),
+    ("Friction of 0.6 of the force", "on a slant it makes the ball roll: what is said of the slant hangs on it"),
 )
 
 
@@ -271,7 +271,7 @@ def _which_drop(found: Mapping[str, Any]) -> dict[str, Any]:
                 }
                 for one in drop["said"].get(name, [])
             ]
-            lines.append({"drop": n + 1, "of": name, "true": f"{drop['true_mm'][name]:.0f} mm", "said": said})
+            lines.append({"drop": n + 1, "of": name, "true": f"{drop['true'][name]:.0f} {question.unit}", "said": said})
     count = len(found["drops"])
     right = {name: [f"{k} of {count}" for k in counts] for name, counts in found["right"].items()}
     return {"lines": lines, "right": right, "chance": {name: _share(v) for name, v in found["chance"].items()}}

@@ -172,7 +172,7 @@ def _say(console: Console, hearing: Hearing, quiet: Hearing) -> None:
 
 
 def _say_which(console: Console, found: dict[str, Any]) -> None:
-    """Say how often ball and height were named rightly, by time."""
+    """Say how often ball, height and slant were named rightly, by time."""
     count = len(found["drops"])
     for name, right in found["right"].items():
         by_time = ", ".join(f"{k} after {ms} ms" for k, ms in zip(right, found["answered_ms"], strict=True))

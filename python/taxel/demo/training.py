@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.demo.script import TRAINING_SEED, script
+from taxel.demo.script import TRAINING_SEED, Draw, left_to_rest, script
 from taxel.detect import Readout
 from taxel.encode import ContactArea
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
-from taxel.simulate import Contact, play, truth
+from taxel.simulate import Contact, Scene, play, truth
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
@@ -38,7 +38,9 @@ class _Example(NamedTuple):
 def train(
     *, boards: int = 4, scenes: int = 4, draw: int = 0, progress: Callable[[str], object] = lambda _: None
 ) -> Readout:
-    """Train contact and lift on scenes like the demo's and as many with the ball left to rest.
+    """Train contact and lift on scenes of balls that bounce and are caught, and as many with the ball left to rest.
+
+    All fall on a level array, on columns of foam: the demo's slants and its bonded foam are new to the readout.
 
     Parameters
     ----------
@@ -60,7 +62,7 @@ def train(
     examples = []
     for n in range(2 * boards):
         progress(f"playing training scenes, board {n + 1} of {2 * boards}")
-        examples.append(_example(TRAINING_SEED + 1000 * draw + n, scenes, left_to_rest=n >= boards))
+        examples.append(_example(TRAINING_SEED + 1000 * draw + n, scenes, Scene.draw if n < boards else left_to_rest))
     areas = [example.area for example in examples]
     cones = {}
     for label, tau, bound in (("contact", 0.5, 3.0), ("lift", 3.0, 1.0)):
@@ -74,8 +76,8 @@ def train(
     return Readout(ContactArea(), cones, delay_ms=_DELAY_MS, run_threshold=0.9)
 
 
-def _example(seed: int, scenes: int, *, left_to_rest: bool) -> _Example:
-    acts = script(seed, scenes, left_to_rest=left_to_rest)
+def _example(seed: int, scenes: int, draw: Draw) -> _Example:
+    acts = script(seed, scenes, draw=draw)
     events = play(acts, seed=seed).events
     start = events.markers[0][0]
     area = ContactArea(tare=Tare.take(events, stop_us=start)).encode(events)

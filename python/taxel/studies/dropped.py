@@ -143,14 +143,14 @@ def _drop(p: Mapping[str, Any], condition: Condition, seed: int) -> Drops:
 
 
 def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator) -> Scene:
-    # Under a slant only the part of the speed that meets the sensor counts: v cos(slant), a fall from h cos^2.
-    height = (condition.height_mm + rng.normal(0, p["height_sd_mm"])) * np.cos(np.radians(condition.slant_deg)) ** 2
+    height = condition.height_mm + rng.normal(0, p["height_sd_mm"])
     fall_ms = float(np.sqrt(2 * height / 9.81e-3))
     array = Array.thesis()
     x, y = ((n - 1) * array.pitch_mm / 2 + rng.normal(0, p["place_sd_mm"]) for n in (array.columns, array.rows))
     return Scene(
         {
-            "surface": "columns",
+            # One surface for all: else how it is reckoned would tell a slant.
+            "surface": "layer",
             "foam": {},
             "bodies": [
                 {
@@ -168,6 +168,7 @@ def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator)
                     },
                 }
             ],
+            "slant_deg": condition.slant_deg,
             "lead_ms": float(rng.uniform(0, _LEAD_MS)),
         }
     )

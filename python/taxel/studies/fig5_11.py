@@ -288,7 +288,7 @@ def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> lis
             "; ".join(f"{VARIED[n]} {a:.2f} to {b:.2f}" for n, (a, b) in share.items())
             + f" of what can be told, from {_ms(short['period_ms'])} to {_ms(long['period_ms'])}",
             worst == "ball_mm",
-            f"{VARIED[worst]} loses most; a slant is told by its speed alone here; {size}",
+            f"{VARIED[worst]} loses most; {size}",
         )
     ]
 
