@@ -39,7 +39,7 @@ demo: build
 
 test: build
 	cargo test --release --workspace --quiet
-	$(BIN)/python -m pytest -q -m "not slow"
+	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow"
 
 slow: build dist
 	cargo test --release --workspace --quiet -- --ignored
