@@ -13,7 +13,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,6 +34,8 @@ _PIECE_BYTES = 1 << 20
 
 def is_ours(path: Path) -> bool:
     """Tell whether a .h5 is of the layout that `taxel convert` writes; false too for what is no HDF5 file."""
+    import h5py  # noqa: PLC0415  loads slowly
+
     try:
         with h5py.File(path) as h5:
             return "taxel" in h5.attrs
@@ -45,6 +46,8 @@ def is_ours(path: Path) -> bool:
 
 def write_h5(part: Path, table: Events | Frames, remarks: Remarks) -> None:
     """Write a .h5."""
+    import h5py  # noqa: PLC0415  loads slowly
+
     said = replace(remarks, array=table.array).to_json()
     with h5py.File(part, "w") as h5:
         h5.attrs["taxel"] = _VERSION
@@ -66,6 +69,8 @@ def read_h5(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:
     ------
     FormatError : no HDF5 file, or one of another layout
     """
+    import h5py  # noqa: PLC0415  loads slowly
+
     try:
         with h5py.File(path) as h5:
             if "taxel" not in h5.attrs:
@@ -89,6 +94,8 @@ def read_h5(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:
 
 
 def _column(place: str, name: str, data: Any) -> NDArray[Any]:
+    import h5py  # noqa: PLC0415  loads slowly
+
     if not isinstance(data, h5py.Dataset):
         raise FormatError(f"{place}: a group; must be a column")
     if name in {"about", "unit"}:

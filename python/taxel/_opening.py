@@ -78,7 +78,7 @@ def open_any(
     if place.is_dir():
         return _folder(place, how)
     if not _is_own(place) and place.exists() and (names := _formats(place)):
-        return [_of(trial, place) for trial in formats.trials(place, names[0])]
+        return [_of(trial, place, names[0]) for trial in formats.trials(place, names[0])]
     return open_recording(place, **how)
 
 
@@ -94,7 +94,7 @@ def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
             said = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
             raise FormatError(f"{folder}: holds {said}; there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}")
         trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
-        named = [(Path(trial.name), _of(trial, folder)) for trial in trials]
+        named = [(Path(trial.name), _of(trial, folder, names[0])) for trial in trials]
     return _labelled(folder / LABELS, named)
 
 
@@ -134,13 +134,13 @@ class _Named:
     clock: Clock | None
 
 
-def _of(trial: Trial, place: Path) -> Recording:
+def _of(trial: Trial, place: Path, kind: str) -> Recording:
     """Return a trial of other people's as a recording; what is known of it are notes."""
     notes = sorted(
         (Note(event, int(t), 0) for event, times in trial.truth.items() for t in times), key=lambda note: note.t or 0
     )
     path = place if place.is_file() else place / trial.name
-    return in_memory(path, "trial", trial.recorded, Remarks(source=trial.source, notes=tuple(notes)), name=trial.name)
+    return in_memory(path, kind, trial.recorded, Remarks(source=trial.source, notes=tuple(notes)), name=trial.name)
 
 
 def _formats(place: Path) -> list[str]:

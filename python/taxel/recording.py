@@ -32,7 +32,17 @@ from taxel.wire import Registers
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["ENDINGS", "BoardChange", "Clock", "Datagrams", "Note", "Recording", "in_memory", "open_recording"]
+__all__ = [
+    "ENDINGS",
+    "BoardChange",
+    "Clock",
+    "Datagrams",
+    "Note",
+    "Recording",
+    "in_memory",
+    "kind_of_file",
+    "open_recording",
+]
 
 #: Pictures a second where a recording of events is asked for frames without a rate.
 FRAMES_HZ = 100.0
@@ -57,6 +67,11 @@ _STRANGERS = {
     b"\x93NUMPY": "a single NumPy array; save its columns t, x, y, p with numpy.savez",
 }
 ENDINGS = {".mcap": "mcap", ".lsa": "lsa", ".npz": "npz", ".csv": "csv", ".h5": "h5"}
+
+
+def kind_of_file(kind: str) -> str:
+    """Return what a kind of recording is called: by its ending where it is ours, else by its format."""
+    return f".{kind}" if kind in ENDINGS.values() else f"{kind} recording"
 
 
 @dataclass(frozen=True)
@@ -192,7 +207,8 @@ class Recording:
     name : str
         The file's name; of a trial in other people's file what that calls it.
     kind : str
-        "mcap", "lsa", "npz", "csv" or "h5"; "trial" of other people's, "merged" of `taxel.merge`.
+        "mcap", "lsa", "npz", "csv" or "h5"; of other people's one of `taxel.formats.FORMATS`; of
+        `taxel.merge` "merged".
     array : Array
         The sensor.
     source : str
@@ -375,7 +391,7 @@ class Recording:
         """
         datagrams = self._source.datagrams
         if datagrams is None:
-            raise ProblemError(f"{self.path}: a .{self.kind} holds no datagrams; only .mcap does")
+            raise ProblemError(f"{self.path}: the {kind_of_file(self.kind)} holds no datagrams; only .mcap does")
         return datagrams
 
     @property
@@ -598,7 +614,7 @@ class _Source:
 
     @property
     def verdict(self) -> str:
-        return f"a .{self.kind} does not say what was lost"
+        return f"the {kind_of_file(self.kind)} does not say what was lost"
 
     @property
     def truncated(self) -> bool:

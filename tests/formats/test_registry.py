@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import FormatError, ProblemError, formats
+from taxel.cli import main
 from taxel.formats import gaitndd, gaitpdb, moticon, pedar, plate
 
 from . import making
@@ -153,3 +155,23 @@ def test_a_trial_may_hold_events_as_well_as_pictures() -> None:
     assert trial.scored == (0, 300)
     with pytest.raises(ProblemError, match="holds events and no pictures"):
         _ = trial.frames
+
+
+@pytest.mark.parametrize("name", formats.FORMATS)
+def test_the_command_line_says_what_is_in_it_trial_by_trial(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A trial's name may hold what a file's may not."""
+    file = made(name, tmp_path)
+    for place in (file, tmp_path):
+        with pytest.raises(SystemExit) as ended:
+            main(["info", str(place), "--json"])
+        said = capsys.readouterr()
+        assert not ended.value.code, said.err
+        every = json.loads(said.out)
+        every = every if isinstance(every, list) else [every]
+        trials = list(formats.trials(place))
+        assert len({one["file"] for one in every}) == len(every) == len(trials)
+        assert {one["kind"] for one in every} == {name}
+        assert all(one["file"].startswith(str(place)) for one in every)
+    assert taxel.open(tmp_path)[0].verdict == f"the {name} recording does not say what was lost"

@@ -147,6 +147,8 @@ def _notes(recording: Recording) -> dict[str, NDArray[np.int64]]:
 
 def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArray[np.int64]]:
     """Return the events of a recording that lie within it; what lies outside is left out, and said."""
+    from taxel.recording import kind_of_file  # noqa: PLC0415  the command line starts quickly
+
     times = recording.events.t if recording.has_events else recording.frames().t
     if not len(times):
         raise ProblemError(f"{recording.path}: holds nothing")
@@ -160,8 +162,8 @@ def _within(table: Labels, recording: Recording, option: str) -> dict[str, NDArr
         raise ProblemError(f"{option} {table.path}: none of its {total} events lies within {span}")
     if recording.clock is None and any(row.host_ns is not None for row in table.rows):
         warnings.warn(
-            f"a .{recording.kind} keeps no arrival times, so host_ns cannot settle by how many turns of the board's "
-            f"clock (6.5536 s) {table.path} is ahead of it: times are taken as they are",
+            f"the {kind_of_file(recording.kind)} keeps no arrival times, so host_ns cannot settle by how many turns of "
+            f"the board's clock (6.5536 s) {table.path} is ahead of it: times are taken as they are",
             stacklevel=2,
         )
     if lost:

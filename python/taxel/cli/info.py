@@ -107,7 +107,7 @@ def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[st
     span = (int(table.t.min()), int(table.t.max())) if len(table) else None
     seconds = (span[1] - span[0]) / 1e6 if span else 0.0
     said: dict[str, Any] = {
-        "file": str(recording.path.with_name(recording.name)),
+        "file": _named(recording),
         "kind": recording.kind,
         "source": recording.source,
         "array": {name: value for name, value in array._geometry().items() if name != "exists"},
@@ -151,6 +151,12 @@ def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[st
     }
 
 
+def _named(recording: Recording) -> str:
+    """Return the file, and which trial of it this is where other people's holds several."""
+    place = str(recording.path)
+    return place if place.endswith(recording.name) else f"{place}, {recording.name}"
+
+
 def _pressure(frames: Frames, above: float) -> dict[str, Any] | None:
     """Return the largest contact area, peak and sum with their times, and where the centre went."""
     if not len(frames):
@@ -186,7 +192,9 @@ def _peak(t: Any) -> float | None:
 
 def _page(said: dict[str, Any]) -> str:
     """Return the same as lines for people."""
-    head = f"{said['file']}: .{said['kind']}" + f", from {said['source']}" * bool(said["source"])
+    from taxel.recording import kind_of_file  # noqa: PLC0415
+
+    head = f"{said['file']}: {kind_of_file(said['kind'])}" + f", from {said['source']}" * bool(said["source"])
     rows = [*_contents(said), *_rates(said), *_losses(said), ("verdict", said["verdict"])]
     lines = [head, *(f"  {name:<20}{value}" for name, value in rows)]
     lines += [f"{what} written to {said[what]}" for what in ("picture", "table") if what in said]
@@ -228,7 +236,7 @@ def _contents(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def _rates(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if said.get("events_per_s_board") is not None:
         peak = said["peak_events_per_s_board"]
-        yield "rate, board", f"{said['events_per_s_board']:.0f} events/s, at most {peak:.0f} in 10 ms"
+        yield "rate, board", f"{said['events_per_s_board']:.0f} events/s; {peak:.0f} events/s in the busiest 10 ms"
     if said.get("pictures_per_s") is not None:
         yield "rate", f"{said['pictures_per_s']:.1f} pictures/s"
     if said.get("events_per_s_host") is not None:

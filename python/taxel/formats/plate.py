@@ -10,8 +10,8 @@ import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -61,6 +61,8 @@ def trials(path: str | Path) -> Iterator[Trial]:
     ------
     FormatError : a file that does not hold what it should
     """
+    import h5py  # noqa: PLC0415  loads slowly
+
     place = Path(arguments.path("path", path))
     found = files(place)
     if not found:
@@ -86,7 +88,9 @@ def trials(path: str | Path) -> Iterator[Trial]:
             raise FormatError(f"{file.name}: not a whole HDF5 file ({str(error).splitlines()[0]})") from None
 
 
-def _image(h5: h5py.File, name: str, file: Path) -> NDArray[np.int32]:
+def _image(h5: Any, name: str, file: Path) -> NDArray[np.int32]:
+    import h5py  # noqa: PLC0415  loads slowly
+
     data = h5[name]
     if not isinstance(data, h5py.Dataset) or data.ndim != 3 or data.dtype.kind not in "ui" or 0 in data.shape:
         raise FormatError(f"{file.name}, {name}: must be whole numbers, rows x columns x frames")

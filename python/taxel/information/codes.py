@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import rankdata
 
 from taxel._arguments import floats, instance, mapping, number, several, shown
 from taxel._core import ProblemError
@@ -202,7 +201,9 @@ class RankOrder(RelativeLatency):
         since = self._told(first - first.min())
         fired = since < self.window_ms
         values = np.zeros(len(first))
-        values[fired] = 1.0 - (rankdata(since[fired]) - 1.0) / len(first)
+        order = np.sort(since[fired])
+        before = np.searchsorted(order, since[fired]), np.searchsorted(order, since[fired], side="right")
+        values[fired] = 1.0 - (sum(before) - 1.0) / 2.0 / len(first)  # those at the same time share their ranks
         return values
 
 
