@@ -604,7 +604,9 @@ SOUND: dict[str, Sound] = {
     "taxel.wire.Registers.commands_to": method(REGISTERS, "commands_to", target=REGISTERS),
     "taxel.wire.Registers.preset": plain(taxel.wire.Registers.preset, name="2 kHz", array=None),
     "taxel.wire.Registers.replace": method(REGISTERS, "replace", noise_floor=4, frame_sync=True, nrows=63),
-    "taxel.wire.decode": plain(taxel.wire.decode, data=BYTES, array=ARRAY, pairing="direct", differences=False),
+    "taxel.wire.decode": plain(
+        taxel.wire.decode, data=BYTES, array=ARRAY, pairing="direct", differences=False, lengths=[len(BYTES)]
+    ),
     "taxel.wire.encode": plain(taxel.wire.encode, events=EVENTS),
     "taxel.live.Live": plain(
         listen,

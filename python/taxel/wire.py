@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import flag, instance, number, several, shown, text, whole
+from taxel._arguments import column, flag, instance, number, several, shown, text, whole
 from taxel._columns import frozen
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
@@ -83,6 +83,7 @@ def decode(
     array: Array | None = None,
     pairing: Literal["direct", "taxel"] = "direct",
     differences: bool = False,
+    lengths: ArrayLike | None = None,
 ) -> Events:
     """Read a whole stream of bytes; see `Decoder`, which also counts what is dropped.
 
@@ -93,6 +94,9 @@ def decode(
         The sensor; the thesis' 64 x 64 where it is left out.
     pairing : {"direct", "taxel"}
     differences : bool
+    lengths : array of int, shape (datagrams,), optional
+        Bytes of each datagram, where `data` is datagrams one behind the other: then each is heard by itself, so that no
+        intensity belongs to a change of the datagram before.
 
     Returns
     -------
@@ -108,6 +112,9 @@ def decode(
     Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
     """
     decoder = Decoder(array=array, pairing=pairing, differences=differences)
+    if lengths is not None:
+        each = column("lengths", lengths, np.int64)
+        return Events._from_parts(decoder._core.datagrams(_bytes(data), each), decoder.array)
     if pairing == "taxel":
         markers = decoder.push(data).markers
         events = decoder.finish()

@@ -202,6 +202,22 @@ def test_an_end_of_stream_begins_anew_but_counts_on():
     assert decoder.counts.words == 2
 
 
+@given(data=st.binary(max_size=200), cuts=st.lists(st.integers(0, 200), max_size=6))
+def test_datagrams_one_behind_the_other_are_heard_each_by_itself(data, cuts):
+    """As pushed one by one, each with its end; whatever is in them, wherever one ends."""
+    edges = sorted({0, len(data), *(min(cut, len(data)) for cut in cuts)})
+    pieces = [data[start:stop] for start, stop in pairwise(edges)]
+    decoder, parts = wire.Decoder(), []
+    for piece in pieces:
+        parts += [decoder.push(piece), decoder.end_of_datagram()]
+    parts.append(decoder.finish())
+    heard = wire.decode(data, lengths=[len(piece) for piece in pieces])
+    assert rows(heard) == [row for part in parts for row in rows(part)]
+    assert heard.markers == tuple(marker for part in parts for marker in part.markers)
+    with pytest.raises(taxel.ProblemError, match="lengths: must be 0 or more each"):
+        wire.decode(data, lengths=[len(data) + 1])
+
+
 def test_a_whole_recording_paired_by_taxel_keeps_its_markers():
     data = oracle.word("marker", 1) + oracle.word("change", 2, 1, 1) + oracle.word("change", 2, 2, 2)
     data += oracle.word("intensity", 9, 1, 1)

@@ -85,6 +85,14 @@ impl Events {
         self.view().is_repaired(k)
     }
 
+    /// Sees to it that there is a column of intensities: none for the events so far.
+    pub(crate) fn complete_intensities(&mut self) {
+        let n = self.len();
+        let column = self.intensity.get_or_insert_default();
+        column.ticks.resize(n, 0);
+        column.present.resize(n, false);
+    }
+
     /// Says of the events from place `from` on, which were added just now, whether states gave them.
     pub(crate) fn mark_repaired(&mut self, from: usize, repaired: bool) {
         let n = self.len();

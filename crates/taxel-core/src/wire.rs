@@ -3,6 +3,7 @@
 //! Nothing here does I/O: push bytes as they come, in pieces of any size, and take events. Socket, file and emulated
 //! board are shells around it.
 
+mod columns;
 pub mod command;
 pub mod decoder;
 pub mod receiver;
@@ -10,8 +11,9 @@ pub mod registers;
 pub mod v1;
 pub mod v2;
 
+pub use columns::{Filled, Room};
 pub use command::{Command, CommandReader};
-pub use decoder::{Counts, Decoder, Filled, Pairing, Room, decode};
+pub use decoder::{Counts, Decoder, Pairing, decode};
 pub use receiver::{Receiver, Took};
 pub use registers::{Refusal, Registers};
 pub use v1::{STAMP_US, WORD_BYTES, Word, encode};

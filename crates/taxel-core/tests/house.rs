@@ -13,8 +13,8 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
     (
         "taxel-core",
         &[
-            &["error", "reading", "vectors"],
-            &["allowed"],
+            &["error", "reading"],
+            &["allowed", "vectors"],
             &["parameters", "array"],
             &["events", "frames", "spikes"],
             &["circuit"],

@@ -3,9 +3,9 @@
 use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use taxel_core::Error;
 use taxel_core::board::{Board, IntensityWord, Previous, Version2};
 use taxel_core::wire::{self, Command, Counts, Decoder, Filled, Pairing, Registers, Room};
+use taxel_core::{Error, Events, problem};
 
 use crate::convert::{ArrayParts, EventsIn, EventsOut, from_events, slice, to_array, to_events};
 use crate::enter::{Shared, enter};
@@ -60,6 +60,38 @@ impl WireDecoder {
         let (Filled { rows, paired }, markers) =
             self.0.enter(py, |decoder, stop| decoder.fill(data, arrived, room, last, stop))?;
         Ok((rows, paired, markers.iter().map(|m| (m.t, m.start)).collect()))
+    }
+
+    /// Takes datagrams that lie one behind the other, each by itself, as a host hears them; ends the stream.
+    fn datagrams<'py>(
+        &self,
+        py: Python<'py>,
+        data: PyReadonlyArray1<'_, u8>,
+        lengths: PyReadonlyArray1<'_, i64>,
+    ) -> PyResult<EventsOut<'py>> {
+        /// Datagrams between two looks at Ctrl-C: some milliseconds of work.
+        const PIECE: usize = 1 << 14;
+        let (mut data, lengths) = (slice("data", &data)?, slice("lengths", &lengths)?);
+        let wrong = || problem!("lengths: must be 0 or more each, and {} bytes together", data.len());
+        let cut = lengths.iter().try_fold(0, |sum: usize, &n| sum.checked_add(usize::try_from(n).ok()?));
+        if cut != Some(data.len()) {
+            return Err(core(wrong()));
+        }
+        let events = self.0.enter(py, |decoder, stop| {
+            let mut events = Events::empty(decoder.array().clone());
+            for piece in lengths.chunks(PIECE) {
+                stop.check()?;
+                for &length in piece {
+                    let (datagram, later) = data.split_at(length as usize);
+                    decoder.push_into(datagram, None, &mut events);
+                    decoder.end_of_datagram_into(&mut events);
+                    data = later;
+                }
+            }
+            decoder.finish_into(&mut events);
+            Ok::<_, Error>(events)
+        })?;
+        Ok(from_events(py, events))
     }
 
     /// Releases the change that waits for its intensity.

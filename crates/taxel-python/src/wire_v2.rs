@@ -76,8 +76,8 @@ fn decode_datagrams<'py>(
         let mut events = Events::empty(sensor);
         for piece in bytes.chunks(PIECE) {
             stop.check()?;
-            reader.push(piece, |datagram| {
-                decoder.push(datagram, None, &mut events);
+            reader.push(piece, |_, header, body| {
+                decoder.push_read(header, body, None, &mut events);
             });
         }
         reader.finish();
@@ -101,7 +101,7 @@ impl DatagramStream {
     fn push<'py>(&self, py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         let (bytes, mut found) = (slice("data", &data)?, vec![]);
         let found = self.0.enter(py, |reader, _| {
-            reader.push(bytes, |datagram| found.push(datagram.to_vec()));
+            reader.push(bytes, |datagram, _, _| found.push(datagram.to_vec()));
             Ok::<_, Error>(found)
         })?;
         Ok(found.iter().map(|datagram| PyBytes::new(py, datagram)).collect())

@@ -2,6 +2,8 @@
 
 use std::sync::OnceLock;
 
+use crate::{Result, problem};
+
 /// Sets of vector instructions that code is written or compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Instructions {
@@ -32,6 +34,15 @@ impl Instructions {
     #[inline]
     pub fn present(self) -> bool {
         self <= Self::best()
+    }
+
+    /// Itself, where this machine has it.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where it does not.
+    pub fn checked(self) -> Result<Self> {
+        if self.present() { Ok(self) } else { Err(problem!("instructions {self:?}: this machine does not have them")) }
     }
 
     /// Asks the machine for what this set has beyond the one before.

@@ -2,17 +2,17 @@
 
 mod blocks;
 mod clock;
-mod columns;
+mod filling;
 
 pub use clock::FARTHEST_BACK;
-pub use columns::{Filled, Room};
 
 use blocks::Carried;
 use clock::Clock;
-use columns::{Change, Filling};
+use filling::{Change, Filling};
 use serde::{Deserialize, Serialize};
 
 use crate::vectors::Instructions;
+use crate::wire::columns::{self, Filled, Room};
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES, Word};
 use crate::{Array, Events, Intensities, Marker, Result, Stop, problem};
 
@@ -126,10 +126,7 @@ impl Decoder {
     ///
     /// `Problem` where this machine does not have them.
     pub fn instructions(mut self, instructions: Instructions) -> Result<Self> {
-        if !instructions.present() {
-            return Err(problem!("instructions {instructions:?}: this machine does not have them"));
-        }
-        self.instructions = instructions;
+        self.instructions = instructions.checked()?;
         Ok(self)
     }
 
@@ -157,43 +154,11 @@ impl Decoder {
     /// As [`Self::push`], into columns that are used again ([`Events::clear`]): appends.
     pub fn push_into(&mut self, bytes: &[u8], arrived: Option<i64>, out: &mut Events) {
         let (before, most) = (out.len(), self.most_rows(bytes.len()));
-        let paired = out.intensity.is_some();
-        let mut intensity = out.intensity.take().unwrap_or_default();
-        let rows_to_come = before + most - intensity.ticks.len();
-        out.t.reserve(most);
-        out.x.reserve(most);
-        out.y.reserve(most);
-        out.p.reserve(most);
-        intensity.ticks.reserve(rows_to_come);
-        intensity.present.reserve(rows_to_come);
-        let skip = before - intensity.ticks.len();
-        let room = Room {
-            t: &mut out.t.spare_capacity_mut()[..most],
-            x: &mut out.x.spare_capacity_mut()[..most],
-            y: &mut out.y.spare_capacity_mut()[..most],
-            p: &mut out.p.spare_capacity_mut()[..most],
-            ticks: &mut intensity.ticks.spare_capacity_mut()[skip..skip + most],
-            present: &mut intensity.present.spare_capacity_mut()[skip..skip + most],
-        };
-        let filled = self.fill_columns(bytes, arrived, room, paired, &mut out.markers);
-        let after = before + filled.rows;
-        // SAFETY: `fill_columns` has written the first `rows` entries of t, x, y and p, which begin at `before`, and the
-        // capacity was reserved above.
+        // SAFETY: `fill_columns` writes each row that it counts, and with `paired` its ticks and present.
         unsafe {
-            out.t.set_len(after);
-            out.x.set_len(after);
-            out.y.set_len(after);
-            out.p.set_len(after);
-        }
-        if filled.paired {
-            intensity.ticks.resize(before, 0);
-            intensity.present.resize(before, false);
-            // SAFETY: as above; with `paired`, it has written the first `rows` entries of ticks and present too.
-            unsafe {
-                intensity.ticks.set_len(after);
-                intensity.present.set_len(after);
-            }
-            out.intensity = Some(intensity);
+            columns::append(out, most, |room, paired, markers| {
+                self.fill_columns(bytes, arrived, room, paired, markers)
+            });
         }
         out.mark_repaired(before, false);
     }

@@ -13,7 +13,7 @@ mod scalar;
 
 pub(super) use carried::Carried;
 
-use super::columns::Filling;
+use super::filling::Filling;
 use crate::vectors::Instructions;
 use crate::wire::v1::WORD_BYTES;
 

@@ -1,76 +1,23 @@
 //! Datagrams of version 2 to events: each intact one exactly once, whatever was lost, repeated, reordered or damaged.
 
+mod held;
+mod words;
+
 use std::collections::VecDeque;
 
-use serde::{Deserialize, Serialize};
-
+use super::counts::{Counts, Status};
 use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Layout, Refused, START, STOP};
-use crate::{Array, Events, Intensities, Marker};
+use crate::vectors::Instructions;
+use crate::wire::columns::{self, Filled};
+use crate::{Array, Events, Marker, Result};
+use held::Held;
+use words::{Body, Meaning};
 
 /// How far behind the highest sequence number a datagram may come and still be told from a repeated one.
 const WINDOW: usize = 65_536;
 
 /// Sessions that are remembered, for datagrams that come behind a reset.
 const SESSIONS: usize = 4;
-
-/// The board's own totals since reset, as its status datagrams say them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Status {
-    /// Frames scanned.
-    pub frames: u64,
-    /// Events put into datagrams.
-    pub events: u64,
-    /// Events dropped, because the queue was full.
-    pub dropped: u64,
-    /// Datagrams made before this one.
-    pub datagrams: u64,
-    /// Conversions whose comparator had not returned.
-    pub faults: u64,
-}
-
-/// What a decoder heard, and all that it missed, by cause.
-///
-/// `datagrams = intact + repeated + old + refused by cause`; of each session `missing` numbers lie between the first and the last
-/// intact one and never came.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Counts {
-    /// Datagrams given to the decoder.
-    pub datagrams: u64,
-    /// Those that were decoded.
-    pub intact: u64,
-    /// Came again, and were not decoded again.
-    pub repeated: u64,
-    /// Came more than 65 536 numbers late, so that nobody can tell whether they had come before; not decoded.
-    pub old: u64,
-    /// Refused: too short.
-    pub short: u64,
-    /// Refused: not of version 2, or of another board.
-    pub foreign: u64,
-    /// Refused: the checksum disagrees.
-    pub checksum: u64,
-    /// Sequence numbers that never came intact, between the first and the last of each session.
-    pub missing: u64,
-    /// Of a kind that is not known; skipped.
-    pub unknown_kind: u64,
-    /// With flags that are not known; decoded.
-    pub unknown_flags: u64,
-    /// Bodies that end within a word; what was whole is decoded.
-    pub malformed: u64,
-    /// Events on the array.
-    pub events: u64,
-    /// Of these, those that a state gave, because its value differed from the held one.
-    pub repaired: u64,
-    /// States on the array.
-    pub states: u64,
-    /// Events and states outside the array.
-    pub outside: u64,
-    /// Starts and stops.
-    pub markers: u64,
-    /// Times that the board said it had dropped events.
-    pub dropped: u64,
-    /// Resets that were noticed.
-    pub resets: u64,
-}
 
 /// What one datagram was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -128,6 +75,13 @@ impl Session {
 
     /// Notes a number; none where it is too old, else whether it is new.
     fn note(&mut self, number: i64) -> Option<bool> {
+        if number == self.highest + 1 {
+            // As nearly all come: the place is free for it, whatever came a window ago.
+            let (word, bit) = place(number);
+            self.seen[word] |= bit;
+            (self.highest, self.received) = (number, self.received + 1);
+            return Some(true);
+        }
         if number <= self.highest - WINDOW as i64 {
             return None;
         }
@@ -164,6 +118,7 @@ fn place(number: i64) -> (usize, u64) {
 #[derive(Debug, Clone)]
 pub struct Decoder {
     array: Array,
+    instructions: Instructions,
     board: Option<u16>,
     sessions: VecDeque<Session>,
     /// Missing numbers of sessions that are remembered no more.
@@ -173,8 +128,7 @@ pub struct Decoder {
     latest: i64,
     /// Whether there was time before the first session.
     goes_on: bool,
-    held: Vec<Option<u16>>,
-    held_at: Vec<i64>,
+    held: Held,
     status: Option<Status>,
     counts: Counts,
 }
@@ -183,20 +137,30 @@ impl Decoder {
     /// A decoder for the given array; it belongs to the first board that it hears.
     #[must_use]
     pub fn new(array: Array) -> Self {
-        let taxels = array.len();
+        let held = Held::new(&array);
         Self {
             array,
+            instructions: Instructions::best(),
             board: None,
             sessions: VecDeque::new(),
             missed_before: 0,
             heard: None,
             latest: 0,
             goes_on: false,
-            held: vec![None; taxels],
-            held_at: vec![i64::MIN; taxels],
+            held,
             status: None,
             counts: Counts::default(),
         }
+    }
+
+    /// Uses other vector instructions than the machine's best, for tests and measurements: the events are the same.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where this machine does not have them.
+    pub fn instructions(mut self, instructions: Instructions) -> Result<Self> {
+        self.instructions = instructions.checked()?;
+        Ok(self)
     }
 
     /// The sensor.
@@ -232,8 +196,8 @@ impl Decoder {
 
     /// What each taxel holds as far as was heard, by index.
     #[must_use]
-    pub fn held(&self) -> &[Option<u16>] {
-        &self.held
+    pub fn held(&self) -> Vec<Option<u16>> {
+        self.held.by_index()
     }
 
     /// Takes a datagram; appends its events.
@@ -241,23 +205,28 @@ impl Decoder {
     /// `arrived` is the host's clock in us. After a reset it says how much time has passed, else time goes on from the latest
     /// that was heard.
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
-        self.counts.datagrams += 1;
-        let (header, body) = match Header::read(datagram) {
-            Ok(read) => read,
+        match Header::read(datagram) {
+            Ok((header, body)) => self.push_read(&header, body, arrived, out),
             Err(refused) => {
+                self.counts.datagrams += 1;
                 *match refused {
                     Refused::Short => &mut self.counts.short,
                     Refused::Foreign => &mut self.counts.foreign,
                     Refused::Checksum => &mut self.counts.checksum,
                 } += 1;
-                return Heard::Refused(refused);
+                Heard::Refused(refused)
             }
-        };
+        }
+    }
+
+    /// As [`Self::push`], of a datagram that was read and found intact.
+    pub fn push_read(&mut self, header: &Header, body: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
+        self.counts.datagrams += 1;
         if *self.board.get_or_insert(header.board) != header.board {
             self.counts.foreign += 1;
             return Heard::Refused(Refused::Foreign);
         }
-        let (which, reset) = self.session(&header, arrived);
+        let (which, reset) = self.session(header, arrived);
         let session = &mut self.sessions[which];
         match session.note(session.number_of(header.sequence)) {
             None => {
@@ -276,7 +245,7 @@ impl Decoder {
         self.counts.dropped += u64::from(header.flags & DROPPED != 0);
         self.counts.unknown_flags += u64::from(header.flags & !(FRAME_SYNC | DIFFERENCES | DROPPED) != 0);
         self.latest = self.latest.max(base);
-        self.body(&header, body, base, out);
+        self.body(header, body, base, out);
         self.heard = arrived.map(|now| (now, self.latest)).or(self.heard);
         let until = (header.span > 0).then(|| base + i64::from(header.span));
         self.latest = self.latest.max(until.unwrap_or(i64::MIN));
@@ -309,8 +278,7 @@ impl Decoder {
         if !began {
             self.counts.resets += 1;
             // After its reset the board compares with 0, and tells every taxel that differs from it.
-            self.held.fill(None);
-            self.held_at.fill(i64::MIN);
+            self.held.forget();
         }
         if self.sessions.len() == SESSIONS
             && let Some(gone) = self.sessions.pop_front()
@@ -353,81 +321,27 @@ impl Decoder {
         }
     }
 
-    fn words(&mut self, header: &Header, kind: Kind, word: Layout, body: &[u8], base: i64, out: &mut Events) {
-        let valued = word.value > 0;
+    fn words(&mut self, header: &Header, kind: Kind, layout: Layout, body: &[u8], base: i64, out: &mut Events) {
         let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
-        let differences = header.flags & DIFFERENCES != 0 && !states;
-        let mask = (1_i64 << header.stride.min(31)) - 1;
-        let (step, _) = word.advance();
-        let (mut position, mut t) = (-1_i64, base);
-        let mut words = body.chunks_exact(word.bytes).map(|bytes| match *bytes {
-            [a, b] => u32::from(u16::from_le_bytes([a, b])),
-            [a, b, c, d] => u32::from_le_bytes([a, b, c, d]),
-            _ => 0,
-        });
-        let before = out.len();
-        if valued {
-            let column = out.intensity.get_or_insert_with(Intensities::default);
-            column.ticks.resize(before, 0);
-            column.present.resize(before, false);
+        let meaning = match states {
+            true => Meaning::States,
+            false if header.flags & DIFFERENCES != 0 && layout.value > 0 => Meaning::Differences,
+            false => Meaning::Changes,
+        };
+        if layout.value > 0 {
+            out.complete_intensities();
         }
-        let mut cut = !body.len().is_multiple_of(word.bytes);
-        while let Some(bits) = words.next() {
-            let p = bits >> (word.skip + word.value) & 1 == 1;
-            let skip = bits >> word.value & word.control();
-            let value = bits & ((1 << word.value) - 1);
-            if skip == word.control() {
-                if p {
-                    let Some(offset) = words.next() else {
-                        cut = true;
-                        break;
-                    };
-                    (t, position) = (base + i64::from(offset), -1);
-                } else {
-                    position += i64::from(value + 1) * step;
-                }
-                continue;
-            }
-            position += i64::from(skip) + 1;
-            let (x, y) = (position >> header.stride.min(31), position & mask);
-            if x >= i64::from(self.array.columns) || y >= i64::from(self.array.rows) {
-                self.counts.outside += 1;
-                continue;
-            }
-            let (x, y) = (x as u16, y as u16);
-            let taxel = self.array.index(x, y);
-            let value = value as u16;
-            let held = self.held[taxel];
-            let newest = t >= self.held_at[taxel];
-            let (p, told) = if states {
-                self.counts.states += 1;
-                if !newest || held == Some(value) {
-                    continue;
-                }
-                self.counts.repaired += 1;
-                (value >= held.unwrap_or_default(), value)
-            } else if differences {
-                let from = held.unwrap_or_default();
-                (p, if p { from.saturating_add(value) } else { from.saturating_sub(value) })
-            } else {
-                (p, value)
-            };
-            if valued && (newest || differences) {
-                self.held[taxel] = Some(told);
-                self.held_at[taxel] = self.held_at[taxel].max(t);
-            }
-            self.counts.events += 1;
-            self.latest = self.latest.max(t);
-            out.t.push(t);
-            out.x.push(x);
-            out.y.push(y);
-            out.p.push(p);
-            if let Some(column) = &mut out.intensity {
-                column.ticks.push(if valued { told } else { 0 });
-                column.present.push(valued);
-            }
+        let before = out.len();
+        let body = Body::new(layout, meaning, header.stride, base, body);
+        let Self { instructions, held, counts, latest, .. } = self;
+        // SAFETY: `words::decode` writes each row that it counts, and with `paired` its ticks and present.
+        unsafe {
+            columns::append(out, words::most_rows(&body), |room, paired, _| {
+                let given = words::decode(body, *instructions, held, room, paired, counts);
+                *latest = given.latest.max(*latest);
+                Filled { rows: given.rows, paired }
+            });
         }
         out.mark_repaired(before, states);
-        self.counts.malformed += u64::from(cut);
     }
 }

@@ -1,6 +1,6 @@
 //! Datagrams in files and on streams, each behind its length: cut anywhere, and found again after damage.
 
-use super::{DATAGRAM_BYTES, HEADER_BYTES, Header, MAGIC, Refused, TRAILER_BYTES};
+use super::{DATAGRAM_BYTES, HEADER_BYTES, Header, MAGIC, TRAILER_BYTES};
 
 /// Bytes of a length.
 const LENGTH_BYTES: usize = 2;
@@ -14,8 +14,8 @@ pub struct StreamReader {
 }
 
 impl StreamReader {
-    /// Takes the next bytes; gives each whole datagram to `take`.
-    pub fn push(&mut self, bytes: &[u8], mut take: impl FnMut(&[u8])) {
+    /// Takes the next bytes; gives each whole datagram to `take`, with its header and body.
+    pub fn push(&mut self, bytes: &[u8], mut take: impl FnMut(&[u8], &Header, &[u8])) {
         self.bytes.extend_from_slice(bytes);
         let mut at = 0;
         while let Some(rest) = self.bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) {
@@ -25,8 +25,8 @@ impl StreamReader {
                 && rest[LENGTH_BYTES + 1] >> 4 == 2;
             if likely {
                 let Some(datagram) = rest.get(LENGTH_BYTES..LENGTH_BYTES + length) else { break };
-                if Header::read(datagram) != Err(Refused::Checksum) {
-                    take(datagram);
+                if let Ok((header, body)) = Header::read(datagram) {
+                    take(datagram, &header, body);
                     at += LENGTH_BYTES + length;
                     continue;
                 }

@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::carried::{Carried, indices, value};
-use crate::wire::decoder::columns::Filling;
+use crate::wire::decoder::filling::Filling;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
 const WORDS: usize = 32;

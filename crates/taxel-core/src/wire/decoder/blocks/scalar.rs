@@ -1,7 +1,7 @@
 //! Plain words one by one, on any machine.
 
 use super::carried::{Carried, value};
-use crate::wire::decoder::columns::Filling;
+use crate::wire::decoder::filling::Filling;
 use crate::wire::v1::{FIRST, STAMP_US, WORD_BYTES};
 
 /// See [`super::blocks`]; at most `most` words. The first pair of a filling counts as not plain.

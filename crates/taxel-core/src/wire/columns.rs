@@ -1,0 +1,128 @@
+//! Columns that a decoder fills, in place.
+
+use std::mem::MaybeUninit;
+
+use crate::{Events, Marker, Result, problem};
+
+/// Columns to be filled; all equally long.
+#[derive(Debug)]
+pub struct Room<'a> {
+    pub(in crate::wire) t: &'a mut [MaybeUninit<i64>],
+    pub(in crate::wire) x: &'a mut [MaybeUninit<u16>],
+    pub(in crate::wire) y: &'a mut [MaybeUninit<u16>],
+    pub(in crate::wire) p: &'a mut [MaybeUninit<bool>],
+    pub(in crate::wire) ticks: &'a mut [MaybeUninit<u16>],
+    pub(in crate::wire) present: &'a mut [MaybeUninit<bool>],
+}
+
+impl<'a> Room<'a> {
+    /// Room in the given columns; polarity and presence become 0 or 1.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where they are not equally long.
+    pub fn new(t: &'a mut [i64], [x, y, ticks]: [&'a mut [u16]; 3], [p, present]: [&'a mut [u8]; 2]) -> Result<Self> {
+        if [x.len(), y.len(), ticks.len(), p.len(), present.len()].iter().any(|&n| n != t.len()) {
+            return Err(problem!("columns to fill must be equally long"));
+        }
+        // SAFETY: the decoder writes whole values only, never leaves an entry uninitialised, and a bool that it writes
+        // is a byte of 0 or 1; sizes and alignments are those of the given types.
+        unsafe {
+            Ok(Self { t: open(t), x: open(x), y: open(y), p: open(p), ticks: open(ticks), present: open(present) })
+        }
+    }
+
+    pub(in crate::wire) fn len(&self) -> usize {
+        self.t.len()
+    }
+
+    /// The room from a row on.
+    pub(in crate::wire) fn behind(&mut self, row: usize) -> Room<'_> {
+        Room {
+            t: &mut self.t[row..],
+            x: &mut self.x[row..],
+            y: &mut self.y[row..],
+            p: &mut self.p[row..],
+            ticks: &mut self.ticks[row..],
+            present: &mut self.present[row..],
+        }
+    }
+
+    /// Writes "none" for the first rows.
+    pub(in crate::wire) fn without_intensities(&mut self, rows: usize) {
+        self.ticks[..rows].fill(MaybeUninit::new(0));
+        self.present[..rows].fill(MaybeUninit::new(false));
+    }
+}
+
+/// The same entries, to be written only.
+///
+/// # Safety
+///
+/// `U` must have the size and alignment of `T`, and whoever writes must write valid `U` that are valid `T` too.
+unsafe fn open<T, U>(column: &mut [T]) -> &mut [MaybeUninit<U>] {
+    // SAFETY: the caller's promise; length and lifetime are the slice's own.
+    unsafe { std::slice::from_raw_parts_mut(column.as_mut_ptr().cast(), column.len()) }
+}
+
+/// What a decoder wrote into columns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Filled {
+    /// Rows.
+    pub rows: usize,
+    /// Whether the columns of intensities were written too; else no event has one.
+    pub paired: bool,
+}
+
+/// Appends rows to events: `fill` gets room for `most` of them, whether intensities are there already, and the markers.
+///
+/// # Safety
+///
+/// `fill` must have written as many rows as it says: t, x, y and p of each, and with `paired` ticks and present too.
+#[inline]
+pub(in crate::wire) unsafe fn append(
+    out: &mut Events,
+    most: usize,
+    fill: impl FnOnce(Room<'_>, bool, &mut Vec<Marker>) -> Filled,
+) {
+    let before = out.len();
+    let paired = out.intensity.is_some();
+    let mut intensity = out.intensity.take().unwrap_or_default();
+    let rows_to_come = before + most - intensity.ticks.len();
+    out.t.reserve(most);
+    out.x.reserve(most);
+    out.y.reserve(most);
+    out.p.reserve(most);
+    intensity.ticks.reserve(rows_to_come);
+    intensity.present.reserve(rows_to_come);
+    let skip = before - intensity.ticks.len();
+    let room = Room {
+        t: &mut out.t.spare_capacity_mut()[..most],
+        x: &mut out.x.spare_capacity_mut()[..most],
+        y: &mut out.y.spare_capacity_mut()[..most],
+        p: &mut out.p.spare_capacity_mut()[..most],
+        ticks: &mut intensity.ticks.spare_capacity_mut()[skip..skip + most],
+        present: &mut intensity.present.spare_capacity_mut()[skip..skip + most],
+    };
+    let filled = fill(room, paired, &mut out.markers);
+    assert!(filled.rows <= most, "more rows than there was room for");
+    let after = before + filled.rows;
+    // SAFETY: the caller has written the first `rows` entries of t, x, y and p, which begin at `before`, and the capacity
+    // was reserved above.
+    unsafe {
+        out.t.set_len(after);
+        out.x.set_len(after);
+        out.y.set_len(after);
+        out.p.set_len(after);
+    }
+    if filled.paired {
+        intensity.ticks.resize(before, 0);
+        intensity.present.resize(before, false);
+        // SAFETY: as above; with `paired`, the caller has written the first `rows` entries of ticks and present too.
+        unsafe {
+            intensity.ticks.set_len(after);
+            intensity.present.set_len(after);
+        }
+        out.intensity = Some(intensity);
+    }
+}

@@ -1,0 +1,62 @@
+//! What a decoder of version 2 heard and missed, and what the board says of itself.
+
+use serde::{Deserialize, Serialize};
+
+/// The board's own totals since reset, as its status datagrams say them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Status {
+    /// Frames scanned.
+    pub frames: u64,
+    /// Events put into datagrams.
+    pub events: u64,
+    /// Events dropped, because the queue was full.
+    pub dropped: u64,
+    /// Datagrams made before this one.
+    pub datagrams: u64,
+    /// Conversions whose comparator had not returned.
+    pub faults: u64,
+}
+
+/// What a decoder heard, and all that it missed, by cause.
+///
+/// `datagrams = intact + repeated + old + refused by cause`; of each session `missing` numbers lie between the first and the last
+/// intact one and never came.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Counts {
+    /// Datagrams given to the decoder.
+    pub datagrams: u64,
+    /// Those that were decoded.
+    pub intact: u64,
+    /// Came again, and were not decoded again.
+    pub repeated: u64,
+    /// Came more than 65 536 numbers late, so that nobody can tell whether they had come before; not decoded.
+    pub old: u64,
+    /// Refused: too short.
+    pub short: u64,
+    /// Refused: not of version 2, or of another board.
+    pub foreign: u64,
+    /// Refused: the checksum disagrees.
+    pub checksum: u64,
+    /// Sequence numbers that never came intact, between the first and the last of each session.
+    pub missing: u64,
+    /// Of a kind that is not known; skipped.
+    pub unknown_kind: u64,
+    /// With flags that are not known; decoded.
+    pub unknown_flags: u64,
+    /// Bodies that end within a word; what was whole is decoded.
+    pub malformed: u64,
+    /// Events on the array.
+    pub events: u64,
+    /// Of these, those that a state gave, because its value differed from the held one.
+    pub repaired: u64,
+    /// States on the array.
+    pub states: u64,
+    /// Events and states outside the array.
+    pub outside: u64,
+    /// Starts and stops.
+    pub markers: u64,
+    /// Times that the board said it had dropped events.
+    pub dropped: u64,
+    /// Resets that were noticed.
+    pub resets: u64,
+}

@@ -1,0 +1,65 @@
+//! What each taxel holds as far as was heard, and since when.
+
+use crate::Array;
+use crate::wire::v2::stride;
+
+/// Laid out as the wire names places (position = line << stride | row, with the array's own stride), so that a line is
+/// written as it comes.
+#[derive(Debug, Clone)]
+pub(super) struct Held {
+    pub(super) columns: u16,
+    pub(super) rows: u16,
+    /// Bits that name a row.
+    pub(super) stride: u8,
+    pub(super) values: Vec<u16>,
+    /// us; [`NEVER`] where nothing was heard.
+    pub(super) since: Vec<i64>,
+    /// No entry of `since` is later.
+    pub(super) newest: i64,
+}
+
+/// Before any time.
+pub(super) const NEVER: i64 = i64::MIN;
+
+impl Held {
+    pub(super) fn new(array: &Array) -> Self {
+        let stride = stride(array.rows);
+        let places = usize::from(array.columns) << stride;
+        Self {
+            columns: array.columns,
+            rows: array.rows,
+            stride,
+            values: vec![0; places],
+            since: vec![NEVER; places],
+            newest: NEVER,
+        }
+    }
+
+    /// Where a taxel's entries lie.
+    #[inline(always)]
+    pub(super) fn place(&self, x: u16, y: u16) -> usize {
+        usize::from(x) << self.stride | usize::from(y)
+    }
+
+    #[inline(always)]
+    pub(super) fn get(&self, place: usize) -> Option<u16> {
+        (self.since[place] != NEVER).then_some(self.values[place])
+    }
+
+    #[inline(always)]
+    pub(super) fn set(&mut self, place: usize, value: u16, t: i64) {
+        self.values[place] = value;
+        self.since[place] = self.since[place].max(t);
+        self.newest = self.newest.max(t);
+    }
+
+    pub(super) fn forget(&mut self) {
+        self.since.fill(NEVER);
+        self.newest = NEVER;
+    }
+
+    /// By taxel index.
+    pub(super) fn by_index(&self) -> Vec<Option<u16>> {
+        (0..self.rows).flat_map(|y| (0..self.columns).map(move |x| self.get(self.place(x, y)))).collect()
+    }
+}

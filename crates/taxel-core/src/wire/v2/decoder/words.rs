@@ -1,0 +1,85 @@
+//! Words of a body to rows: one by one on any machine, in blocks where it has the instructions.
+//!
+//! The blocks take what is plain (on the array, no earlier than anything that is held, values as they are) and stop at
+//! anything else, which [`single::words`] takes: it alone says what a word means, so every set of instructions gives
+//! the same rows, held values and counts.
+
+#[cfg(target_arch = "x86_64")]
+mod avx512;
+mod body;
+mod single;
+
+pub(super) use body::{Body, Meaning};
+
+use super::held::Held;
+use crate::vectors::Instructions;
+use crate::wire::columns::Room;
+use crate::wire::v2::counts::Counts;
+
+/// Rows beyond those that words give that a block may write over.
+const MARGIN: usize = 32;
+
+/// Words that are taken one by one before blocks are tried again.
+const STRETCH: usize = 32;
+
+/// What a body gave.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Given {
+    pub(super) rows: usize,
+    /// The latest time of a row, us; `i64::MIN` where there is none.
+    pub(super) latest: i64,
+}
+
+/// How much room a body needs, rows.
+pub(super) fn most_rows(body: &Body<'_>) -> usize {
+    body.left() + MARGIN
+}
+
+/// Decodes a body; with `paired` each row gets an intensity, or the mark that it has none. `room` has [`most_rows`] or more.
+pub(super) fn decode(
+    mut body: Body<'_>,
+    set: Instructions,
+    held: &mut Held,
+    mut room: Room<'_>,
+    paired: bool,
+    counts: &mut Counts,
+) -> Given {
+    assert!(room.len() >= most_rows(&body), "columns too short");
+    while body.left() > 0 {
+        blocks(&mut body, set, held, &mut room, paired);
+        if body.left() == 0 {
+            break;
+        }
+        let most = if set == Instructions::Avx512Bytes { STRETCH } else { usize::MAX };
+        match body.layout.value {
+            0 => single::words::<2, 15, 0>(&mut body, held, &mut room, paired, counts, most),
+            8 => single::words::<2, 7, 8>(&mut body, held, &mut room, paired, counts, most),
+            _ => single::words::<4, 15, 16>(&mut body, held, &mut room, paired, counts, most),
+        }
+    }
+    counts.events += body.rows as u64;
+    counts.malformed += u64::from(body.cut || body.at < body.bytes.len());
+    Given { rows: body.rows, latest: body.latest }
+}
+
+/// Takes plain words, as far as they go, where the machine has the instructions.
+#[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
+fn blocks(body: &mut Body<'_>, set: Instructions, held: &mut Held, room: &mut Room<'_>, paired: bool) {
+    #[cfg(target_arch = "x86_64")]
+    if set == Instructions::Avx512Bytes
+        && body.meaning == Meaning::Changes
+        && body.stride == held.stride
+        && held.values.len() <= 1 << 16
+    {
+        // SAFETY: the machine has this set, as `Decoder::instructions` and `best` see to. `decode` has asserted that the room
+        // holds a row for each word and 32 more, and no word gives more than one row. The last two conditions are the
+        // block's own.
+        unsafe {
+            match body.layout.value {
+                0 => avx512::blocks::<0>(body, held, room, paired),
+                8 => avx512::blocks::<8>(body, held, room, paired),
+                _ => avx512::blocks::<16>(body, held, room, paired),
+            }
+        }
+    }
+}

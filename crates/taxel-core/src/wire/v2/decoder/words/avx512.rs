@@ -1,0 +1,204 @@
+//! Blocks of up to 32 words with AVX-512 (F, BW, VL, VBMI2) and BMI2; the last one of a body is shorter.
+
+use std::arch::x86_64::*;
+
+use super::body::{Body, word};
+use crate::wire::columns::Room;
+use crate::wire::v2::decoder::held::Held;
+
+const WORDS: usize = 32;
+
+/// So many events, or fewer, are a block of a scene.
+const FEW: usize = 8;
+
+/// Positions are counted from 1 in 16 bits, and sums stop here: what comes to it is left to the one by one.
+const FULL: u16 = u16::MAX;
+
+/// For each 16-bit lane the last lane of the 128 bits before it, and the 16th lane.
+static LAST_BEFORE: [u16; WORDS] = lanes(false);
+static SIXTEENTH: [u16; WORDS] = lanes(true);
+
+const fn lanes(sixteenth: bool) -> [u16; WORDS] {
+    let mut out = [15; WORDS];
+    let mut k = 8;
+    while k < WORDS && !sixteenth {
+        out[k] = (k / 8 * 8 - 1) as u16;
+        k += 1;
+    }
+    out
+}
+
+/// Each lane's number.
+static LANE: [u16; WORDS] = every(1, 0);
+
+/// Where the words of 32 bits have their low and their high halves.
+static LOW_HALVES: [u16; WORDS] = every(2, 0);
+static HIGH_HALVES: [u16; WORDS] = every(2, 1);
+
+const fn every(step: u16, first: u16) -> [u16; WORDS] {
+    let mut out = [0; WORDS];
+    let mut k = 0;
+    while k < WORDS {
+        out[k] = step * k as u16 + first;
+        k += 1;
+    }
+    out
+}
+
+/// Takes plain words of so many bits of value.
+///
+/// # Safety
+///
+/// The machine must have the features below; each column of `room` must have 32 entries more than the rows so far and the
+/// words that are left; `body.stride` must be that of `held`, which has no more than 65 536 places.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut Held, room: &mut Room<'_>, paired: bool) {
+    let bytes = if VALUE == 16 { 4 } else { 2 };
+    let control = if VALUE == 8 { 0x7f } else { 0x7fff };
+    // SAFETY: each table is 64 bytes long.
+    let table = |t: &[u16; WORDS]| unsafe { _mm512_loadu_si512(t.as_ptr().cast()) };
+    let (last_before, sixteenth) = (table(&LAST_BEFORE), table(&SIXTEENTH));
+    let (low_halves, high_halves) = (table(&LOW_HALVES), table(&HIGH_HALVES));
+    let lane = table(&LANE);
+    let (one, zero) = (_mm512_set1_epi16(1), _mm512_setzero_si512());
+    let stride = _mm_cvtsi32_si128(i32::from(body.stride));
+    let row_mask = _mm512_set1_epi16(((1_u32 << body.stride) - 1) as i16);
+    let (columns, rows) = (_mm512_set1_epi16(held.columns as i16), _mm512_set1_epi16(held.rows as i16));
+
+    while body.bytes.len() - body.at >= bytes {
+        if VALUE > 0 && body.t < held.newest || body.position >= i64::from(FULL) - 1 {
+            return;
+        }
+        let count = ((body.bytes.len() - body.at) / bytes).min(WORDS);
+        let lanes = u32::MAX >> (WORDS - count);
+        // SAFETY: only the lanes of `count` words are read, which lie in the body.
+        let (head, value) = unsafe {
+            let block = body.bytes.as_ptr().add(body.at);
+            if VALUE == 16 {
+                let a = _mm512_maskz_loadu_epi32(lanes as u16, block.cast());
+                let b = _mm512_maskz_loadu_epi32((lanes >> 16) as u16, block.wrapping_add(64).cast());
+                (_mm512_permutex2var_epi16(a, high_halves, b), _mm512_permutex2var_epi16(a, low_halves, b))
+            } else {
+                (_mm512_maskz_loadu_epi16(lanes, block.cast()), zero)
+            }
+        };
+        let polarity = _mm512_movepi16_mask(head);
+        let (skip, value) = if VALUE == 8 {
+            let seven = _mm512_set1_epi16(0x7f);
+            (_mm512_and_si512(_mm512_srli_epi16::<8>(head), seven), _mm512_and_si512(head, _mm512_set1_epi16(0xff)))
+        } else {
+            (_mm512_and_si512(head, _mm512_set1_epi16(0x7fff)), value)
+        };
+        let controls = _mm512_cmpeq_epi16_mask(skip, _mm512_set1_epi16(control)) & lanes;
+        let times = controls & polarity;
+        if times & 1 != 0 {
+            let after = body.at + bytes;
+            if body.bytes.len() - after < bytes {
+                return;
+            }
+            let offset = if VALUE == 16 { word::<4>(body.bytes, after) } else { word::<2>(body.bytes, after) };
+            (body.t, body.position) = (body.base + i64::from(offset), -1);
+            body.at = after + bytes;
+            continue;
+        }
+        // Up to the next word of time, behind which the position begins anew.
+        let taken = lanes & (times & times.wrapping_neg()).wrapping_sub(1);
+        let advances = controls & taken;
+        let events = taken & !controls;
+
+        // Steps of the position, added up; a sum that is too large stays too large.
+        let mut steps = _mm512_maskz_add_epi16(taken, skip, one);
+        if advances != 0 {
+            let advance = if VALUE == 8 {
+                _mm512_slli_epi16::<6>(_mm512_add_epi16(value, one))
+            } else {
+                let small = _mm512_slli_epi16::<14>(_mm512_add_epi16(value, one));
+                let large = _mm512_cmpgt_epu16_mask(value, _mm512_set1_epi16(2));
+                _mm512_mask_mov_epi16(small, large, _mm512_set1_epi16(-1))
+            };
+            steps = _mm512_mask_mov_epi16(steps, advances, advance);
+        }
+        steps = _mm512_adds_epu16(steps, _mm512_bslli_epi128::<2>(steps));
+        steps = _mm512_adds_epu16(steps, _mm512_bslli_epi128::<4>(steps));
+        steps = _mm512_adds_epu16(steps, _mm512_bslli_epi128::<8>(steps));
+        let carried = _mm512_maskz_permutexvar_epi16(0xff00_ff00, last_before, steps);
+        steps = _mm512_adds_epu16(steps, carried);
+        let carried = _mm512_maskz_permutexvar_epi16(0xffff_0000, sixteenth, steps);
+        steps = _mm512_adds_epu16(steps, carried);
+        let from_1 = _mm512_adds_epu16(steps, _mm512_set1_epi16((body.position + 1) as i16));
+        // No step is below 0, and lanes that are not taken add none: the last one has the sum.
+        let last = (_mm_extract_epi16::<7>(_mm512_extracti32x4_epi32::<3>(from_1)) & 0xffff) as u16;
+        if last == FULL {
+            return;
+        }
+
+        let n = events.count_ones() as usize;
+        let position = _mm512_maskz_compress_epi16(events, _mm512_sub_epi16(from_1, one));
+        let ticks = _mm512_maskz_compress_epi16(events, value);
+        let p = _pext_u32(polarity, events);
+        let given = if n == 0 { 0 } else { u32::MAX >> (WORDS - n) };
+        let (x, y) = (_mm512_srl_epi16(position, stride), _mm512_and_si512(position, row_mask));
+        if (_mm512_cmpge_epu16_mask(x, columns) | _mm512_cmpge_epu16_mask(y, rows)) & given != 0 {
+            return;
+        }
+
+        let first = body.rows;
+        let t = _mm512_set1_epi64(body.t);
+        // SAFETY: the caller's promise: 32 rows fit behind `first`. What lies beyond the block's events is written again by later
+        // rows, or never read.
+        unsafe {
+            let to = room.t.as_mut_ptr().add(first).cast::<i64>();
+            _mm512_storeu_si512(to.cast(), t);
+            if n > FEW {
+                _mm512_storeu_si512(to.add(8).cast(), t);
+                _mm512_storeu_si512(to.add(16).cast(), t);
+                _mm512_storeu_si512(to.add(24).cast(), t);
+            }
+            _mm512_storeu_si512(room.x.as_mut_ptr().add(first).cast(), x);
+            _mm512_storeu_si512(room.y.as_mut_ptr().add(first).cast(), y);
+            _mm256_storeu_si256(room.p.as_mut_ptr().add(first).cast(), _mm256_maskz_set1_epi8(p & given, 1));
+            if paired {
+                let present = _mm256_set1_epi8(i8::from(VALUE > 0));
+                _mm512_storeu_si512(room.ticks.as_mut_ptr().add(first).cast(), if VALUE > 0 { ticks } else { zero });
+                _mm256_storeu_si256(room.present.as_mut_ptr().add(first).cast(), present);
+            }
+        }
+        if VALUE > 0 && n > 0 {
+            let begin = (_mm_cvtsi128_si32(_mm512_castsi512_si128(position)) & 0xffff) as usize;
+            if n > FEW && advances == 0 && usize::from(last) == begin + n {
+                // Neighbours: they lie in `held` as they came.
+                // SAFETY: the places of the events, from `begin` on, are on the array, as was seen above, and so in `held`.
+                unsafe {
+                    _mm512_mask_storeu_epi16(held.values.as_mut_ptr().add(begin).cast(), given, ticks);
+                    let since = held.since.as_mut_ptr().add(begin);
+                    _mm512_mask_storeu_epi64(since, given as u8, t);
+                    _mm512_mask_storeu_epi64(since.wrapping_add(8), (given >> 8) as u8, t);
+                    _mm512_mask_storeu_epi64(since.wrapping_add(16), (given >> 16) as u8, t);
+                    _mm512_mask_storeu_epi64(since.wrapping_add(24), (given >> 24) as u8, t);
+                }
+            } else {
+                let (mut places, mut values) = ([0_u16; WORDS], [0_u16; WORDS]);
+                // Lanes without an event repeat the last one, so that the loop has one of two lengths: a processor guesses these.
+                let repeated = _mm512_min_epu16(_mm512_set1_epi16(n as i16 - 1), lane);
+                // SAFETY: both are 64 bytes long, and the places of the first `n` events are on the array, as was seen above,
+                // and so in `held`.
+                unsafe {
+                    _mm512_storeu_si512(places.as_mut_ptr().cast(), _mm512_permutexvar_epi16(repeated, position));
+                    _mm512_storeu_si512(values.as_mut_ptr().cast(), _mm512_permutexvar_epi16(repeated, ticks));
+                    let lanes = if n > FEW { WORDS } else { FEW };
+                    for (&place, &value) in places[..lanes].iter().zip(&values[..lanes]) {
+                        *held.values.get_unchecked_mut(usize::from(place)) = value;
+                        *held.since.get_unchecked_mut(usize::from(place)) = body.t;
+                    }
+                }
+            }
+            held.newest = body.t;
+        }
+        if n > 0 {
+            body.latest = body.latest.max(body.t);
+        }
+        body.rows = first + n;
+        body.position = i64::from(last) - 1;
+        body.at += bytes * taken.count_ones() as usize;
+    }
+}

@@ -1,0 +1,60 @@
+//! A datagram's body as it is read, which is what its loops carry.
+
+use crate::wire::v2::Layout;
+
+/// What a body's words mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Meaning {
+    /// Changes, with the value held where the kind has one.
+    Changes,
+    /// Changes by a value.
+    Differences,
+    /// Values told again.
+    States,
+}
+
+/// A body and how far it was read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Body<'a> {
+    pub(crate) layout: Layout,
+    pub(crate) meaning: Meaning,
+    /// Bits of a position that name its row.
+    pub(crate) stride: u8,
+    /// us.
+    pub(crate) base: i64,
+    pub(crate) bytes: &'a [u8],
+    /// Read so far, bytes; never more than there are.
+    pub(super) at: usize,
+    /// The time of the next event, us.
+    pub(super) t: i64,
+    /// That of the last word.
+    pub(super) position: i64,
+    /// Whether an offset was missing.
+    pub(super) cut: bool,
+    /// The latest time of a row, us; `i64::MIN` before the first.
+    pub(super) latest: i64,
+    /// Rows written so far.
+    pub(super) rows: usize,
+}
+
+impl<'a> Body<'a> {
+    /// A body whose times count from `base`, us, and of which nothing was read yet.
+    pub(crate) fn new(layout: Layout, meaning: Meaning, stride: u8, base: i64, bytes: &'a [u8]) -> Self {
+        let (at, rows) = (0, 0);
+        Self { layout, meaning, stride, base, bytes, at, t: base, position: -1, cut: false, latest: i64::MIN, rows }
+    }
+
+    /// Whole words that are left.
+    #[inline(always)]
+    pub(super) fn left(&self) -> usize {
+        (self.bytes.len() - self.at) / self.layout.bytes
+    }
+}
+
+/// The word at a place, of 2 or 4 bytes.
+#[inline(always)]
+pub(super) fn word<const BYTES: usize>(bytes: &[u8], at: usize) -> u32 {
+    let mut word = [0; 4];
+    word[..BYTES].copy_from_slice(&bytes[at..at + BYTES]);
+    u32::from_le_bytes(word)
+}

@@ -1,0 +1,84 @@
+//! Words one by one, on any machine: what each of them means.
+
+use super::body::{Body, Meaning, word};
+use crate::wire::columns::Room;
+use crate::wire::v2::counts::Counts;
+use crate::wire::v2::decoder::held::Held;
+
+/// Takes words of so many bytes, bits of skip and bits of value; `most` at most. `room` must have as many rows left.
+#[inline(always)]
+pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
+    body: &mut Body<'_>,
+    held: &mut Held,
+    room: &mut Room<'_>,
+    paired: bool,
+    counts: &mut Counts,
+    most: usize,
+) {
+    let control = (1_u32 << SKIP) - 1;
+    let stride = body.stride.min(31);
+    let mask = (1_i64 << stride) - 1;
+    let (columns, rows) = (i64::from(held.columns), i64::from(held.rows));
+    let end = body.at + (body.bytes.len() - body.at).min(most.saturating_mul(BYTES)) / BYTES * BYTES;
+    let Body { base, mut at, mut t, mut position, mut latest, rows: mut n, .. } = *body;
+    while at < end {
+        let bits = word::<BYTES>(body.bytes, at);
+        at += BYTES;
+        let p = bits >> (SKIP + VALUE) & 1 == 1;
+        let skip = bits >> VALUE & control;
+        let value = (bits & ((1 << VALUE) - 1)) as u16;
+        if skip == control {
+            if !p {
+                position += (i64::from(value) + 1) << (SKIP - 1);
+            } else if body.bytes.len() - at >= BYTES {
+                (t, position) = (base + i64::from(word::<BYTES>(body.bytes, at)), -1);
+                at += BYTES;
+            } else {
+                body.cut = true;
+            }
+            continue;
+        }
+        position += i64::from(skip) + 1;
+        let (x, y) = (position >> stride, position & mask);
+        if x >= columns || y >= rows {
+            counts.outside += 1;
+            continue;
+        }
+        let (x, y) = (x as u16, y as u16);
+        let (mut p, mut told) = (p, value);
+        if VALUE > 0 {
+            let place = held.place(x, y);
+            let newest = t >= held.since[place];
+            match body.meaning {
+                Meaning::Changes => {}
+                Meaning::Differences => {
+                    let from = held.get(place).unwrap_or_default();
+                    told = if p { from.saturating_add(value) } else { from.saturating_sub(value) };
+                }
+                Meaning::States => {
+                    counts.states += 1;
+                    let before = held.get(place);
+                    if !newest || before == Some(value) {
+                        continue;
+                    }
+                    counts.repaired += 1;
+                    p = value >= before.unwrap_or_default();
+                }
+            }
+            if newest || body.meaning == Meaning::Differences {
+                held.set(place, told, t);
+            }
+        }
+        latest = latest.max(t);
+        room.t[n].write(t);
+        room.x[n].write(x);
+        room.y[n].write(y);
+        room.p[n].write(p);
+        if paired {
+            room.ticks[n].write(if VALUE > 0 { told } else { 0 });
+            room.present[n].write(VALUE > 0);
+        }
+        n += 1;
+    }
+    (body.at, body.t, body.position, body.latest, body.rows) = (at, t, position, latest, n);
+}
