@@ -36,7 +36,8 @@ def inline(page: Path) -> list[str]:
 WAY = [
     line
     for line in shell_lines(README)
-    if re.match(r"taxel (record|emulate|info|train|detect|live) ", line) and "--panel" not in line  # tests/panel opens it
+    if re.match(r"taxel (record|emulate|info|train|detect|live) ", line)
+    and "--panel" not in line  # tests/panel opens it
 ]
 CASES = [(page, line) for page in PAGES for line in [*shell_lines(page), *inline(page)]]
 

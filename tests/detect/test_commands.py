@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_readout import recipe, tare, touches
+from test_readout import ARRAY, recipe, tare, touches
 
 import taxel
 from taxel import _core
@@ -107,6 +107,21 @@ def test_a_tare_may_be_the_beginning_of_the_recording(folder: Path, trained: Pat
     arguments = ("detect", folder / "9.npz", "--readout", trained, "--truth", folder / "truth.csv", "--json")
     code, out, _ = call(capsys, *arguments, "--tare", 0.05)
     assert (code, json.loads(out)["score"]["found"]) == (0, 12)
+
+
+def test_taxels_whose_rest_is_not_in_the_tare_are_said(folder: Path, trained: Path, tmp_path: Path, capsys) -> None:
+    """Recorded from the middle of a stream: only what changed is known, and encoders leave all else out."""
+    taxel.convert(taxel.open(folder / "9.npz").events.between(1000, 2**40), tmp_path / "late.npz")
+    heard = np.zeros(ARRAY.shape, bool)
+    events = taxel.open(tmp_path / "late.npz").events
+    heard[events.y, events.x] = True
+    code, _, error = call(capsys, "detect", tmp_path / "late.npz", "--readout", trained, "--tare", 0.05)
+    known = np.count_nonzero(~np.isnan(taxel.Tare.take(events, stop_us=int(events.t[0]) + 50_000).rest))
+    assert code == 0
+    assert f"the rest of {heard.sum() - known} of {heard.sum()} taxels is not known" in error
+    assert "--tare FILE" in error
+    code, _, error = call(capsys, "detect", folder / "9.npz", "--readout", trained, "--tare", 0.05)
+    assert (code, error) == (0, "")
 
 
 def test_a_tare_longer_than_half_of_the_recording_is_refused(folder: Path, trained: Path, capsys) -> None:

@@ -1,6 +1,7 @@
 """What is judged was not trained on, each thing is judged once, and the better point is chosen."""
 
 import dataclasses
+import warnings
 
 import numpy as np
 import pytest
@@ -53,10 +54,26 @@ def test_a_point_that_finds_nothing_is_not_chosen() -> None:
         label: {**own, "ub": 1e-6, "search": [{"ub": own.get("ub", 3.0)}]} for label, own in plan.neurons.items()
     }
     silent = dataclasses.replace(plan, neurons=neurons)
-    with pytest.warns(UserWarning, match="bring"):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # of readouts that nobody keeps nothing is said
         best = choose(examples(1, 2), silent, window_ms=10.0)
     assert {label: own["ub"] for label, own in best.neurons.items()} == dict.fromkeys(plan.neurons, 3.0)
     assert judge(examples(1, 9), best, 2, window_ms=10.0).together.missed == 0
+
+
+def test_events_out_of_reach_are_named_by_label_time_and_example() -> None:
+    data = examples(1, 2)
+    plan = recipe()
+    neurons = {label: {**own, "ub": 1e-6} for label, own in plan.neurons.items()}
+    with pytest.warns(UserWarning, match="out of reach") as caught:
+        train(data, dataclasses.replace(plan, neurons=neurons))
+    for label in plan.neurons:
+        (said,) = [str(one.message) for one in caught if str(one.message).startswith(f"{label}: ")]
+        first = data[0].labels[label][0] / 1000.0
+        count = sum(len(example.labels[label]) for example in data)
+        assert said.startswith(f"{label}: {count} of {count} events are out of reach")
+        assert f"({first:.10g} ms of example 0, " in said
+        assert "pattern" not in said
 
 
 def test_the_first_of_equal_points_is_kept() -> None:

@@ -386,6 +386,24 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path) -> None:
     np.testing.assert_array_equal([line["t_us"] for line in lines], taxel.open(tmp_path / "live.mcap").detections.t)
 
 
+def test_taxel_live_says_which_taxels_its_tare_does_not_know(tmp_path: Path) -> None:
+    """Begun in the middle of a stream, it hears of the taxels that change and of no others."""
+    port = free_port()
+    Readout(ContactArea(), {"contact": (Neuron(tau=0.5), np.ones(10))}).save(tmp_path / "touch.json")
+    arguments = command("live", "--readout", tmp_path / "touch.json", "--host", LOOPBACK, "--port", port)
+    arguments += ["--array", "4x4", "--tare", 0.05, "--seconds", 60]
+    with subprocess.Popen(
+        list(map(str, arguments)), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+    ) as process:
+        listening(process)
+        play(presses(5), port)
+        assert process.stderr is not None
+        said = next(line for line in process.stderr if "the tare knows" in line)
+        process.send_signal(signal.SIGINT)
+        process.stderr.read()
+    assert said.startswith("taxel: the tare knows 1 of 16 taxels")
+
+
 def test_taxel_live_refuses_a_tare_that_nobody_keeps(tmp_path: Path) -> None:
     touch().save(tmp_path / "touch.json")
     arguments = command("live", "--readout", tmp_path / "touch.json", "--save-tare", tmp_path / "tare.json")

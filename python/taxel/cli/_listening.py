@@ -19,12 +19,16 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from taxel.encode import Encoder
+    from taxel.events import Events
+    from taxel.frames import Frames
     from taxel.labels import Labels
     from taxel.recording import Recording
     from taxel.tare import Tare
 
 #: A rest ends so long before the first label, and lasts so long at least, us.
 _BEFORE_US, _LEAST_REST_US = 20_000, 10_000
+#: Of the taxels that a recording has events of, so many may lack a rest without a word: the few that woke late.
+_MOST_UNKNOWN = 0.1
 
 TARE_HELP = "Rest of the taxels: a file that Tare.save wrote, or so many seconds at the recording's beginning."
 SET_HELP = (
@@ -83,7 +87,7 @@ def tare_of(said: str | None, recording: Recording) -> Tare | None:
     stop = first + int(seconds * 1e6)
     if isinstance(source, Events):
         stop = min([stop, *(t for t, start in source.markers if start and t > first)])
-    return Tare.take(source, stop_us=stop, note=str(recording.path))
+    return _taken(recording, source, stop)
 
 
 def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -> Tare:
@@ -92,7 +96,6 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
     A label that a person set may come late, so the rest ends a little earlier.
     """
     from taxel.events import Events  # noqa: PLC0415  the command line starts quickly
-    from taxel.tare import Tare  # noqa: PLC0415
 
     source = recording.events if recording.has_events else recording.frames()
     ends = [int(times[0]) - _BEFORE_US for times in labels.values() if len(times)]
@@ -104,7 +107,27 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
         raise ProblemError(
             f"{recording.path}: holds {what}, from which to take the taxels' rest; give --tare SECONDS or --tare FILE"
         )
-    return Tare.take(source, stop_us=min(ends), note=str(recording.path))
+    return _taken(recording, source, min(ends))
+
+
+def _taken(recording: Recording, source: Events | Frames, stop_us: int) -> Tare:
+    """Return the rest before a time; warn of taxels first heard of behind it: encoders do not listen to them."""
+    from taxel.events import Events  # noqa: PLC0415  the command line starts quickly
+    from taxel.tare import Tare  # noqa: PLC0415
+
+    tare = Tare.take(source, stop_us=stop_us, note=str(recording.path))
+    if isinstance(source, Events):
+        heard = np.zeros(source.array.shape, bool)
+        heard[source.y, source.x] = True
+        unknown = int(np.count_nonzero(heard & np.isnan(tare.rest)))
+        if unknown > _MOST_UNKNOWN * np.count_nonzero(heard):
+            warnings.warn(
+                f"{recording.path}: the rest of {unknown} of {np.count_nonzero(heard)} taxels is not known, as none of "
+                f"their changes lies in its first {to_ms(stop_us - int(source.t[0])):g} ms: they are not listened to; "
+                "record from before the board starts, which tells all taxels then, or give --tare FILE",
+                stacklevel=2,
+            )
+    return tare
 
 
 def new_report(folder: Path) -> Path:

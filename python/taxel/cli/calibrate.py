@@ -12,7 +12,7 @@ import typer
 
 from taxel._core import FormatError, ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import TARE_HELP, assignments, tare_of
+from taxel.cli._listening import TARE_HELP, assignments, tare_of, told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -88,7 +88,8 @@ def calibrate(
     opened = _opened(recording)
     place = recording.with_name(f"{recording.stem}.calibration.json") if out is None else out
     try_whole(place, overwrite=overwrite)
-    read = _read(opened, tare)
+    with told(as_json):
+        read = _read(opened, tare)
     how: dict[str, Any] = {"unit": unit, "rest": read.rest, "floor": read.floor, "date": date, "note": note}
     made: Calibration | None = None
     if law:
@@ -108,8 +109,8 @@ def calibrate(
     made.save(place, overwrite=overwrite)
     if as_json:
         said = {"calibration": str(place), "unit": made.unit, "of": made.of, "date": made.date}
-        told = [{"load": a, "unit": b, "made": c} for a, b, c in made.loads]
-        typer.echo(json.dumps(said | {"residual": made.residual, "loads": told}))
+        each_load = [{"load": a, "unit": b, "made": c} for a, b, c in made.loads]
+        typer.echo(json.dumps(said | {"residual": made.residual, "loads": each_load}))
         return
     typer.echo(f"{made.described()}: written to {place}")
     for number, (given, of, value) in enumerate(made.loads, start=1):

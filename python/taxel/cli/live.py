@@ -7,6 +7,7 @@ from collections import deque
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 from rich.console import Console, Group
 from rich.live import Live as Display
@@ -208,6 +209,20 @@ def _tared(pipeline: Live, at_rest: contextlib.ExitStack, console: Console) -> N
     while pipeline.counters["taring"] and not pipeline._core.is_over():
         pipeline.next(_REDRAW)
     at_rest.close()
+    if pipeline.tare is not None:
+        _unheard(pipeline.tare)
+
+
+def _unheard(tare: Tare) -> None:
+    """Warn where a fresh tare knows few taxels: encoders leave the others out."""
+    known = int(np.count_nonzero(~np.isnan(tare.rest)))
+    if 2 * known < tare.array.taxels:
+        typer.echo(
+            f"taxel: the tare knows {known} of {tare.array.taxels} taxels, those that changed while it was taken; the "
+            "others are not listened to. Start taxel live before the board, which tells all taxels then, or give "
+            "--tare FILE",
+            err=True,
+        )
 
 
 def _watch(
@@ -218,6 +233,7 @@ def _watch(
     console.print(f"listening on UDP {pipeline.address[0]}:{pipeline.address[1]}; Ctrl-C ends")
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
         before, told = pipeline.counters, False
+        taring = before["taring"]
         while seconds is None or before["seconds"] < seconds:
             if panel is not None and panel.live is not None and panel.live is not pipeline:
                 # A page chose another address.
@@ -230,6 +246,9 @@ def _watch(
             now = pipeline.counters
             if not now["taring"]:
                 at_rest.close()
+                if taring and pipeline.tare is not None:
+                    taring = False
+                    _unheard(pipeline.tare)
             if not told and (wrong := outside(now, pipeline.array)):
                 typer.echo(f"taxel: {wrong}", err=True)
                 told = True

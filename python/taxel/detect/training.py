@@ -5,7 +5,8 @@ from __future__ import annotations
 import inspect
 import json
 import os
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -218,7 +219,7 @@ def train(
 
     Warns
     -----
-    UserWarning : what `taxel.learn.ConeR` warns of, behind the label
+    UserWarning : what `taxel.learn.ConeR` warns of, behind the label; events out of reach by their times
 
     Notes
     -----
@@ -287,9 +288,30 @@ def learn(patterns: Sequence[Pattern], recipe: Recipe, array: Array, told: Calla
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
         told(f"learning {label} from {sum(map(len, targets))} events")
         heard = [_until(pattern.trains, times) for pattern, times in zip(patterns, targets, strict=True)]
-        learners[label] = learner.fit(heard, targets)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            learners[label] = learner.fit(heard, targets)
+        for text_of in _remarks(learners[label], targets, shift_ms, caught):
+            warnings.warn(f"{label}: {text_of}", stacklevel=3)
         delays[label] = delay_ms
     return Readout(recipe.encoder, learners, array=array, delay_ms=delays, run_threshold=float(recipe.run_threshold))
+
+
+def _remarks(
+    cone: ConeR, targets: Sequence[NDArray[np.float64]], shift_ms: float, caught: Sequence[warnings.WarningMessage]
+) -> Iterator[str]:
+    """Give what a fit warns of, in the words of events and examples."""
+    missed = cone.unreachable_
+    if missed:
+        places = [f"{targets[p][k] - shift_ms:.10g} ms" + f" of example {p}" * (len(targets) > 1) for p, k in missed]
+        named = ", ".join(places[:3]) + f" and {len(places) - 3} more" * (len(places) > 3)
+        yield (
+            f"{len(missed)} of {sum(map(len, targets))} events are out of reach, as too little is felt at them "
+            f"({named}); the rest was learnt. A larger delay_ms or tau, wider lb and ub, or another of the recipe's "
+            "points (taxel train --search) may reach them"
+        )
+    # The learner names unreachable targets, if any, first.
+    yield from (str(one.message) for one in caught[bool(missed) :])
 
 
 def _until(trains: SpikeTrains, targets: NDArray[np.float64]) -> SpikeTrains:
