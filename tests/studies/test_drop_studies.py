@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
 
-from taxel import Array, SceneError, SpikeTrains
+from taxel import Array, ProblemError, SceneError, SpikeTrains
 from taxel.information.neighbours import distances_of
 from taxel.metrics import pairwise
 from taxel.spikes import to_ms
-from taxel.studies import dropped, drops, fig5_11
-from taxel.studies.dropped import FRAMES, REGION, Condition
+from taxel.studies import dropped, drops, fig4_8, fig4_9, fig5_11
+from taxel.studies.dropped import FRAMES, REGION, TENNIS, Condition
 from taxel.studies.study import Row
 from taxel.wire import FRAME_US
 
-FEW = {**dropped.TABLE, "drops": 4}
+FEW, TENNIS_FEW = {**dropped.TABLE, "drops": 4}, {**dropped.TENNIS_TABLE, "drops": 3}
 SIDE, PERIOD_MS = 4, 0.5
 
 
@@ -146,3 +148,61 @@ def test_search_first_then_details_at_each_periods_best(tmp_path):
 def test_frames_cost_what_the_thesis_says():
     assert drops._frames_kbit_s(drops.INTENSITY_BITS) == pytest.approx(13_333, rel=1e-3)
     assert drops._frames_kbit_s(drops.CHANGE_BITS) == pytest.approx(2_667, rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def tennis(folder):
+    return dropped.played(TENNIS_FEW, Condition(65.0, 400.0, 0.0), 1, folder, TENNIS)
+
+
+def test_a_tennis_ball_is_filmed_at_2_khz_around_the_first_taxel_that_answered(folder, tennis):
+    assert TENNIS.frame_us == pytest.approx(500, abs=1)
+    assert tennis.ticks.shape == (3, 1 + 80, 17 * 17)
+    film = dropped.pictures(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
+    np.testing.assert_array_equal(film, tennis.ticks[:, 1:].astype(int) - tennis.ticks[:, :1].astype(int))
+    middle = 17 * 8 + 8
+    assert (film[:, 0, middle] > 0).all()  # it answered in the impact's first frame
+    rise = film.sum(2)
+    assert (rise.argmax(1) * TENNIS.frame_us < 12_000).all()
+    assert (rise[:, -1] < 0.3 * rise.max(1)).all()  # the ball is off again
+
+
+def test_slower_films_hold_the_frames_before_their_times(tennis):
+    every = dropped.pictures(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
+    late = np.array([0.0, 1.2, 4.9])
+    for k, film in enumerate(dropped.pictures(tennis.ticks, 5.0, late, TENNIS, 20.0)):
+        at = np.floor((late[k] + 5.0 * np.arange(4)) * 1000 / TENNIS.frame_us).astype(int)
+        np.testing.assert_array_equal(film, every[k, at])
+
+
+def test_faster_films_of_a_tennis_ball_tell_more(tmp_path):
+    section = fig4_8.STUDY.run(tmp_path, size="toy", changes={"drops": 6}, quiet=True)
+    fast, slow = section["said"]["lines"]
+    assert (fast["period_ms"], slow["period_ms"]) == (2.0, 40.0)
+    assert fast["bits"] > slow["bits"] + 0.5
+    assert all(0 <= line[name] <= 2 for line in (fast, slow) for name in ("bits", "any_phase_bits"))
+
+
+def test_own_neighbours_are_those_of_scikit_learn():
+    from sklearn.neighbors import NearestNeighbors
+
+    rng = np.random.default_rng(3)
+    y = np.repeat([0, 1, 2], 20)
+    places = rng.normal(size=(60, 2)) + 1.5 * y[:, None]
+    near = NearestNeighbors(n_neighbors=fig4_9.NEIGHBOURS).fit(places).kneighbors(return_distance=False)
+    assert fig4_9.own_neighbours(places, y) == pytest.approx(np.mean(y[near] == y[:, None]))
+
+
+def test_t_sne_lays_classes_that_differ_apart(tmp_path):
+    section = fig4_9.STUDY.run(
+        tmp_path, size="toy", changes={"drops": 6, "rates_hz": [1000.0], "perplexity": 4.0}, quiet=True
+    )
+    (line,) = section["said"]["lines"]
+    assert len(line["map"]) == 24
+    assert line["own"] > 0.5  # by chance a quarter
+
+
+def test_without_its_package_a_study_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "sklearn", None)
+    with pytest.raises(ProblemError, match=r'fig4.9: it needs sklearn: pip install "taxel\[studies\]"'):
+        fig4_9.STUDY.run(tmp_path, size="toy", quiet=True)

@@ -56,7 +56,8 @@ def every(
 ) -> None:
     """Run every study and make one page of them.
 
-    Studies on recordings are left out, and said to be, where no recordings are.
+    Studies on recordings are left out, and said to be, where no recordings are; so are those whose packages are not
+    installed.
 
     Example: taxel study all --report figures --jobs 2
     """
@@ -69,6 +70,9 @@ def every(
             where = _data(data)
             if study.data and (where is None or not any((where / folder).is_dir() for folder in study.data)):
                 typer.echo(f"{name}: left out, it needs any of {', '.join(study.data)} (--data)", err=True)
+                continue
+            if study.lacks is not None:
+                typer.echo(f"{name}: left out, {study.lacks}", err=True)
                 continue
             said[name] = study.run(
                 report,

@@ -12,6 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, BinaryIO
@@ -140,6 +141,8 @@ class Study:
         Folders of recordings that it needs.
     courses : bool
         Whether it is on simulated contact.
+    needs : tuple of str
+        Modules of the extra ``studies`` that it needs.
     unread : function of (parameters, data)
         Which of their files cannot be read, and why. It raises `FormatError` where none can.
     """
@@ -160,6 +163,7 @@ class Study:
     code: tuple[ModuleType, ...] = ()
     data: tuple[str, ...] = field(default=())
     courses: bool = False
+    needs: tuple[str, ...] = ()
     unread: Callable[[Parameters, Path], Mapping[str, str]] = lambda _parameters, _data: {}
 
     def set(self, size: str = "full", **changes: Any) -> dict[str, Any]:
@@ -182,6 +186,12 @@ class Study:
         if "realisations" in values:
             arguments.whole("realisations", values["realisations"], 1)
         return values
+
+    @property
+    def lacks(self) -> str | None:
+        """Say which modules are not installed; None where all are."""
+        missing = [name for name in self.needs if find_spec(name) is None]
+        return f'it needs {", ".join(missing)}: pip install "taxel[studies]"' if missing else None
 
     def run(
         self,
@@ -218,10 +228,12 @@ class Study:
 
         Raises
         ------
-        ProblemError : a size or parameter that is none
+        ProblemError : a size or parameter that is none; a module that is not installed
         FormatError : recordings that it needs are not there, or cannot be read (none of them; one, with `strict`)
         """
         parameters = self.set(size, **(changes or {}))
+        if self.lacks is not None:
+            raise ProblemError(f"{self.name}: {self.lacks}")
         given: dict[str, Any] = {}
         unread: Mapping[str, str] = {}
         if self.data:
