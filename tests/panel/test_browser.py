@@ -15,6 +15,7 @@ import pytest
 from tests.panel.browser import PATIENCE, chromium, free_port, running
 
 import taxel
+import taxel.device
 
 __all__ = ["chromium"]
 
@@ -78,7 +79,7 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
         panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
         with running(*panel, "--folder", str(folder), folder=folder) as server:
             url = server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")
-            yield SimpleNamespace(url=url, folder=folder)
+            yield SimpleNamespace(url=url, folder=folder, control=control)
 
 
 @pytest.fixture
@@ -147,6 +148,37 @@ def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live
     said = {note.text: note.t for note in file.notes}
     assert said == {"heel": None, "contact": int(rows[0]["t_us"])}
     assert file.events.t[0] - 2_500_000 <= said["contact"] <= file.events.t[-1] + 2_500_000
+
+
+def test_a_board_is_chosen_connected_and_remembered(chromium: Any, live: SimpleNamespace, tmp_path: Path) -> None:
+    with running("live", "--panel", "--port", str(free_port()), "--host", "127.0.0.1", folder=tmp_path) as server:
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "where-said", "no control line")
+        assert not page.get_by_label("Noise floor", exact=True).is_enabled()
+        # The machine's ports and addresses stand in the lists.
+        until(lambda: page.locator("#udp-choice option[value^='127.0.0.1:']").count() == 1, "loopback is offered")
+        listed = page.locator("#control-choice optgroup[label='Serial ports'] option").evaluate_all(
+            "all => all.map(e => e.value)"
+        )
+        assert listed == [port.place for port in taxel.device.ports()]
+        page.locator("#control").fill("127.0.0.1:1")
+        page.locator("#control-connect").click()
+        shows(page, "control-why", "refused")
+        page.locator("#control").fill(live.control)
+        page.locator("#control-connect").click()
+        shows(page, "where-said", re.escape(live.control))
+        until(lambda: page.get_by_label("Noise floor", exact=True).is_enabled(), "registers can be written")
+        shows(page, "board-lines", "REG")
+        page.locator("#control-drop").click()
+        shows(page, "where-said", "no control line")
+        page.locator("#control-choice").select_option(live.control)
+        assert page.locator("#control").input_value() == live.control
+        page.locator("#delta-intensity").check()
+        until(
+            lambda: page.locator("#delta-intensity").is_checked() and page.locator("#said").is_hidden(), "it is taken"
+        )
+        assert not page.errors
+        page.context.close()
 
 
 def test_a_refused_value_stays_typed_with_its_reason_until_escape(page: Any) -> None:

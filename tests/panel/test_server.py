@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import socket
 import struct
 import threading
 import time
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 
 import taxel
+import taxel.device
 from taxel.cli import main
 from taxel.live import Live, Panel, send
 
@@ -101,6 +103,12 @@ def live():
 def panel(live, tmp_path):
     with Panel(live, folder=tmp_path) as panel:
         yield panel
+
+
+def say(live, *datagrams):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board:
+        for datagram in datagrams:
+            board.sendto(datagram, live.address)
 
 
 def heard(live, events):
@@ -346,6 +354,45 @@ def test_a_recording_is_made_labelled_shown_and_cut(live, panel, tmp_path):  # n
         assert page.ask("step", frames=-1)["type"] == "done"
         earlier = recording.events.t[recording.events.t < middle].max()
         assert next(m for m in reversed(page.said) if m["type"] == "transport")["t_us"] == earlier
+
+
+def test_the_ports_and_addresses_of_the_machine_are_told(panel):
+    with Client(panel) as page:
+        assert page.ask("places")["type"] == "done"
+        told = next(m for m in page.said if m["type"] == "places")
+        assert [port["place"] for port in told["serial"]] == [port.place for port in taxel.device.ports()]
+        assert {"host": "127.0.0.1", "name": "lo"} in told["addresses"]
+        for address in told["addresses"]:
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as own:
+                own.bind((address["host"], 0))
+
+
+def test_differences_add_up_once_the_page_says_that_they_are_some(panel):
+    with Client(panel) as page:
+        assert page.until("hello")["delta_intensity"] is False
+        page.send(type="credit", n=2)
+        say(panel.live, word(1000, 3, 5, 90))
+        while head(page.until("picture"))[0]["events"] < 1:
+            pass
+        where = panel.live.address
+        assert page.ask("delta_intensity", on="yes")["field"] == "on"
+        assert page.ask("delta_intensity", on=True)["type"] == "done"
+        told = next((m for m in page.said[1:] if m["type"] == "hello"), None) or page.until("hello")
+        assert (told["delta_intensity"], told["udp"]) == (True, "{}:{}".format(*where))
+        say(
+            panel.live,
+            *(word(t, 3, 5, n, more) for t, more, n in ((1000, True, 40), (2000, True, 8), (3000, False, 18))),
+        )
+        say(panel.live, word(4000, 4, 5, 7))
+        while head(page.until("picture"))[0]["events"] < 4:
+            pass
+        assert list(section(page.pictures[-1], 0, "<u2").reshape(64, 64)[5, 3:5]) == [30, 7]
+        assert page.ask("record", name="delta")["type"] == "done"
+        assert "recording runs" in page.ask("delta_intensity", on=False)["reason"]
+        say(panel.live, word(5000, 3, 5, 1))
+        heard(panel.live, 5)
+        assert page.ask("stop")["type"] == "done"
+        page.until("recorder", state="idle")
 
 
 def test_health_of_what_is_shown_is_that_of_taxel_health(live, panel):

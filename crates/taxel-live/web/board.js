@@ -1,5 +1,6 @@
-// The board: where it is, what it says, its registers as sliders, presets, counters of losses.
+// The board: its registers as sliders, presets.
 
+import { Connection } from "./connection.js";
 import { make, part, write } from "./dom.js";
 import { FIELDS, PRESETS, refused, warned } from "./registers.js";
 import { RefusedError } from "./server.js";
@@ -36,7 +37,6 @@ const SPOKEN = {
 /** Set by recordings, or the board's build. */
 const NOT_HERE = ["record", "channels"];
 const SLIDER = 1000;
-const LINES_KEPT = 200;
 
 /** A register with its number, and its slider where it has one. */
 class Control {
@@ -193,9 +193,10 @@ function shortUnit(name) {
 export class Board {
   /**
    * @param {Server} server
+   * @param {import("./settings.js").Settings} settings
    * @param {(error: unknown) => void} failed
    */
-  constructor(server, failed) {
+  constructor(server, settings, failed) {
     this.server = server;
     this.failed = failed;
     this.array = { rows: 64, columns: 64 };
@@ -227,17 +228,7 @@ export class Board {
     part("preset-delete", HTMLButtonElement).onclick = () => this.ask({ type: "preset_delete", name: this.select.value });
     part("send-all", HTMLButtonElement).onclick = () => this.ask({ type: "send_all" });
     part("read-back", HTMLButtonElement).onclick = () => this.ask({ type: "read" });
-    part("listen-form", HTMLFormElement).onsubmit = (event) => {
-      event.preventDefault();
-      const [host, port] = this.address(part("udp", HTMLInputElement).value);
-      this.ask({ type: "listen", host, port });
-    };
-    part("control-form", HTMLFormElement).onsubmit = (event) => {
-      event.preventDefault();
-      this.ask({ type: "control", place: part("control", HTMLInputElement).value.trim() || null });
-    };
-    part("control-drop", HTMLButtonElement).onclick = () => this.ask({ type: "control", place: null });
-    part("control", HTMLInputElement).addEventListener("focus", () => this.server.say({ type: "places" }));
+    this.connection = new Connection(server, settings, failed);
   }
 
   /** @param {{ type: string } & Record<string, unknown>} message */
@@ -245,25 +236,13 @@ export class Board {
     return this.server.ask(message).catch(this.failed);
   }
 
-  /** @param {string} text @returns {[string, number]} host and port; an address in brackets may hold colons */
-  address(text) {
-    const at = text.trim().lastIndexOf(":");
-    const host = at < 0 ? "" : text.trim().slice(0, at).replace(/^\[|\]$/g, "");
-    return [host || "127.0.0.1", Number(text.trim().slice(at + 1))];
-  }
-
   /** @param {Hello} hello */
   greet(hello) {
     this.array = hello.array ?? this.array;
     this.writable = hello.live && hello.control !== null;
-    part("where", HTMLElement).hidden = !hello.live;
     part("losses", HTMLElement).hidden = !hello.live;
-    const udp = part("udp", HTMLInputElement);
-    if (document.activeElement !== udp) udp.value = hello.udp ?? "";
-    const control = part("control", HTMLInputElement);
-    if (document.activeElement !== control) control.value = hello.control ?? "";
-    part("control-drop", HTMLButtonElement).disabled = hello.control === null;
-    const said = hello.live ? "No control line: registers can be read here, not written. Connect one above." : "Of a recording: what the registers held.";
+    this.connection.greet(hello);
+    const said = hello.live ? "No control line: registers can be read here, not written. Choose a port above." : "Of a recording: what the registers held.";
     write(part("registers-why", HTMLElement), this.writable ? "" : said);
     this.enable();
   }
@@ -361,19 +340,5 @@ export class Board {
 
   restoreAll() {
     for (const control of this.controls.values()) control.restore();
-  }
-
-  /** @param {string} text of the board's serial line */
-  hear(text) {
-    const log = part("board-lines", HTMLElement);
-    log.append(make("li", {}, text));
-    while (log.children.length > LINES_KEPT) log.firstElementChild?.remove();
-    log.scrollTop = log.scrollHeight;
-    part("no-lines", HTMLElement).hidden = true;
-  }
-
-  /** @param {string[]} serial */
-  choose(serial) {
-    part("places", HTMLElement).replaceChildren(...serial.map((value) => make("option", { value })));
   }
 }

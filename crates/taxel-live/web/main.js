@@ -46,7 +46,7 @@ const maps = new Maps(settings, watch);
 const raster = new Raster(part("raster", HTMLCanvasElement));
 const lanes = new Lanes();
 const labels = new Labels(server, settings, player, () => timeline, failed, () => showTab("labels"));
-const board = new Board(server, failed);
+const board = new Board(server, settings, failed);
 const view = new View(server, settings, failed, (taxel) => maps.point(taxel));
 const recorder = new Recorder(server, failed, () => showTab("record"));
 const strip = new Strip(player, () => timeline, () => ({ labels: labels.labels, detections, notes: timed(opened?.notes ?? []), cut: view.cut }));
@@ -187,9 +187,9 @@ function hear(message) {
       maps.mark();
       return view.takeHealth(message);
     case "board_line":
-      return board.hear(message.text);
+      return board.connection.hear(message.text);
     case "places":
-      return board.choose(message.serial);
+      return board.connection.offer(message);
     case "cut":
       return say(`wrote ${message.name}${message.lost.length ? `; left out: ${message.lost.join(", ")}` : ""}`);
     case "warning":

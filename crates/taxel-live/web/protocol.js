@@ -9,7 +9,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ rows: number, columns: number, pitch_mm: number, name: string, exists: string | null }} ArrayTold
  * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayTold | null, udp: string | null, control: string | null,
  *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, time_columns: number,
- *   delta_intensity?: boolean }} Hello
+ *   delta_intensity: boolean | null }} Hello
  * @typedef {{ type: "registers", known: boolean, values: Record<string, number | boolean>, preset: string | null, frame_us: number,
  *   warnings: string[] }} RegistersTold
  * @typedef {{ type: "presets", built_in: string[], own: Record<string, Record<string, number>>, path: string }} Presets
@@ -36,7 +36,8 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "health", source: string | null, taxels: number, heard: number, dead: Taxel[], stuck: Taxel[], noisy: Taxel[] }} Health
  * @typedef {{ type: "board_line", at_ns: number, text: string }} BoardLine
  * @typedef {{ type: "cut", name: string, lost: string[] }} Cut
- * @typedef {{ type: "places", serial: string[] }} Places
+ * @typedef {{ place: string, kind: string, product: string | null, maker: string | null, serial: string | null }} Port
+ * @typedef {{ type: "places", serial: Port[], addresses: { host: string, name: string }[] }} Places
  * @typedef {{ type: "done", id: number }} Done
  * @typedef {{ type: "refused", id?: number, what: string | null, reason: string, field: string | null }} Refused
  * @typedef {{ type: "warning", text: string }} Warning

@@ -17,6 +17,9 @@ const DEFAULTS = {
   tones: true,
   letters: true,
   label: "contact",
+  /** Where boards were before: a place a line, the last first. */
+  lines: "",
+  addresses: "",
 };
 
 /** @typedef {typeof DEFAULTS} Values */

@@ -64,12 +64,6 @@ export class View {
     };
     part("rest-now", HTMLButtonElement).onclick = () => this.rest("now");
     part("rest-lowest", HTMLButtonElement).onclick = () => this.rest("lowest");
-    const delta = part("delta-intensity", HTMLInputElement);
-    delta.onchange = () =>
-      this.server.ask({ type: "delta_intensity", on: delta.checked }).catch((error) => {
-        delta.checked = !delta.checked;
-        failed(error);
-      });
     part("look", HTMLButtonElement).onclick = () => this.look();
     part("cut-from", HTMLButtonElement).onclick = () => this.cutHere?.(0);
     part("cut-to", HTMLButtonElement).onclick = () => this.cutHere?.(1);
@@ -106,8 +100,6 @@ export class View {
     encoder.value = hello.encoders.includes(now) ? now : "";
     if (!encoder.value) this.settings.set("raster", "changes");
     part("live-view", HTMLElement).hidden = !hello.live;
-    part("delta-row", HTMLElement).hidden = hello.delta_intensity === undefined;
-    part("delta-intensity", HTMLInputElement).checked = hello.delta_intensity ?? false;
   }
 
   /** @param {"now" | "lowest"} how */

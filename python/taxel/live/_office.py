@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import json
 import os
+import socket
+import struct
 import threading
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,12 +23,15 @@ from taxel._files import whole_file
 from taxel._health import judged
 from taxel._parts import cut
 from taxel._remarks import array_of
-from taxel.device import Cable
+from taxel.device import Cable, ports
 from taxel.labels import Labels, write_labels
 from taxel.recording import open_recording
 from taxel.wire import Command
 
-__all__ = ["Office", "presets_path"]
+__all__ = ["Office", "own_addresses", "presets_path"]
+
+#: SIOCGIFADDR of Linux (netdevice(7)).
+_ADDRESS_OF = 0x8915
 
 
 def presets_path() -> Path:
@@ -31,11 +39,33 @@ def presets_path() -> Path:
     return Path(os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config") / "taxel" / "presets.toml"
 
 
+def own_addresses() -> list[tuple[str, str]]:
+    """Return the IPv4 addresses of this machine: name of the network interface and address."""
+    found = []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asked:
+        for _, name in socket.if_nameindex():
+            # An interface that is down has none. struct ifreq: the name, then the address from byte 20 on.
+            with contextlib.suppress(OSError):
+                told = fcntl.ioctl(asked, _ADDRESS_OF, struct.pack("256s", name.encode()[:15]))
+                found.append((name, socket.inet_ntoa(told[20:24])))
+    return found
+
+
+class Source(Protocol):
+    """What is listened to, and can begin anew."""
+
+    def listen(self, host: str, port: int) -> None:
+        """Listen on another address."""
+
+    def delta_intensity(self, on: bool) -> None:
+        """Take intensities for differences, or for values."""
+
+
 class Office:
     """Answer the server's questions, from whichever thread asks."""
 
-    def __init__(self, listen: Callable[[str, int], None], cable: Cable | None) -> None:
-        self._listen_on, self._cable = listen, cable
+    def __init__(self, panel: Source, cable: Cable | None) -> None:
+        self._panel, self._cable = panel, cable
         self._at_cable, self._at_files = threading.Lock(), threading.Lock()
 
     def answer(self, what: str, asked: str) -> str:
@@ -75,8 +105,18 @@ class Office:
         return {}
 
     def _listen(self, asked: Mapping[str, Any]) -> object:
-        self._listen_on(asked["host"], asked["port"])
+        self._panel.listen(asked["host"], asked["port"])
         return {}
+
+    def _differences(self, asked: Mapping[str, Any]) -> object:
+        self._panel.delta_intensity(asked["on"])
+        return {}
+
+    def _places(self, _: Mapping[str, Any]) -> object:
+        return {
+            "serial": [asdict(port) for port in ports()],
+            "addresses": [{"host": host, "name": name} for name, host in own_addresses()],
+        }
 
     def _health(self, asked: Mapping[str, Any]) -> object:
         said = dict(asked["array"])

@@ -7,8 +7,8 @@ from pathlib import Path
 from types import TracebackType
 
 from taxel import _core
+from taxel._arguments import flag, text, whole
 from taxel._arguments import path as checked_path
-from taxel._arguments import text, whole
 from taxel._core import ProblemError
 from taxel.device import Cable
 from taxel.live._office import Office
@@ -74,7 +74,7 @@ class Panel:
                 # Indexed by the server when a page asks for it; a file that is none is refused now.
                 _core.RecordingReader(place)
             folder, opened = place.resolve().parent, place.resolve().name
-        self._office = Office(self.listen, None if control is None else Cable(text("control", control)))
+        self._office = Office(self, None if control is None else Cable(text("control", control)))
         readout = None if self._live is None else self._live._labels
         try:
             self._core = _core.Panel(
@@ -126,15 +126,38 @@ class Panel:
         ProblemError : no board is listened to, or to a file, which has to be ended first
         OSError : the port is taken; then it listens where it did
         """
-        before = self._live
-        if before is None:
-            raise ProblemError("listen: this panel shows recordings only")
-        if before._how.get("record") is not None:
-            raise ProblemError("listen: a recording was begun with this address; end it first")
+        before = self._may_begin_anew("listen")
         after = Live(port, host=host, **before._how)
         self._core.attach(after._core)
         self._live = after
         before.stop()
+
+    def delta_intensity(self, on: bool) -> None:
+        """Take intensities for differences from the value before, or for values, from here on.
+
+        What came before was read in the other way, so nothing of it is kept: time, picture, a readout and its tare
+        begin anew, on the same address.
+
+        Raises
+        ------
+        ProblemError : no board is listened to, or to a file, which has to be ended first
+        OSError : the port was taken by another program in that moment
+        """
+        before = self._may_begin_anew("delta_intensity")
+        if flag("on", on) == before._how["differences"]:
+            return
+        host, port = before.address
+        before.stop()
+        after = Live(port, host=host, **{**before._how, "differences": on})
+        self._core.attach(after._core)
+        self._live = after
+
+    def _may_begin_anew(self, what: str) -> Live:
+        if self._live is None:
+            raise ProblemError(f"{what}: this panel shows recordings only")
+        if self._live._how.get("record") is not None:
+            raise ProblemError(f"{what}: a recording was begun with this address; end it first")
+        return self._live
 
     def stop(self) -> None:
         """End the server; pages hear of it. What `listen` began is ended as well."""

@@ -143,7 +143,16 @@ impl Hub {
         let said = handle.hear(TOLD_WAITING);
         let outlet = handle.look()?;
         let array = handle.options().array.clone();
-        let registers = handle.registers();
+        let registers = {
+            let mut state = self.state();
+            if state.known {
+                // The board is the one whose registers were read: another source begins with what it was told.
+                handle.wrote(state.registers);
+            } else {
+                state.registers = handle.registers();
+            }
+            state.registers
+        };
         let floor = u16::from(registers.noise_floor);
         let blank =
             Keyframe { latest: None, events: 0, held: vec![UNKNOWN; array.len()], rest: vec![UNKNOWN; array.len()] };
@@ -156,12 +165,6 @@ impl Hub {
             said,
             missing: AtomicU64::new(0),
         };
-        {
-            let mut state = self.state();
-            if !state.known {
-                state.registers = registers;
-            }
-        }
         *lock(&self.live) = Some(Arc::new(side));
         self.tell(Told::Hello);
         Ok(())
@@ -338,6 +341,7 @@ impl Hub {
             "live": live.is_some(),
             "array": array,
             "udp": live.as_ref().map(|live| live.handle.address().to_string()),
+            "delta_intensity": live.as_ref().map(|live| live.handle.options().differences),
             "control": self.state().control,
             "folder": self.options.folder,
             "open": self.options.open,

@@ -69,12 +69,13 @@ impl<'a> Asked<'a> {
         self.whole(key, -(1 << 52), 1 << 52)
     }
 
+    /// False where it was left out.
     pub(super) fn flag(&self, key: &str) -> Answer<bool> {
-        match self.0.get(key) {
-            None | Some(Value::Null) => Ok(false),
-            Some(Value::Bool(flag)) => Ok(*flag),
-            Some(_) => Err(Refused::of(key, "must be true or false")),
-        }
+        if self.has(key) { self.switch(key) } else { Ok(false) }
+    }
+
+    pub(super) fn switch(&self, key: &str) -> Answer<bool> {
+        self.0.get(key).and_then(Value::as_bool).ok_or_else(|| Refused::of(key, "must be true or false"))
     }
 
     pub(super) fn text(&self, key: &str, most: usize) -> Answer<&'a str> {
@@ -385,13 +386,20 @@ pub(super) async fn carry_out(
                 _ => return Err(Refused::of("how", "must be now or lowest")),
             }
         }
+        "places" => {
+            let mut said = hub.ask("places", json!({})).await?;
+            if let Some(said) = said.as_object_mut() {
+                said.insert("type".to_owned(), json!("places"));
+            }
+            return Ok(Some(said));
+        }
+        "delta_intensity" => {
+            may_begin_anew(&hub)?;
+            let on = asked.switch("on")?;
+            hub.ask("differences", json!({ "on": on })).await?;
+        }
         "listen" => {
-            if hub.recorder.is_busy() {
-                return Err("a recording runs: stop it first".into());
-            }
-            if hub.live().is_none() {
-                return Err("this panel shows recordings only: begin it with taxel live --panel".into());
-            }
+            may_begin_anew(&hub)?;
             let (host, port) = (asked.text("host", 255)?, asked.whole("port", 0, 65_535)?);
             hub.ask("listen", json!({ "host": host, "port": port })).await?;
         }
@@ -412,6 +420,17 @@ pub(super) async fn carry_out(
         _ => return Err(format!("type {what:?} is none of the protocol's").into()),
     }
     Ok(None)
+}
+
+/// Whether the source may begin anew: on another address, or read in another way.
+fn may_begin_anew(hub: &Hub) -> Answer {
+    if hub.recorder.is_busy() {
+        return Err("a recording runs: stop it first".into());
+    }
+    if hub.live().is_none() {
+        return Err("this panel shows recordings only: begin it with taxel live --panel".into());
+    }
+    Ok(())
 }
 
 /// What a client needs to know that only the office knows.
