@@ -79,7 +79,7 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
         panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
         with running(*panel, "--folder", str(folder), folder=folder) as server:
             url = server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)")
-            yield SimpleNamespace(url=url, folder=folder, control=control)
+            yield SimpleNamespace(url=url, folder=folder)
 
 
 @pytest.fixture
@@ -150,8 +150,13 @@ def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live
     assert file.events.t[0] - 2_500_000 <= said["contact"] <= file.events.t[-1] + 2_500_000
 
 
-def test_a_board_is_chosen_connected_and_remembered(chromium: Any, live: SimpleNamespace, tmp_path: Path) -> None:
-    with running("live", "--panel", "--port", str(free_port()), "--host", "127.0.0.1", folder=tmp_path) as server:
+def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Path) -> None:
+    port = str(free_port())
+    with (
+        running("emulate", "--port", port, "--control", "0", folder=tmp_path) as board,
+        running("live", "--panel", "--port", port, "--host", "127.0.0.1", folder=tmp_path) as server,
+    ):
+        control = board.wait_for(r"commands are taken at (\S+)")
         page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
         shows(page, "where-said", "no control line")
         assert not page.get_by_label("Noise floor", exact=True).is_enabled()
@@ -164,15 +169,15 @@ def test_a_board_is_chosen_connected_and_remembered(chromium: Any, live: SimpleN
         page.locator("#control").fill("127.0.0.1:1")
         page.locator("#control-connect").click()
         shows(page, "control-why", "refused")
-        page.locator("#control").fill(live.control)
+        page.locator("#control").fill(control)
         page.locator("#control-connect").click()
-        shows(page, "where-said", re.escape(live.control))
+        shows(page, "where-said", re.escape(control))
         until(lambda: page.get_by_label("Noise floor", exact=True).is_enabled(), "registers can be written")
         shows(page, "board-lines", "REG")
         page.locator("#control-drop").click()
         shows(page, "where-said", "no control line")
-        page.locator("#control-choice").select_option(live.control)
-        assert page.locator("#control").input_value() == live.control
+        page.locator("#control-choice").select_option(control)
+        assert page.locator("#control").input_value() == control
         page.locator("#delta-intensity").check()
         until(
             lambda: page.locator("#delta-intensity").is_checked() and page.locator("#said").is_hidden(), "it is taken"
