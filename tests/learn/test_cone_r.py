@@ -553,3 +553,39 @@ def test_the_gap_is_a_bound_also_where_the_fit_stops_early(options):
     fine = fitted(made(ConeR, **common, tolerance=1e-8), patterns, targets)
     assert fine.objective_ <= rough.objective_
     assert rough.objective_ * (1 - rough.gap_) <= fine.objective_ * (1 + 1e-12)
+
+
+def test_trains_without_a_spike_weigh_nothing_and_cost_nothing():
+    """A whole array has tens of thousands of trains, of which a touch reaches a few hundred."""
+    random = np.random.default_rng(5)
+    spoken = np.sort(random.choice(60, 25, replace=False))
+    some = [[np.sort(random.uniform(0, 200, 3)) for _ in spoken] for _ in range(3)]
+    targets = [[80.0], [120.0, 170.0], []]
+    few = [SpikeTrains.from_lists(one, stop=200) for one in some]
+    many = [
+        SpikeTrains.from_lists([one[list(spoken).index(n)] if n in spoken else [] for n in range(60)], stop=200)
+        for one in some
+    ]
+    bounds = random.uniform(0.2, 0.5, 60)
+    alone = ConeR(lb=list(-bounds[spoken]), ub=list(bounds[spoken])).fit(few, targets)
+    among = ConeR(lb=list(-bounds), ub=list(bounds)).fit(many, targets)
+    np.testing.assert_array_equal(among.weights_[spoken], alone.weights_)
+    assert np.count_nonzero(among.weights_) <= len(spoken)
+    assert (among.objective_, among.gap_, among.rounds_) == (alone.objective_, alone.gap_, alone.rounds_)
+    again = ConeR(lb=list(-bounds), ub=list(bounds)).fit(many, targets, start=among)
+    assert again.objective_ == pytest.approx(among.objective_, rel=1e-5)
+    with pytest.raises(ProblemError, match="weights: 25 for 60 trains"):
+        ConeR().fit(many, targets, start=alone)
+    problem = ConeR().prepare(many, targets)
+    with pytest.raises(ProblemError, match="lb: 3 bounds for 60 trains"):
+        problem.fit(ConeR(lb=[-1.0] * 3))
+    with pytest.raises(ProblemError, match="lb: holds a train without a spike away from 0"):
+        problem.fit(ConeR(lb=0.1, ub=0.2))
+    held = np.where(np.arange(60) == np.setdiff1d(np.arange(60), spoken)[0], 0.25, 0.3)
+    assert ConeR(lb=list(np.where(held == 0.25, 0.25, -0.3)), ub=list(held)).fit(many, targets).weights_.max() >= 0.25
+
+
+def test_more_trains_than_can_be_weighed_are_refused_before_memory_is_asked_for():
+    trains = SpikeTrains.from_lists([[1.0 + n % 50] for n in range(10_001)], stop=100)
+    with pytest.raises(ProblemError, match="10001 trains have spikes, at most 10000"):
+        ConeR().fit([trains], [[60.0]])

@@ -286,15 +286,23 @@ def learn(patterns: Sequence[Pattern], recipe: Recipe, array: Array, told: Calla
             targets.append(times + shift_ms)
         if not any(len(times) for times in targets):
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
-        told(f"learning {label} from {sum(map(len, targets))} events")
         heard = [_until(pattern.trains, times) for pattern, times in zip(patterns, targets, strict=True)]
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            learners[label] = learner.fit(heard, targets)
+            learners[label] = learner.fit(heard, targets, progress=_telling(told, label, targets))
         for text_of in _remarks(learners[label], targets, shift_ms, caught):
             warnings.warn(f"{label}: {text_of}", stacklevel=3)
         delays[label] = delay_ms
     return Readout(recipe.encoder, learners, array=array, delay_ms=delays, run_threshold=float(recipe.run_threshold))
+
+
+def _telling(
+    told: Callable[[str], object], label: str, targets: Sequence[NDArray[np.float64]]
+) -> Callable[[int, int, float, float], object]:
+    """Tell what is learnt, and how far each round of the fit came."""
+    what = f"learning {label} from {sum(map(len, targets))} events"
+    told(what)
+    return lambda n, _rows, _objective, gap: told(f"{what}, round {n}: within {gap:.1e} of the least")
 
 
 def _remarks(

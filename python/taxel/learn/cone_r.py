@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, floats, instance
-from taxel._core import NotFittedError
+from taxel._arguments import callback, floats, instance, parameters
+from taxel._core import NotFittedError, ProblemError
 from taxel._parameters import defaults
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner, predicted
@@ -24,6 +24,8 @@ __all__ = ["ConeR", "ConeRProblem"]
 
 
 _DEFAULT = defaults("cone_r")
+#: Trains with spikes that can be weighed: 1.6 GB of curvature, and half a minute a step.
+_MOST_TRAINS = 10_000
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -194,7 +196,8 @@ class ConeR(SpikeLearner):
 
         Raises
         ------
-        ProblemError : patterns or targets that make no sense (names pattern and target)
+        ProblemError : patterns or targets that make no sense (names pattern and target), or more than 10 000 trains
+            with spikes
         """
         return ConeRProblem(self, patterns, targets)
 
@@ -228,8 +231,41 @@ class ConeRProblem:
 
     def __init__(self, cone: ConeR, patterns: Sequence[SpikeTrains], targets: Sequence[ArrayLike]) -> None:
         trains, times = examples(patterns, targets)
-        self._problem = _core.ConeRProblem(instance("cone", cone, ConeR)._json(), trains, times)
+        self._trains = len(trains[0][1]) - 1 if trains else 0
+        self._heard = _heard(instance("cone", cone, ConeR), trains)
+        if self._heard is not None:
+            trains = [(parts[0], np.append(parts[1][self._heard], parts[1][-1]), *parts[2:]) for parts in trains]
+        count = self._trains if self._heard is None else len(self._heard)
+        if count > _MOST_TRAINS:
+            raise ProblemError(
+                f"patterns: {count} trains have spikes, at most {_MOST_TRAINS} can be weighed, as memory goes with the "
+                "square and time with the cube of them; take an encoder that pools taxels, fewer levels, or a part of "
+                "the array"
+            )
+        self._problem = _core.ConeRProblem(self._handed(cone), trains, times)
         self.silent_rows: int = self._problem.silent_rows
+
+    def _handed(self, cone: ConeR) -> str:
+        """Return a learner's parameters for the trains that are weighed."""
+        if self._heard is None:
+            return cone._json()
+        cone._check()
+        plain = cone._plain()
+        silent = np.ones(self._trains, bool)
+        silent[self._heard] = False
+        for name, away in (("lb", np.greater), ("ub", np.less)):
+            bound = np.asarray(plain[name], np.float64)
+            if bound.ndim and len(bound) != self._trains:
+                raise ProblemError(
+                    f"{name}: {len(bound)} bounds for {self._trains} trains, must be one a train, or one for all"
+                )
+            if away(bound, 0.0)[silent if bound.ndim else ...].any():
+                raise ProblemError(
+                    f"{name}: holds a train without a spike away from 0; lay the rows out with these bounds"
+                )
+            if bound.ndim:
+                plain[name] = bound[self._heard].tolist()
+        return parameters(plain)
 
     def fit(
         self,
@@ -260,8 +296,12 @@ class ConeRProblem:
         first = None if start is None else self._start(start)
         if progress is not None:
             callback("progress", progress)
-        found, signal = self._problem.fit(instance("cone", cone, ConeR)._json(), first, progress)
-        _keep(cone, found, self.silent_rows, self._problem.rows)
+        (weights, *others), signal = self._problem.fit(self._handed(instance("cone", cone, ConeR)), first, progress)
+        if self._heard is not None:
+            every = np.zeros(self._trains)
+            every[self._heard] = weights
+            weights = every
+        _keep(cone, (weights, *others), self.silent_rows, self._problem.rows)
         if signal is not None:
             raise signal
         _warn(cone)
@@ -269,11 +309,35 @@ class ConeRProblem:
 
     def _start(self, start: ConeR | ArrayLike) -> tuple[NDArray[np.float64], Any]:
         if not isinstance(start, ConeR):
-            return floats("start", start), None
+            return self._weighed(floats("start", start)), None
         if not hasattr(start, "weights_"):
             raise NotFittedError("start: not fitted yet, call fit first")
         rows, multipliers = start._multipliers
-        return start.weights_, multipliers if rows == self._problem.rows else None
+        return self._weighed(start.weights_), multipliers if rows == self._problem.rows else None
+
+    def _weighed(self, weights: NDArray[np.float64]) -> NDArray[np.float64]:
+        if self._heard is None:
+            return weights
+        if weights.shape != (self._trains,):
+            raise ProblemError(f"weights: {weights.size} for {self._trains} trains, must be one a train")
+        return weights[self._heard]
+
+
+def _heard(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64] | None:
+    """Return the trains that have a spike in some pattern, or that bounds hold away from 0; None: nothing to leave out.
+
+    The weight of any other is 0 whatever else is learnt, and of a whole array's trains nearly all are such.
+    """
+    if len({len(parts[1]) for parts in trains}) != 1:
+        return None
+    cone._check()
+    plain = cone._plain()
+    wanted = np.logical_or.reduce([np.diff(parts[1]) > 0 for parts in trains])
+    low, high = (np.asarray(plain[name], np.float64) for name in ("lb", "ub"))
+    if any(bound.ndim and len(bound) != len(wanted) for bound in (low, high)):
+        return None
+    wanted |= (low > 0) | (high < 0)
+    return None if wanted.all() or not wanted.any() else np.flatnonzero(wanted)
 
 
 def _keep(cone: ConeR, found: Any, silent_rows: int, all_rows: int) -> None:
