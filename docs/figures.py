@@ -1,16 +1,20 @@
 """Keep what a report of studies found for the page of figures: numbers as JSON, pictures drawn from them as SVG.
 
 python docs/figures.py            draws all pictures again
-python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first
+python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first, with the commit
+
+A report is taken as long as the code that ran it is the commit's: its digest is held against the checkout's.
 """
 
 from __future__ import annotations
 
 import json
+import subprocess
 import sys
 from pathlib import Path
 
 from taxel.studies import STUDIES, load
+from taxel.studies.runner import code_digest
 from taxel.studies.study import drawn
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
@@ -23,7 +27,24 @@ def keep(report: Path) -> None:
         if summary.exists():
             section = json.loads(summary.read_text())
             section.pop("tables")
+            section["commit"] = commit(name, section["code"])
             (FIGURES / f"{name}.json").write_text(json.dumps(section) + "\n")
+
+
+def commit(name: str, code: str) -> str:
+    """Return the commit whose code ran a study; end where that is not the one that is checked out, unchanged."""
+    study = load(name)
+    if code_digest((sys.modules[study.realise.__module__], *study.code)) != code:
+        sys.exit(f"{name}: other code than is here ran it; run it again, or check that code out")
+    if git("status", "--porcelain", "--untracked-files=no", "--", ":/python", ":/crates"):
+        sys.exit(f"{name}: the code here is not committed; commit it first")
+    return git("rev-parse", "--short", "HEAD")
+
+
+def git(*arguments: str) -> str:
+    """Return what git says of this checkout."""
+    ran = subprocess.run(["git", *arguments], cwd=FIGURES, capture_output=True, text=True, check=True)
+    return ran.stdout.strip()
 
 
 def draw(name: str) -> list[str]:

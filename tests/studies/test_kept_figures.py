@@ -1,0 +1,52 @@
+"""What is kept for the page of figures names the commit that ran it, or is not kept."""
+
+import importlib.util
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from taxel.studies import load
+from taxel.studies.runner import code_digest
+
+_spec = importlib.util.spec_from_file_location("figures", Path(__file__).parents[2] / "docs" / "figures.py")
+assert _spec is not None
+assert _spec.loader is not None
+figures = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(figures)
+
+
+@pytest.fixture
+def report(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A report of one study, of this very code; the page's folder is another."""
+    (tmp_path / "kept").mkdir()
+    monkeypatch.setattr(figures, "FIGURES", tmp_path / "kept")
+    study = load("fig6.1")
+    (tmp_path / "fig6.1").mkdir()
+    section = {
+        "name": "fig6.1",
+        "tables": [],
+        "code": code_digest((sys.modules[study.realise.__module__], *study.code)),
+    }
+    (tmp_path / "fig6.1" / "summary.json").write_text(json.dumps(section))
+    return tmp_path
+
+
+def test_the_commit_is_named_where_its_code_ran_the_study(report: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(figures, "git", lambda *said: "" if said[0] == "status" else "1234abc")
+    figures.keep(report)
+    assert json.loads((report / "kept" / "fig6.1.json").read_text())["commit"] == "1234abc"
+
+
+def test_a_report_of_other_code_or_of_uncommitted_code_is_not_kept(
+    report: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(figures, "git", lambda *said: " M python/taxel/neuron.py")
+    with pytest.raises(SystemExit, match="not committed"):
+        figures.keep(report)
+    summary = report / "fig6.1" / "summary.json"
+    summary.write_text(summary.read_text().replace('"code": "', '"code": "0'))
+    with pytest.raises(SystemExit, match="other code"):
+        figures.keep(report)
+    assert list((report / "kept").iterdir()) == []
