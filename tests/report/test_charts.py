@@ -202,19 +202,42 @@ def test_a_page_needs_nothing_but_itself():
     assert "<code>taxel view &#39;a walk.mcap&#39;</code>." in text
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
-def test_a_browser_draws_every_chart(tmp_path):
+def opened(text, tmp_path):
+    """Return a page as a browser holds it after some seconds."""
     place = tmp_path / "page.html"
-    place.write_text(page(*some()), encoding="utf-8")
+    place.write_text(text, encoding="utf-8")
     asked = ["--headless", "--disable-gpu", "--virtual-time-budget=4000", f"--user-data-dir={tmp_path / 'profile'}"]
     asked += ["--no-sandbox"] * (os.geteuid() == 0)
-    seen = subprocess.run(
+    return subprocess.run(
         [shutil.which("chromium"), *asked, "--dump-dom", place.as_uri()],
         check=True,
         capture_output=True,
         text=True,
         timeout=120,
     ).stdout
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
+def test_a_browser_draws_every_chart(tmp_path):
+    seen = opened(page(*some()), tmp_path)
     assert re.findall(r'class="charts" data-drawn="(\d+)"', seen) == ["2", "1"]
     assert seen.count("<canvas") == 3
     assert "a line" in seen
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
+def test_a_window_that_is_dragged_wider_leaves_one_drawing(tmp_path):
+    """Its next width comes while pictures of the last one still load."""
+    figure = Figure()
+    axes = figure.subplots()
+    figure.colorbar(axes.imshow(np.eye(4)), label="mV")
+    text = page(figure)
+    dragged = (
+        "<script>{ let width = 900; Object.defineProperty(window, 'innerWidth', { get: () => (width += 7) });"
+        "addEventListener('load', () => { for (let k = 0; k < 5; k++) dispatchEvent(new Event('resize')); }); }"
+        "</script>"
+    )
+    seen = opened(text.replace("<body>", f"<body>{dragged}", 1), tmp_path)
+    assert dragged in seen
+    assert re.findall(r'class="charts" data-drawn="(\d+)"', seen) == ["1"]
+    assert (seen.count('class="strip"'), seen.count("<canvas")) == (1, 1)

@@ -382,8 +382,13 @@ function scaleStrip(scale, parent) {
   strip.append(words(`${short(scale.max)} ${scale.label}`));
 }
 
+const turns = new WeakMap();
+
 async function draw(holder) {
   const said = JSON.parse(holder.querySelector("script").textContent);
+  // Pictures take a while to load; a window that is dragged wider asks for the next drawing before.
+  const turn = (turns.get(holder) ?? 0) + 1;
+  turns.set(holder, turn);
   for (const old of [...holder.children]) if (old.tagName !== "SCRIPT") old.remove();
   if (said.title) element("p", "title", holder).textContent = said.title;
   const grid = element("div", "grid", holder);
@@ -414,6 +419,7 @@ async function draw(holder) {
         return { ...image, loaded };
       }),
     );
+    if (turns.get(holder) !== turn) return;
     const group = {
       x: (min, max, own) => {
         for (const other of built) {
