@@ -175,8 +175,14 @@ def test_slower_films_hold_the_frames_before_their_times(tennis):
         np.testing.assert_array_equal(film, every[k, at])
 
 
-def test_faster_films_of_a_tennis_ball_tell_more(tmp_path):
-    section = fig4_8.STUDY.run(tmp_path, size="toy", changes={"drops": 6}, quiet=True)
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    """Both studies of a tennis ball leave their drops here, and share them."""
+    return tmp_path_factory.mktemp("tennis")
+
+
+def test_faster_films_of_a_tennis_ball_tell_more(report):
+    section = fig4_8.STUDY.run(report, size="toy", changes={"drops": 6}, quiet=True)
     fast, slow = section["said"]["lines"]
     assert (fast["period_ms"], slow["period_ms"]) == (2.0, 40.0)
     assert fast["bits"] > slow["bits"] + 0.5
@@ -193,9 +199,9 @@ def test_own_neighbours_are_those_of_scikit_learn():
     assert fig4_9.own_neighbours(places, y) == pytest.approx(np.mean(y[near] == y[:, None]))
 
 
-def test_t_sne_lays_classes_that_differ_apart(tmp_path):
+def test_t_sne_lays_classes_that_differ_apart(report):
     section = fig4_9.STUDY.run(
-        tmp_path, size="toy", changes={"drops": 6, "rates_hz": [1000.0], "perplexity": 4.0}, quiet=True
+        report, size="toy", changes={"drops": 6, "rates_hz": [1000.0], "perplexity": 4.0}, quiet=True
     )
     (line,) = section["said"]["lines"]
     assert len(line["map"]) == 24

@@ -165,7 +165,7 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Said:
         for k, row in enumerate(rows)
     ]
     good = [row for row in rows if found(row.result["learnt"])]
-    shown = (good or list(rows))[0]
+    shown = min(good, key=lambda row: float(row.result["learnt"]["wanders_ms"])) if good else rows[0]
     return {"feet": feet, "shown": shown.params["foot"], "course": shown.result["course"]}
 
 
