@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from taxel import SpikeTrains
-from taxel.studies import stdp_walk
+from taxel.studies import stdp_walk, untold
 from taxel.studies.gait.pieces import Piece
 
 TAUS = {name: stdp_walk.PARAMETERS[name] for name in ("tau_m", "tau_s", "tau_plus", "tau_minus")}
@@ -47,9 +47,9 @@ def test_where_nothing_repeats_there_is_nothing_to_find():
 @pytest.mark.parametrize("hz", [0.1, 1.0])
 def test_a_threshold_is_the_least_at_which_a_neuron_fires_so_often(hz):
     spikes = foot(2).spikes
-    level = stdp_walk.threshold(spikes, hz, TAUS)
+    level = untold.threshold(spikes, hz, TAUS)
     fired = [
-        1000 * len(stdp_walk._unlearning(share * level, TAUS).partial_fit(spikes).spikes_) / spikes.stop
+        1000 * len(untold.unlearning(share * level, TAUS).partial_fit(spikes).spikes_) / spikes.stop
         for share in (1.0, 0.9)
     ]
     assert fired[0] <= hz < fired[1]

@@ -49,6 +49,7 @@ STUDIES = {
     "receptors": "what SA-1, FA-1, SA-2 and FA-2 answer to: phases of a ramp-and-hold, thresholds against frequency",
     "fa1": "which properties of FA-1 are worth keeping, in bits and in events",
     "stdp": "a neuron finds a pattern that repeats in its inputs, without being told",
+    "stdp_touch": "a neuron hears an array on which balls fall, untold, and comes to fire as a touch begins",
     "stdp_walk": "a neuron hears a foot walk, untold, and comes to fire once a stride",
     "rivals": "how many spike times each rule learns, beside CONE-X",
     "tempotron": "which loads the Tempotron solves, and in how many epochs",

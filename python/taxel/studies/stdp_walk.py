@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from taxel import encode, formats, learn
 from taxel.learn import STDP
-from taxel.spikes import SpikeTrains
+from taxel.studies import untold
 from taxel.studies.gait import sources
 from taxel.studies.gait.pieces import Piece
 from taxel.studies.runner import Task
 from taxel.studies.study import Parameters, Row, Said, Statement, Study
+from taxel.studies.untold import moved, threshold, unlearning
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -40,8 +41,6 @@ CHOSEN_ON = 6
 ONCE, WANDERS_MS = 0.8, 50.0
 #: Longer than this is no stride but a pause, ms.
 LONGEST_STRIDE_MS = 2000.0
-#: Halvings when a threshold is sought: to 1e-4 of it.
-_HALVINGS = 16
 
 
 def tasks(p: Parameters, *, data: Path) -> list[Task]:
@@ -85,32 +84,13 @@ def heard(foot: Piece, params: Parameters) -> dict[str, Any]:
     learnt = judged(stdp.spikes_ - late, foot, half)
     # As often, without learning: at a lower threshold.
     hz = max(1000 * len(stdp.spikes_) / half, params["untrained_hz"])
-    deaf = _unlearning(threshold(first, hz, taus), taus).partial_fit(foot.spikes)
+    deaf = unlearning(threshold(first, hz, taus), taus).partial_fit(foot.spikes)
     return {
         "learnt": learnt,
         "untrained": judged(deaf.spikes_[deaf.spikes_ >= half], foot, half),
         "strong": int(np.count_nonzero(stdp.weights_ > 0.5)),
         "course": course,
     }
-
-
-def moved(spikes: SpikeTrains, later_ms: float) -> SpikeTrains:
-    """Return the same spikes so much later."""
-    return SpikeTrains(spikes.times + later_ms, spikes.offsets, spikes.start + later_ms, spikes.stop + later_ms)
-
-
-def _unlearning(level: float, taus: Mapping[str, float]) -> STDP:
-    return STDP(threshold=level, a_plus=0.0, a_minus=0.0, **taus)
-
-
-def threshold(spikes: SpikeTrains, hz: float, taus: Mapping[str, float]) -> float:
-    """Return the threshold at which a neuron that has learnt nothing fires so often, or a little less."""
-    low, high = 1e-3, float(len(spikes.offsets))
-    for _ in range(_HALVINGS):
-        middle = float(np.sqrt(low * high))
-        fired = len(_unlearning(middle, taus).partial_fit(spikes).spikes_)
-        low, high = (middle, high) if 1000 * fired > hz * (spikes.stop - spikes.start) else (low, middle)
-    return high
 
 
 def phases(
@@ -236,7 +216,7 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(sources, formats, encode, learn),
+    code=(sources, formats, encode, learn, untold),
     data=(sources.SOURCES[SOURCE].folder,),
     unread=lambda _parameters, data: sources.unread(data, [SOURCE]),
 )
