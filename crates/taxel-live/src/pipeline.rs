@@ -16,8 +16,10 @@ mod rest;
 mod said;
 mod sending;
 mod shared;
+mod sources;
 mod tap;
 
+use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex};
@@ -37,11 +39,13 @@ pub use handle::Handle;
 use handover::Handover;
 pub use options::{LiveOptions, Record};
 pub use read::Ear;
-use recorder::Recorder;
+use recorder::{Part, Recorder};
 pub use said::{Lines, Said, Sink};
 use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{Shared, Shown};
+use sources::Others;
+pub use sources::{Place, Source, SourceCounts, SourceKind};
 pub use tap::{Change, Outlet, Piece, UNKNOWN};
 
 /// How long a wait lasts before it is asked whether to stop.
@@ -55,6 +59,7 @@ pub struct Live {
     shared: Arc<Shared>,
     said: channel::Receiver<Said>,
     threads: Vec<JoinHandle<()>>,
+    others: Mutex<Others>,
 }
 
 impl Live {
@@ -65,6 +70,22 @@ impl Live {
     /// `Socket` where the port is taken, `File` where the file exists or cannot be created, or a destination cannot be
     /// opened, `Core(Problem)` for options that make no sense.
     pub fn start(address: SocketAddr, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+        if let (None, Some(source)) = (&options.record, options.sources.first()) {
+            return Err(
+                taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
+            );
+        }
+        Self::begin(address, options, ear, sinks, None)
+    }
+
+    /// Begins; `host` is whose recording this one's is a part of.
+    fn begin(
+        address: SocketAddr,
+        options: LiveOptions,
+        ear: Ear,
+        sinks: Vec<Box<dyn Sink>>,
+        host: Option<Part>,
+    ) -> Result<Self> {
         for (name, frames) in [("guard_frames", options.guard_frames), ("gap_frames", options.gap_frames)] {
             if !(frames.is_finite() && frames >= 0.0) {
                 return Err(taxel_core::problem!("{name} is {frames}: must be 0 or more").into());
@@ -87,8 +108,12 @@ impl Live {
         let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
         // The socket first: where the port is taken no empty file is left behind.
         let receiver = Receiver::bind(address, options.capture)?;
-        let recorder =
-            options.record.as_ref().map(|r| Recorder::create(r, &options, receiver.address())).transpose()?;
+        let address = receiver.address();
+        let recorder = match (&options.record, host) {
+            (None, _) => None,
+            (Some(record), None) => Some(Recorder::create(record, &options, address)?),
+            (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, address)),
+        };
         let shown = Shown { picture: vec![0; options.array.len()], ..Shown::default() };
         let shared = Arc::new(Shared {
             receiver,
@@ -111,7 +136,13 @@ impl Live {
         let decoder = Decoder::new(options.array.clone()).differences(options.differences);
         let sender = wire::Receiver::new(decoder, 1);
         let listens = !matches!(ear, Ear::Deaf);
-        let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![] };
+        let others = Others::start(&shared).inspect_err(|_| {
+            // Nothing came: a new file is not left behind.
+            let recorder = lock(&shared.recorder).take();
+            drop(recorder.map(|recorder| recorder.finish(&Counters::default())));
+        })?;
+        let others = Mutex::new(others);
+        let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![], others };
         let theirs = Arc::clone(&shared);
         let decode_options = options.clone();
         live.spawn("taxel-decode", move || decode::run(&theirs, sender, &decode_options, listens))?;
@@ -193,7 +224,29 @@ impl Live {
     /// What came and what became of it up to now.
     #[must_use]
     pub fn counters(&self) -> Counters {
-        self.shared.counters()
+        let others = lock(&self.others);
+        let boards = others.boards.iter().map(|(n, b)| (n.clone(), SourceCounts::Board(Box::new(b.counters()))));
+        let numbers = others.numbers.iter().map(|(name, numbers)| (name.clone(), numbers.counts()));
+        Counters { sources: boards.chain(numbers).collect(), ..self.shared.counters() }
+    }
+
+    /// Where another board of the recording is listened to; `None` where there is none of that name.
+    #[must_use]
+    pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
+        lock(&self.others).boards.iter().find(|(known, _)| known == name).map(|(_, board)| board.address())
+    }
+
+    /// Keeps numbers of a source that is given, one for each of its columns, which came at `arrived_ns` (ns since 1970).
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where there is no such source, or it has other columns; `File` where the disk is full.
+    pub fn sample(&self, name: &str, arrived_ns: i64, values: &[f64]) -> Result<()> {
+        let numbers = lock(&self.others).numbers.iter().find(|(known, _)| known == name).map(|(_, n)| Arc::clone(n));
+        match numbers {
+            Some(numbers) => numbers.sample(arrived_ns, values),
+            None => Err(taxel_core::problem!("source {name:?}: none of numbers has that name").into()),
+        }
     }
 
     /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 until a taxel was heard of.
@@ -248,8 +301,10 @@ impl Live {
     ///
     /// What ended the way early, or `File` where the end of the recording cannot be written.
     pub fn stop(mut self) -> Result<Summary> {
+        let others = lock(&self.others).stop();
         let joined = self.join();
-        let counters = self.counters();
+        let (sources, ended) = others.map_or_else(|error| (BTreeMap::new(), Err(error)), |counts| (counts, Ok(())));
+        let counters = Counters { sources, ..self.shared.counters() };
         let recorder = lock(&self.shared.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
         let verdict = if counters.nothing_came() {
@@ -264,6 +319,13 @@ impl Live {
         };
         joined?;
         self.check()?;
+        ended?;
+        let others = counters.sources.iter().filter_map(|(name, counts)| match counts {
+            SourceCounts::Board(counts) => Some(format!("{name}: {}", recorder::losses(counts, None).verdict())),
+            SourceCounts::Numbers { strange: 0, .. } => None,
+            SourceCounts::Numbers { strange, .. } => Some(format!("{name}: {strange} lines could not be read")),
+        });
+        let verdict = std::iter::once(verdict).chain(others).collect::<Vec<_>>().join("; ");
         Ok(Summary { counters, verdict, path })
     }
 

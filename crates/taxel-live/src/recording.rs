@@ -12,6 +12,7 @@ mod lsa;
 mod mcap_reader;
 mod mcap_writer;
 mod picture;
+mod stream;
 mod topic;
 
 use std::collections::BTreeMap;
@@ -24,7 +25,8 @@ use taxel_core::{Array, problem};
 
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks};
-pub use mcap_writer::Writer;
+pub use mcap_writer::{Track, Writer};
+pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
 
 /// How long a datagram waits at most until its chunk is closed and handed to the operating system.
@@ -59,6 +61,24 @@ pub struct Header {
     /// The host's clock when the recording began, ns since 1970.
     #[serde(default)]
     pub started_ns: i64,
+    /// What this source is called among the others of its file.
+    #[serde(default = "board", skip_serializing_if = "is_board")]
+    pub name: String,
+    /// Of a stream of numbers what its lines hold; a board has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stream: Option<Stream>,
+    /// The other sources of the file, each with its own clock.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sources: Vec<Header>,
+}
+
+/// What a source is called that nobody named.
+fn board() -> String {
+    "board".to_owned()
+}
+
+fn is_board(name: &str) -> bool {
+    name == "board"
 }
 
 /// How a file is written.
@@ -128,8 +148,71 @@ impl Header {
         if !(-limits::TIME_US..=limits::TIME_US).contains(&self.origin_us) {
             return Err(problem!("origin_us is {}: must lie within 142 years of 0", self.origin_us));
         }
-        self.registers.map_or(Ok(()), |registers| registers.check(&self.array))
+        if let Some(stream) = &self.stream {
+            stream.check(&self.name)?;
+            if self.array.len() != stream.values().count() {
+                let n = stream.values().count();
+                return Err(problem!("source {}: {n} columns of values, and {} taxels", self.name, self.array.len()));
+            }
+        }
+        self.registers.map_or(Ok(()), |registers| registers.check(&self.array))?;
+        if self.sources.len() >= limits::SOURCES {
+            return Err(problem!("{} sources; a file holds at most {}", self.sources.len() + 1, limits::SOURCES));
+        }
+        let mut names = vec![&self.name];
+        for source in &self.sources {
+            check_name(&source.name)?;
+            if names.contains(&&source.name) {
+                return Err(problem!("source {:?}: there are two of that name", source.name));
+            }
+            names.push(&source.name);
+            if !source.sources.is_empty() {
+                return Err(problem!("source {:?}: holds sources of its own", source.name));
+            }
+            source.check()?;
+        }
+        check_name(&self.name)
     }
+
+    /// The header of a board.
+    #[must_use]
+    pub fn of_board(array: Array, registers: Option<Registers>, source: String, started_ns: i64) -> Self {
+        Self {
+            array,
+            registers,
+            difference: false,
+            origin_us: 0,
+            source,
+            started_ns,
+            name: board(),
+            stream: None,
+            sources: vec![],
+        }
+    }
+
+    /// The header of a stream of numbers: a row of as many taxels as it has columns of values.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` for a name or columns that make no sense.
+    pub fn of_stream(name: &str, stream: Stream, source: String, started_ns: i64) -> taxel_core::Result<Self> {
+        stream.check(name)?;
+        let columns = u16::try_from(stream.values().count()).unwrap_or(u16::MAX);
+        let array = Array::new(1, columns, 1.0, name)?;
+        let board = Self::of_board(array, None, source, started_ns);
+        let header = Self { name: name.to_owned(), stream: Some(stream), ..board };
+        header.check()?;
+        Ok(header)
+    }
+}
+
+/// A source's name is a part of the names of its channels.
+fn check_name(name: &str) -> taxel_core::Result<()> {
+    let fits = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || name.len() > 64 || !name.chars().all(fits) {
+        return Err(problem!("source {name:?}: a name is of letters, digits, _ and -, at most 64"));
+    }
+    Ok(())
 }
 
 impl Counts {

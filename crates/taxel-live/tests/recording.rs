@@ -25,14 +25,7 @@ impl Drop for Folder {
 }
 
 fn header() -> Header {
-    Header {
-        array: Array::thesis(),
-        registers: Some(Registers::default()),
-        difference: false,
-        origin_us: 0,
-        source: "udp 127.0.0.1:5208".to_owned(),
-        started_ns: 1_000_000_000_000,
-    }
+    Header::of_board(Array::thesis(), Some(Registers::default()), "udp 127.0.0.1:5208".to_owned(), 1_000_000_000_000)
 }
 
 /// The bytes of datagram `k`: enough of them for more than one chunk.

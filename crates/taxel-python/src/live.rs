@@ -14,7 +14,7 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
 use taxel_live::capture::{self, Sender};
-use taxel_live::pipeline::{Ear, Handle, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink};
+use taxel_live::pipeline::{Ear, Handle, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink, Source};
 
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
@@ -36,6 +36,10 @@ struct Chosen {
     gro: Option<bool>,
     /// Where detections go as lines.
     send: Vec<String>,
+    /// What the board is called in a recording.
+    name: String,
+    /// What else the recording holds: what it is called, and what it is.
+    sources: Vec<(String, String)>,
 }
 
 impl Chosen {
@@ -113,7 +117,14 @@ impl Live {
             }
         };
         let usual = LiveOptions::new(to_array(parts)?);
+        let sources = enter(py, |_| {
+            let said = chosen.sources.iter();
+            said.map(|(name, what)| Ok(Source { name: name.clone(), kind: what.parse()? }))
+                .collect::<taxel_live::Result<_>>()
+        })?;
         let options = LiveOptions {
+            name: chosen.name.clone(),
+            sources,
             registers: chosen.registers(&usual.array)?,
             differences: chosen.differences,
             guard_frames: chosen.guard_frames,
@@ -184,6 +195,18 @@ impl Live {
     /// Starts and stops that came since this was asked last: (t us, start).
     fn take_markers(&self, py: Python<'_>) -> PyResult<Vec<(i64, bool)>> {
         self.with(py, |pipeline| Ok(pipeline.take_markers().iter().map(|m| (m.t, m.start)).collect()))
+    }
+
+    /// Host and port that another board of the recording is listened to on; None where there is none of that name.
+    fn source_address(&self, py: Python<'_>, name: &str) -> PyResult<Option<(String, u16)>> {
+        let address = self.with(py, |pipeline| Ok(pipeline.source_address(name)))?;
+        Ok(address.map(|address| (address.ip().to_string(), address.port())))
+    }
+
+    /// Keeps numbers of a source that is given; `arrived_ns` is now where it is left out.
+    fn sample(&self, py: Python<'_>, name: &str, values: Vec<f64>, arrived_ns: Option<i64>) -> PyResult<()> {
+        let arrived_ns = arrived_ns.unwrap_or_else(taxel_live::recording::now_ns);
+        self.with(py, |pipeline| pipeline.sample(name, arrived_ns, &values))
     }
 
     /// Writes something down in the recording.

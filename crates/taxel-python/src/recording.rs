@@ -15,10 +15,11 @@ use taxel_live::recording::{
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
 use crate::enter::{Shared, enter};
-use crate::errors::core;
+use crate::errors::{core, live};
 use crate::parameters::parsed;
 
-/// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram; counts of version 2 as JSON.
+/// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram; counts of version 2 as JSON; when
+/// each datagram could leave the board, us.
 type DecodedOut<'py> = (
     EventsOut<'py>,
     String,
@@ -27,6 +28,17 @@ type DecodedOut<'py> = (
     Bound<'py, PyArray1<u64>>,
     Bound<'py, PyArray1<u64>>,
     String,
+    Bound<'py, PyArray1<i64>>,
+);
+
+/// Arrival ns, number and own time us of each sample, all values, lines that could not be read, how often the clock began anew.
+type SamplesOut<'py> = (
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<f64>>,
+    u64,
+    u64,
 );
 
 /// Arrival ns, number, where each begins, all bytes.
@@ -46,6 +58,23 @@ impl RecordingReader {
         Ok(Self { reader: enter(py, |_| Reader::open(&path))? })
     }
 
+    /// The names of the sources.
+    fn sources(&self) -> Vec<String> {
+        self.reader.sources().map(str::to_owned).collect()
+    }
+
+    /// The same recording as one of its sources has it.
+    fn of_source(&self, name: &str) -> PyResult<Self> {
+        Ok(Self { reader: self.reader.of_source(name).map_err(live)? })
+    }
+
+    /// All samples of a stream.
+    fn samples<'py>(&self, py: Python<'py>) -> PyResult<SamplesOut<'py>> {
+        let all = enter(py, |stop| self.reader.samples(stop))?;
+        let (arrived, number) = (array(py, all.arrived_ns), array(py, all.number));
+        Ok((arrived, number, array(py, all.t), array(py, all.values), all.bad, all.resets))
+    }
+
     /// What the recording says of itself, how it ended, and what was rebuilt: JSON.
     fn about(&self) -> String {
         let reader = &self.reader;
@@ -63,6 +92,7 @@ impl RecordingReader {
             "board": all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>(),
             "counts": all.counts, "datagrams": all.datagrams, "datagram_bytes": all.datagram_bytes,
             "arrivals": all.arrivals, "pictures": all.pictures, "bad_chunks": bad_chunks,
+            "samples": all.samples, "held": all.held,
         });
         Ok(said.to_string())
     }
@@ -79,6 +109,7 @@ impl RecordingReader {
             array(py, decoded.number),
             array(py, decoded.first),
             json!(decoded.version_2).to_string(),
+            array(py, decoded.left),
         ))
     }
 
@@ -190,6 +221,29 @@ impl RecordingWriter {
         self.with(py, |writer| writer.picture(at_ns, t_us, columns, ticks))
     }
 
+    /// Keeps what the taxels held when it began, ticks by index, 65 535 of one that was not heard of.
+    fn held(&self, py: Python<'_>, at_ns: i64, t_us: Option<i64>, ticks: PyReadonlyArray1<'_, u16>) -> PyResult<()> {
+        let ticks = slice("ticks", &ticks)?;
+        self.with(py, |writer| writer.held(at_ns, t_us, ticks))
+    }
+
+    /// Keeps samples of the stream that the recording is of: arrival ns, number, all columns row by row.
+    fn samples(
+        &self,
+        py: Python<'_>,
+        arrived_ns: PyReadonlyArray1<'_, i64>,
+        number: PyReadonlyArray1<'_, u64>,
+        values: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<()> {
+        let (arrived_ns, number) = (slice("arrived_ns", &arrived_ns)?, slice("number", &number)?);
+        let values = slice("values", &values)?;
+        let columns = values.len().checked_div(arrived_ns.len()).unwrap_or(0).max(1);
+        self.with(py, |writer| {
+            let rows = arrived_ns.iter().zip(number).zip(values.chunks(columns));
+            rows.into_iter().try_for_each(|((&at_ns, &number), row)| writer.sample(at_ns, number, row))
+        })
+    }
+
     /// Ends the recording; counts in and out as JSON.
     fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<String> {
         let counts: Counts = parsed("counts", counts)?;
@@ -239,16 +293,17 @@ fn read_lsa<'py>(
     Ok((array(py, read.bytes), from_events(py, read.events), json!(read.counts).to_string(), read.complete))
 }
 
-/// The line between the board's clock and the host's: a board time (us), the host's then (ns), drift (ppm).
+/// Lines between a source's clock and the host's, one for each stretch: its middle (us), a time of the source (us), the
+/// host's then (ns), drift (ppm).
 #[pyfunction]
-fn board_clock(
+fn clock_lines(
     py: Python<'_>,
-    board_us: PyReadonlyArray1<'_, i64>,
+    own_us: PyReadonlyArray1<'_, i64>,
     arrived_ns: PyReadonlyArray1<'_, i64>,
-) -> PyResult<Option<(i64, i64, f64)>> {
-    let (board_us, arrived_ns) = (slice("board_us", &board_us)?, slice("arrived_ns", &arrived_ns)?);
-    let offset = enter(py, |_| Ok::<_, taxel_core::Error>(BoardClock::offset_of(board_us, arrived_ns)))?;
-    Ok(offset.map(|o| (o.board_us, o.host_ns, o.drift_ppm)))
+) -> PyResult<Vec<(i64, i64, i64, f64)>> {
+    let (own_us, arrived_ns) = (slice("own_us", &own_us)?, slice("arrived_ns", &arrived_ns)?);
+    let lines = enter(py, |_| Ok::<_, taxel_core::Error>(BoardClock::offsets_of(own_us, arrived_ns)))?;
+    Ok(lines.into_iter().map(|(middle, o)| (middle, o.board_us, o.host_ns, o.drift_ppm)).collect())
 }
 
 /// The name of a recording in automatic mode: the index appended to the name.
@@ -263,7 +318,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(recording_verdict, module)?)?;
     module.add_function(wrap_pyfunction!(recording_damage, module)?)?;
     module.add_function(wrap_pyfunction!(read_lsa, module)?)?;
-    module.add_function(wrap_pyfunction!(board_clock, module)?)?;
+    module.add_function(wrap_pyfunction!(clock_lines, module)?)?;
     module.add_function(wrap_pyfunction!(write_lsa, module)?)?;
     module.add_function(wrap_pyfunction!(numbered_path, module)?)
 }

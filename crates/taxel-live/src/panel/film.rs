@@ -434,14 +434,7 @@ impl FileFilm {
             }
             Some("lsa") => {
                 let file = File::open(path).map_err(Error::file(path))?;
-                let header = Header {
-                    array: Array::thesis(),
-                    registers: None,
-                    difference: false,
-                    origin_us: 0,
-                    source: path.display().to_string(),
-                    started_ns: 0,
-                };
+                let header = Header::of_board(Array::thesis(), None, path.display().to_string(), 0);
                 let complete = path.with_extension("lss").exists();
                 let verdict =
                     if complete { NOTHING_LOST.to_owned() } else { "no .lss: perhaps not complete".to_owned() };
@@ -862,14 +855,7 @@ mod tests {
         let array = Array::thesis();
         let mut random = StdRng::seed_from_u64(seed);
         let mut board = Board::new(Registers::default(), &array).unwrap();
-        let header = Header {
-            array: array.clone(),
-            registers: Some(Registers::default()),
-            difference: false,
-            origin_us: 0,
-            source: String::new(),
-            started_ns: 0,
-        };
+        let header = Header::of_board(array.clone(), Some(Registers::default()), String::new(), 0);
         let how = WriterOptions { overwrite: true, ..WriterOptions::default() };
         let writer = (ending == "mcap").then(|| Writer::create(&path, &header, how).unwrap());
         let (mut ticks, mut bytes, mut number) = (vec![48_u16; array.len()], vec![], 0);

@@ -1,11 +1,13 @@
 //! What the pipeline counts, and how it ended.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Serialize;
 use taxel_core::wire;
 
 use super::sending::Sent;
+use super::sources::SourceCounts;
 use crate::capture;
 use crate::clock::Offset;
 use crate::latency::Quantiles;
@@ -51,6 +53,8 @@ pub struct Counters {
     pub detections_dropped: u64,
     /// What went to each destination: `sent + lost + waiting = detections`.
     pub sent: Vec<Sent>,
+    /// What came of the recording's other sources.
+    pub sources: BTreeMap<String, SourceCounts>,
     /// From the kernel's stamp to the end of decoding, a datagram each.
     pub decode_latency: Quantiles,
     /// From `known` to said, by the board's clock.

@@ -12,7 +12,7 @@ use super::shared::{Shared, Wish};
 use super::tap::{Tap, UNKNOWN, tap};
 use crate::Result;
 use crate::capture::Batch;
-use crate::clock::BoardClock;
+use crate::clock::{BoardClock, leaves};
 use crate::locked::lock;
 use crate::recording::now_ns;
 use crate::recording::{BoardChange, Change};
@@ -31,9 +31,6 @@ const IDLE: Duration = Duration::from_millis(20);
 
 /// Events are handed on when so many are there, also in the middle of a large batch.
 const HAND_ON: usize = 1 << 14;
-
-/// The largest datagram of a board that closes frames with a shorter one: 280 events.
-const FULL: usize = 280 * taxel_core::wire::WORD_BYTES;
 
 pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, listens: bool) {
     let mut work = Work {
@@ -270,14 +267,10 @@ impl Work<'_> {
                 self.late += late.count() as u64;
                 let gap_us = (self.options.gap_frames * self.frame_us) as i64;
                 self.promise.note(&took, arrived_us, gap_us);
-                if let Some(until) = took.until {
-                    self.clock.note(until, datagram.arrived_ns);
-                }
-            } else if let Some(&t) = self.events.t[before..].last() {
-                // What a frame saw leaves at its end, but for a full datagram, which leaves as soon as it is full.
-                if bytes.len() < FULL {
-                    self.clock.note(t + self.frame_us(), datagram.arrived_ns);
-                }
+            }
+            let last = self.events.t[before..].last().copied();
+            if let Some(left) = leaves(&took, last, bytes.len(), self.frame_us()) {
+                self.clock.note(left, datagram.arrived_ns);
             }
             self.shared.shown().decode_latency.note(now - datagram.arrived_ns);
             if self.events.len() >= HAND_ON {

@@ -6,6 +6,7 @@ use taxel_core::Array;
 use taxel_core::wire::Registers;
 
 use super::sending::Destination;
+use super::sources::Source;
 use crate::capture::ReceiverOptions;
 use crate::recording::Compression;
 
@@ -30,6 +31,10 @@ pub struct LiveOptions {
     pub record: Option<Record>,
     /// Where detections go as lines, besides to the sinks.
     pub send: Vec<Destination>,
+    /// What the board is called in a recording.
+    pub name: String,
+    /// What else the recording holds.
+    pub sources: Vec<Source>,
 }
 
 impl LiveOptions {
@@ -46,6 +51,8 @@ impl LiveOptions {
             capture: ReceiverOptions::default(),
             record: None,
             send: vec![],
+            name: "board".to_owned(),
+            sources: vec![],
         }
     }
 }

@@ -4,7 +4,7 @@ use std::fs::OpenOptions;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError, Weak};
 
 use taxel_core::encode::Tare;
 use taxel_core::wire::Registers;
@@ -13,9 +13,11 @@ use taxel_core::{Marker, problem};
 use super::counters::Counters;
 use super::options::{LiveOptions, Record};
 use super::said::Said;
+use super::shared::Shared;
+use super::sources::Source;
 use crate::capture::Batch;
 use crate::locked::lock;
-use crate::recording::{self, BoardChange, Header, LsaWriter, Writer, now_ns};
+use crate::recording::{self, BoardChange, Header, LsaWriter, Track, Writer, now_ns};
 use crate::{Error, Result};
 
 /// A recording being written. Raw `.lsa` holds bytes and nothing else: what else there is to keep is left out of it.
@@ -35,6 +37,8 @@ pub(super) struct Recorder {
     /// Held by the one who opens the file.
     opening: Mutex<()>,
     guest: Option<Guest>,
+    /// Whose file it is, where it is another's.
+    host: Option<Part>,
 }
 
 /// A recording that was begun while listening. Its own clock begins with its first stamp, so the file is opened when that
@@ -61,20 +65,74 @@ const MOST_WAITING: usize = 1 << 22;
 
 enum Kind {
     Mcap(Writer),
+    /// A part of another's.
+    Track(Track),
     /// Locked for the borrow only: one thread writes.
     Lsa(Mutex<LsaWriter>),
 }
 
+impl Kind {
+    /// Where more than bytes is kept.
+    fn track(&self) -> Option<&Track> {
+        match self {
+            Self::Mcap(writer) => Some(writer),
+            Self::Track(track) => Some(track),
+            Self::Lsa(_) => None,
+        }
+    }
+}
+
+/// A source's part of a recording that another pipeline began.
+#[derive(Clone)]
+pub(super) struct Part {
+    pub(super) host: Weak<Shared>,
+    pub(super) name: String,
+}
+
+impl Part {
+    /// Opens it: the file is there from then on.
+    pub(super) fn open(&self) -> Result<Track> {
+        let host = self.host.upgrade().ok_or_else(|| problem!("source {}: the recording has ended", self.name))?;
+        match &*lock(&host.recorder) {
+            Some(recorder) => recorder.writer(&self.name),
+            None => Err(problem!("source {}: nothing is recorded", self.name).into()),
+        }
+    }
+}
+
 impl Recorder {
+    /// A part of another's recording.
+    pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, address: SocketAddr) -> Self {
+        let name = host.name.clone();
+        let board =
+            Header::of_board(options.array.clone(), Some(options.registers), format!("udp {address}"), now_ns());
+        Self {
+            record: record.clone(),
+            header: Header { name, ..board },
+            new: false,
+            noted: AtomicBool::new(false),
+            refused: AtomicBool::new(false),
+            begun: AtomicBool::new(false),
+            kind: OnceLock::new(),
+            opening: Mutex::new(()),
+            guest: None,
+            host: Some(host),
+        }
+    }
+
+    /// Another source's part of this recording.
+    fn writer(&self, name: &str) -> Result<Track> {
+        match self.kind()? {
+            Kind::Mcap(writer) => writer.track(name),
+            Kind::Track(_) | Kind::Lsa(_) => Err(problem!("source {name}: only a .mcap holds several sources").into()),
+        }
+    }
+
     pub(super) fn create(record: &Record, options: &LiveOptions, address: SocketAddr) -> Result<Self> {
-        let header = Header {
-            array: options.array.clone(),
-            registers: Some(options.registers),
-            difference: options.differences,
-            origin_us: 0,
-            source: format!("udp {address}"),
-            started_ns: now_ns(),
-        };
+        let board =
+            Header::of_board(options.array.clone(), Some(options.registers), format!("udp {address}"), now_ns());
+        let sources = options.sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
+        let header = Header { difference: options.differences, name: options.name.clone(), sources, ..board };
         let path = &record.path;
         let new = !(record.overwrite && path.exists());
         let recorder = Self {
@@ -87,7 +145,11 @@ impl Recorder {
             kind: OnceLock::new(),
             opening: Mutex::new(()),
             guest: None,
+            host: None,
         };
+        if !recorder.header.sources.is_empty() && named(path)? != "mcap" {
+            return Err(problem!("{}: only a .mcap holds several sources", path.display()).into());
+        }
         if new {
             recorder.kind()?;
         } else {
@@ -107,7 +169,9 @@ impl Recorder {
             return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
         }
         OpenOptions::new().write(true).create_new(true).open(path).map_err(Error::file(path))?;
-        let whole = Self::create(&Record { overwrite: true, ..record.clone() }, options, address)?;
+        // What else is heard belongs to the recording that it was begun with.
+        let options = LiveOptions { sources: vec![], ..options.clone() };
+        let whole = Self::create(&Record { overwrite: true, ..record.clone() }, &options, address)?;
         let guest = Guest { since: Counters::default(), waiting: Mutex::default(), bytes: AtomicUsize::new(0) };
         Ok(Self { new: true, guest: Some(guest), ..whole })
     }
@@ -150,14 +214,14 @@ impl Recorder {
     }
 
     fn write(kind: &Kind, entry: Entry) -> Result<()> {
-        match (kind, entry) {
-            (Kind::Mcap(writer), Entry::Datagram(at, number, bytes)) => writer.datagram(at, number, &bytes),
-            (Kind::Lsa(writer), Entry::Datagram(_, _, bytes)) => lock(writer).bytes(&bytes),
-            (Kind::Mcap(writer), Entry::Registers(at, registers)) => writer.registers(at, &registers),
-            (Kind::Mcap(writer), Entry::Board(change)) => writer.board_change(&change),
-            (Kind::Mcap(writer), Entry::Held(at, t_us, held)) => writer.held(at, t_us, &held),
-            (Kind::Mcap(writer), Entry::Note(at, t_us, text)) => writer.note(at, t_us, &text),
-            (Kind::Lsa(_), _) => Ok(()),
+        match (kind, kind.track(), entry) {
+            (_, Some(track), Entry::Datagram(at, number, bytes)) => track.datagram(at, number, &bytes),
+            (Kind::Lsa(writer), _, Entry::Datagram(_, _, bytes)) => lock(writer).bytes(&bytes),
+            (_, Some(track), Entry::Registers(at, registers)) => track.registers(at, &registers),
+            (_, Some(track), Entry::Board(change)) => track.board_change(&change),
+            (_, Some(track), Entry::Held(at, t_us, held)) => track.held(at, t_us, &held),
+            (_, Some(track), Entry::Note(at, t_us, text)) => track.note(at, t_us, &text),
+            (_, None, _) => Ok(()),
         }
     }
 
@@ -166,6 +230,10 @@ impl Recorder {
         let _one = lock(&self.opening);
         if let Some(kind) = self.kind.get() {
             return Ok(kind);
+        }
+        if let Some(host) = &self.host {
+            let track = host.open()?;
+            return Ok(self.kind.get_or_init(|| Kind::Track(track)));
         }
         let Record { path, compression, overwrite } = &self.record;
         let kind = match named(path)? {
@@ -192,15 +260,15 @@ impl Recorder {
             let mut all = batch.iter();
             return all.try_for_each(|(d, bytes)| self.push(Entry::Datagram(d.arrived_ns, d.number, bytes.to_vec())));
         }
-        match self.kind()? {
-            Kind::Mcap(writer) => {
-                batch.iter().try_for_each(|(d, bytes)| writer.datagram(d.arrived_ns, d.number, bytes))
-            }
-            Kind::Lsa(writer) => {
-                let mut writer = writer.lock().unwrap_or_else(PoisonError::into_inner);
-                batch.iter().try_for_each(|(_, bytes)| writer.bytes(bytes))
-            }
+        let kind = self.kind()?;
+        if let Some(track) = kind.track() {
+            batch.iter().try_for_each(|(d, bytes)| track.datagram(d.arrived_ns, d.number, bytes))?;
         }
+        if let Kind::Lsa(writer) = kind {
+            let mut writer = lock(writer);
+            batch.iter().try_for_each(|(_, bytes)| writer.bytes(bytes))?;
+        }
+        Ok(())
     }
 
     /// The board's registers as they are from now on.
@@ -224,23 +292,17 @@ impl Recorder {
     }
 
     pub(super) fn marker(&self, marker: Marker) -> Result<()> {
-        match self.kind()? {
-            Kind::Mcap(writer) => writer.marker(now_ns(), marker),
-            Kind::Lsa(_) => Ok(()),
-        }
+        self.kind()?.track().map_or(Ok(()), |track| track.marker(now_ns(), marker))
     }
 
     pub(super) fn detection(&self, said: &Said) -> Result<()> {
-        match self.kind()? {
-            Kind::Mcap(writer) => writer.detection(said.said_ns, &said.detection),
-            Kind::Lsa(_) => Ok(()),
-        }
+        self.kind()?.track().map_or(Ok(()), |track| track.detection(said.said_ns, &said.detection))
     }
 
     /// What is taken off the pictures from here on.
     pub(super) fn tare(&self, tare: &Tare) -> Result<()> {
-        if let Kind::Mcap(writer) = self.kind()? {
-            writer.tare(tare);
+        if let Some(track) = self.kind()?.track() {
+            track.tare(tare);
         }
         Ok(())
     }
@@ -249,24 +311,19 @@ impl Recorder {
         if self.waits() {
             return Ok(());
         }
-        match self.kind()? {
-            Kind::Mcap(writer) => writer.picture(now_ns(), board_us, columns, held),
-            Kind::Lsa(_) => Ok(()),
-        }
+        self.kind()?.track().map_or(Ok(()), |track| track.picture(now_ns(), board_us, columns, held))
     }
 
     /// What an unfinished recording will know of its losses; a raw one knows nothing, but its bytes reach the system.
     pub(super) fn so_far(&self, counters: &Counters) -> Result<()> {
-        match self.kind.get() {
-            Some(Kind::Mcap(writer)) => writer.counts(now_ns(), &self.losses(counters)),
-            Some(Kind::Lsa(_)) | None => Ok(()),
-        }
+        let track = self.kind.get().and_then(Kind::track);
+        track.map_or(Ok(()), |track| track.counts(now_ns(), &self.losses(counters)))
     }
 
     /// Bytes must not wait in memory for long: `.mcap` sees to that itself.
     pub(super) fn flush(&self) -> Result<()> {
         match self.kind.get() {
-            Some(Kind::Mcap(_)) | None => Ok(()),
+            Some(Kind::Mcap(_) | Kind::Track(_)) | None => Ok(()),
             Some(Kind::Lsa(writer)) => writer.lock().unwrap_or_else(PoisonError::into_inner).flush(),
         }
     }
@@ -292,10 +349,18 @@ impl Recorder {
     /// Closes the file and says where it is; a file that would hold nothing is not kept.
     pub(super) fn finish(self, counters: &Counters) -> Result<Option<PathBuf>> {
         let lost = self.losses(counters);
-        let nothing = match &self.guest {
-            Some(guest) => counters.decoded == guest.since.decoded,
-            None => counters.nothing_came(),
-        };
+        if let Some(host) = &self.host {
+            if let Some(track) = self.kind.get().and_then(Kind::track) {
+                track.end(&host.name, lost);
+            }
+            return Ok(None);
+        }
+        let others = matches!(self.kind.get(), Some(Kind::Mcap(writer)) if writer.holds_anything());
+        let nothing = !others
+            && match &self.guest {
+                Some(guest) => counters.decoded == guest.since.decoded,
+                None => counters.nothing_came(),
+            };
         if (!nothing || self.noted.load(Ordering::Relaxed)) && self.waits() {
             self.kind()?;
         }
@@ -315,7 +380,7 @@ impl Recorder {
                 writer.into_inner().unwrap_or_else(PoisonError::into_inner).flush()?
             }
             Some(Kind::Lsa(writer)) => writer.into_inner().unwrap_or_else(PoisonError::into_inner).finish()?,
-            None => {}
+            Some(Kind::Track(_)) | None => {}
         }
         Ok(Some(path))
     }

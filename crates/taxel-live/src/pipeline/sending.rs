@@ -307,7 +307,7 @@ impl Device {
 }
 
 /// A serial line that takes what it has room for, and never waits.
-fn serial(path: &Path, baud: u32) -> Result<serialport::TTYPort> {
+pub(super) fn serial(path: &Path, baud: u32) -> Result<serialport::TTYPort> {
     let place = path.display().to_string();
     let opened = serialport::new(place, baud).timeout(Duration::ZERO).open_native();
     let port = opened.map_err(|error| Error::file(path)(error.into()))?;

@@ -7,6 +7,12 @@ pub(super) const CHUNK: u32 = 1 << 26;
 /// Of a metadata record.
 pub(super) const METADATA: u64 = 1 << 24;
 
+/// Sources of a file.
+pub(super) const SOURCES: usize = 64;
+
+/// Columns of a stream of numbers.
+pub(super) const COLUMNS: usize = 1024;
+
 /// Taxels of a sensor: 2048 x 2048.
 pub(super) const TAXELS: usize = 1 << 22;
 

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use mcap::records::{Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -16,21 +17,26 @@ use serde::Serialize;
 use serde_json::Value;
 use taxel_core::detect::Detection;
 use taxel_core::wire::{self, Decoder, Pairing, Registers};
-use taxel_core::{Events, Marker, Stop};
+use taxel_core::{Events, Marker, Stop, problem};
 
 use super::mcap_writer::{BEGIN, END, unbase64};
-use super::{BoardChange, Change, Counts, Header, Note, Topic, limits};
+use super::stream::Sampling;
+use super::{BoardChange, Change, Counts, Header, Note, Samples, Topic, limits};
+use crate::clock::leaves;
 use crate::{Error, Result};
 
 /// Opcode, length.
 const RECORD_HEAD: u64 = 9;
 
 /// A recording of the live format, opened.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub struct Reader {
-    blocks: Blocks,
-    header: Header,
+    blocks: Arc<Blocks>,
+    header: Arc<Header>,
+    /// Which of the file's sources this reads.
+    source: usize,
     ending: Option<Ending>,
+    ends: Arc<BTreeMap<String, Counts>>,
     rebuilt: Rebuilt,
 }
 
@@ -122,6 +128,8 @@ pub struct Decoded {
     pub number: Vec<u64>,
     /// The first event of each; with pairing by taxel all events come at the end.
     pub first: Vec<u64>,
+    /// When each could leave the board at the earliest, us; `i64::MIN` where that is not known.
+    pub left: Vec<i64>,
     /// Chunks that could not be used.
     pub bad_chunks: u64,
 }
@@ -129,7 +137,16 @@ pub struct Decoded {
 impl Decoded {
     fn empty(events: Events) -> Self {
         let (counts, version_2) = (wire::Counts::default(), wire::v2::Counts::default());
-        Self { events, counts, version_2, arrived_ns: vec![], number: vec![], first: vec![], bad_chunks: 0 }
+        Self {
+            events,
+            counts,
+            version_2,
+            arrived_ns: vec![],
+            number: vec![],
+            first: vec![],
+            left: vec![],
+            bad_chunks: 0,
+        }
     }
 }
 
@@ -156,6 +173,8 @@ pub struct Remarks {
     pub pictures: u64,
     /// Resets of the board, and changes of its version of the wire.
     pub board: Vec<BoardChange>,
+    /// How many lines of a stream there are.
+    pub samples: u64,
     /// What the taxels held when the recording began, ticks by index, 65 535 where a taxel was not heard of; where it says.
     pub held: Option<Vec<u16>>,
 }
@@ -215,6 +234,7 @@ impl Remarks {
                     self.board.push(BoardChange { at_ns: message.at_ns, ..said });
                 }
             }
+            Topic::Samples => self.samples += 1,
             Topic::Counts => self.counts = serde_json::from_slice(message.data).ok().or(self.counts.take()),
         }
     }
@@ -240,7 +260,7 @@ impl Reader {
         let mut walk = Walk::of(path, &file, length);
         walk.magic()?;
         walk.records()?;
-        let Walk { begin, end, ending, blocks, rebuilt, .. } = walk;
+        let Walk { begin, end, ending, ends, blocks, rebuilt, .. } = walk;
         let blocks = Blocks { path: path.to_owned(), file, length, places: blocks };
         // The copy beside the datagrams' channel has a checksum, the others have not.
         let Some(header) = blocks.header()?.or(end).or(begin) else {
@@ -250,13 +270,39 @@ impl Reader {
             ));
         };
         header.check().map_err(|error| format(path, &format!("header: {error}")))?;
-        Ok(Self { blocks, header, ending, rebuilt })
+        let (blocks, header, ends) = (Arc::new(blocks), Arc::new(header), Arc::new(ends));
+        Ok(Self { blocks, header, source: 0, ending, ends, rebuilt })
     }
 
-    /// What the recording says of itself.
+    /// The names of the sources; the first is the one that this reads at first.
+    pub fn sources(&self) -> impl Iterator<Item = &str> {
+        std::iter::once(&*self.header).chain(&self.header.sources).map(|source| source.name.as_str())
+    }
+
+    /// The same recording as one of its sources has it.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where there is none of that name.
+    pub fn of_source(&self, name: &str) -> Result<Self> {
+        let Some(source) = self.sources().position(|known| known == name) else {
+            let known: Vec<&str> = self.sources().collect();
+            let path = self.blocks.path.display();
+            return Err(problem!("{path}: holds no source {name:?}; there are {}", known.join(", ")).into());
+        };
+        let ending = match &self.ending {
+            Some(Ending::Finished { .. }) if source != 0 => {
+                self.ends.get(name).map(|counts| Ending::Finished { counts: counts.clone(), verdict: counts.verdict() })
+            }
+            whole => whole.clone(),
+        };
+        Ok(Self { source, ending, ..self.clone() })
+    }
+
+    /// What the source says of itself.
     #[must_use]
     pub fn header(&self) -> &Header {
-        &self.header
+        if self.source == 0 { &self.header } else { &self.header.sources[self.source - 1] }
     }
 
     /// How it ended, where it says so.
@@ -309,13 +355,13 @@ impl Reader {
         let sound = self.blocks.records(block, bytes, |record| {
             match record {
                 Record::Channel(channel) => {
-                    topics.insert(channel.id, Topic::of_name(&channel.topic));
+                    topics.insert(channel.id, Topic::of_name(&channel.topic, self.source, &self.header().name));
                 }
                 Record::Message { header, data } => {
                     let topic = topics.get(&header.channel_id).copied();
-                    if let Some(topic) = topic.unwrap_or_else(|| Topic::of_number(header.channel_id)) {
+                    if let Some(topic) = topic.unwrap_or_else(|| Topic::of_number(header.channel_id, self.source)) {
                         let mut number = u64::from(header.sequence);
-                        if topic == Topic::Datagrams {
+                        if matches!(topic, Topic::Datagrams | Topic::Samples) {
                             number = unwrap(*last, header.sequence);
                             *last = number;
                             *in_datagrams += data.len() as u64;
@@ -375,21 +421,46 @@ impl Reader {
         Ok(all)
     }
 
+    /// All samples of a stream.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the source is a board; else as [`Reader::messages`].
+    pub fn samples(&self, stop: Stop<'_>) -> Result<Samples> {
+        let Some(stream) = &self.header().stream else {
+            return Err(problem!("source {}: a board has no samples", self.header().name).into());
+        };
+        let mut sampling = Sampling::new(stream);
+        self.messages(stop, |message| {
+            if message.topic == Topic::Samples {
+                sampling.take(message.at_ns, message.number, message.data);
+            }
+            Ok(())
+        })?;
+        Ok(sampling.finish())
+    }
+
     /// Decodes all datagrams.
     ///
     /// # Errors
     ///
     /// As [`Reader::messages`].
     pub fn decode(&self, pairing: Pairing, stop: Stop<'_>) -> Result<Decoded> {
-        let array = self.header.array.clone();
-        let decoder = Decoder::new(array.clone()).pairing(pairing).differences(self.header.difference);
+        let header = self.header();
+        let array = header.array.clone();
+        let decoder = Decoder::new(array.clone()).pairing(pairing).differences(header.difference);
         let mut sender = wire::Receiver::new(decoder, 1);
         let mut decoded = Decoded::empty(Events::empty(array));
+        #[allow(clippy::cast_possible_truncation)]
+        let frame_us = header.registers.map_or(0, |registers| registers.frame_us() as i64);
         let bad = self.messages(stop, |message| {
             if message.topic == Topic::Datagrams {
                 let before = decoded.events.len();
                 let arrived = Some(message.at_ns / 1000);
-                sender.push(message.data, arrived, &mut decoded.events);
+                let took = sender.push(message.data, arrived, &mut decoded.events);
+                let last = decoded.events.t.get(before..).and_then(<[i64]>::last).copied();
+                let left = leaves(&took, last, message.data.len(), frame_us).map_or(i64::MIN, |t| t + header.origin_us);
+                decoded.left.push(left);
                 decoded.arrived_ns.push(message.at_ns);
                 decoded.number.push(message.number);
                 decoded.first.push(before as u64);
@@ -404,8 +475,8 @@ impl Reader {
             Ok(())
         })?;
         sender.finish_into(&mut decoded.events);
-        decoded.events.t.iter_mut().for_each(|t| *t += self.header.origin_us);
-        decoded.events.markers.iter_mut().for_each(|m| m.t += self.header.origin_us);
+        decoded.events.t.iter_mut().for_each(|t| *t += header.origin_us);
+        decoded.events.markers.iter_mut().for_each(|m| m.t += header.origin_us);
         decoded.counts = *sender.counts();
         decoded.version_2 = sender.two().counts();
         decoded.bad_chunks = bad;
@@ -511,6 +582,8 @@ struct Walk<'a> {
     begin: Option<Header>,
     end: Option<Header>,
     ending: Option<Ending>,
+    /// What the other sources said at their end.
+    ends: BTreeMap<String, Counts>,
     blocks: Vec<Block>,
     /// What the chunks so far say that they unpack to, bytes.
     unpacked: u64,
@@ -520,7 +593,18 @@ struct Walk<'a> {
 impl<'a> Walk<'a> {
     fn of(path: &'a Path, file: &'a File, length: u64) -> Self {
         let rebuilt = Rebuilt { unfinished: true, ..Rebuilt::default() };
-        Self { path, file, length, begin: None, end: None, ending: None, blocks: vec![], unpacked: 0, rebuilt }
+        Self {
+            path,
+            file,
+            length,
+            begin: None,
+            end: None,
+            ending: None,
+            ends: BTreeMap::new(),
+            blocks: vec![],
+            unpacked: 0,
+            rebuilt,
+        }
     }
 
     /// Up to `wanted` bytes at `offset`; fewer at the end of the file.
@@ -653,6 +737,10 @@ impl<'a> Walk<'a> {
             BEGIN => self.begin = header,
             END => {
                 self.end = header;
+                let ends = record.metadata.iter().filter_map(|(key, text)| {
+                    Some((key.strip_prefix("counts.")?.to_owned(), serde_json::from_str(text).ok()?))
+                });
+                self.ends = ends.collect();
                 self.ending = match record.metadata.get("stopped") {
                     Some(why) => Some(Ending::Stopped(why.clone())),
                     None => record.metadata.get("counts").and_then(|text| serde_json::from_str(text).ok()).map(

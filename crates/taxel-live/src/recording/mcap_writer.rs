@@ -27,7 +27,7 @@ use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
 use super::picture::Pictures;
-use super::{BoardChange, Compression, Counts, FLUSH_EVERY, Header, LATE, Topic, WriterOptions, create};
+use super::{BoardChange, Compression, Counts, FLUSH_EVERY, Header, LATE, Stream, Topic, WriterOptions, create};
 use crate::{Error, Result};
 
 /// A chunk is closed when it is this large, or when the queue is empty.
@@ -48,10 +48,28 @@ pub(super) const END: &str = "taxel.end";
 ///
 /// Dropped without [`Writer::finish`], it keeps everything that was given, and says that it was not finished.
 pub struct Writer {
+    /// The first source.
+    track: Track,
+    header: Header,
+    thread: Option<JoinHandle<Result<()>>>,
+}
+
+/// One source's part of a recording being written; fed from any thread. A [`Writer`] is the first one's.
+pub struct Track {
     path: PathBuf,
     shared: Arc<Shared>,
+    /// Which of the file's sources.
+    source: usize,
+    stream: Option<Stream>,
     pictures: Mutex<Pictures>,
-    thread: Option<JoinHandle<Result<()>>>,
+}
+
+impl std::ops::Deref for Writer {
+    type Target = Track;
+
+    fn deref(&self) -> &Track {
+        &self.track
+    }
 }
 
 struct Shared {
@@ -69,7 +87,10 @@ struct Shared {
 #[derive(Default)]
 struct Pending {
     queue: Queue,
-    recorded: u64,
+    /// Datagrams and samples of each source.
+    recorded: Vec<u64>,
+    /// What each source but the first said at its end.
+    ends: BTreeMap<String, Counts>,
     /// How the recording ends: set once.
     end: Option<Option<Counts>>,
     /// What broke the writing; nothing is taken after it.
@@ -92,7 +113,7 @@ struct Queue {
 }
 
 struct Queued {
-    topic: Topic,
+    channel: u16,
     number: u32,
     at_ns: u64,
     bytes: usize,
@@ -115,11 +136,12 @@ impl Queue {
 }
 
 impl Writer {
-    /// Begins a recording; the file is readable from here on.
+    /// Begins a recording of the header's source and of those that it names; the file is readable from here on.
     ///
     /// # Errors
     ///
-    /// `File` where the file exists (and `overwrite` is not set), or cannot be created or written.
+    /// `File` where the file exists (and `overwrite` is not set), or cannot be created or written; `Core(Problem)` for sources
+    /// that make no sense.
     pub fn create(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
         let mut writer = Self::alone(path, header, options)?;
         let (shared, path) = (Arc::clone(&writer.shared), path.to_owned());
@@ -130,12 +152,106 @@ impl Writer {
 
     /// A writer whose thread has not begun.
     fn alone(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
+        header.check()?;
         let at_disk = Arc::new(AtomicBool::new(false));
         let file = create(path, options.overwrite)?;
         let pen = Pen::begin(file, header, options.compression, &at_disk).map_err(|e| Broken::of(e).named(path))?;
-        let (pen, state) = (Mutex::new(Some(pen)), Mutex::new(Pending::default()));
-        let shared = Shared { pen, at_disk, state, work: Condvar::new(), room: Condvar::new() };
-        Ok(Self { path: path.to_owned(), shared: Arc::new(shared), pictures: Mutex::default(), thread: None })
+        let recorded = vec![0; header.sources.len() + 1];
+        let (pen, state) = (Mutex::new(Some(pen)), Mutex::new(Pending { recorded, ..Pending::default() }));
+        let shared = Arc::new(Shared { pen, at_disk, state, work: Condvar::new(), room: Condvar::new() });
+        let track = Track {
+            path: path.to_owned(),
+            shared,
+            source: 0,
+            stream: header.stream.clone(),
+            pictures: Mutex::default(),
+        };
+        Ok(Self { track, header: header.clone(), thread: None })
+    }
+
+    /// Another source's part.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the header named none of that name.
+    pub fn track(&self, name: &str) -> Result<Track> {
+        let named = self.header.sources.iter().position(|source| source.name == name);
+        let Some(k) = named else {
+            return Err(problem!("source {name:?}: the recording has none of that name").into());
+        };
+        Ok(Track {
+            path: self.track.path.clone(),
+            shared: Arc::clone(&self.track.shared),
+            source: k + 1,
+            stream: self.header.sources[k].stream.clone(),
+            pictures: Mutex::default(),
+        })
+    }
+
+    /// Whether any source has given anything.
+    #[must_use]
+    pub fn holds_anything(&self) -> bool {
+        self.shared.lock().recorded.iter().any(|&n| n > 0)
+    }
+
+    /// Ends the recording with what was lost of the first source and a verdict line, which it gives back; the other sources
+    /// have ended before ([`Track::end`]).
+    ///
+    /// The file is on the disk when this returns.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the disk is full or gone; the file keeps everything that was written before.
+    pub fn finish(mut self, counts: Counts) -> Result<Counts> {
+        let counts = {
+            let mut state = self.shared.lock();
+            let counts = Counts { recorded: state.recorded[0], ..counts };
+            state.end = Some(Some(counts.clone()));
+            counts
+        };
+        self.shared.work.notify_all();
+        self.join()?;
+        Ok(counts)
+    }
+
+    fn join(&mut self) -> Result<()> {
+        match self.thread.take().map(JoinHandle::join) {
+            None => Ok(()),
+            Some(Ok(outcome)) => outcome,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+        }
+    }
+}
+
+impl Track {
+    /// Keeps numbers of a stream as they came, one for each of its columns: arrival by the host's clock (ns since 1970), our
+    /// arrival number.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the source is no stream, or has other columns; else as [`Track::datagram`].
+    pub fn sample(&self, arrived_ns: i64, number: u64, values: &[f64]) -> Result<()> {
+        let Some(stream) = self.stream.as_ref().filter(|stream| stream.takes(values)) else {
+            let n = self.stream.as_ref().map_or(0, |stream| stream.columns.len());
+            return Err(problem!("{} values: the source has {n} columns", values.len()).into());
+        };
+        self.push(Topic::Samples, arrived_ns, number, stream.message(values).to_string().as_bytes())
+    }
+
+    /// Keeps a line of a stream that could not be read, as it came.
+    ///
+    /// # Errors
+    ///
+    /// As [`Track::datagram`].
+    pub fn strange_line(&self, arrived_ns: i64, number: u64, line: &str) -> Result<()> {
+        self.push(Topic::Samples, arrived_ns, number, json!({ "line": line }).to_string().as_bytes())
+    }
+
+    /// Says what was received and lost of this source, at its end; nothing is taken of it afterwards.
+    pub fn end(&self, name: &str, counts: Counts) {
+        let mut state = self.shared.lock();
+        let recorded = state.recorded[self.source];
+        state.ends.insert(name.to_owned(), Counts { recorded, ..counts });
     }
 
     /// Keeps a datagram as it came: arrival by the host's clock (ns since 1970), our arrival number, bytes.
@@ -273,25 +389,6 @@ impl Writer {
         self.push_json(Topic::Held, at_ns, &held)
     }
 
-    /// Ends the recording with what was lost and a verdict line, which it gives back.
-    ///
-    /// The file is on the disk when this returns.
-    ///
-    /// # Errors
-    ///
-    /// `File` where the disk is full or gone; the file keeps everything that was written before.
-    pub fn finish(mut self, counts: Counts) -> Result<Counts> {
-        let counts = {
-            let mut state = self.shared.lock();
-            let counts = Counts { recorded: state.recorded, ..counts };
-            state.end = Some(Some(counts.clone()));
-            counts
-        };
-        self.shared.work.notify_all();
-        self.join()?;
-        Ok(counts)
-    }
-
     fn push_json(&self, topic: Topic, at_ns: i64, value: &serde_json::Value) -> Result<()> {
         self.push(topic, at_ns, 0, value.to_string().as_bytes())
     }
@@ -305,6 +402,9 @@ impl Writer {
         if let Some(broken) = &state.broken {
             return Err(broken.clone().named(&self.path));
         }
+        if state.end.is_some() {
+            return Err(problem!("{}: the recording has ended", self.path.display()).into());
+        }
         let before = state.queue.bytes.len();
         state.queue.bytes.extend_from_slice(bytes);
         if before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
@@ -314,22 +414,14 @@ impl Writer {
         #[allow(clippy::cast_possible_truncation)]
         let number = number as u32;
         let at_ns = u64::try_from(at_ns).unwrap_or(0);
-        state.queue.messages.push(Queued { topic, number, at_ns, bytes: bytes.len() });
+        state.queue.messages.push(Queued { channel: topic.channel(self.source), number, at_ns, bytes: bytes.len() });
         state.queue.since.get_or_insert_with(Instant::now);
-        state.recorded += u64::from(topic == Topic::Datagrams);
+        state.recorded[self.source] += u64::from(matches!(topic, Topic::Datagrams | Topic::Samples));
         if !state.queue.is_late() || self.shared.at_disk.load(Ordering::Relaxed) {
             return Ok(());
         }
         drop(state);
         self.shared.drain(&self.path)
-    }
-
-    fn join(&mut self) -> Result<()> {
-        match self.thread.take().map(JoinHandle::join) {
-            None => Ok(()),
-            Some(Ok(outcome)) => outcome,
-            Some(Err(panic)) => std::panic::resume_unwind(panic),
-        }
     }
 }
 
@@ -389,7 +481,8 @@ impl Shared {
     /// Writes the end, and waits for the disk.
     fn end(&self, counts: Option<&Counts>, path: &Path) -> Result<()> {
         let Some(mut pen) = self.pen().take() else { return Ok(()) };
-        if let Err(error) = pen.end(counts) {
+        let ends = std::mem::take(&mut self.lock().ends);
+        if let Err(error) = pen.end(counts, &ends) {
             return Err(self.broke(error, Some(pen.sheet()), path));
         }
         let mut sheet = pen.sheet();
@@ -530,14 +623,17 @@ impl Pen {
         let mut pen = Self { mcap, header: header.clone(), taken: Queue::default() };
         let said = BTreeMap::from([("header".to_owned(), json!(header).to_string())]);
         pen.mcap.write_metadata(&Metadata { name: BEGIN.to_owned(), metadata: said.clone() })?;
-        for topic in Topic::ALL {
-            let schema = match topic.schema() {
-                None => 0,
-                Some((name, text)) => pen.mcap.add_schema(name, "jsonschema", text.as_bytes())?,
-            };
-            // Once more where a checksum guards it.
-            let more = if topic == Topic::Datagrams { said.clone() } else { BTreeMap::new() };
-            pen.mcap.add_channel_with_id(topic as u16, schema, topic.name(), topic.encoding(), &more)?;
+        for (k, source) in std::iter::once(header).chain(&header.sources).enumerate() {
+            for topic in Topic::of_source(source.stream.is_some()) {
+                let schema = match topic.schema() {
+                    None => 0,
+                    Some((name, text)) => pen.mcap.add_schema(name, "jsonschema", text.as_bytes())?,
+                };
+                // Once more where a checksum guards it.
+                let more = if k == 0 && topic == Topic::Datagrams { said.clone() } else { BTreeMap::new() };
+                let (number, name) = (topic.channel(k), topic.channel_name(k, &source.name));
+                pen.mcap.add_channel_with_id(number, schema, &name, topic.encoding(), &more)?;
+            }
         }
         pen.mcap.flush()?;
         Ok(pen)
@@ -548,7 +644,7 @@ impl Pen {
         let (mut at, mut chunk) = (0, 0);
         for message in &self.taken.messages {
             let header = MessageHeader {
-                channel_id: message.topic as u16,
+                channel_id: message.channel,
                 sequence: message.number,
                 log_time: message.at_ns,
                 publish_time: message.at_ns,
@@ -566,14 +662,19 @@ impl Pen {
     }
 
     /// Writes what was lost and the summary, and waits until the disk has all.
-    fn end(&mut self, counts: Option<&Counts>) -> std::result::Result<(), McapError> {
+    fn end(
+        &mut self,
+        counts: Option<&Counts>,
+        others: &BTreeMap<String, Counts>,
+    ) -> std::result::Result<(), McapError> {
         if let Some(counts) = counts {
-            let end = BTreeMap::from([
+            let mut end = BTreeMap::from([
                 ("verdict".to_owned(), counts.verdict()),
                 ("counts".to_owned(), json!(counts).to_string()),
                 ("header".to_owned(), json!(self.header).to_string()),
                 ("stopped_ns".to_owned(), super::now_ns().to_string()),
             ]);
+            end.extend(others.iter().map(|(name, counts)| (format!("counts.{name}"), json!(counts).to_string())));
             self.mcap.write_metadata(&Metadata { name: END.to_owned(), metadata: end })?;
         }
         self.mcap.flush()?;

@@ -23,11 +23,16 @@ pub enum Topic {
     Held = 8,
     /// Resets of the board, and changes of its version of the wire.
     Board = 9,
+    /// Lines of numbers of a source that is no board.
+    Samples = 10,
 }
+
+/// The channels of a file's second source have this added to their numbers, those of the third twice that ...
+const NEXT_SOURCE: u16 = 16;
 
 impl Topic {
     /// All, by number.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Datagrams,
         Self::Registers,
         Self::Markers,
@@ -37,7 +42,18 @@ impl Topic {
         Self::Pressure,
         Self::Held,
         Self::Board,
+        Self::Samples,
     ];
+
+    /// Those of a source: a board's, or those of a stream of numbers.
+    pub(super) fn of_source(stream: bool) -> impl Iterator<Item = Self> {
+        let kept = move |topic: &Self| match topic {
+            Self::Samples => stream,
+            Self::Counts => true,
+            _ => !stream,
+        };
+        Self::ALL.into_iter().filter(kept)
+    }
 
     /// The name in the file.
     #[must_use]
@@ -52,6 +68,7 @@ impl Topic {
             Self::Pressure => "/pressure",
             Self::Held => "/held",
             Self::Board => "/board",
+            Self::Samples => "/samples",
         }
     }
 
@@ -75,16 +92,27 @@ impl Topic {
             Self::Pressure => ("foxglove.RawImage", include_str!("schemas/RawImage.json")),
             Self::Held => ("taxel.Held", include_str!("schemas/Held.json")),
             Self::Board => ("taxel.Board", include_str!("schemas/Board.json")),
+            Self::Samples => ("taxel.Sample", include_str!("schemas/Sample.json")),
         })
     }
 
-    /// The topic of a channel's name.
-    pub(super) fn of_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|t| t.name() == name)
+    /// The number of the channel in a file; `source` counts the file's sources.
+    pub(super) fn channel(self, source: usize) -> u16 {
+        u16::try_from(source).unwrap_or(u16::MAX).saturating_mul(NEXT_SOURCE).saturating_add(self as u16)
     }
 
-    /// The topic of a channel's number in a file of ours.
-    pub(super) fn of_number(number: u16) -> Option<Self> {
-        Self::ALL.into_iter().find(|t| *t as u16 == number)
+    /// The name of the channel in a file: those of the first source have the topic's alone.
+    pub(super) fn channel_name(self, source: usize, named: &str) -> String {
+        if source == 0 { self.name().to_owned() } else { format!("/{named}{}", self.name()) }
+    }
+
+    /// The topic of a channel's name, where the channel is that source's.
+    pub(super) fn of_name(name: &str, source: usize, named: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|t| t.channel_name(source, named) == name)
+    }
+
+    /// The topic of a channel's number in a file of ours, where the channel is that source's.
+    pub(super) fn of_number(number: u16, source: usize) -> Option<Self> {
+        Self::ALL.into_iter().find(|t| t.channel(source) == number)
     }
 }
