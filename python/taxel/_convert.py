@@ -35,6 +35,9 @@ _DATAGRAM_BYTES = 1400
 #: Between the pictures that a converted file shows to viewers, us.
 _PICTURE_US = 100_000
 
+#: Of a stream of numbers.
+_UNREAD = "lines_that_could_not_be_read"
+
 #: The board's stamps: their unit and how far they count.
 _STAMP_US, _TURN_US = 100, 6_553_600
 
@@ -95,9 +98,13 @@ def convert(
     if not isinstance(source, Recording | Events | Frames):
         raise ProblemError(f"source is {shown(source)}: must be a Recording, Events, Frames or the name of a file")
     recording = source if isinstance(source, Recording) else None
+    if recording is not None and recording.is_stream and kind == ".mcap" and not recording.is_slice:
+        with whole_file(place, overwrite=overwrite) as part:
+            return _write_stream(part, recording, compression)
     table = _table(source, frames_hz)
     if kind in (".npz", ".csv", ".h5"):
         remarks, lost = _remarks_of(recording)
+        lost = lost + _others(recording)
         if kind == ".h5":
             with whole_file(place, overwrite=overwrite) as part:
                 write_h5(part, table, remarks)
@@ -110,7 +117,8 @@ def convert(
     if isinstance(table, Frames):
         raise ProblemError(f"{place}: a {kind} holds events and no pictures; write pictures to .npz, .csv or .h5")
     # Of a slice the bytes are not known: they are made of its events.
-    origin = None if recording is None or recording.is_slice else recording._source
+    made = recording is None or recording.is_slice or recording.is_on_clock
+    origin = None if recording is None or made else recording._source
     if kind == ".lsa":
         if origin is not None and origin.speaks_version_2:
             raise ProblemError(
@@ -119,9 +127,9 @@ def convert(
         raw = None if origin is None else origin.payload
         payload, lost = (raw.tobytes(), []) if raw is not None else _encoded(table)
         _core.write_lsa(place, payload, overwrite)
-        return lost + _not_in_lsa(table, recording)
+        return lost + _not_in_lsa(table, recording) + _others(recording)
     with whole_file(place, overwrite=overwrite) as part:
-        return _write_mcap(part, table, recording, origin, compression)
+        return _write_mcap(part, table, recording, origin, compression) + _others(recording)
 
 
 def _table(source: Recording | Events | Frames, frames_hz: float | None) -> Events | Frames:
@@ -149,6 +157,22 @@ def _remarks_of(recording: Recording | None) -> tuple[Remarks, list[str]]:
     )
     lost = {"mcap": ["raw datagrams with their arrival times"], "lsa": ["raw bytes (words that are no events)"]}
     return remarks, lost.get(recording.kind, [])
+
+
+def _others(recording: Recording | None) -> list[str]:
+    """Return which sources of a recording are not written with one of them."""
+    if recording is None or len(recording._family) == 1:
+        return []
+    return [f"the source {name}" for name in recording._family if name != recording._source.label]
+
+
+def _write_stream(part: Path, recording: Recording, compression: str) -> list[str]:
+    """Write a stream of numbers alone, as it came."""
+    header, arrived, number, values = recording._stream()
+    writer = _core.RecordingWriter(part, json.dumps({**header, "sources": []}), compression, True)
+    writer.samples(arrived, number, values)
+    writer.finish(json.dumps({"received": len(arrived), "converted": recording.verdict}))
+    return _others(recording) + [f"{n} lines that could not be read" for n in [recording.counts[_UNREAD]] if n]
 
 
 def _sensor(table: Events | Frames) -> str:
@@ -223,6 +247,8 @@ def _write_mcap(
         writer.board_change(max(0, change.at_ns), change._json())
         done = max(done, upto)
     _add_datagrams(writer, datagrams, arrived, done, len(arrived))
+    if origin is not None and origin.held is not None:
+        writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(origin.held).reshape(-1))
     _add_remarks(writer, events, recording)
     writer.finish(json.dumps(_counts(recording, len(datagrams))))
     again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)

@@ -70,10 +70,18 @@ class Frames(Columns):
             raise ProblemError(f"pictures have shape {self.values.shape[1:]}: the array has {self.array.shape}")
 
     @classmethod
-    def from_events(cls, events: Events, period_us: int, start: int | None = None, stop: int | None = None) -> Frames:
+    def from_events(
+        cls,
+        events: Events,
+        period_us: int,
+        start: int | None = None,
+        stop: int | None = None,
+        *,
+        held: ArrayLike | None = None,
+    ) -> Frames:
         """Return the held intensities as pictures, every `period_us`.
 
-        A picture at time t holds what came up to and at t. A taxel reads 0 until its first event.
+        A picture at time t holds what came up to and at t. A taxel reads 0, or what it held, until its first event.
 
         Parameters
         ----------
@@ -82,10 +90,12 @@ class Frames(Columns):
         period_us : int, us, 1 or more
         start, stop : int, us, optional
             First picture, and the end (exclusive) of the pictures; the events' own time where they are left out.
+        held : shape (rows, columns), ticks, optional
+            What the taxels hold before the first event, where it is known.
 
         Raises
         ------
-        ProblemError : events without intensities, or a period below 1 us
+        ProblemError : events without intensities, a period below 1 us, or held values of another array
         """
         instance("events", events, Events)
         if events.intensity is None or events.present is None:
@@ -107,12 +117,17 @@ class Frames(Columns):
         order = there[np.argsort(events.t[there], kind="stable")]
         index = array.index(events.x[order], events.y[order])
         place = np.searchsorted(t, events.t[order], side="left")
-        held = np.zeros(array.rows * array.columns, np.float32)
+        now = np.zeros(array.rows * array.columns, np.float32)
+        if held is not None:
+            begins = kept_numbers("held", held, np.float32)
+            if begins.shape != array.shape:
+                raise ProblemError(f"held has shape {begins.shape}: must have the array's, {array.shape}")
+            now[:] = begins.reshape(-1)
         bounds = np.searchsorted(place, np.arange(len(t) + 1), side="left")
         for k in range(len(t)):
             new = slice(bounds[k], bounds[k + 1])
-            held[index[new]] = events.intensity[order[new]]
-            values[k] = held
+            now[index[new]] = events.intensity[order[new]]
+            values[k] = now
         pictures_of = frozen(values).reshape(len(t), array.rows, array.columns)
         return cls(pictures_of, frozen(t), unit="ticks", array=array)
 

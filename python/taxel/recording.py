@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from taxel import _arguments as arguments
 from taxel import _core
 from taxel._arguments import flag, instance, number, several, shown, text, window
+from taxel._clock import Clock
 from taxel._core import FormatError, ProblemError
 from taxel._h5 import read_h5
 from taxel._remarks import Note, Remarks, array_of, detections_of, notes_of
@@ -46,6 +47,9 @@ __all__ = [
 
 #: Pictures a second where a recording of events is asked for frames without a rate.
 FRAMES_HZ = 100.0
+
+#: What a file holds of a taxel that was never heard of.
+_UNHEARD = 65_535
 
 #: How well-known files of other kinds begin, and what to do with them.
 _MAGIC = {
@@ -137,65 +141,6 @@ class Datagrams:
         return f"Datagrams({len(self)}, {self.payload.size} bytes)"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Clock:
-    """Tell the board's time from the host's: when each datagram came against the last stamp in it.
-
-    A datagram comes late by whatever the way costs, never early, so the line below all arrivals is the offset between
-    the clocks and the shortest way together; they cannot be told apart.
-
-    Parameters
-    ----------
-    board_us : int64, shape (n,), us
-        The last stamp of each datagram that has one.
-    arrived_ns : int64, shape (n,), ns since 1970
-        When it came.
-    """
-
-    board_us: NDArray[np.int64]
-    arrived_ns: NDArray[np.int64]
-
-    @cached_property
-    def _line(self) -> tuple[int, int, float]:
-        line = _core.board_clock(self.board_us, self.arrived_ns)
-        if line is None:
-            raise ProblemError("clock: no datagram holds a time, so there is nothing to compare")
-        return line
-
-    @property
-    def drift_ppm(self) -> float:
-        """How much faster the host's clock runs than the board's, parts per million; 0 below four seconds."""
-        return self._line[2]
-
-    @property
-    def offset_ns(self) -> int:
-        """The host's time at time 0 of the board, ns since 1970."""
-        return int(self.host_ns(0))
-
-    def host_ns(self, board_us: int | NDArray[np.int64]) -> Any:
-        """Return the host's time (ns since 1970) at times of the board (us)."""
-        board, host, drift = self._line
-        since = np.asarray(board_us, np.int64) - board
-        return host + since * 1000 + np.rint(since * drift * 1e-3).astype(np.int64)
-
-    def board_us_at(self, host_ns: int) -> int:
-        """Return the board's time (us) at a time of the host (ns since 1970)."""
-        board, host, drift = self._line
-        return board + round((host_ns - host) / (1000.0 + drift * 1e-3))
-
-    @property
-    def delay_us(self) -> NDArray[np.float64]:
-        """How much later than the quickest each datagram came, us."""
-        late: NDArray[np.float64] = (self.arrived_ns - self.host_ns(self.board_us)) / 1000.0
-        return late
-
-    def __repr__(self) -> str:
-        if not len(self.board_us):
-            return "Clock(no datagram holds a time)"
-        late = np.percentile(self.delay_us, [50, 99])
-        return f"Clock(drift {self.drift_ppm:+.1f} ppm, delays {late[0]:.0f} us median, {late[1]:.0f} us 99 %)"
-
-
 class Recording:
     """Hold a file, opened: everything is read when it is first asked for.
 
@@ -231,13 +176,21 @@ class Recording:
     """
 
     def __init__(
-        self, source: _Source, window: tuple[float, float] | None = None, noted: tuple[Note, ...] = ()
+        self,
+        source: _Source,
+        window: tuple[float, float] | None = None,
+        noted: tuple[Note, ...] = (),
+        family: dict[str, _Source] | None = None,
+        clock_of: str | None = None,
     ) -> None:
         if not isinstance(source, _Source):
             raise ProblemError(f"source is {shown(source)}: a recording is opened by taxel.open(path), not built")
         self._source = source
         self._window = window
         self._noted = noted
+        #: All sources of the file by name, this one among them, and whose clock they are on (its own each, if none).
+        self._family = {source.label: source} if family is None else family
+        self._clock_of = clock_of
         self.path, self.kind, self.array, self.source = source.path, source.kind, source.array, source.origin
         self.name = source.name
 
@@ -265,7 +218,7 @@ class Recording:
         Returns
         -------
         Frames
-            Of events: the held intensities, 0 before a taxel's first; of pictures: the last at each time.
+            Of events: the held intensities, which begin with `held`, else with 0; of pictures: the last at each time.
 
         Raises
         ------
@@ -277,17 +230,87 @@ class Recording:
             period = round(1e6 / FRAMES_HZ) if period is None else period
             whole = self._source.events
             assert whole is not None  # a file holds one of the two
+            begins = self._source.held
+            begins = None if begins is None else np.where(begins == _UNHEARD, 0, begins)
             if self._window is None:
-                return Frames.from_events(whole, period)
+                return Frames.from_events(whole, period, held=begins)
             # A picture needs what came before the window, too.
             t = whole.t if len(whole) else np.zeros(1, np.int64)
             first, last = max(int(t.min()), _whole(self._window[0])), min(int(t.max()) + 1, _whole(self._window[1]))
-            return Frames.from_events(whole, period, first, max(first, last))
+            return Frames.from_events(whole, period, first, max(first, last), held=begins)
         if period is not None and len(own):
             t = np.arange(own.t[0], own.t[-1] + 1, period, dtype=np.int64)
             held = own.values[np.searchsorted(own.t, t, side="right") - 1]
             own = Frames(held, t, unit=own.unit, array=own.array)
         return own if self._window is None else own.between(*self._window)
+
+    @property
+    def sources(self) -> dict[str, Recording]:
+        """The sources of the file by name, in the order in which they were named, each with its own clock.
+
+        Each is a recording that every step takes. A file of one board is one source. Of one board and streams of
+        numbers (an IMU) the file's own events, frames and all else are the board's; of several boards they are refused,
+        by name.
+
+        Raises
+        ------
+        ProblemError : of a slice by the clock of one source: the others have another
+        """
+        if self._window is not None and len(self._family) > 1 and self._clock_of is None:
+            names = ", ".join(self._family)
+            raise ProblemError(
+                f"{self.path}: a slice by one clock, and its sources ({names}) have each its own; say on_clock(name) "
+                "before between"
+            )
+        return {
+            name: Recording(source, self._window, self._noted if source is self._source else (), self._family,
+                            self._clock_of)
+            for name, source in self._family.items()
+        }  # fmt: skip
+
+    def on_clock(self, name: str) -> Recording:
+        """Return the same recording with all its sources' times by the clock of one of them, or of the host.
+
+        Nothing else applies what is known of the clocks (`clock`): until this is asked for, each source has its own.
+
+        Parameters
+        ----------
+        name : str
+            A source, or "host": then times are us since 1970.
+
+        Raises
+        ------
+        ProblemError : no such source, one without arrival times, or a slice by another clock
+
+        Examples
+        --------
+        After ``both = taxel.open("two.mcap").on_clock("left")`` the times of ``both.sources["right"].events`` are in us
+        of the board "left".
+        """
+        names = [*self._family, "host"]
+        text("name", name)
+        if name not in names:
+            raise ProblemError(f"{self.path}: has no clock {name!r}; there are {', '.join(names)}")
+        if self._clock_of is not None:
+            raise ProblemError(f"{self.path}: is on the clock of {self._clock_of} already")
+        if self._window is not None:
+            raise ProblemError(f"{self.path}: a slice by its own clock; say on_clock({name!r}) before between")
+        to = None if name == "host" else _clock_of(self._family[name])
+        family = {
+            one: source if one == name else _OnClock(source, to) for one, source in self._family.items()
+        }  # fmt: skip
+        own = _alone(family) if self._source.is_several else family[self._source.label]
+        return Recording(own, None, (), family, name)
+
+    @cached_property
+    def held(self) -> NDArray[np.float32] | None:
+        """What the taxels held when it began, ticks, shape (rows, columns), NaN of one that was not heard of.
+
+        None where the file does not say. A recording that begins in mid-stream says it, as a taxel that does not change
+        would else be unknown until it does; `frames` begins with it.
+        """
+        held = self._source.held
+        return None if held is None else np.where(held == _UNHEARD, np.nan, held).astype(np.float32)
 
     @cached_property
     def calibration(self) -> Calibration | None:
@@ -339,7 +362,7 @@ class Recording:
     @property
     def has_events(self) -> bool:
         """Whether the file holds events (else pictures)."""
-        return self._source.frames is None
+        return self._source.is_several or self._source.holds_events
 
     @cached_property
     def notes(self) -> tuple[Note, ...]:
@@ -349,7 +372,9 @@ class Recording:
         ------
         FormatError : a table of labels that is none (names the line)
         """
-        notes = self._source.notes + self._noted + _beside(self.path, self.kind)
+        # They are by the clock of the file's first source.
+        beside = _beside(self.path, self.kind) if self._source.label == next(iter(self._family)) else ()
+        notes = self._source.notes + self._noted + self._source.moved(beside)
         if self._window is None:
             return notes
         start, stop = self._window
@@ -381,6 +406,36 @@ class Recording:
     def clock(self) -> Clock | None:
         """Arrival times against board time; None where the file has no arrival times."""
         return self._source.clock
+
+    @property
+    def columns(self) -> list[str]:
+        """Of a stream of numbers the names of its columns of values, in the order of `frames`.
+
+        Raises
+        ------
+        ProblemError : no stream of numbers
+        """
+        of = self._source.of if isinstance(self._source, _OnClock) else self._source
+        if not isinstance(of, _Samples):
+            raise ProblemError(
+                f"{self.path}: source {self._source.label!r} is no stream of numbers, so it has no columns"
+            )
+        return of.columns
+
+    @property
+    def is_stream(self) -> bool:
+        """Whether it is a stream of numbers, line by line, as an IMU's, and no array of taxels."""
+        return isinstance(self._source, _Samples)
+
+    def _stream(self) -> tuple[dict[str, Any], NDArray[np.int64], NDArray[np.uint64], NDArray[np.float64]]:
+        """Return header, arrivals (ns), numbers and all columns of a stream, its own stamps unwrapped."""
+        assert isinstance(self._source, _Samples)
+        return self._source.as_it_came
+
+    @property
+    def is_on_clock(self) -> bool:
+        """Whether times are by another clock, made by `on_clock`."""
+        return self._clock_of is not None
 
     def datagrams(self) -> Datagrams:
         """Return the raw datagrams as they came; of a slice, too, all of the file.
@@ -424,12 +479,13 @@ class Recording:
         start, stop = window("us", start, stop)
         if self._window is not None:
             start, stop = max(start, self._window[0]), min(stop, self._window[1])
-        return Recording(self._source, (start, max(start, stop)), self._noted)
+        part = (start, max(start, stop))
+        return Recording(self._source, part, self._noted, self._family, self._clock_of)
 
     def with_notes(self, notes: Iterable[Note]) -> Recording:
         """Return the same recording with further notes."""
         more = tuple(instance("notes", note, Note) for note in several("notes", notes))
-        return Recording(self._source, self._window, self._noted + more)
+        return Recording(self._source, self._window, self._noted + more, self._family, self._clock_of)
 
     def plot(self) -> Figure:
         """Draw what is in it: events (or the sum of pressure) over time, and where on the array."""
@@ -443,12 +499,16 @@ class Recording:
         return html(self)
 
     def __repr__(self) -> str:
+        if self._source.is_several:
+            return f"Recording({self.name}: {len(self._family)} sources: {', '.join(self._family)})"
         what = self.events if self.has_events else self.frames()
         noun = "events" if self.has_events else "pictures"
         time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) else "no time"
         more = [f"{len(self.notes)} notes"] * bool(self.notes)
         more += [f"{len(self.detections)} detections"] * bool(len(self.detections))
         more += ["truncated"] * self.truncated
+        others = [name for name in self._family if name != self._source.label]
+        more += [f"beside {', '.join(others)}"] * bool(others)
         size = f"{self.array.rows} x {self.array.columns} taxels"
         return f"Recording({self.name}: {', '.join([f'{len(what)} {noun}', time, size, *more])})"
 
@@ -503,13 +563,39 @@ def open_recording(
     kind = _kind(place, head)
     try:
         if kind == "mcap":
-            return Recording(_Mcap(place, pairing))
+            return _of_mcap(place, pairing)
         if kind == "lsa":
             return Recording(_Lsa(place, array or Array.thesis(), pairing, differences))
         table = {"npz": read_npz, "csv": read_csv, "h5": read_h5}[kind](place, array)
         return in_memory(place, kind, *table)
     except MemoryError as error:
         raise FormatError(f"{place}: needs more memory than there is ({error})") from None
+
+
+def _of_mcap(place: Path, pairing: str) -> Recording:
+    """Open the live format, with all its sources."""
+    reader = _core.RecordingReader(place)
+    family: dict[str, _Source] = {}
+    for name in reader.sources():
+        one = reader.of_source(name)
+        header = json.loads(one.about())["header"]
+        family[name] = _Mcap(place, pairing, one) if header.get("stream") is None else _Samples(place, one)
+    return Recording(_alone(family), family=family)
+
+
+def _alone(family: dict[str, _Source]) -> _Source:
+    """Return the source whose events are the file's: its only one, or its only board; else one that refuses."""
+    boards = [source for source in family.values() if source.holds_events]
+    if len(family) == 1:
+        return next(iter(family.values()))
+    return boards[0] if len(boards) == 1 else _Several(family)
+
+
+def _clock_of(source: _Source) -> Clock:
+    clock = source.clock
+    if clock is None or not len(clock.board_us):
+        raise ProblemError(f"{source.path}: source {source.label!r} has no arrival times, so its clock is not known")
+    return clock
 
 
 def in_memory(path: Path, kind: str, table: Events | Frames, remarks: Remarks, *, name: str | None = None) -> Recording:
@@ -566,6 +652,26 @@ class _Source:
     def __init__(self, path: Path, kind: str, array: Array, origin: str = "") -> None:
         self.path, self.kind, self.array, self.origin = path, kind, array, origin
         self.name = path.name
+        #: What the source is called among those of its file.
+        self.label = "board"
+
+    @property
+    def is_several(self) -> bool:
+        """Whether there are several sources of events, so that none is the file's."""
+        return False
+
+    @property
+    def holds_events(self) -> bool:
+        return self.frames is None
+
+    @property
+    def held(self) -> NDArray[np.uint16] | None:
+        """What the taxels held when it began, shape (rows, columns)."""
+        return None
+
+    def moved(self, notes: tuple[Note, ...]) -> tuple[Note, ...]:
+        """Return notes by the clock that the source is on."""
+        return notes
 
     @property
     def events(self) -> Events | None:
@@ -717,19 +823,62 @@ class _Lsa(_Source):
         return "; ".join(parts)
 
 
-class _Mcap(_Source):
-    """The live format."""
+class _Reader(_Source):
+    """A source of the live format."""
 
-    def __init__(self, path: Path, pairing: str) -> None:
-        self._reader, self._pairing = _core.RecordingReader(path), pairing
+    def __init__(self, path: Path, reader: _core.RecordingReader) -> None:
+        self._reader = reader
         about = json.loads(self._reader.about())
         self._header, self._ending, self._rebuilt = about["header"], about["ending"] or {}, about["rebuilt"]
         super().__init__(path, "mcap", array_of(self._header["array"]), self._header["source"])
+        self.label = self._header.get("name", "board")
 
     @cached_property
     def _remarks(self) -> dict[str, Any]:
         remarks: dict[str, Any] = json.loads(self._reader.remarks())
         return remarks
+
+    @property
+    def truncated(self) -> bool:
+        return bool(self._rebuilt["unfinished"]) or "finished" not in self._ending
+
+    @property
+    def rebuilt(self) -> dict[str, int]:
+        rebuilt = {key: int(value) for key, value in self._rebuilt.items() if key != "unfinished"}
+        return {**rebuilt, "bad_chunks": int(self._remarks["bad_chunks"])}
+
+    @property
+    def verdict(self) -> str:
+        rebuilt = self.rebuilt
+        bad = []
+        if rebuilt["large_chunks"]:
+            bad.append(f"{rebuilt['large_chunks']} chunks skipped that say they unpack to more than 64 MiB")
+        if rebuilt["bad_chunks"]:
+            bad.append(f"{rebuilt['bad_chunks']} bad chunks skipped")
+        if rebuilt["gaps"]:
+            bad.append(f"{rebuilt['skipped_bytes']} bytes of the file skipped in {rebuilt['gaps']} places")
+        if rebuilt["torn_bytes"]:
+            bad.append(f"{rebuilt['torn_bytes']} torn bytes at the end")
+        if "finished" in self._ending:
+            said = str(self._ending["finished"]["verdict"])
+            return f"LOST in the file: {', '.join(bad)}; while recording: {said}" if bad else said
+        why = "not finished: what came last is missing"
+        if "stopped" in self._ending:
+            why = f"stopped by an error ({self._ending['stopped']}): what came last is missing"
+        so_far = self._remarks["counts"]
+        known = "no counts were kept yet"
+        if so_far is not None:
+            # What was received then is more than what the file holds now: the rest is the unfinished end.
+            known = _core.recording_verdict(json.dumps({**so_far, "received": 0}))
+        return "; ".join([why, *bad, f"until then: {known}"])
+
+
+class _Mcap(_Reader):
+    """A board's part of the live format."""
+
+    def __init__(self, path: Path, pairing: str, reader: _core.RecordingReader) -> None:
+        super().__init__(path, reader)
+        self._pairing = pairing
 
     @cached_property
     def _decoded(self) -> tuple[Any, ...]:
@@ -770,12 +919,18 @@ class _Mcap(_Source):
     def detections(self) -> Detections:
         return detections_of(self._remarks["detections"])
 
-    @property
+    @cached_property
     def clock(self) -> Clock:
-        events, _, _, arrived, _, first, _ = self._decoded
-        last = np.append(first[1:], len(events)).astype(np.int64) - 1
-        has = last >= first.astype(np.int64)
-        return Clock(np.ascontiguousarray(events.t[last[has]]), np.ascontiguousarray(arrived[has]))
+        arrived, left = self._decoded[3], self._decoded[7]
+        has = left > np.iinfo(np.int64).min
+        return Clock(np.ascontiguousarray(left[has]), np.ascontiguousarray(arrived[has]))
+
+    @property
+    def held(self) -> NDArray[np.uint16] | None:
+        held = self._remarks["held"]
+        if held is None or len(held) != self.array.rows * self.array.columns:
+            return None
+        return np.array(held, np.uint16).reshape(self.array.shape)
 
     @property
     def datagrams(self) -> Datagrams:
@@ -794,15 +949,6 @@ class _Mcap(_Source):
         return int(self._header["origin_us"])
 
     @property
-    def truncated(self) -> bool:
-        return bool(self._rebuilt["unfinished"]) or "finished" not in self._ending
-
-    @property
-    def rebuilt(self) -> dict[str, int]:
-        rebuilt = {key: int(value) for key, value in self._rebuilt.items() if key != "unfinished"}
-        return {**rebuilt, "bad_chunks": int(self._remarks["bad_chunks"])}
-
-    @property
     def counts(self) -> dict[str, Any]:
         said = self._ending.get("finished", {}).get("counts") or self._remarks["counts"] or {}
         _, decoder, _, _, number, *_ = self._decoded
@@ -816,27 +962,207 @@ class _Mcap(_Source):
             **self.rebuilt,
         }
 
+
+class _Samples(_Reader):
+    """A stream's part of the live format: numbers, line by line."""
+
+    @cached_property
+    def _read(self) -> tuple[Any, ...]:
+        return self._reader.samples()
+
+    @property
+    def holds_events(self) -> bool:
+        return False
+
+    @cached_property
+    def frames(self) -> Frames:
+        _, _, t, values, _, _ = self._read
+        order = np.argsort(t, kind="stable")
+        rows = values.reshape(len(t), 1, self.array.columns)[order]
+        return Frames(rows.astype(np.float32), _ascending(t[order]), unit="as sent", array=self.array)
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of the columns of values."""
+        stream = self._header["stream"]
+        return [name for name in stream["columns"] if name != stream.get("time")]
+
+    @cached_property
+    def clock(self) -> Clock:
+        return Clock(self._read[2], self._read[0])
+
+    @property
+    def as_it_came(self) -> tuple[dict[str, Any], NDArray[np.int64], NDArray[np.uint64], NDArray[np.float64]]:
+        """Header, arrivals (ns), numbers, and all columns line by line: the source's own stamps unwrapped."""
+        arrived, number, t, values, _, _ = self._read
+        stream = self._header["stream"]
+        rows = values.reshape(len(t), self.array.columns)
+        if stream.get("time") is not None:
+            own = t / float(stream["unit_us"])
+            rows = np.insert(rows, stream["columns"].index(stream["time"]), own, axis=1)
+        return self._header, arrived, number, np.ascontiguousarray(rows).reshape(-1)
+
+    @property
+    def counts(self) -> dict[str, Any]:
+        _, _, t, _, bad, resets = self._read
+        said = self._ending.get("finished", {}).get("counts") or {}
+        seen = {"samples": len(t), "lines_that_could_not_be_read": bad, "clock_began_anew": resets}
+        return {**seen, "received": said.get("received"), **self.rebuilt}
+
+
+class _Several(_Source):
+    """A file of several boards, of which none is the file's."""
+
+    def __init__(self, family: dict[str, _Source]) -> None:
+        first = next(iter(family.values()))
+        super().__init__(first.path, first.kind, first.array, first.origin)
+        self._family, self.label = family, first.label
+
+    @property
+    def is_several(self) -> bool:
+        return True
+
+    def _refusal(self) -> ProblemError:
+        names = ", ".join(self._family)
+        first = next(iter(self._family))
+        return ProblemError(
+            f"{self.path}: holds {len(self._family)} sources ({names}); say which, as recording.sources[{first!r}]"
+        )
+
+    @property
+    def events(self) -> Events:
+        raise self._refusal()
+
+    @property
+    def registers(self) -> dict[str, Any]:
+        raise self._refusal()
+
+    @property
+    def register_changes(self) -> tuple[tuple[int, dict[str, Any]], ...]:
+        raise self._refusal()
+
+    @property
+    def board_changes(self) -> tuple[BoardChange, ...]:
+        raise self._refusal()
+
+    @property
+    def held(self) -> NDArray[np.uint16]:
+        raise self._refusal()
+
+    @property
+    def clock(self) -> Clock:
+        raise self._refusal()
+
+    @property
+    def datagrams(self) -> Datagrams:
+        raise self._refusal()
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        return next(iter(self._family.values())).notes
+
+    @property
+    def detections(self) -> Detections:
+        return next(iter(self._family.values())).detections
+
+    @property
+    def counts(self) -> dict[str, Any]:
+        return {name: source.counts for name, source in self._family.items()}
+
     @property
     def verdict(self) -> str:
-        rebuilt = self.rebuilt
-        bad = []
-        if rebuilt["large_chunks"]:
-            bad.append(f"{rebuilt['large_chunks']} chunks skipped that say they unpack to more than 64 MiB")
-        if rebuilt["bad_chunks"]:
-            bad.append(f"{rebuilt['bad_chunks']} bad chunks skipped")
-        if rebuilt["gaps"]:
-            bad.append(f"{rebuilt['skipped_bytes']} bytes of the file skipped in {rebuilt['gaps']} places")
-        if rebuilt["torn_bytes"]:
-            bad.append(f"{rebuilt['torn_bytes']} torn bytes at the end")
-        if "finished" in self._ending:
-            said = str(self._ending["finished"]["verdict"])
-            return f"LOST in the file: {', '.join(bad)}; while recording: {said}" if bad else said
-        why = "not finished: what came last is missing"
-        if "stopped" in self._ending:
-            why = f"stopped by an error ({self._ending['stopped']}): what came last is missing"
-        so_far = self._remarks["counts"]
-        known = "no counts were kept yet"
-        if so_far is not None:
-            # What was received then is more than what the file holds now: the rest is the unfinished end.
-            known = _core.recording_verdict(json.dumps({**so_far, "received": 0}))
-        return "; ".join([why, *bad, f"until then: {known}"])
+        return "; ".join(f"{name}: {source.verdict}" for name, source in self._family.items())
+
+    @property
+    def truncated(self) -> bool:
+        return any(source.truncated for source in self._family.values())
+
+
+class _OnClock(_Source):
+    """A source with its times by another clock; the host's, where that is none."""
+
+    def __init__(self, source: _Source, to: Clock | None) -> None:
+        super().__init__(source.path, source.kind, source.array, source.origin)
+        self.name, self.label = source.name, source.label
+        self.of, self._own, self._to = source, _clock_of(source), to
+
+    def _times(self, t: NDArray[np.int64]) -> NDArray[np.int64]:
+        host = self._own.host_ns(np.asarray(t, np.int64))
+        return np.asarray((host + 500) // 1000 if self._to is None else self._to.board_us_at(host), np.int64)
+
+    def _time(self, t: int) -> int:
+        return int(self._times(np.array([t]))[0])
+
+    @property
+    def holds_events(self) -> bool:
+        return self.of.holds_events
+
+    @cached_property
+    def events(self) -> Events | None:
+        of = self.of.events
+        if of is None:
+            return None
+        more: dict[str, Any] = {"array": of.array, "repaired": of.repaired}
+        if of.intensity is not None:
+            more |= {"intensity": of.intensity, "present": of.present}
+        markers = [(self._time(t), start) for t, start in of.markers]
+        return Events(self._times(of.t), of.x, of.y, of.p, markers=markers, **more)
+
+    @cached_property
+    def frames(self) -> Frames | None:
+        of = self.of.frames
+        return None if of is None else Frames(of.values, _ascending(self._times(of.t)), unit=of.unit, array=of.array)
+
+    @property
+    def registers(self) -> dict[str, Any] | None:
+        return self.of.registers
+
+    @property
+    def register_changes(self) -> tuple[tuple[int, dict[str, Any]], ...]:
+        return self.of.register_changes
+
+    @property
+    def board_changes(self) -> tuple[BoardChange, ...]:
+        return tuple(replace(c, t=None if c.t is None else self._time(c.t)) for c in self.of.board_changes)
+
+    def moved(self, notes: tuple[Note, ...]) -> tuple[Note, ...]:
+        return tuple(replace(note, t=None if note.t is None else self._time(note.t)) for note in notes)
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        return self.moved(self.of.notes)
+
+    @property
+    def detections(self) -> Detections:
+        of = self.of.detections
+        return Detections(of.label, self._times(of.t), self._times(of.known), of.slope, repaired=of.repaired)
+
+    @property
+    def clock(self) -> Clock:
+        return Clock(self._times(self._own.board_us), self._own.arrived_ns)
+
+    @property
+    def held(self) -> NDArray[np.uint16] | None:
+        return self.of.held
+
+    @property
+    def counts(self) -> dict[str, Any]:
+        return self.of.counts
+
+    @property
+    def verdict(self) -> str:
+        return self.of.verdict
+
+    @property
+    def truncated(self) -> bool:
+        return self.of.truncated
+
+    @property
+    def rebuilt(self) -> dict[str, int]:
+        return self.of.rebuilt
+
+
+def _ascending(t: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return times of pictures, of which two at one time follow one another by 1 us."""
+    steps = np.arange(len(t))
+    return np.maximum.accumulate(t - steps) + steps if len(t) else t

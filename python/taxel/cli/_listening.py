@@ -219,6 +219,16 @@ def open_recording(path: Path) -> Recording:
     return recording.open_recording(path)
 
 
+def of_source(recording: Recording, name: str | None) -> Recording:
+    """Return the source that ``--source`` names, or the recording where it names none."""
+    if name is None:
+        return recording
+    sources = recording.sources
+    if name not in sources:
+        raise ProblemError(f"--source {name}: {recording.path} holds {', '.join(sources)}")
+    return sources[name]
+
+
 def open_all(paths: Sequence[Path]) -> list[Recording]:
     """Open recordings one after the other; of a folder, or of another maker's file, all trials in it."""
     from taxel._opening import open_any  # noqa: PLC0415  the command line starts quickly

@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 
 from taxel.cli._app import app
+from taxel.cli._listening import of_source, open_recording
 
 __all__ = ["convert"]
 
@@ -21,6 +22,9 @@ def convert(
     frames: Annotated[
         float | None,
         typer.Option(metavar="HZ", help="Write pictures at this rate (.npz, .csv, .h5), not events."),
+    ] = None,
+    part: Annotated[
+        str | None, typer.Option("--source", metavar="NAME", help="Of a recording of several sources this one.")
     ] = None,
     compression: Annotated[str, typer.Option(help="Of a .mcap: none, lz4 or zstd.")] = "none",
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the target where it exists.")] = False,
@@ -36,7 +40,8 @@ def convert(
     try_whole(target, overwrite=overwrite)
     # Shown on a terminal only, and gone when done.
     with Console(stderr=True).status(f"{source} to {target}"):
-        lost = taxel.convert(source, target, frames_hz=frames, compression=compression, overwrite=overwrite)
+        recording = of_source(open_recording(source), part)
+        lost = taxel.convert(recording, target, frames_hz=frames, compression=compression, overwrite=overwrite)
     if as_json:
         typer.echo(json.dumps({"source": str(source), "target": str(target), "lost": lost}))
         return

@@ -12,6 +12,7 @@ import typer
 from taxel import _core
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._listening import of_source
 
 __all__ = ["cut"]
 
@@ -27,6 +28,9 @@ def cut(
     label: Annotated[str | None, typer.Option(help="Cut around each note of this text.")] = None,
     before: Annotated[float, typer.Option(min=0.0, metavar="S", help="With --label: so long before it, s.")] = 0.5,
     after: Annotated[float, typer.Option(min=0.0, metavar="S", help="With --label: so long after it, s.")] = 0.5,
+    source: Annotated[
+        str | None, typer.Option("--source", metavar="NAME", help="Of a recording of several sources this one.")
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace OUT where it exists.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -38,7 +42,7 @@ def cut(
     from taxel.recording import open_recording  # noqa: PLC0415
 
     parts = taxel.cut(
-        open_recording(recording),
+        of_source(open_recording(recording), source),
         start_us=float("-inf") if start is None else start * 1e6,
         stop_us=float("inf") if stop is None else stop * 1e6,
         columns=_range("--columns", columns),

@@ -69,6 +69,10 @@ def info(
             every = [about(recording, above_rest(recording)) for recording in opened]
             typer.echo(json.dumps(every) if as_json else "\n".join(_page(said) for said in every))
             return
+        if len(opened.sources) > 1:
+            several = _sources(opened, drawn=picture is not None or table is not None)
+            typer.echo(json.dumps(several) if as_json else _pages(several))
+            return
         recording = opened
         pressed = above_rest(recording)
         said = about(recording, pressed)
@@ -96,6 +100,43 @@ def info(
         write_whole(picture, lambda out: figure.savefig(out, format=kind), overwrite=overwrite)
         said["picture"] = str(picture)
     typer.echo(json.dumps(said) if as_json else _page(said))
+
+
+def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
+    """Return what is said of each source of a file, and how their clocks lie to the first one's."""
+    from taxel._pressure import above_rest  # noqa: PLC0415  the command line starts quickly
+
+    if drawn:
+        raise ProblemError(
+            f"{recording.path}: holds {len(recording.sources)} sources ({', '.join(recording.sources)}); a picture "
+            "or a table is of one: taxel convert --source NAME writes it to a file of its own"
+        )
+    first = next(iter(recording.sources.values()))
+    sources: dict[str, Any] = {}
+    for name, source in recording.sources.items():
+        said = about(source, None if source.is_stream else above_rest(source))
+        clock, ours = source.clock, first.clock
+        if source.is_stream:
+            said["columns"] = source.columns
+        if (
+            source is not first
+            and clock is not None
+            and ours is not None
+            and len(clock.board_us)
+            and len(ours.board_us)
+        ):
+            begins = int(clock.board_us.min())
+            said["against"] = {
+                "source": next(iter(recording.sources)),
+                "offset_us": int(ours.board_us_at(int(clock.host_ns(begins)))) - begins,
+                "drift_ppm": clock.drift_ppm - ours.drift_ppm,
+            }
+        sources[name] = said
+    return {"file": str(recording.path), "verdict": recording.verdict, "sources": sources}
+
+
+def _pages(several: dict[str, Any]) -> str:
+    return "\n".join(f"{name}: {_page(said)}" for name, said in several["sources"].items())
 
 
 def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[str, Any]:
@@ -131,7 +172,7 @@ def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[st
         late = np.percentile(clock.delay_us, [50, 99])
         said |= {
             "seconds_host": host,
-            "events_per_s_host": said["events"] / host if host else None,
+            "events_per_s_host": said["events"] / host if host and "events" in said else None,
             "datagrams_per_s_host": len(clock.arrived_ns) / host if host else None,
             "drift_ppm": clock.drift_ppm,
             "delay_us": {"median": float(late[0]), "p99": float(late[1])},
@@ -210,7 +251,12 @@ def _contents(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
         words = f"{said['intensities']} with intensity, {len(said['markers'])} markers"
         yield "events", f"{said['events']}, {words}"
     else:
-        yield "pictures", f"{said['pictures']} ({said['unit']})"
+        yield ("samples" if "columns" in said else "pictures"), f"{said['pictures']} ({said['unit']})"
+    if "columns" in said:
+        yield "columns", ", ".join(said["columns"])
+    if "against" in said:
+        of = said["against"]
+        yield f"clock of {of['source']}", f"{of['offset_us']:+d} us at the beginning, {of['drift_ppm']:+.1f} ppm faster"
     if said["calibration"] is not None:
         yield "calibration", said["calibration"]
     pressed = said["pressure"]

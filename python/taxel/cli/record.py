@@ -46,6 +46,15 @@ def record(
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
     markers: Annotated[bool, typer.Option("--markers", help="End where the board marks a stop.")] = False,
     compression: Annotated[str, typer.Option(help="Of .mcap: none, lz4 or zstd.")] = "none",
+    name: Annotated[str, typer.Option(help="What the board is called among the recording's sources.")] = "board",
+    source: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=WHAT",
+            help="Record this too: another board (udp:HOST:PORT,array=16x16), lines of numbers as an IMU's "
+            "(serial:PATH@BAUD, pipe:PATH, columns=t_us:ax:ay); may be repeated.",
+        ),
+    ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
     differences: Annotated[bool, typer.Option("--differences", help="The board sends intensity differences.")] = False,
     length: Annotated[
@@ -63,10 +72,12 @@ def record(
     Ends with Ctrl-C, after --seconds, or with the board's stop marker (--markers). With --length it records one trial
     after the other, the index appended to the name, a countdown with beeps before each. While it records, a key on the
     terminal, or a line on any other standard input, writes a note with that label and the board's time into the .mcap
-    (give it < /dev/null where its input is meant for others). Exit code 3 where nothing came
+    (give it < /dev/null where its input is meant for others). --source records other boards, and lines of numbers, into
+    the same .mcap, each by its own clock. Exit code 3 where nothing came
     or something was lost after it had arrived, 2 where the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap
+    Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay
     """
     if length is None and trials is not None:
         raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
@@ -80,6 +91,8 @@ def record(
         "compression": compression,
         "overwrite": overwrite,
         "differences": differences,
+        "name": name,
+        "sources": _named(source or []),
     }
     console = Console(stderr=True, quiet=as_json)
     if length is None:
@@ -137,8 +150,11 @@ def _one(
     """Record one file until its time is over, the board marks a stop, or Ctrl-C; return whether it was that."""
     with Live(record=file, **options) as live:
         try:
-            # A .lsa holds no notes.
-            takes = noting(live.note, console.print) if file.suffix == ".mcap" else nullcontext("")
+            # A .lsa holds no notes, and a source may have the standard input for itself.
+            notes = file.suffix == ".mcap" and not any(
+                what.startswith("pipe:-") for what in options["sources"].values()
+            )
+            takes = noting(live.note, console.print) if notes else nullcontext("")
             with takes as how:
                 console.print(f"listening on UDP {live.address[0]}:{live.address[1]}, recording to {file}; Ctrl-C ends")
                 if how:
@@ -168,6 +184,19 @@ def _watch(live: Live, seconds: float | None, markers: bool, console: Console) -
             before = now
 
 
+def _named(said: list[str]) -> dict[str, str]:
+    """Return what ``--source NAME=WHAT`` says."""
+    sources: dict[str, str] = {}
+    for one in said:
+        name, equals, what = one.partition("=")
+        if not equals or not name or not what:
+            raise ProblemError(f"--source {one}: must be NAME=WHAT, as imu=serial:/dev/ttyACM0")
+        if name in sources:
+            raise ProblemError(f"--source {one}: there are two of that name")
+        sources[name] = what
+    return sources
+
+
 def _say(summary: Summary, as_json: bool) -> None:
     if as_json:
         path = None if summary.path is None else str(summary.path)
@@ -180,4 +209,9 @@ def _say(summary: Summary, as_json: bool) -> None:
             f"{summary.path}: {counters['seconds']:.1f} s, {counters['decoded']} datagrams, {wire['bytes']} bytes, "
             f"{counters['events']} events, {wire['markers']} markers"
         )
+    for name, came in counters["sources"].items():
+        what = (
+            f"{came['decoded']} datagrams, {came['events']} events" if "capture" in came else f"{came['lines']} lines"
+        )
+        typer.echo(f"  {name}: {what}" + f"; {came['trouble']}" * bool(came.get("trouble")))
     typer.echo(summary.verdict)

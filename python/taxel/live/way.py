@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -21,6 +22,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
+from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.tare import Tare
 from taxel.wire import FRAME_US, Registers
 
@@ -28,6 +30,9 @@ __all__ = ["PORT", "Live", "Said", "Source", "Summary", "heard", "send"]
 
 #: Where the board's datagrams go (reading: the thesis names no port).
 PORT = 5208
+
+#: How what goes to, or comes from, the lab streaming layer begins.
+_LSL = "lsl:"
 
 #: The largest value of a source's frames.
 _MOST = 2**16 - 1
@@ -86,8 +91,8 @@ class Summary:
     @property
     def lost(self) -> int:
         """How much was lost after it had arrived: messages in the kernel, datagrams in our queue; 0 is nothing."""
-        capture = self.counters["capture"]
-        return int(capture["dropped_by_kernel"] + capture["dropped_by_queue"])
+        boards = [self.counters, *(one for one in self.counters["sources"].values() if "capture" in one)]
+        return sum(int(one["capture"]["dropped_by_kernel"] + one["capture"]["dropped_by_queue"]) for one in boards)
 
     @property
     def nothing_came(self) -> bool:
@@ -122,6 +127,16 @@ class Live:
         ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
     record : path, optional
         A new file: `.mcap` keeps all that is known, `.lsa` the manual's raw bytes.
+    name : str
+        What the board is called in the recording.
+    sources : mapping of str to str, optional
+        What else the recording (`.mcap`) holds, by name, each with its own clock:
+        "udp:HOST:PORT,array=16x16,preset=2 kHz" another board, which sends to that address of this machine;
+        "serial:PATH@BAUD" or "pipe:PATH" lines of numbers, as an IMU's ("-" is the standard input); "given" numbers
+        that a program gives (`sample`). Of numbers ``columns=t_us:ax:ay`` says what a line holds (else its first line
+        is waited for), and ``time=NAME:UNIT`` which column is its clock, where not one called `t_us`,
+        `time_ms` ... is; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, a line's time is when it
+        came.
     compression : {"none", "lz4", "zstd"}
         Of `.mcap`.
     overwrite : bool
@@ -136,7 +151,8 @@ class Live:
         Write each detection to the standard output as one line of JSON, from the thread that made it.
     send : str or sequence of str
         Send each detection as such a line to "udp:HOST:PORT" (a datagram a line), "pipe:PATH" (a named pipe that is
-        there) or "serial:PATH@BAUD", from the thread that made it. Up to 1024 lines wait for who reads slowly; what
+        there) or "serial:PATH@BAUD", from the thread that made it; "lsl:NAME" says its label in a stream of markers of
+        the lab streaming layer. Up to 1024 lines wait for who reads slowly; what
         finds no room, or nobody who reads, is lost and counted, and nothing waits for it.
     kernel_buffer_bytes, queue_bytes, readout_events : int, optional
         How much may wait in the kernel, before the decoder and before the readout.
@@ -177,6 +193,8 @@ class Live:
         readout: Readout | None = None,
         tare: Tare | float | None = None,
         record: str | os.PathLike[str] | None = None,
+        name: str = "board",
+        sources: Mapping[str, str] | None = None,
         compression: str = "none",
         overwrite: bool = False,
         guard_frames: float = 5.0,
@@ -194,6 +212,11 @@ class Live:
         if array is None and readout is not None:
             array = readout.array
         self.array = Array._of(array)
+        goes = [text("send", to) for to in ([send] if isinstance(send, str) else several("send", send))]
+        heard_of = _sources(sources)
+        outlets = [LslOutlet(to.removeprefix(_LSL)) for to in goes if to.startswith(_LSL)]
+        inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in heard_of if how.startswith(_LSL)}
+        self._inlets = list(inlets.values())
         sizes = {
             "kernel_buffer_bytes": kernel_buffer_bytes,
             "queue_bytes": queue_bytes,
@@ -205,20 +228,23 @@ class Live:
             "guard_frames": number("guard_frames", guard_frames),
             "gap_frames": number("gap_frames", gap_frames),
             "gro": None if gro is None else flag("gro", gro),
-            "send": [text("send", to) for to in ([send] if isinstance(send, str) else several("send", send))],
-            **{name: None if size is None else whole(name, size, 0, 2**31 - 1) for name, size in sizes.items()},
+            "send": [to for to in goes if not to.startswith(_LSL)],
+            "name": text("name", name),
+            "sources": [(what, _given(inlets[what]) if what in inlets else how) for what, how in heard_of],
+            **{what: None if size is None else whole(what, size, 0, 2**31 - 1) for what, size in sizes.items()},
         }
         #: What is needed to begin again on another address.
         self._how: dict[str, Any] = {
             "array": self.array, "registers": registers, "differences": differences, "readout": readout, "tare": tare,
-            "record": record, "compression": compression, "overwrite": overwrite, "guard_frames": guard_frames,
-            "gap_frames": gap_frames, "say": say, "lines": lines, "send": send,
+            "record": record, "name": name, "sources": sources, "compression": compression, "overwrite": overwrite,
+            "guard_frames": guard_frames, "gap_frames": gap_frames, "say": say, "lines": lines, "send": send,
             "kernel_buffer_bytes": kernel_buffer_bytes, "queue_bytes": queue_bytes, "readout_events": readout_events,
             "gro": gro,
         }  # fmt: skip
         self._labels = None if readout is None else list(json.loads(readout.to_json())["neurons"])
         if say is not None and not callable(say):
             raise ProblemError(f"say is {shown(say)}: must be a function of a Said")
+        listeners: list[Callable[[Said], object]] = [*outlets, *([] if say is None else [say])]
         if readout is None and tare is not None:
             raise ProblemError("tare without a readout: nothing would use it")
         recording = None
@@ -234,9 +260,11 @@ class Live:
             None if readout is None else readout.to_json(),
             tare.to_json() if isinstance(tare, Tare) else None,
             None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
-            None if say is None else lambda *said: say(Said(*said)),
+            None if not listeners else lambda *said: [hear(Said(*said)) for hear in listeners],
             flag("lines", lines),
         )
+        for what, inlet in inlets.items():
+            inlet.begin(partial(self._core.sample, what))
 
     @property
     def address(self) -> tuple[str, int]:
@@ -274,7 +302,8 @@ class Live:
         `wire_late` (events of version 2 that came when time had gone on without them), `events`, `read_out`,
         `events_dropped`,
         `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence
-        that was none, because events came later than the guard), `detections_dropped`, `sent` (of each destination: to,
+        that was none, because events came later than the guard), `detections_dropped`, `sources` (what came of
+        each other source), `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
         `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
         drift_ppm, or None), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
@@ -312,6 +341,36 @@ class Live:
         """
         self._core.expect_version(whole("version", version, 1, 2))
 
+    def source_address(self, name: str) -> tuple[str, int]:
+        """Return host and port that another board of the recording is listened to on.
+
+        Raises
+        ------
+        ProblemError : no other board of that name
+        """
+        address = self._core.source_address(text("name", name))
+        if address is None:
+            raise ProblemError(f"source {name!r}: no other board has that name")
+        return address
+
+    def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
+        """Keep numbers of a source that is given.
+
+        Parameters
+        ----------
+        name : str
+        values : float, one for each column of the source, its own stamp among them
+        arrived_ns : int, ns since 1970, optional
+            When they came; now, where it is left out.
+
+        Raises
+        ------
+        ProblemError : no such source, or other columns
+        OSError : the disk is full
+        """
+        came = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
+        self._core.sample(text("name", name), numbers("values", values, np.float64).reshape(-1).tolist(), came)
+
     def note(self, said: str) -> None:
         """Write something down in the recording, with the time of now.
 
@@ -328,6 +387,8 @@ class Live:
         ------
         OSError : the disk is full; what was written before stays readable
         """
+        while self._inlets:
+            self._inlets.pop().close()
         said = self._core.stop()
         if said is not None:
             values = json.loads(said)
@@ -430,6 +491,18 @@ class Source:
     def __repr__(self) -> str:
         rows, columns = self.array.shape
         return f"Source({rows} x {columns} taxels, {1e6 / self.registers.frame_us:g} frames/s)"
+
+
+def _sources(sources: Mapping[str, str] | None) -> list[tuple[str, str]]:
+    if sources is None:
+        return []
+    if not isinstance(sources, Mapping):
+        raise ProblemError(f'sources is {shown(sources)}: must be a mapping, as {{"imu": "serial:/dev/ttyACM0"}}')
+    return [(text("name of a source", name), text(f"source {name}", what)) for name, what in sources.items()]
+
+
+def _given(inlet: LslInlet) -> str:
+    return f"given,columns={':'.join(inlet.columns)}"
 
 
 def _held(registers: str | Registers) -> object:

@@ -64,7 +64,7 @@ enum Entry {
 const MOST_WAITING: usize = 1 << 22;
 
 enum Kind {
-    Mcap(Writer),
+    Mcap(Box<Writer>),
     /// A part of another's.
     Track(Track),
     /// Locked for the borrow only: one thread writes.
@@ -239,7 +239,7 @@ impl Recorder {
         let kind = match named(path)? {
             "mcap" => {
                 let how = recording::WriterOptions { compression: *compression, overwrite: *overwrite };
-                Kind::Mcap(Writer::create(path, &self.header, how)?)
+                Kind::Mcap(Box::new(Writer::create(path, &self.header, how)?))
             }
             _ => Kind::Lsa(Mutex::new(LsaWriter::create(path, *overwrite)?)),
         };

@@ -1,0 +1,110 @@
+"""A source's clock against the host's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._core import ProblemError
+
+__all__ = ["Clock"]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Clock:
+    """Tell a source's time, a board's or a stream's, from the host's.
+
+    A datagram comes late by whatever the way costs, never early. So the line below all points *arrival less own time*
+    is the offset between the clocks and the shortest way together; they cannot be told apart. Of all such lines it is
+    the edge of the lower convex hull above the mean time; its slope is the drift. Over more than 32 s it is drawn again
+    and again, each time of the last 64 s, and between the middles of two such stretches time passes evenly.
+
+    Parameters
+    ----------
+    board_us : int64, shape (n,), us
+        When each datagram could leave by the source's clock: the end of its frame, as far as that is known.
+    arrived_ns : int64, shape (n,), ns since 1970
+        When it came.
+    """
+
+    board_us: NDArray[np.int64]
+    arrived_ns: NDArray[np.int64]
+
+    @cached_property
+    def _lines(self) -> list[tuple[int, int, int, float]]:
+        lines = _core.clock_lines(self.board_us, self.arrived_ns)
+        if not lines:
+            raise ProblemError("clock: no datagram holds a time, so there is nothing to compare")
+        return lines
+
+    @cached_property
+    def _knots(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """The middles of the stretches, us, and the host's time then, ns, with a second more on either side."""
+        lines = self._lines
+        middles = [line[0] for line in lines]
+        places = [middles[0] - 1_000_000, *middles, middles[-1] + 1_000_000]
+        of = [lines[0], *lines, lines[-1]]
+        host = [_at(line, place) for line, place in zip(of, places, strict=True)]
+        return np.array(places, np.int64), np.array(host, np.int64)
+
+    @property
+    def drift_ppm(self) -> float:
+        """How much faster the host's clock runs than the source's, parts per million."""
+        lines = self._lines
+        if len(lines) == 1:
+            return lines[0][3]
+        own, host = self._knots
+        return float((host[-2] - host[1]) / ((own[-2] - own[1]) * 1000) - 1) * 1e6
+
+    @property
+    def offset_ns(self) -> int:
+        """The host's time at time 0 of the source, ns since 1970."""
+        return int(self.host_ns(0))
+
+    def host_ns(self, board_us: int | NDArray[np.int64]) -> Any:
+        """Return the host's time (ns since 1970) at times of the source (us)."""
+        t = np.asarray(board_us, np.int64)
+        own, host = self._knots
+        k = np.clip(np.searchsorted(own, t, side="right") - 1, 0, len(own) - 2)
+        since = t - own[k]
+        slope = (host[k + 1] - host[k]) / (own[k + 1] - own[k]) - 1000.0
+        if self._is_one_line:
+            slope = np.full(np.shape(k), self._lines[0][3] * 1e-3)
+        return host[k] + since * 1000 + np.rint(since * slope).astype(np.int64)
+
+    @property
+    def _is_one_line(self) -> bool:
+        return len(self._lines) == 1
+
+    def board_us_at(self, host_ns: int | NDArray[np.int64]) -> Any:
+        """Return the source's time (us) at times of the host (ns since 1970)."""
+        wanted = np.asarray(host_ns, np.int64)
+        own, host = self._knots
+        t = own[0] + (wanted - host[0]) // 1000
+        for _ in range(4):
+            # What is off shrinks by the drift each time, 1e-4 or less.
+            t = t + np.rint((wanted - self.host_ns(t)) / 1000.0).astype(np.int64)
+        return t if np.ndim(host_ns) else int(t)
+
+    @property
+    def delay_us(self) -> NDArray[np.float64]:
+        """How much later than the quickest each datagram came, us."""
+        late: NDArray[np.float64] = (self.arrived_ns - self.host_ns(self.board_us)) / 1000.0
+        return late
+
+    def __repr__(self) -> str:
+        if not len(self.board_us):
+            return "Clock(no datagram holds a time)"
+        late = np.percentile(self.delay_us, [50, 99])
+        return f"Clock(drift {self.drift_ppm:+.1f} ppm, delays {late[0]:.0f} us median, {late[1]:.0f} us 99 %)"
+
+
+def _at(line: tuple[int, int, int, float], own_us: int) -> int:
+    _, place, host, drift = line
+    since = own_us - place
+    return host + since * 1000 + round(since * drift * 1e-3)

@@ -1,0 +1,361 @@
+"""Several sources in one recording: each a recording with its own clock, and one clock where it is asked for."""
+
+import json
+import os
+import pty
+import socket
+import subprocess
+import sys
+import time
+import tty
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import taxel
+from taxel import _core
+from taxel.live import Live
+
+LOOPBACK = "127.0.0.1"
+SMALL = taxel.Array(4, 4, pitch_mm=2.0, name="small")
+
+
+def presses(n: int, x: int) -> taxel.Events:
+    """A taxel rises each 20 ms by one tick more."""
+    t = np.arange(n) * 20_000
+    return taxel.Events(t, np.full(n, x), np.full(n, 2), np.ones(n, bool), array=SMALL, intensity=np.arange(n) + 60)
+
+
+def play(events: taxel.Events, address: tuple[str, int]) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        for t in events.t:
+            link.sendto(taxel.wire.encode(events[events.t == t]), address)
+
+
+def until(what: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not what():
+        assert time.monotonic() < end, "never came"
+        time.sleep(0.005)
+
+
+def lines(live: Live, name: str) -> int:
+    return int(live.counters["sources"][name]["lines"])
+
+
+def record_all(path: Path) -> dict[str, taxel.Events]:
+    """Two boards, an IMU on a serial line and numbers that are given, into one file."""
+    ours, theirs = pty.openpty()
+    tty.setraw(theirs)
+    sources = {
+        "left": f"udp:{LOOPBACK}:0,array=4x4",
+        "imu": f"serial:{os.ttyname(theirs)},columns=t_ms:ax:ay",
+        "given": "given,columns=force",
+    }
+    sent = {"right": presses(30, 1), "left": presses(20, 3)}
+    with Live(0, host=LOOPBACK, array=SMALL, record=path, name="right", sources=sources) as live:
+        play(sent["right"], live.address)
+        play(sent["left"], live.source_address("left"))
+        os.write(ours, b"".join(f"{10 * k}, {k / 8}, {-k}\r\n".encode() for k in range(50)) + b"nonsense\n")
+        for k in range(5):
+            live.sample("given", [k + 0.5], arrived_ns=1_700_000_000_000_000_000 + k * 1_000_000)
+        until(lambda: lines(live, "imu") == 51)
+        until(lambda: live.counters["sources"]["left"]["decoded"] == 20 and live.counters["decoded"] == 30)
+        live.note("standing")
+        counts = live.stop().counters["sources"]
+    os.close(ours)
+    os.close(theirs)
+    assert counts["imu"] == {"lines": 51, "strange": 1, "trouble": None}
+    assert counts["given"]["lines"] == 5
+    assert counts["left"]["events"] == 20
+    return sent
+
+
+@pytest.fixture(scope="module")
+def several(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, taxel.Events]]:
+    path = tmp_path_factory.mktemp("sources") / "all.mcap"
+    return path, record_all(path)
+
+
+def test_each_source_is_a_recording_that_holds_what_was_sent(several: tuple[Path, dict[str, taxel.Events]]) -> None:
+    path, sent = several
+    sources = taxel.open(path).sources
+    assert list(sources) == ["right", "left", "imu", "given"]
+    for name in ("right", "left"):
+        events = sources[name].events
+        np.testing.assert_array_equal(events.x, sent[name].x)
+        np.testing.assert_array_equal(events.intensity, sent[name].intensity)
+        np.testing.assert_array_equal(np.diff(events.t), np.diff(sent[name].t))
+        assert (
+            sources[name].verdict
+            == "nothing lost after arrival (version 1 of the wire cannot show what was lost before it)"
+        )
+        assert len(taxel.encode.ChangeEvents().encode(events)) == 16
+    imu = sources["imu"]
+    assert not imu.has_events
+    assert imu.columns == ["ax", "ay"]
+    assert imu.counts["lines_that_could_not_be_read"] == 1
+    assert "1 lines that could not be read" in imu.verdict
+    frames = imu.frames()
+    np.testing.assert_array_equal(frames.t, np.arange(50) * 10_000)
+    np.testing.assert_array_equal(frames.values[:, 0, 0], np.arange(50, dtype=np.float32) / 8)
+    np.testing.assert_array_equal(frames.values[:, 0, 1], -np.arange(50, dtype=np.float32))
+    given = sources["given"].frames()
+    np.testing.assert_array_equal(given.t, 1_700_000_000_000_000 + np.arange(5) * 1000)
+    np.testing.assert_array_equal(given.values.ravel(), np.arange(5) + 0.5)
+    spikes = taxel.encode.LevelCrossing(np.arange(0.5, 7.0)).encode(frames)
+    assert len(spikes[0]) > 0
+
+
+def test_of_several_boards_none_is_the_files_own(several: tuple[Path, dict[str, taxel.Events]]) -> None:
+    recording = taxel.open(several[0])
+    assert repr(recording) == "Recording(all.mcap: 4 sources: right, left, imu, given)"
+    for ask in (
+        lambda: recording.events,
+        recording.frames,
+        lambda: recording.registers,
+        lambda: recording.clock,
+        recording.datagrams,
+        lambda: taxel.encode.ChangeEvents().encode(recording.events),
+        lambda: taxel.convert(recording, several[0].with_suffix(".npz")),
+        lambda: taxel.cut(recording, stop_us=5.0)[0].events,
+    ):
+        with pytest.raises(
+            taxel.ProblemError, match=r"holds 4 sources \(right, left, imu, given\); say which"
+        ) as refused:
+            ask()
+        assert "\n" not in str(refused.value)
+    assert [note.text for note in recording.notes] == ["standing"]
+    assert not several[0].with_suffix(".npz").exists()
+
+
+def test_of_one_board_and_numbers_the_files_own_is_the_board(tmp_path: Path) -> None:
+    path, sent = tmp_path / "one.mcap", presses(10, 2)
+    with Live(0, host=LOOPBACK, array=SMALL, record=path, sources={"imu": "given,columns=t_us:ax"}) as live:
+        play(sent, live.address)
+        live.sample("imu", [7.0, 1.0])
+        until(lambda: live.counters["decoded"] == 10)
+    recording = taxel.open(path)
+    assert "beside imu" in repr(recording)
+    assert recording.events == recording.sources["board"].events
+    assert len(recording.frames(100)) == 19
+    lost = taxel.convert(recording, tmp_path / "one.npz")
+    assert "the source imu" in lost
+    assert taxel.convert(recording.sources["imu"], tmp_path / "imu.mcap") == ["the source board"]
+    alone = taxel.open(tmp_path / "imu.mcap")
+    assert alone.frames() == recording.sources["imu"].frames()
+    assert list(alone.sources) == ["imu"]
+    (part,) = taxel.cut(recording, stop_us=90_000.0)
+    assert len(part.events) == 5
+    with pytest.raises(taxel.ProblemError, match="say on_clock"):
+        _ = part.sources
+
+
+def test_the_command_line_shows_and_writes_one_source(
+    several: tuple[Path, dict[str, taxel.Events]], tmp_path: Path
+) -> None:
+    def command(*arguments: object) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "taxel", *map(str, arguments)]
+        return subprocess.run(line, capture_output=True, text=True, check=False)
+
+    said = json.loads(command("info", several[0], "--json").stdout)["sources"]
+    assert {name: one.get("events", one.get("pictures")) for name, one in said.items()} == {
+        "right": 30, "left": 20, "imu": 50, "given": 5,
+    }  # fmt: skip
+    assert said["imu"]["columns"] == ["ax", "ay"]
+    assert abs(said["left"]["against"]["offset_us"]) < 60_000_000
+    assert command("convert", several[0], tmp_path / "imu.csv", "--source", "imu").returncode == 0
+    assert taxel.open(tmp_path / "imu.csv").frames().values.shape == (50, 1, 2)
+    assert command("cut", several[0], tmp_path / "left.npz", "--source", "left", "--to", "0.1").returncode == 0
+    refused = command("convert", several[0], tmp_path / "x.csv")
+    assert refused.returncode == 2
+    assert refused.stderr.startswith(f"taxel: {several[0]}: holds 4 sources (right, left, imu, given)")
+    unknown = command("cut", several[0], tmp_path / "x.npz", "--source", "up")
+    assert unknown.stderr == f"taxel: --source up: {several[0]} holds right, left, imu, given\n"
+
+
+@pytest.mark.parametrize(
+    ("sources", "said"),
+    [
+        ({"imu": "nowhere"}, "must be udp:HOST:PORT, serial:PATH@BAUD, pipe:PATH or given"),
+        ({"imu": "given"}, "needs columns=A:B:C"),
+        ({"imu": "given,columns=a:a"}, "two of that name"),
+        ({"imu": "given,columns=t_us"}, "holds no column of values"),
+        ({"board": "given,columns=a"}, "there are two of that name"),
+        ({"a b": "given,columns=a"}, "a name is of letters, digits"),
+        ({"imu": 3}, "source imu is 3"),
+        (["imu"], "sources is ['imu']"),
+        ({"imu": "given,columns=a,rate=3"}, 'has no option "rate"'),
+    ],
+)
+def test_a_source_that_is_none_is_refused_and_leaves_no_file(tmp_path: Path, sources: object, said: str) -> None:
+    with pytest.raises(taxel.ProblemError) as refused:
+        Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "no.mcap", sources=sources)  # type: ignore[arg-type]
+    assert said in str(refused.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_source_needs_a_recording_that_can_hold_it_and_its_place(tmp_path: Path) -> None:
+    with pytest.raises(taxel.ProblemError, match="source imu without a recording"):
+        Live(0, host=LOOPBACK, sources={"imu": "given,columns=a"})
+    with pytest.raises(taxel.ProblemError, match=r"only a \.mcap holds several sources"):
+        Live(0, host=LOOPBACK, record=tmp_path / "no.lsa", sources={"imu": "given,columns=a"})
+    with pytest.raises(OSError, match="/no/such/line"):
+        Live(0, host=LOOPBACK, record=tmp_path / "no.mcap", sources={"imu": "serial:/no/such/line,columns=a"})
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind((LOOPBACK, 0))
+        where = f"udp:{LOOPBACK}:{taken.getsockname()[1]}"
+        with pytest.raises(OSError, match="Address already in use"):
+            Live(0, host=LOOPBACK, record=tmp_path / "no.mcap", sources={"left": where})
+    assert not list(tmp_path.iterdir())
+
+
+def test_columns_are_learnt_from_the_first_line_of_a_pipe(tmp_path: Path) -> None:
+    pipe = tmp_path / "imu"
+    os.mkfifo(pipe)
+    writer = os.open(pipe, os.O_RDWR)
+    os.write(writer, b"t_s,ax\n")
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"pipe:{pipe}"}) as live:
+        os.write(writer, b"0.5,1\n0.25,2\n# no numbers\n0.75 3\n")
+        until(lambda: lines(live, "imu") == 4)
+    os.close(writer)
+    imu = taxel.open(tmp_path / "imu.mcap").sources["imu"]
+    np.testing.assert_array_equal(imu.frames().t, [250_000, 500_000, 750_000])
+    np.testing.assert_array_equal(imu.frames().values.ravel(), [2, 1, 3])
+
+
+def mcap(path: Path, clocks: dict[str, tuple[float, int]], seconds: float, rate: float, seed: int) -> None:
+    """Write streams whose clocks run by so many ppm and begin at so many us, 1 % of them 5 ms late."""
+    random = np.random.default_rng(seed)
+    header = {"array": {"rows": 1, "columns": 1, "pitch_mm": 1.0, "name": "a", "exists": None}}
+    for name in clocks:
+        stream = {"columns": ["t_us", "a"], "time": "t_us", "unit_us": 1.0}
+        one = {**header, "name": name, "stream": stream}
+        writer = _core.RecordingWriter(path / f"{name}.mcap", json.dumps(one), "none", True)
+        host = np.sort(random.uniform(0, seconds * 1e9, int(seconds * rate)))
+        own = np.floor(clocks[name][1] + host * 1e-3 * (1 + clocks[name][0] * 1e-6)) % 2**32
+        late = random.exponential(60e3, len(host)) + np.where(random.random(len(host)) < 0.01, 5e6, 0.0)
+        arrived = np.asarray(1_700_000_000_000_000_000 + (host + late).astype(np.int64))
+        rows = np.stack([own, host], axis=1)
+        writer.samples(arrived, np.arange(len(host), dtype=np.uint64), np.ascontiguousarray(rows).reshape(-1))
+        writer.finish("{}")
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    drift=st.floats(-200, 200),
+    # Within the hour a counter of 32 bits turns over.
+    begin=st.integers(0, 2**32 - 1),
+    seconds=st.sampled_from([1.0, 3.0, 10.0]),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_a_drifting_clock_is_found_whatever_it_is(
+    tmp_path_factory: pytest.TempPathFactory, drift: float, begin: int, seconds: float, seed: int
+) -> None:
+    path = tmp_path_factory.mktemp("clock")
+    mcap(path, {"imu": (drift, begin)}, seconds, 1000.0, seed)
+    recording = taxel.open(path / "imu.mcap")
+    on_host = recording.on_clock("host").frames()
+    truth = 1_700_000_000_000_000 + recording.frames().values[:, 0, 0].astype(np.float64) * 1e-3
+    # The values are float32: a second of ns is held to 64 ns, ten to 1 us.
+    off = on_host.t - truth
+    assert np.abs(off[-100:]).max() < (10 if seconds < 10 else 6), (drift, off[-3:])
+    back = recording.clock.board_us_at(recording.clock.host_ns(recording.clock.board_us))
+    assert np.abs(back - recording.clock.board_us).max() <= 1
+    assert np.all(np.diff(on_host.t) > 0)
+
+
+def test_times_go_from_one_clock_to_the_other_and_nothing_else_moves(
+    several: tuple[Path, dict[str, taxel.Events]],
+) -> None:
+    recording = taxel.open(several[0])
+    plain, on_left = recording.sources, recording.on_clock("left").sources
+    assert on_left["left"].events == plain["left"].events
+    np.testing.assert_array_equal(on_left["right"].events.intensity, plain["right"].events.intensity)
+    host = plain["right"].clock.host_ns(plain["right"].events.t)
+    np.testing.assert_array_equal(on_left["right"].events.t, plain["left"].clock.board_us_at(host))
+    assert recording.sources["right"].events == plain["right"].events, "what was opened stays as it was"
+    cut = recording.on_clock("left").between(0, 100_000).sources
+    assert len(cut["left"].events) == 5
+    with pytest.raises(taxel.ProblemError, match="has no clock 'up'; there are right, left, imu, given, host"):
+        recording.on_clock("up")
+    with pytest.raises(taxel.ProblemError, match="is on the clock of left already"):
+        recording.on_clock("left").on_clock("host")
+    with pytest.raises(taxel.ProblemError, match=r"say on_clock\('left'\) before between"):
+        plain["left"].between(0, 5).on_clock("left")
+    note = recording.on_clock("host").notes[0]
+    assert abs(note.t - note.at_ns / 1000) < 60_000_000
+
+
+EMULATED = """
+import sys
+from taxel.simulate import Silence, Version2, emulate
+to, drift, ms = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
+said = Version2(heartbeat_us=500)
+report = emulate(to, [Silence(ms)], preset="2 kHz", wire=2, drift_ppm=drift, tare_ms=5.0, version_2=said)
+print(report.began_ns)
+"""
+
+
+def test_two_boards_that_drift_are_put_on_one_clock(tmp_path: Path) -> None:
+    """Two processes on version 2, +50 and -30 ppm; how far off they come out is the machine's, so little is asked."""
+    drifts, began = {"board": 50.0, "left": -30.0}, {}
+    sources = {"left": f"udp:{LOOPBACK}:0,preset=2 kHz"}
+    with Live(0, host=LOOPBACK, registers="2 kHz", record=tmp_path / "two.mcap", sources=sources) as live:
+        to = {"board": live.address, "left": live.source_address("left")}
+        boards = {
+            name: subprocess.Popen(
+                [sys.executable, "-c", EMULATED, "{}:{}".format(*to[name]), str(drift), "4000"], stdout=subprocess.PIPE
+            )
+            for name, drift in drifts.items()
+        }
+        for name, board in boards.items():
+            began[name] = float(board.communicate(timeout=120)[0])
+            assert board.returncode == 0
+    recording = taxel.open(tmp_path / "two.mcap")
+    for name, source in recording.sources.items():
+        clock = source.clock
+        assert len(clock.board_us) > 4 * 1000
+        last = int(clock.board_us[-1])
+        truth = began[name] + last * 1000 / (1 + drifts[name] * 1e-6)
+        print(f"{name}: {clock.host_ns(last) - truth:.0f} ns, {clock.drift_ppm:+.2f} ppm")
+        assert abs(clock.host_ns(last) - truth) < 5e6
+        # The host's clock against the board's: the other way round.
+        assert abs(clock.drift_ppm + drifts[name]) < 250
+    left = recording.sources["left"].clock
+    at = int(left.board_us[-1])
+    moved = int(recording.sources["board"].clock.board_us_at(int(left.host_ns(at))))
+    truth = (began["left"] + at * 1000 / (1 - 30e-6) - began["board"]) / 1000 * (1 + 50e-6)
+    print(f"left to board: {moved - truth:.1f} us")
+    assert abs(moved - truth) < 5000
+
+
+def test_a_recording_begun_in_mid_stream_begins_with_what_the_taxels_held(tmp_path: Path) -> None:
+    header = {"array": {"rows": 4, "columns": 4, "pitch_mm": 2.0, "name": "small", "exists": None}}
+    writer = _core.RecordingWriter(tmp_path / "mid.mcap", json.dumps(header), "none", True)
+    held = np.full(16, 65_535, np.uint16)
+    held[[5, 9]] = 300, 41
+    writer.held(1_700_000_000_000_000_000, None, held)
+    rises = taxel.Events([1000, 11_000], [1, 2], [2, 2], [True, True], array=SMALL, intensity=[50, 7])
+    for k, t in enumerate(rises.t):
+        writer.datagram(1_700_000_000_000_000_000 + int(t) * 1000, k, taxel.wire.encode(rises[rises.t == t]))
+    writer.finish("{}")
+    recording = taxel.open(tmp_path / "mid.mcap")
+    known = np.full(16, np.nan)
+    known[[5, 9]] = 300, 41
+    np.testing.assert_array_equal(recording.held, known.reshape(4, 4))
+    frames = recording.frames(rate_hz=100)
+    first = np.where(np.isnan(known), 0, known).reshape(4, 4)
+    first[2, 1] = 50
+    np.testing.assert_array_equal(frames.values[0], first)
+    first[2, 2] = 7
+    np.testing.assert_array_equal(frames.values[1], first)
+    np.testing.assert_array_equal(recording.between(10_000, 12_000).frames(100).values[0, 1], first[1])
+    taxel.convert(recording, tmp_path / "again.mcap")
+    again = taxel.open(tmp_path / "again.mcap")
+    np.testing.assert_array_equal(again.held, recording.held)
+    assert again.frames(100) == frames
