@@ -19,7 +19,10 @@ from taxel.live import send
 DOCS = Path(__file__).parent.parent / "docs"
 
 #: Words of parsers and of Python that no user should have to know.
-FOREIGN = r"invalid type|invalid value|expected|`|Traceback|_core|overwrite=|NoneType|Input should be|taxel\.[A-Z]"
+FOREIGN = (
+    r"invalid type|unable to parse|invalid value|expected|`|Traceback|_core|overwrite=|NoneType|Input should be|"
+    r"taxel\.[A-Z]"
+)
 
 
 def call(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
@@ -53,7 +56,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             ("record", "--port", "70000", "a.mcap"),
             "--port: must be less than or equal to 65535; see taxel record --help",
         ),
-        (("record", "--port", "x", "a.mcap"), "--port: "),
+        (("record", "--port", "x", "a.mcap"), "--port: must be a whole number; see taxel record --help"),
+        (("record", "--seconds", "x", "a.mcap"), "--seconds: must be a number; see taxel record --help"),
+        (("record", "--port", "0", "nowhere/a.mcap"), "nowhere: no such folder"),
+        (("emulate", "--truth", "nowhere/x.csv"), "nowhere: no such folder"),
+        (("info", "nowhere/a.mcap"), "nowhere: no such folder"),
+        (("info", "none.mcap"), "none.mcap: no such file or directory"),
         (("record", "--compression", "x", "a.mcap"), '--compression is "x": must be none, lz4 or zstd'),
         (("record", "--host", "no such host", "a.mcap"), '--host is "no such host": must be an address or a name'),
         (("record", "--preset", "9 kHz", "a.mcap"), 'preset "9 kHz": there are "5.2 kHz"'),

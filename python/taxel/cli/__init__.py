@@ -5,9 +5,11 @@ Exit codes, for scripts: 0 done, 2 the user's input is wrong, 3 board, socket or
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import Any, NoReturn
 
 import typer
@@ -59,7 +61,12 @@ def _plain(said: str) -> str:
     """Return what is wrong with a word, without what the parser says of itself."""
     said = re.sub(r"^Invalid value for '?(.+?)'?: ", r"\1: ", said)
     said = re.sub(r"^Missing (?:argument|option|parameter) '(.+?)'.*", lambda m: f"{_upper(m[1])} is missing", said)
-    return said.replace("Input should be", "must be").rstrip(".")
+    said = said.replace("Input should be", "must be").rstrip(".")
+    return re.sub(r"must be a valid (\w+)(, .*)?$", lambda m: f"must be {_NUMBERS.get(m[1], m[1])}", said)
+
+
+#: What the parser calls numbers, in the words of our own messages.
+_NUMBERS = {"number": "a number", "integer": "a whole number"}
 
 
 def _upper(word: str) -> str:
@@ -77,6 +84,10 @@ def _end(text: str, code: int) -> NoReturn:
 
 
 def _said(error: OSError) -> str:
+    if isinstance(error, FileNotFoundError) and error.filename is not None:
+        folder = Path(os.fsdecode(error.filename)).parent
+        if not folder.is_dir():
+            return f"{folder}: no such folder"
     if error.filename is not None and error.strerror:
         return f"{error.filename}: {error.strerror.lower()}"
     return str(error)

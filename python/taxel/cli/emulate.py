@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from taxel._core import ProblemError
+from taxel._files import try_whole
 from taxel._opening import open_any
 from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
@@ -116,6 +117,8 @@ def emulate(
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
     _together(scene=scene, replay=replay, pipe=pipe, rest=rest, counted=scenes is not None or labels is not None)
+    if labels is not None:
+        try_whole(labels, overwrite=overwrite)
     written = None if scene is None else SceneFile.open(scene)
     said_by = written or SceneFile(Scene({}))
     tare = said_by.tare_ms / 1e3 if tare is None else tare
@@ -123,8 +126,7 @@ def emulate(
     # Wrong ones are said before anything else is.
     Registers.preset(preset)
     seed = (secrets.randbelow(TRAINING_SEED) if written is None else written.seed) if seed is None else seed
-    flaws, faults = _flaws(flaw or [], seed), _faults(fault or [], seed)
-    lines = _circuit(circuit or [], seed)
+    flaws, faults, lines = _flaws(flaw or [], seed), _faults(fault or [], seed), _circuit(circuit or [], seed)
     console = Console(stderr=True, quiet=as_json)
     if replay is not None:
         touch, said = _again(replay, speed)
