@@ -211,7 +211,9 @@ def _draw_model(p: Parameters, model: dict[str, Any]) -> Figure:
     axes[0].set_title(
         "the model: (a) diameter, (b) modulus, (c) depth along the arrow, (d) its angle; the base is held"
     )
-    pressed = PolyCollection(np.array(model["pressed"])[quads], linewidths=0, cmap="viridis", rasterized=True)
+    pressed = PolyCollection(
+        np.array(model["pressed"])[quads], linewidths=0, antialiaseds=False, cmap="viridis", rasterized=True
+    )
     pressure = np.array(model["pressure_kpa"])
     pressed.set_array(pressure)
     pressed.set_clim(0, float(np.quantile(pressure, 0.995)))

@@ -221,6 +221,7 @@ def draw(p: Parameters, said: Said) -> Figure:
         # Equal steps of rank, not of height: the floor is flat and the walls are steep.
         heights = np.unique(np.quantile(surface, np.linspace(0, 1, 25)))
         drawn = above.contourf(first, second, surface, heights, cmap="viridis")
+        drawn.set(edgecolor="face", linewidth=0.4)  # else the page shows between two bands
         broken = np.where(found["silent"], np.nan, 1.0)
         above.contourf(first, second, broken, [0.5, 1.5], colors="none", hatches=["////"])
         above.plot(*line.T, color="0.2", lw=1.0, ls="--")
