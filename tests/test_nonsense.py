@@ -660,6 +660,9 @@ SOUND: dict[str, Sound] = {
         tare_ms=3.0,
         array=None,
         sensor={},
+        wire=2,
+        circuit=None,
+        asynchronous=True,
         watch=lambda _: None,
     ),
     "taxel.simulate.circuit.Fabric": plain(CIRCUIT.Fabric, rest_us=0.1, touch_us=1.0, exponent=0.8),
@@ -697,6 +700,17 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.circuit.Converter.ramp_ticks": method(CIRCUIT.Converter(), "ramp_ticks", volts=[1.0, 9.0]),
     "taxel.simulate.circuit.Converter.trace": method(
         CIRCUIT.Converter(), "trace", line_v=[1.4, 1.5, 2.0, 2.5], every_us=0.1, stop_us=6.0
+    ),
+    "taxel.simulate.circuit.AdaptiveRamp": plain(
+        CIRCUIT.AdaptiveRamp,
+        converter=CIRCUIT.Converter(),
+        steepest=38,
+        gentlest=510,
+        moves_ticks=4.0,
+        noise_ticks=2.0,
+    ),
+    "taxel.simulate.circuit.AdaptiveRamp.convert": method(
+        CIRCUIT.AdaptiveRamp(), "convert", volts=np.full((9, 4, 8), 1.5), period_us=20.0
     ),
     "taxel.simulate.circuit.Circuit": plain(
         CIRCUIT.Circuit, readout=CIRCUIT.VirtualGround(), converter=CIRCUIT.Converter()
@@ -954,6 +968,7 @@ LEFT_OUT = {
     "taxel.live.Panel.listen": "begins a Live, which checks",
     "taxel.live.Live.next": "waits",
     "taxel.live.Live.note": "tried with Live's own tests",
+    "taxel.simulate.circuit.Converted": "a result",
     "taxel.simulate.circuit.Trace": "a result",
     "taxel.simulate.Contact": "a result",
     "taxel.simulate.Motion": "a result",

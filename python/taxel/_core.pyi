@@ -217,6 +217,9 @@ def converter_ramp(json: str, given: NDArray[np.float64], back: bool) -> NDArray
 def converter_trace(
     json: str, line_v: list[float], every_us: float, stop_us: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]: ...
+def adaptive_convert(
+    json: str, shape: tuple[int, int], volts: NDArray[np.float64], period_us: float
+) -> tuple[NDArray[np.float64], NDArray[np.uint32], NDArray[np.float64], NDArray[np.float64]]: ...
 
 # calibration: the law of fabric, amplifier and ramp
 
@@ -242,8 +245,9 @@ def play(
     seed: int,
     acts: list[_Act],
     tare_ms: float,
+    options: str,
     watch: Callable[[float], object],
-) -> tuple[_Events, int, int]: ...
+) -> tuple[_Events, int, int, int]: ...
 def emulate(
     to: str,
     parts: _Array,
@@ -299,9 +303,7 @@ class DatagramStream:
 
 @final
 class WireBoard:
-    def __new__(
-        cls, registers: str, array: _Array, previous: str, intensity: str, queue: int, version_2: str
-    ) -> WireBoard: ...
+    def __new__(cls, registers: str, array: _Array, options: str) -> WireBoard: ...
     def reset(self) -> None: ...
     def greeting(self) -> str: ...
     def registers(self) -> str: ...

@@ -11,10 +11,17 @@ import numpy as np
 import pytest
 
 import taxel
-from taxel.simulate.circuit import Circuit, Converter, Divider, Fabric, VirtualGround
+from taxel.simulate.circuit import AdaptiveRamp, Circuit, Converter, Divider, Fabric, VirtualGround
 
 
-def solved(g_us: np.ndarray, read: int, *, ground: VirtualGround | None = None, divider: Divider | None = None) -> Any:
+def solved(
+    g_us: np.ndarray,
+    read: int,
+    *,
+    ground: VirtualGround | None = None,
+    divider: Divider | None = None,
+    saturates: bool = False,
+) -> Any:
     """What the sense lines give, by the plainest nodal analysis: one unknown a node, no structure used.
 
     Nodes: each crossing's on its sense line and on its driven line (one for the line without wires), and of each sense
@@ -63,7 +70,31 @@ def solved(g_us: np.ndarray, read: int, *, ground: VirtualGround | None = None, 
         a[outputs[i]] = 0.0
         a[outputs[i], outputs[i]], a[outputs[i], ends[i]] = 0.0 if ground.gain is None else 1 / ground.gain, 1.0
         b[outputs[i]] = ground.v_trans
+    if ground is not None and saturates:
+        return _saturated(a, b, ground, outputs, ends)
     return np.linalg.solve(a, b)[ends if divider is not None else outputs]
+
+
+def _saturated(a: np.ndarray, b: np.ndarray, ground: VirtualGround, outputs: Any, ends: Any) -> Any:
+    """The same with outputs that stop at 0 and at the rail: each end is tried until none is wrong.
+
+    An output at its rail is a voltage source; it may stay there as long as its input asks for still more.
+    """
+    at = np.full(len(outputs), np.nan)
+    for _ in range(4 * len(outputs)):
+        fixed, known = a.copy(), b.copy()
+        for output, volts in zip(outputs, at, strict=True):
+            if np.isfinite(volts):
+                fixed[output], known[output] = np.eye(len(b))[output], volts
+        found = np.linalg.solve(fixed, known)
+        gain = np.inf if ground.gain is None else ground.gain
+        asks = ground.v_trans - found[ends]
+        low, high = found[outputs] < 0.0, found[outputs] > ground.rail_v
+        over = (at == ground.rail_v) & (asks < (ground.rail_v / gain)) | (at == 0.0) & (asks > 0.0)
+        if not (over | np.isnan(at) & (low | high)).any():
+            return found[outputs]
+        at = np.where(over, np.nan, np.where(np.isnan(at) & high, ground.rail_v, np.where(np.isnan(at) & low, 0.0, at)))
+    raise AssertionError("no end fits")
 
 
 def every(g_us: np.ndarray, **of: Any) -> np.ndarray:
@@ -105,6 +136,26 @@ def test_dividers_equal_a_plain_nodal_solve(seed, idle, rows, columns):
         idle=idle,
     )
     assert lines.volts(g) == pytest.approx(every(g, divider=lines), rel=2e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("wire_ohm", [0.0, 4.0])
+def test_a_line_whose_amplifier_saturates_is_held_no_longer(seed, wire_ohm):
+    """Against the nodal solve whose outputs are tried at their rails; several rows of a column saturate."""
+    random = np.random.default_rng([seed, 7])
+    g = 10.0 ** random.uniform(-1, 3.5, (6, 5))
+    lines = VirtualGround(
+        gain=10.0 ** random.uniform(1, 5) if seed % 3 else None,
+        switch_ohm=random.choice([2.5, 300.0]),
+        wire_ohm=wire_ohm,
+    )
+    wanted = every(g, ground=lines, saturates=True)
+    got = lines.volts(g)
+    assert got == pytest.approx(wanted, rel=2e-6, abs=1e-9)
+    # It can fail: what lines that stay held would give is another thing.
+    held = np.clip(VirtualGround(**{**lines.get_params(), "rail_v": 1e9}).volts(g), 0, 5.0)
+    assert 3 < np.count_nonzero(wanted >= 5.0) < 28
+    assert np.abs(held - wanted).max() > 1e-3
 
 
 def test_a_taxel_of_four_by_hand():
@@ -158,6 +209,19 @@ def test_currents_sum_to_nothing():
         # The driven line alone feeds the network: the taxels' currents from it are all that flows.
         given = (1e-6 * g[:, read] * (5.0 - out)).sum()
         assert given == pytest.approx((out / 10e3).sum(), rel=1e-9)
+
+
+def test_the_board_s_size_equals_a_plain_solve_to_round_off():
+    """64 x 64: all 128 lines' balances, a right-hand side a column."""
+    g_us = drawn(11, 64, 64)
+    lines = VirtualGround(rail_v=1e9)
+    g, share = 1e-6 * g_us, lines.gain / (1 + lines.gain)
+    sense, switch = (1 + lines.gain) * 1e-3 / lines.feedback_kohm, 1 / lines.switch_ohm
+    a = np.block([[np.diag(g.sum(1) + sense), -g], [-g.T, np.diag(g.sum(0) + switch)]])
+    b = np.vstack([np.full((64, 64), sense * lines.v_trans * share), switch * lines.v_trans * (1 - np.eye(64))])
+    into = sense * (lines.v_trans * share - np.linalg.solve(a, b)[:64])
+    wanted = lines.v_trans * share + (1e3 * lines.feedback_kohm - 1 / sense) * into
+    assert lines.volts(g_us) == pytest.approx(np.clip(wanted, 0, None), rel=1e-7, abs=1e-8)
 
 
 @pytest.mark.skipif(shutil.which("ngspice") is None, reason="ngspice is not installed")
@@ -235,9 +299,39 @@ def test_a_comparator_sees_its_line_settle_and_the_ramp_pass():
     assert np.count_nonzero(np.diff(seen.high.astype(int)) > 0) == 4
 
 
+def test_a_ramp_of_one_length_converts_as_the_converter_does():
+    """Columns of a frame are read as they are in their turn; a ramp that may not change is the converter's."""
+    random = np.random.default_rng(3)
+    slopes, rest = random.uniform(-2e-4, 2e-4, (4, 6)), random.uniform(1.3, 2.4, (4, 6))
+    t = np.arange(400.0)
+    volts = rest + slopes * t[:, None, None]
+    converter = Converter()
+    seen = AdaptiveRamp(converter=converter, steepest=150, gentlest=150).convert(volts, period_us=1.0)
+    frames = np.arange(len(seen.t_us))
+    assert seen.t_us == pytest.approx(18.0 * frames)
+    assert (seen.ramp == 150).all()
+    read = 18.0 * frames[:, None, None] + 3.0 * np.arange(6)
+    assert seen.ticks == pytest.approx(converter.ticks(rest + slopes * read), abs=1e-6)
+    assert seen.volts == pytest.approx(converter.ramp_volts(np.floor(seen.ticks) + 0.5))
+
+
+def test_the_ramp_turns_steep_where_a_taxel_moves_and_gentle_where_none_does():
+    still, moving = np.full(3000, 1.5), 1.5 + np.sin(np.linspace(0, 6 * np.pi, 3000))
+    volts = np.broadcast_to(np.concatenate([still, moving, still])[:, None, None], (9000, 4, 16)).copy()
+    ramp = AdaptiveRamp(steepest=30, gentlest=400)
+    seen = ramp.convert(volts, period_us=1.0)
+    before, during, after = (seen.ramp[(seen.t_us >= begin) & (seen.t_us < begin + 1800)] for begin in (0, 3600, 7200))
+    assert (before == 400).all()
+    assert np.median(during) < 100
+    assert (after == 400).all()
+    assert np.diff(seen.t_us) == pytest.approx(16 * (1.0 + 4 * seen.ramp[:-1] / 300), rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
+        (lambda: AdaptiveRamp(steepest=600), "steepest is 600: must be at most gentlest, 510"),
+        (lambda: AdaptiveRamp().convert(np.ones((9, 4, 4)), period_us=0.0), "period_us is 0 us: must be above 0"),
         (lambda: VirtualGround(wire_ohm=1e-5), "wire_ohm is 0.00001 ohm: must be 0, or from 0.001 to 1e9"),
         (lambda: VirtualGround().volts([[1.0, -2.0]]), "conductance at x 1, y 0 is -2 uS: must be from 0 to 1e9"),
         (lambda: VirtualGround().volts([1.0]), r"conductance_us has shape \(1,\)"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from taxel.studies import fabric_array, fig3_3, fig3_5, fig4_3, fig4_6, fig4_7
+from taxel.studies import adaptive_ramp, asynchronous, fabric_array, fig3_3, fig3_5, fig4_3, fig4_6, fig4_7
 from taxel.studies.study import Study
 
 
@@ -22,6 +22,30 @@ def test_the_time_of_a_straight_ramp_is_proportional_and_that_of_an_rc_ramp_is_i
         trips = np.minimum(volts + 0.05, 3.0)  # half the hysteresis
         wanted = 0.5 * (trips / 3.0 if shape == "linear" else np.log(5 / (5 - trips)) / np.log(2.5))
         assert elapsed == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_ramp_that_adapts_is_near_the_best_fixed_one_in_each_phase(tmp_path):
+    said, statements = found(adaptive_ramp.STUDY, tmp_path)
+    assert [s["holds"] for s in statements.values()] == [True, True, True, None]
+    ramps = said["ramps"]
+    own, gentle, steep = (ramps[name]["rms_mv"] for name in ("adaptive", "510", "38"))
+    assert gentle["fine"] < steep["fine"]
+    assert steep["gross"] < gentle["gross"]
+    assert own["gross"] < gentle["gross"]
+    # A gentle ramp's own error: a tick is uniform, 3 V / 510 on average and less where the RC curve is flat.
+    assert gentle["fine"] == pytest.approx(1e3 * 3 / 510 / np.sqrt(12), rel=0.5)
+    course = ramps["adaptive"]["course"]
+    assert min(course["ramp"]) < 150 < max(course["ramp"]) == 510
+
+
+def test_an_asynchronous_array_tells_finer_times_of_the_same_touch(tmp_path):
+    said, statements = found(asynchronous.STUDY, tmp_path)
+    costs = said["costs"]
+    assert next(iter(statements.values()))["holds"]
+    assert costs["asynchronous"]["moments"] > costs["scanned"]["moments"]
+    # A taxel by itself tells each step that a scanned one jumps over, and no step of noise less.
+    assert costs["asynchronous"]["events"] >= costs["scanned"]["events"]
+    assert all(0 <= one["first"][0] <= said["most"] for bits in said["bits"].values() for one in bits.values())
 
 
 def test_a_lower_voltage_of_the_lines_trades_sensitivity_for_range(tmp_path):

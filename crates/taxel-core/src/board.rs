@@ -4,6 +4,7 @@
 //! host, emulator and logic agree. It has no clock of its own: each frame moves its time on.
 
 mod afferents;
+mod alone;
 mod counts;
 mod crossed;
 mod flaws;
@@ -14,6 +15,7 @@ mod scan;
 mod session;
 
 use afferents::Afferents;
+use alone::{Alone, Crossing, Sample};
 use outbox::Outbox;
 use scan::Lfsr;
 use serde::{Deserialize, Serialize};
@@ -104,6 +106,8 @@ pub struct Board {
     /// By taxel, with `mechanoreceptor`: the afferents, and the integrals that fired in this frame.
     afferents: Afferents,
     integrals: Vec<i64>,
+    /// Where each taxel compares by itself and nothing is scanned: what they are at.
+    alone: Option<Alone>,
     /// The datagram of version 1 that fills.
     filling: Vec<u8>,
     /// The datagrams of version 2.
@@ -171,6 +175,7 @@ impl Board {
             line_changed: vec![false; array.columns.into()],
             afferents: Afferents::default(),
             integrals: vec![0; array.len()],
+            alone: None,
             filling: Vec::with_capacity(DATAGRAM_WORDS * WORD_BYTES),
             packer: Packer::new(settings, array)?,
             version_2,
@@ -211,13 +216,15 @@ impl Board {
         (self.time, self.told_totals, self.told_lines) = (0, 0, 0);
         self.values.fill(0);
         self.afferents.forget();
+        self.alone = self.alone.take().map(|_| Alone::default());
         self.filling.clear();
         self.packer = Packer::new(self.settings(), &self.array)?;
         Ok(())
     }
 
     fn settings(&self) -> v2::Settings {
-        settings(&self.active, self.intensity, &self.version_2, self.session)
+        let frame_sync = self.active.frame_sync && self.alone.is_none();
+        settings(&Registers { frame_sync, ..self.active }, self.intensity, &self.version_2, self.session)
     }
 
     /// Chooses what a new value is compared with.
@@ -233,6 +240,32 @@ impl Board {
         self.intensity = intensity;
         self.packer.follow(self.settings());
         self
+    }
+
+    /// Lets each taxel compare by itself with what it sent last: no scan, and stamps of 1 us (thesis 4.5, Table 7.1).
+    ///
+    /// A taxel tells each step of `noise_floor + 1` ticks when it reaches it. What it reads is known once a frame, at the
+    /// time of its line; between two readings it counts as a straight line, so events leave a frame after they happened.
+    /// At reset each tells what it reads. The order of lines plays no part; while `mechanoreceptor` is set later, lines are
+    /// scanned.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the registers hold version 1 of the wire, whose stamps are of 100 us, or `mechanoreceptor`, or the
+    /// board compares with the last sample.
+    pub fn asynchronous(mut self) -> Result<Self> {
+        if self.written.wire_version != 2 {
+            return Err(problem!("asynchronous: wire_version is 1: must be 2, for stamps of 1 us"));
+        }
+        if self.written.mechanoreceptor {
+            return Err(problem!("asynchronous: mechanoreceptor is set: must not be, afferents are scanned"));
+        }
+        if self.previous == Previous::LastSample {
+            return Err(problem!("asynchronous: previous is last_sample: must be last_sent"));
+        }
+        self.alone = Some(Alone::default());
+        self.packer = Packer::new(self.settings(), &self.array)?;
+        Ok(self)
     }
 
     /// Bounds the queue, in words; below 2 nothing gets through.
@@ -309,8 +342,9 @@ impl Board {
 
     fn mark(&mut self, start: bool) {
         if self.active.wire_version == 2 {
-            let Self { outbox, counts, packer, time, .. } = self;
-            packer.marker(*time / 100, start, &mut |datagram, events| {
+            let now = self.now();
+            let Self { outbox, counts, packer, .. } = self;
+            packer.marker(now, start, &mut |datagram, events| {
                 counts.words += 2 * u64::from(events == 0);
                 outbox.send(datagram, 2 * events.max(1), &mut |_| false, counts);
             });
@@ -358,7 +392,9 @@ impl Board {
             self.lfsr.shuffle(&mut lines);
         }
         let any = if registers.mechanoreceptor { self.feel(ticks) } else { self.compare(ticks) };
-        if any {
+        if self.is_alone() {
+            self.tell_crossings(any, ticks, &mut sink);
+        } else if any {
             for (place, &x) in (0_u64..).zip(&lines) {
                 if self.line_changed[usize::from(x)] {
                     self.line(x, self.time + place * u64::from(registers.line_period), ticks, &mut sink);
@@ -374,6 +410,47 @@ impl Board {
         Ok(())
     }
 
+    /// Whether taxels compare by themselves.
+    fn is_alone(&self) -> bool {
+        self.alone.is_some() && !self.active.mechanoreceptor
+    }
+
+    /// Up to where all is told on version 2, us: where taxels compare by themselves a frame less than the time.
+    fn now(&self) -> u64 {
+        let behind = if self.is_alone() { self.active.frame_10ns() } else { 0 };
+        self.time.saturating_sub(behind) / 100
+    }
+
+    /// Finds what taxels by themselves have to tell, and tells what happened before this frame.
+    fn tell_crossings(&mut self, any: bool, ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
+        let Some(mut alone) = self.alone.take() else { return };
+        let (registers, columns, new) = (self.active, usize::from(self.array.columns), alone.is_new());
+        if any {
+            for taxel in (0..ticks.len()).filter(|&taxel| self.changed[taxel]) {
+                let (x, y) = ((taxel % columns) as u16, (taxel / columns) as u16);
+                let exists = self.array.exists.as_ref().is_none_or(|exists| exists[taxel]);
+                if x >= registers.lines || !exists {
+                    continue;
+                }
+                let after = u64::from(x) * u64::from(registers.line_period);
+                let sample = Sample { taxel, x, y, after, ticks: ticks[taxel].min(registers.ramp) };
+                alone.cross(self.time, sample, registers.noise_floor.into(), &mut self.values[taxel]);
+            }
+        }
+        let values = &self.values;
+        // One whose comparator is stuck stays as it was told.
+        let read = ticks.iter().zip(values).map(|(&t, &value)| if t == NOT_RETURNED { value } else { t });
+        let due = alone.over(self.time, read.map(|t| t.min(registers.ramp)));
+        self.alone = Some(alone);
+        // What all taxels tell at reset is of the first frame itself.
+        debug_assert!(!new || due.is_empty());
+        for Crossing { at, x, y, p, value, moved } in due {
+            let told = if self.intensity == IntensityWord::Difference { moved } else { value };
+            self.counts.changes += 1;
+            self.queue_event(at, (x, y), p, told, sink);
+        }
+    }
+
     /// Takes over what was written, at a frame's edge.
     fn take_over(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
         if self.active == self.written {
@@ -384,9 +461,10 @@ impl Board {
         }
         if self.active.mechanoreceptor != self.written.mechanoreceptor {
             self.afferents.forget();
+            self.alone = self.alone.take().map(|_| Alone::default());
         }
         self.active = self.written;
-        let (now, settings) = (self.time / 100, self.settings());
+        let (now, settings) = (self.now(), self.settings());
         let Self { outbox, counts, packer, .. } = self;
         packer.flush(now, &mut |datagram, events| outbox.send(datagram, 2 * events, sink, counts));
         packer.follow(settings);
@@ -398,7 +476,7 @@ impl Board {
             self.flush(sink);
             return;
         }
-        let (now, next) = (self.time / 100, (self.time + self.active.frame_10ns()) / 100);
+        let (now, next) = (self.now(), self.now() + self.active.frame_10ns() / 100);
         let every = self.version_2.states_us * 100;
         let Self { outbox, counts, packer, .. } = self;
         packer.over(now, next, &mut |datagram, events| outbox.send(datagram, 2 * events, sink, counts));
@@ -519,20 +597,30 @@ impl Board {
             }
         };
         self.counts.changes += 1;
-        let queued = if registers.wire_version == 2 {
-            self.pack(at / 100, (x, y), p, told, sink)
-        } else {
-            // Rule 8: on version 1 columns and rows fit a byte.
-            let (x, y) = (x as u8, y as u8);
-            let mut words = [0; 2 * WORD_BYTES];
-            words[..WORD_BYTES].copy_from_slice(&Word::Change { stamp: stamp(at), x, y, p }.to_bytes());
-            words[WORD_BYTES..].copy_from_slice(&Word::Intensity { ticks: told, x, y, p }.to_bytes());
-            let valued = registers.mechanoreceptor || self.intensity != IntensityWord::Nothing;
-            self.enqueue(&words[..if valued { 2 } else { 1 } * WORD_BYTES], sink)
-        };
-        if queued && !registers.mechanoreceptor {
+        if self.queue_event(at, (x, y), p, told, sink) && !registers.mechanoreceptor {
             self.values[taxel] = value;
         }
+    }
+
+    /// Queues an event on the version that is spoken; false where the queue is full and it was dropped.
+    fn queue_event(
+        &mut self,
+        at: u64,
+        (x, y): (u16, u16),
+        p: bool,
+        told: u16,
+        sink: &mut impl FnMut(&[u8]) -> bool,
+    ) -> bool {
+        if self.active.wire_version == 2 {
+            return self.pack(at / 100, (x, y), p, told, sink);
+        }
+        // Rule 8: on version 1 columns and rows fit a byte.
+        let (x, y) = (x as u8, y as u8);
+        let mut words = [0; 2 * WORD_BYTES];
+        words[..WORD_BYTES].copy_from_slice(&Word::Change { stamp: stamp(at), x, y, p }.to_bytes());
+        words[WORD_BYTES..].copy_from_slice(&Word::Intensity { ticks: told, x, y, p }.to_bytes());
+        let valued = self.active.mechanoreceptor || self.intensity != IntensityWord::Nothing;
+        self.enqueue(&words[..if valued { 2 } else { 1 } * WORD_BYTES], sink)
     }
 
     /// Gives an event to the packer; false where the queue is full and it was dropped.

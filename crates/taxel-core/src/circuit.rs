@@ -3,20 +3,25 @@
 //! A [`fabric`] conducts more the harder it is pressed. All taxels share their lines, so the current of one is the
 //! others' too: [`grid`] solves that network exactly. A [`readout`] holds its lines, and by its amplifiers or resistors
 //! each sense line becomes a voltage; a [`converter`] multiplexes these onto its comparators, whose [`ramp`] turns them
-//! into ticks. [`chain`] is all of it, as an emulated board can have it.
+//! into ticks, and may be an [`adaptive`] one. [`chain`] is all of it, as an emulated board can have it.
 //!
 //! "Driven line" and "sense line" as for the board: columns are driven, one after the other, and all rows are read.
 
+pub mod adaptive;
 pub mod chain;
 pub mod converter;
+mod dense;
 pub mod fabric;
 pub mod grid;
+pub mod limit;
 pub mod ramp;
 pub mod readout;
 
+pub use adaptive::{Adaptive, Converted};
 pub use chain::Chain;
 pub use converter::{Converter, Moment, Scan};
 pub use fabric::Fabric;
 pub use grid::{Grid, Idle};
+pub use limit::Limit;
 pub use ramp::{Ramp, Shape};
 pub use readout::{Divider, VirtualGround};

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::circuit::{Converter, Divider, Fabric, Scan, VirtualGround};
+use taxel_core::circuit::{Adaptive, Converter, Divider, Fabric, Scan, VirtualGround};
 use taxel_core::{Result, Stop};
 
 use crate::convert::{array, slice};
@@ -136,11 +136,29 @@ fn converter_trace<'py>(
     Ok((of(|m| m.t_us), of(|m| m.line_v), of(|m| m.input_v), of(|m| m.ramp_v), high))
 }
 
+/// us and ticks of each frame; ticks and V of all readings.
+type ConvertedOut<'py> = (Values<'py>, Bound<'py, PyArray1<u32>>, Values<'py>, Values<'py>);
+
+/// Converts voltages that go on, frame after frame, by a ramp that adapts.
+#[pyfunction]
+fn adaptive_convert<'py>(
+    py: Python<'py>,
+    json: &str,
+    shape: (usize, usize),
+    volts: PyReadonlyArray1<'py, f64>,
+    period_us: f64,
+) -> PyResult<ConvertedOut<'py>> {
+    let (adaptive, volts): (Adaptive, _) = (parsed("AdaptiveRamp", json)?, slice("volts", &volts)?);
+    let out = enter(py, |stop| adaptive.convert(volts, period_us, shape.0, shape.1, stop))?;
+    Ok((array(py, out.t_us), array(py, out.ramp), array(py, out.ticks), array(py, out.volts)))
+}
+
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(fabric, module)?)?;
     module.add_function(wrap_pyfunction!(circuit_volts, module)?)?;
     module.add_function(wrap_pyfunction!(circuit_volts_alone, module)?)?;
     module.add_function(wrap_pyfunction!(converter_ticks, module)?)?;
     module.add_function(wrap_pyfunction!(converter_ramp, module)?)?;
-    module.add_function(wrap_pyfunction!(converter_trace, module)?)
+    module.add_function(wrap_pyfunction!(converter_trace, module)?)?;
+    module.add_function(wrap_pyfunction!(adaptive_convert, module)?)
 }

@@ -3,7 +3,7 @@
 use pyo3::prelude::*;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use taxel_core::circuit::{Chain, Converter, Divider, Fabric, VirtualGround};
+use taxel_core::circuit::{Adaptive, Chain, Converter, Divider, Fabric, VirtualGround};
 use taxel_core::encode::{Encoder, RunningRange};
 use taxel_core::learn::rivals::{Batch, Rival, Tempotron};
 use taxel_core::learn::{ConeR, ConeX, OnlineConeR, Stdp};
@@ -38,6 +38,7 @@ fn described(of: &str) -> Option<Described> {
         "divider" => Some(Divider::described()),
         "converter" => Some(Converter::described()),
         "circuit" => Some(Chain::described()),
+        "adaptive_ramp" => Some(Adaptive::described()),
         _ => Encoder::described(of)
             .or_else(|| Rival::described(of))
             .or_else(|| Batch::described(of))
@@ -65,6 +66,7 @@ fn check_parameters(of: &str, parameters: &str) -> PyResult<String> {
         "divider" => checked("Divider", parameters, Divider::check),
         "converter" => checked("Converter", parameters, Converter::check),
         "circuit" => checked("Circuit", parameters, Chain::check),
+        "adaptive_ramp" => checked("AdaptiveRamp", parameters, Adaptive::check),
         _ if Rival::described(of).is_some() => written(of, &to_rival(parameters)?),
         _ if Batch::described(of).is_some() => written(of, &Batch::from_json(of, parameters).map_err(core)?),
         _ if Encoder::described(of).is_some() => Ok(Encoder::from_json(parameters).map_err(core)?.to_json()),

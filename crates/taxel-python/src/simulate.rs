@@ -7,11 +7,11 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyStopIteration;
 use pyo3::prelude::*;
 use serde::Deserialize;
-use taxel_core::board::{Board, Faults, Flaws, IntensityWord, Play, Played, Previous, Version2, opening};
+use taxel_core::board::{Board, Crossed, Faults, Flaws, IntensityWord, Play, Played, Previous, Version2, opening};
 use taxel_core::circuit::Chain;
 use taxel_core::contact::{Act, Bonded, Contact, Foam, Motion, Pictures, Scene, Sensor, Taxels, Track};
 use taxel_core::wire::Registers;
-use taxel_core::{Array, Error, Result, Stop, problem, reading};
+use taxel_core::{Array, Error, Result, Stop, reading};
 use taxel_live::address::of_text;
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{Emulator, EmulatorOptions, Feed, Replay, Report, Scenes, Touch};
@@ -97,13 +97,24 @@ fn truth<'py>(
 ) -> PyResult<(ContactsOut, Bound<'py, PyArray1<f32>>)> {
     let registers = Registers::preset(preset).map_err(core)?;
     let (array_felt, sensor) = (to_array(parts)?, Sensor::default());
-    let play = Play { array: array_felt, registers, sensor, seed: 0, acts: to_acts(acts)?, tare_ms: 0.0 };
+    let (circuit, asynchronous, tare_ms) = (None, false, 0.0);
+    let acts = to_acts(acts)?;
+    let play = Play { array: array_felt, registers, sensor, seed: 0, acts, tare_ms, circuit, asynchronous };
     let stage = enter(py, |_| play.stage())?;
     Ok((from_contacts(stage.contacts()), array(py, stage.force_n())))
 }
 
+/// How a board that is played to works.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlayedBy {
+    wire: u8,
+    circuit: Option<Chain>,
+    asynchronous: bool,
+}
+
 /// Plays acts to a board that arms, is tared and starts; gives what a host decodes of its datagrams, and how many they
-/// were, with their words.
+/// were, with their words and bytes. `options` is JSON.
 ///
 /// `watch` hears, once a second of the board's, what share is played; what it raises ends the play.
 #[pyfunction]
@@ -116,14 +127,17 @@ fn play<'py>(
     seed: u64,
     acts: Vec<ActIn<'py>>,
     tare_ms: f64,
+    options: &str,
     watch: Py<PyAny>,
-) -> PyResult<(EventsOut<'py>, u64, u64)> {
+) -> PyResult<(EventsOut<'py>, u64, u64, u64)> {
     let (array, registers) = (to_array(parts)?, Registers::preset(preset).map_err(core)?);
-    let play = Play { array, registers, sensor: to_sensor(sensor)?, seed, acts: to_acts(acts)?, tare_ms };
-    let Played { events, datagrams, words } = enter_telling(py, |stop, teller| {
+    let PlayedBy { wire, circuit, asynchronous } = parsed("options", options)?;
+    let (registers, sensor) = (Registers { wire_version: wire, ..registers }, to_sensor(sensor)?);
+    let play = Play { array, registers, sensor, seed, acts: to_acts(acts)?, tare_ms, circuit, asynchronous };
+    let Played { events, datagrams, words, bytes } = enter_telling(py, |stop, teller| {
         play.hear(|share| teller.tell(Some(&watch), |py, told| told.call1(py, (share,))), stop)
     })?;
-    Ok((from_events(py, events), datagrams, words))
+    Ok((from_events(py, events), datagrams, words, bytes))
 }
 
 /// What an emulated board feels, as Python hands it over.
@@ -154,6 +168,7 @@ struct Chosen {
     sync: Option<(PathBuf, bool)>,
     faults: Option<Faults>,
     circuit: Option<Chain>,
+    asynchronous: bool,
     flaws: Option<Flaws>,
     reset_every_s: Option<f64>,
     drift_ppm: f64,
@@ -226,15 +241,8 @@ fn emulate(
     let (frame_us, step) = (registers.frame_us(), u16::from(registers.noise_floor) + 1);
     let real_time = !matches!(touch, TouchIn::Pipe(..));
     let sensor = to_sensor(sensor)?;
-    if let (TouchIn::Acts(_), Some(Chain { readout, .. })) = (&touch, &chosen.circuit) {
-        for (name, circuits, sensors) in [
-            ("v_trans", readout.v_trans, sensor.v_trans),
-            ("feedback_kohm", readout.feedback_kohm, sensor.feedback_kohm),
-        ] {
-            if circuits != sensors {
-                return Err(core(problem!("circuit: {name} is {circuits}: must be the sensor's, {sensors}")));
-            }
-        }
+    if let (TouchIn::Acts(_), Some(circuit)) = (&touch, &chosen.circuit) {
+        Crossed::fits(circuit, &sensor).map_err(core)?;
     }
     let mut touch = match touch {
         TouchIn::Acts(iterator) => {
@@ -257,7 +265,10 @@ fn emulate(
         }
     };
     enter_telling(py, |stop, teller| {
-        let board = Board::new(registers, &array)?.previous(previous).intensity(intensity).version_2(version_2)?;
+        let mut board = Board::new(registers, &array)?.previous(previous).intensity(intensity).version_2(version_2)?;
+        if chosen.asynchronous {
+            board = board.asynchronous()?;
+        }
         let options = EmulatorOptions {
             real_time,
             control: chosen.control.as_deref().map(of_text).transpose()?,

@@ -1,9 +1,13 @@
 //! The wire and the board: bytes, commands, registers.
 
+use std::borrow::Cow;
+
 use numpy::{PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use taxel_core::board::{Board, IntensityWord, Previous, Version2};
+use serde::Deserialize;
+use taxel_core::board::{Board, Crossed, IntensityWord, Previous, Version2};
+use taxel_core::circuit::Chain;
 use taxel_core::wire::{self, Command, Counts, Decoder, Filled, Pairing, Registers, Room};
 use taxel_core::{Error, Events, problem};
 
@@ -204,60 +208,68 @@ fn registers_commands(source: &str, target: &str, array: ArrayParts) -> PyResult
     Ok(commands.into_iter().map(|c| (c.register, c.value)).collect())
 }
 
-/// The emulated board.
+/// How an emulated board works.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WireBoardOptions {
+    previous: Previous,
+    intensity: IntensityWord,
+    queue: usize,
+    version_2: Version2,
+    circuit: Option<Chain>,
+    asynchronous: bool,
+}
+
+/// The emulated board, and the circuit through which it reads.
 #[pyclass(module = "taxel._core", frozen)]
-struct WireBoard(Shared<Board>);
+struct WireBoard(Shared<(Board, Option<Crossed>)>);
 
 #[pymethods]
 impl WireBoard {
-    /// `version_2` is JSON.
+    /// `registers` and `options` are JSON.
     #[new]
-    fn new(
-        registers: &str,
-        array: ArrayParts,
-        previous: &str,
-        intensity: &str,
-        queue: usize,
-        version_2: &str,
-    ) -> PyResult<Self> {
-        let version_2: Version2 = parsed("version 2", version_2)?;
-        let registers: Registers = parsed("registers", registers)?;
-        let previous: Previous = parsed("previous", &format!("{previous:?}"))?;
-        let intensity: IntensityWord = parsed("intensity", &format!("{intensity:?}"))?;
-        let board = Board::new(registers, &to_array(array)?).map_err(core)?;
-        let board = board.previous(previous).intensity(intensity).queue(queue);
-        Ok(Self(Shared::new(board.version_2(version_2).map_err(core)?)))
+    fn new(registers: &str, array: ArrayParts, options: &str) -> PyResult<Self> {
+        let (registers, array): (Registers, _) = (parsed("registers", registers)?, to_array(array)?);
+        let WireBoardOptions { previous, intensity, queue, version_2, circuit, asynchronous } =
+            parsed("options", options)?;
+        let mut board = Board::new(registers, &array).map_err(core)?;
+        board = board.previous(previous).intensity(intensity).queue(queue).version_2(version_2).map_err(core)?;
+        if asynchronous {
+            board = board.asynchronous().map_err(core)?;
+        }
+        let crossed = circuit.map(|chain| Crossed::new(chain, &registers, &array)).transpose().map_err(core)?;
+        Ok(Self(Shared::new((board, crossed))))
     }
 
     /// Resets the board.
     fn reset(&self, py: Python<'_>) -> PyResult<()> {
-        self.0.enter(py, |board, _| board.reset())
+        self.0.enter(py, |(board, _), _| board.reset())
     }
 
     fn greeting(&self, py: Python<'_>) -> String {
-        self.0.look(py, |board| board.greeting())
+        self.0.look(py, |(board, _)| board.greeting())
     }
 
     fn registers(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.look(py, |board| to_json(board.registers()))
+        self.0.look(py, |(board, _)| to_json(board.registers()))
     }
 
     fn time_us(&self, py: Python<'_>) -> f64 {
-        self.0.look(py, |board| board.time_us())
+        self.0.look(py, |(board, _)| board.time_us())
     }
 
     /// Takes command bytes; returns status lines.
     fn command(&self, py: Python<'_>, data: PyReadonlyArray1<'_, u8>) -> PyResult<String> {
         let data = slice("data", &data)?;
-        self.0.enter(py, |board, _| Ok::<_, Error>(board.command(data)))
+        self.0.enter(py, |(board, _), _| Ok::<_, Error>(board.command(data)))
     }
 
     fn record(&self, py: Python<'_>, start: bool) {
-        self.0.look(py, |board| board.record(start));
+        self.0.look(py, |(board, _)| board.record(start));
     }
 
     fn faults(&self, py: Python<'_>) -> String {
-        self.0.look(py, Board::faults)
+        self.0.look(py, |(board, _)| board.faults())
     }
 
     /// Scans one frame; returns the datagrams, of which the sink takes at most so many.
@@ -267,9 +279,16 @@ impl WireBoard {
         ticks: PyReadonlyArray1<'py, u16>,
         most: usize,
     ) -> PyResult<Vec<Bound<'py, PyBytes>>> {
-        let (ticks, mut sent) = (slice("ticks", &ticks)?, vec![]);
-        let datagrams = self.0.enter(py, |board, _| {
-            board.frame(ticks, |datagram| {
+        let (given, mut sent) = (slice("ticks", &ticks)?, vec![]);
+        let datagrams = self.0.enter(py, |(board, crossed), stop| {
+            let mut ticks = Cow::from(given);
+            // One of another length is refused by the board.
+            if let Some(crossed) = crossed
+                && ticks.len() == crossed.taxels()
+            {
+                crossed.read(board.registers(), ticks.to_mut(), stop)?;
+            }
+            board.frame(&ticks, |datagram| {
                 let room = sent.len() < most;
                 if room {
                     sent.push(datagram.to_vec());
@@ -283,7 +302,7 @@ impl WireBoard {
 
     /// The counts as JSON.
     fn counts(&self, py: Python<'_>) -> PyResult<String> {
-        self.0.look(py, |board| to_json(board.counts()))
+        self.0.look(py, |(board, _)| to_json(board.counts()))
     }
 }
 

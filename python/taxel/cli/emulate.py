@@ -74,6 +74,10 @@ def emulate(
             "one of them puts in the whole circuit, the others as usual. Takes the board below 5.2 kHz.",
         ),
     ] = None,
+    asynchronous: Annotated[
+        bool,
+        typer.Option("--asynchronous", help="Each taxel compares by itself: no scan, stamps of 1 us (version 2)."),
+    ] = False,
     flaw: Annotated[
         list[str] | None,
         typer.Option(
@@ -167,9 +171,10 @@ def emulate(
                     tare_ms=1e3 * tare,
                     array=said_by.array,
                     sensor=said_by.sensor,
-                    wire=None if wire is None else 2 if wire == 2 else 1,
+                    wire=(2 if asynchronous else None) if wire is None else 2 if wire == 2 else 1,
                     version_2=Version2(board, session, round(1e3 * hold), round(1e3 * heartbeat), round(1e3 * states)),
                     circuit=lines,
+                    asynchronous=asynchronous,
                     flaws=flaws,
                     faults=faults,
                     reset_every_s=reset_every,

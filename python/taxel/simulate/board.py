@@ -22,7 +22,7 @@ from taxel.frames import Frames
 from taxel.recording import Recording
 from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence
 from taxel.simulate.circuit import Circuit
-from taxel.simulate.emulated import Version2
+from taxel.simulate.emulated import Version2, reading
 from taxel.simulate.trouble import Faults, Flaws
 from taxel.spikes import to_ms
 from taxel.wire import Registers
@@ -46,7 +46,9 @@ class Played(NamedTuple):
     """All of them: the tare's, then from the start marker on what the scenes made."""
     datagrams: int
     words: int
-    """Of five bytes each."""
+    """Of version 1 of the wire, of five bytes each; 0 on version 2."""
+    bytes: int
+    """Of all datagrams, without what the network puts around them."""
 
 
 @dataclass(frozen=True)
@@ -273,6 +275,9 @@ def play(
     tare_ms: float = 50.0,
     array: Array | None = None,
     sensor: Mapping[str, float] | None = None,
+    wire: Literal[1, 2] | None = None,
+    circuit: Circuit | None = None,
+    asynchronous: bool = False,
     watch: Callable[[float], object] = lambda _: None,
 ) -> Played:
     """Let an emulated board feel acts, as fast as it goes, and decode its datagrams.
@@ -292,13 +297,20 @@ def play(
     sensor : mapping, optional
         What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm, gain_spread,
         offset_mv, noise_ticks.
+    wire : {1, 2}, optional
+        The version of the wire that it speaks; left out, 1, or 2 where it is asynchronous.
+    circuit : Circuit, optional
+        Lines that its taxels share, settling, comparators with hysteresis; left out, each taxel reads by itself. Its
+        voltage and resistor must be the sensor's; the converter's times are the preset's.
+    asynchronous : bool
+        Each taxel compares by itself, as in `Board`; needs version 2, and no circuit.
     watch : function, optional
         Called with the share that is played, once a second of the board's time.
 
     Raises
     ------
     SceneError : an act or a sensor that makes no sense
-    ProblemError : acts too short for the tare
+    ProblemError : acts too short for the tare; a circuit of another voltage or resistor; asynchronous on version 1
 
     Examples
     --------
@@ -307,16 +319,19 @@ def play(
     ((50300, True), (59900, False))
     """
     parts = _parts(acts, Array._of(array))
-    events, datagrams, words = _core.play(
+    told = reading(circuit, asynchronous)
+    told["wire"] = whole("wire", (2 if asynchronous else 1) if wire is None else wire, 1, 2)
+    events, datagrams, words, taken = _core.play(
         Array._of(array)._parts(),
         text("preset", preset),
         parameters({} if sensor is None else mapping("sensor", sensor)),
         whole("seed", seed, 0),
         parts,
         number("tare_ms", tare_ms),
+        parameters(told),
         callback("watch", watch),
     )
-    return Played(Events._from_parts(events), datagrams, words)
+    return Played(Events._from_parts(events), datagrams, words, taken)
 
 
 def emulate(
@@ -334,6 +349,7 @@ def emulate(
     intensity: Literal["value", "difference", "nothing"] = "value",
     version_2: Version2 | None = None,
     circuit: Circuit | None = None,
+    asynchronous: bool = False,
     flaws: Flaws | None = None,
     faults: Faults | None = None,
     reset_every_s: float | None = None,
@@ -371,7 +387,10 @@ def emulate(
     circuit : Circuit, optional
         Lines that its taxels share, settling, comparators with hysteresis; left out, each taxel reads by itself. Of
         acts its voltage and resistor must be the sensor's; the converter's times are the registers', and flaws come
-        after it. One core then keeps about 2 kHz of 64 x 64 taxels.
+        after it. How many frames a second one core then keeps is in the report.
+    asynchronous : bool
+        Each taxel compares by itself, as in `Board`; no circuit, and the registers must hold version 2 of the wire
+        (``wire=2``).
     flaws : Flaws, optional
         What is wrong with its taxels.
     faults : Faults, optional
@@ -426,7 +445,7 @@ def emulate(
         "control": None if control is None else text("control", control),
         "line": None if line is None else (str(Path(checked_path("line", line))), whole("baud", baud, 300, 4_000_000)),
         "sync": None if sync is None else (str(Path(checked_path("sync", sync))), bool(overwrite)),
-        "circuit": None if circuit is None else instance("circuit", circuit, Circuit)._plain(),
+        **reading(circuit, asynchronous),
         "flaws": None if flaws is None else instance("flaws", flaws, Flaws)._parts(),
         "faults": None if faults is None else instance("faults", faults, Faults)._parts(),
         "reset_every_s": None if reset_every_s is None else number("reset_every_s", reset_every_s),

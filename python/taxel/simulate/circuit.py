@@ -2,7 +2,8 @@
 
 A `Fabric` turns force into conductance. `VirtualGround` (the thesis' array) or a `Divider` (its first, of 8 x 8) turns
 the conductances of a whole array into the voltages that their shared lines really give; a `Converter` turns those into
-ticks. `Circuit` is the last two as an emulated board can have them. Arrays are ``(rows, columns)``, or frames of them.
+ticks, an `AdaptiveRamp` by a ramp as steep as the signal asks for. `Circuit` is lines and converter as an emulated
+board can have them. Arrays are ``(rows, columns)``, or frames of them.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from taxel._arguments import floats, number, numbers, shown
 from taxel._core import ProblemError
 from taxel._parameters import Value, defaults
 
-__all__ = ["Circuit", "Converter", "Divider", "Fabric", "Trace", "VirtualGround"]
+__all__ = ["AdaptiveRamp", "Circuit", "Converted", "Converter", "Divider", "Fabric", "Trace", "VirtualGround"]
 
 Values = NDArray[np.float64]
 
@@ -28,6 +29,7 @@ _GROUND = defaults("virtual_ground")
 _DIVIDER = defaults("divider")
 _CONVERTER = defaults("converter")
 _CIRCUIT = defaults("circuit")
+_ADAPTIVE = defaults("adaptive_ramp")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -140,7 +142,8 @@ class VirtualGround(_Lines):
     wire_ohm : float, ohm, from 0 to 1e9
         A line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
     rail_v : float, V, above 0
-        Where amplifiers saturate. That the line of one that does is no longer held is left out.
+        Where amplifiers saturate; also at 0 V. The line of one that does is no longer held: it hangs on the rail by the
+        feedback resistor.
     seed : int, 0 or more
         Of the offsets.
 
@@ -354,6 +357,88 @@ class Converter(Value):
         lines = floats("line_v", line_v, "V").tolist()
         every, stop = number("every_us", every_us, "us"), number("stop_us", stop_us, "us")
         return Trace(*_core.converter_trace(self._json(), lines, every, stop))
+
+
+class Converted(NamedTuple):
+    """Hold frames that were converted one after the other, each with a ramp of its own."""
+
+    t_us: Values
+    """When each began, us, shape (frames,); a column is read as it is when its turn comes."""
+    ramp: NDArray[np.uint32]
+    """How long its ramp took, ticks, shape (frames,)."""
+    ticks: Values
+    """When the comparators said that it had passed, shape (frames, rows, columns), as `Converter.ticks`."""
+    volts: Values
+    """What the whole ticks that a counter shows say of the voltage, V: halfway to the next tick, 3 V at the end."""
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class AdaptiveRamp(Value):
+    """Convert by a ramp that is steep while the signal moves fast and gentle while it hardly does (thesis 4.3.2).
+
+    After a frame the taxel that moved farthest says how long the next ramp is: as long as lets it move by `moves_ticks`
+    of that ramp within the frame, so that a reading is about as much too old as too coarse. Without any move the ramp
+    takes twice its time, up to the gentlest. What a step and a column take beside their ramp stays.
+
+    Parameters
+    ----------
+    converter : Converter, optional
+        Its times, those of a step and a column with the ramp that it holds. None: the defaults.
+    steepest : int, ticks, from 1 to 65534
+        The shortest time of the ramp.
+    gentlest : int, ticks, from 1 to 65534
+        The longest; the default is that of the preset "2 kHz".
+    moves_ticks : float, ticks, above 0
+        How far the fastest taxel may move in a frame.
+    noise_ticks : float, ticks, 0 or more
+        What does not count as a move, in ticks of the coarser of two ramps.
+
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense, or `steepest` above `gentlest`
+
+    Notes
+    -----
+    The thesis calls for a steep slope during gross movements and a gentle one during fine control, and states no rule:
+    this one is ours. ``taxel study adaptive_ramp`` shows what it gains.
+
+    Examples
+    --------
+    >>> still = np.full((2000, 4, 8), 1.7)
+    >>> AdaptiveRamp().convert(still, period_us=1.0).ramp[:4].tolist()
+    [510, 510, 510, 510]
+    """
+
+    converter: Converter | None = _ADAPTIVE.converter
+    steepest: int = _ADAPTIVE.steepest
+    gentlest: int = _ADAPTIVE.gentlest
+    moves_ticks: float = _ADAPTIVE.moves_ticks
+    noise_ticks: float = _ADAPTIVE.noise_ticks
+
+    _kind = "adaptive_ramp"
+    _nested: ClassVar[dict[str, type[Any]]] = {"converter": Converter}
+
+    def convert(self, volts: ArrayLike, *, period_us: float) -> Converted:
+        """Convert what lines give, frame after frame until the voltages end.
+
+        Parameters
+        ----------
+        volts : float64, V, (n, rows, columns)
+            The lines at even times, straight in between.
+        period_us : float, us, above 0
+            From one of these times to the next.
+
+        Raises
+        ------
+        ProblemError : voltages that are not finite, another shape, or so many that more than 2e8 readings could come
+        """
+        given = _pictures("volts", volts, "V")
+        frames = given if given.ndim == 3 else given[None]
+        shape: tuple[int, int] = frames.shape[1:]
+        period = number("period_us", period_us, "us")
+        t_us, ramp, *read = _core.adaptive_convert(self._json(), shape, frames.ravel(), period)
+        ticks, said = (one.reshape(-1, *shape) for one in read)
+        return Converted(t_us, ramp, ticks, said)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)

@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike
 
 from taxel import _core
 from taxel._arguments import flag, instance, numbers, text, whole
+from taxel._core import ProblemError
 from taxel.array import Array
+from taxel.simulate.circuit import Circuit
 from taxel.wire import Registers, _bytes
 
-__all__ = ["NOT_RETURNED", "Board", "Version2"]
+__all__ = ["NOT_RETURNED", "Board", "Version2", "reading"]
 
 #: A trip time that says: the comparator had not returned when the ramp began. A fault, not a value.
 NOT_RETURNED = 65_535
@@ -53,8 +55,18 @@ class Version2:
             whole(name, getattr(self, name), 0, most)
         whole("states_us", self.states_us, 0, 10**9)
 
-    def _json(self) -> str:
-        return json.dumps(asdict(self))
+
+def reading(circuit: Circuit | None, asynchronous: bool) -> dict[str, Any]:
+    """Return how taxels are read as the compiled part takes it.
+
+    Raises
+    ------
+    ProblemError : a circuit between taxels that compare by themselves
+    """
+    lines = None if circuit is None else instance("circuit", circuit, Circuit)._plain()
+    if flag("asynchronous", asynchronous) and lines is not None:
+        raise ProblemError("asynchronous: taxels that compare by themselves share no lines: circuit must be left out")
+    return {"circuit": lines, "asynchronous": asynchronous}
 
 
 class Board:
@@ -76,6 +88,14 @@ class Board:
         A taxel whose two words find no room is dropped and counted.
     version_2 : Version2, optional
         How it speaks version 2 of the wire.
+    circuit : Circuit, optional
+        Lines that its taxels share, settling, comparators with hysteresis: what `frame` is given passes through it
+        first. Left out, each taxel reads by itself. The converter's times are the registers'.
+    asynchronous : bool
+        Each taxel compares by itself with what it sent last; nothing is scanned, and stamps are of 1 us, so the
+        registers must hold version 2 of the wire (thesis 4.5, Table 7.1). It tells each step of ``noise_floor + 1``
+        ticks when it reaches it. What it reads between two frames lies on a straight line, so events leave a frame
+        after they happened, with the time at which they did. Such taxels share no lines: no `circuit`.
 
     Raises
     ------
@@ -101,17 +121,19 @@ class Board:
         intensity: Literal["value", "difference", "nothing"] = "value",
         queue: int = 16_384,
         version_2: Version2 | None = None,
+        circuit: Circuit | None = None,
+        asynchronous: bool = False,
     ) -> None:
         self.array = Array._of(array)
         start = Registers(array=self.array) if registers is None else instance("registers", registers, Registers)
-        self._core = _core.WireBoard(
-            start._json(),
-            self.array._parts(),
-            text("previous", previous, ("last_sent", "last_sample")),
-            text("intensity", intensity, ("value", "difference", "nothing")),
-            whole("queue", queue, 0, 2**32),
-            instance("version_2", Version2() if version_2 is None else version_2, Version2)._json(),
-        )
+        options = {
+            "previous": text("previous", previous, ("last_sent", "last_sample")),
+            "intensity": text("intensity", intensity, ("value", "difference", "nothing")),
+            "queue": whole("queue", queue, 0, 2**32),
+            "version_2": asdict(instance("version_2", Version2() if version_2 is None else version_2, Version2)),
+            **reading(circuit, asynchronous),
+        }
+        self._core = _core.WireBoard(start._json(), self.array._parts(), json.dumps(options))
 
     def frame(self, ticks: ArrayLike, *, most: int | None = None) -> list[bytes]:
         """Scan one frame; return the datagrams that went out.

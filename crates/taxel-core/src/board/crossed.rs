@@ -2,8 +2,9 @@
 
 use super::NOT_RETURNED;
 use crate::circuit::{Chain, Converter, Ramp, Scan};
+use crate::contact::Sensor;
 use crate::wire::Registers;
-use crate::{Array, Result, Stop};
+use crate::{Array, Result, Stop, problem};
 
 /// Puts frames of trip times through a circuit, one after the other.
 ///
@@ -39,6 +40,29 @@ impl Crossed {
             scan,
             chain,
         })
+    }
+
+    /// How many taxels it reads.
+    #[must_use]
+    pub fn taxels(&self) -> usize {
+        self.ticks.len()
+    }
+
+    /// Refuses a circuit whose voltage and resistor are not those by which a simulated sensor makes trip times.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the parameter.
+    pub fn fits(chain: &Chain, sensor: &Sensor) -> Result<()> {
+        for (name, circuits, sensors) in [
+            ("v_trans", chain.readout.v_trans, sensor.v_trans),
+            ("feedback_kohm", chain.readout.feedback_kohm, sensor.feedback_kohm),
+        ] {
+            if circuits != sensors {
+                return Err(problem!("circuit: {name} is {circuits}: must be the sensor's, {sensors}"));
+            }
+        }
+        Ok(())
     }
 
     /// Changes a frame's trip times to what the board reads of them; one at the ramp's end stays there.

@@ -1,8 +1,9 @@
 //! Acts played to a board that arms, is tared, starts and stops.
 
-use super::{Board, session};
+use super::{Board, Crossed, session};
+use crate::circuit::Chain;
 use crate::contact::{Act, Sensor, Stage, Taxels};
-use crate::wire::{Command, Decoder, Registers, WORD_BYTES};
+use crate::wire::{Command, Decoder, Receiver, Registers, WORD_BYTES};
 use crate::{Array, Events, Result, Stop};
 
 /// What is played, and to which board.
@@ -20,6 +21,10 @@ pub struct Play {
     pub acts: Vec<Act>,
     /// How long the tare takes, ms.
     pub tare_ms: f64,
+    /// What taxels share and how they are converted; nothing: each reads by itself.
+    pub circuit: Option<Chain>,
+    /// Each taxel compares by itself: nothing is scanned.
+    pub asynchronous: bool,
 }
 
 /// A board that has armed, what it is shown from its second frame on, and the commands of its session.
@@ -27,6 +32,8 @@ pub struct Play {
 pub struct Armed {
     /// Its first frame was the stage's.
     pub board: Board,
+    /// The circuit through which it reads.
+    pub crossed: Option<Crossed>,
     /// The frames that are left.
     pub stage: Stage,
     /// Before which frame each comes.
@@ -40,8 +47,10 @@ pub struct Played {
     pub events: Events,
     /// How many datagrams there were.
     pub datagrams: u64,
-    /// How many words, of five bytes, they held.
+    /// How many words of version 1, of five bytes, they held.
     pub words: u64,
+    /// How many bytes they held.
+    pub bytes: u64,
 }
 
 impl Play {
@@ -61,15 +70,27 @@ impl Play {
     ///
     /// # Errors
     ///
-    /// As [`Play::stage`] and [`Board::new`]; `Problem` where the tare leaves no frame for the acts.
+    /// As [`Play::stage`], [`Board::new`], [`Board::asynchronous`], [`Crossed::new`] and [`Crossed::fits`]; `Problem` where
+    /// the tare leaves no frame for the acts.
     pub fn arm(&self) -> Result<Armed> {
         let mut stage = self.stage()?;
         let commands = session(&self.registers, self.tare_ms, stage.frames() as u64)?;
         let mut board = Board::new(self.registers, &self.array)?;
+        if self.asynchronous {
+            board = board.asynchronous()?;
+        }
+        let mut crossed = None;
+        if let Some(chain) = &self.circuit {
+            Crossed::fits(chain, &self.sensor)?;
+            crossed = Some(Crossed::new(chain.clone(), &self.registers, &self.array)?);
+        }
         let mut first = vec![0; self.array.len()];
         stage.frame(&mut first)?;
+        if let Some(crossed) = &mut crossed {
+            crossed.read(&self.registers, &mut first, Stop::never())?;
+        }
         board.arm(&first)?;
-        Ok(Armed { board, stage, commands })
+        Ok(Armed { board, crossed, stage, commands })
     }
 
     /// Plays as fast as it goes and decodes what the board sends; `watch` hears once a second of the board's which share
@@ -79,27 +100,35 @@ impl Play {
     ///
     /// As [`Play::arm`]; `Interrupted` where asked to stop.
     pub fn hear(&self, mut watch: impl FnMut(f64), stop: Stop<'_>) -> Result<Played> {
-        let Armed { mut board, mut stage, commands } = self.arm()?;
-        let mut decoder = Decoder::new(self.array.clone());
+        let Armed { mut board, mut crossed, mut stage, commands } = self.arm()?;
+        let version = self.registers.wire_version;
+        let mut receiver = Receiver::new(Decoder::new(self.array.clone()), version);
         let mut events = Events::empty(self.array.clone());
-        let (mut datagrams, mut words) = (0, 0);
+        let (mut datagrams, mut bytes) = (0, 0);
         let hear = |datagram: &[u8]| {
-            decoder.push_into(datagram, None, &mut events);
-            decoder.end_of_datagram_into(&mut events);
+            receiver.push(datagram, None, &mut events);
             datagrams += 1;
-            words += (datagram.len() / WORD_BYTES) as u64;
+            bytes += datagram.len() as u64;
             true
         };
         let (frames, second) = (stage.frames(), (1e6 / self.registers.frame_us()) as usize);
         let mut done = 0_usize;
+        // The session writes the floor and the markers alone: neither moves the converter.
         let touch = |ticks: &mut [u16]| {
             done += 1;
             if done.is_multiple_of(second) {
                 watch(done as f64 / frames as f64);
             }
-            stage.frame(ticks)
+            let more = stage.frame(ticks)?;
+            if let Some(crossed) = &mut crossed
+                && more
+            {
+                crossed.read(&self.registers, ticks, stop)?;
+            }
+            Ok(more)
         };
         board.play(touch, &commands, hear, stop)?;
-        Ok(Played { events, datagrams, words })
+        let words = if version == 1 { bytes / WORD_BYTES as u64 } else { 0 };
+        Ok(Played { events, datagrams, words, bytes })
     }
 }

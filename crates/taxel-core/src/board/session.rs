@@ -56,6 +56,9 @@ impl Board {
     pub fn arm(&mut self, ticks: &[u16]) -> Result<()> {
         let before = self.counts;
         self.frame(ticks, |_| true)?;
+        if let Some(alone) = &mut self.alone {
+            alone.hush();
+        }
         let BoardCounts { frames, not_returned, .. } = self.counts;
         self.counts = BoardCounts { frames, not_returned, ..before };
         Ok(())

@@ -290,6 +290,12 @@ impl Scan {
         &self.converter
     }
 
+    /// Goes on with other times; as many steps as before, and checked.
+    pub(super) fn follow(&mut self, converter: Converter) {
+        debug_assert_eq!(converter.steps, self.converter.steps);
+        self.converter = converter;
+    }
+
     /// Converts a frame of voltages, `[row * columns + column]`, columns in their order; each step of a channel reads its
     /// next row. Ticks with their fraction; not a number where a comparator had not returned when the ramp began.
     ///

@@ -9,18 +9,18 @@
 //! `(1 + s K) I = K u - v / (1 + r b_j) G_j`, `s` the sense resistance, `u` the sources, `v` on the driven line j.
 //!
 //! That is symmetric, positive definite and as large as there are rows; ideal lines (0 ohm) are no special case, and
-//! small currents are no differences of large ones. Lines that float are `r` without bound. With wire resistance each
-//! crossing has two voltages of its own, and the sparse system of all of them is factored.
+//! small currents are no differences of large ones. Lines that float are `r` without bound: `K` is then another for each
+//! line read, by `(1 / b_j - w_j) G_j G_j'`, so that one factor serves all of them (Sherman and Morrison). With wire
+//! resistance each crossing has two voltages of its own, and the sparse system of all of them is factored.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::llt;
-use faer::linalg::matmul::triangular::{BlockStructure, matmul};
-use faer::linalg::triangular_solve::{solve_lower_triangular_in_place, solve_upper_triangular_in_place};
-use faer::sparse::linalg::cholesky::factorize_symbolic_cholesky;
+use faer::sparse::linalg::cholesky::{LltRef, SymbolicCholesky, factorize_symbolic_cholesky};
 use faer::sparse::{SparseColMat, Triplet};
-use faer::{Accum, Conj, Mat, MatMut, Par, Side};
+use faer::{Conj, Mat, MatMut, Par, Side};
 use serde::{Deserialize, Serialize};
 
+use super::dense::{Matrix, beyond};
+use super::limit::Limit;
 use crate::{Result, Stop, problem};
 
 /// What the driven lines that are not read do.
@@ -49,6 +49,8 @@ pub struct Grid {
     pub wire_ohm: f64,
     /// What the lines that are not read do.
     pub idle: Idle,
+    /// Where a sense line's source gives no more; nothing: nowhere.
+    pub limit: Option<Limit>,
 }
 
 /// The least wire resistance that is solved as one: below it the network's numbers lie too far apart.
@@ -79,57 +81,95 @@ impl Grid {
             let (x, y, g) = (k % m, k / m, conductance_us[k]);
             return Err(problem!("conductance at x {x}, y {y} is {g} uS: must be from 0 to 1e9"));
         }
-        // In siemens by column, so that currents are in ampere.
-        let g = Mat::from_fn(n, m, |i, k| 1e-6 * conductance_us[i * m + k]);
-        let out = if self.wire_ohm > 0.0 {
-            self.with_wires(&g, drive_v, sense_v, stop)?
+        let siemens: Vec<f64> = conductance_us.iter().map(|g| 1e-6 * g).collect();
+        let mut currents = if self.wire_ohm > 0.0 {
+            self.with_wires(&siemens, drive_v, sense_v, stop)?
         } else {
-            self.without_wires(&g, drive_v, sense_v, stop)?
+            self.without_wires(&siemens, drive_v, sense_v)?
         };
-        Ok((0..n * m).map(|k| 1e6 * out[(k / m, k % m)]).collect())
+        currents.iter_mut().for_each(|current| *current *= 1e6);
+        Ok(currents)
     }
 
-    fn without_wires(&self, g: &Mat<f64>, drive_v: f64, sense_v: &[f64], stop: Stop<'_>) -> Result<Mat<f64>> {
-        let (n, m) = (self.rows, self.columns);
-        let by_column: Vec<f64> = (0..m).map(|k| g.col(k).iter().sum()).collect();
-        let by_row: Vec<f64> = (0..n).map(|i| (0..m).map(|k| g[(i, k)]).sum()).collect();
-        let held = |k: usize| self.drive_ohm / (1.0 + self.drive_ohm * by_column[k]);
+    fn without_wires(&self, g: &[f64], drive_v: f64, sense_v: &[f64]) -> Result<Vec<f64>> {
+        let (n, m, r) = (self.rows, self.columns, self.drive_ohm);
+        let (mut by_row, mut by_column, mut of_sources) = (vec![0.0; n], vec![0.0; m], vec![0.0; m]);
+        let mut turned = Matrix::zeros(m, n);
+        for (i, row) in g.chunks_exact(m.max(1)).enumerate() {
+            for (k, &g) in row.iter().enumerate() {
+                by_row[i] += g;
+                by_column[k] += g;
+                of_sources[k] += g * sense_v[i];
+                *turned.at_mut(k, i) = g;
+            }
+        }
+        let held = |k: usize| r / (1.0 + r * by_column[k]);
         let floats = |k: usize| if by_column[k] > 0.0 { by_column[k].recip() } else { 0.0 };
-        let mut currents = Mat::zeros(n, m);
-        // Lines that are held have one matrix for all that are read, lines that float one for each.
-        let at_once = if self.idle == Idle::Held { m } else { 1 };
-        for first in (0..m).step_by(at_once) {
-            stop.check()?;
-            let weight = |k: usize| if (first..first + at_once).contains(&k) { held(k) } else { floats(k) };
-            let weighted = Mat::from_fn(n, m, |i, k| -weight(k) * g[(i, k)]);
-            let mut k = Mat::zeros(n, n);
-            let (lower, full) = (BlockStructure::TriangularLower, BlockStructure::Rectangular);
-            matmul(&mut k, lower, Accum::Replace, &weighted, full, g.transpose(), full, 1.0, Par::Seq);
-            for i in 0..n {
-                k[(i, i)] += by_row[i];
-            }
-            let of = |i: usize, j: usize| if i >= j { k[(i, j)] } else { k[(j, i)] };
-            let of_sources: Vec<f64> = (0..n).map(|i| (0..n).map(|j| of(i, j) * sense_v[j]).sum()).collect();
-            let mut right = Mat::from_fn(n, at_once, |i, c| {
-                let read = first + c;
-                of_sources[i] - drive_v / (1.0 + self.drive_ohm * by_column[read]) * g[(i, read)]
-            });
-            if self.sense_ohm > 0.0 {
-                for j in 0..n {
-                    for i in j..n {
-                        k[(i, j)] *= self.sense_ohm;
-                    }
-                    k[(j, j)] += 1.0;
+        let weights: Vec<f64> = (0..m)
+            .map(|k| match self.idle {
+                Idle::Held => held(k),
+                Idle::Floating => floats(k),
+            })
+            .collect();
+        // K as if no line were read.
+        let mut k_matrix = Matrix::zeros(n, n);
+        let weighted: Vec<f64> = g.iter().zip(weights.iter().cycle()).map(|(g, w)| g * w).collect();
+        k_matrix.subtract(&weighted, &turned);
+        (0..n).for_each(|i| *k_matrix.at_mut(i, i) += by_row[i]);
+        // Columns of G, and behind them K u.
+        let mut solved = Matrix::zeros(n, m + 1);
+        for (i, row) in g.chunks_exact(m.max(1)).enumerate() {
+            solved.set_row(i, row);
+            let back: f64 = (0..m).map(|k| weighted[i * m + k] * of_sources[k]).sum();
+            *solved.at_mut(i, m) = by_row[i] * sense_v[i] - back;
+        }
+        let factor = if self.sense_ohm > 0.0 {
+            let mut matrix = k_matrix.clone().scaled(self.sense_ohm);
+            (0..n).for_each(|i| *matrix.at_mut(i, i) += 1.0);
+            let factor = matrix.factor()?;
+            factor.solve(&mut solved);
+            Some(factor)
+        } else {
+            None
+        };
+        // Of the line read: its weight is one that is held, and its voltage drives.
+        let mut share = vec![0.0; m];
+        for (k, share) in share.iter_mut().enumerate() {
+            let more = weights[k] - held(k);
+            let drives = more * of_sources[k] - drive_v / (1.0 + r * by_column[k]);
+            let (mut own, mut of_rest) = (0.0, 0.0);
+            if more != 0.0 {
+                for i in 0..n {
+                    own += turned.at(k, i) * solved.at(i, k);
+                    of_rest += turned.at(k, i) * solved.at(i, m);
                 }
-                factor_and_solve(k, right.as_mut())?;
             }
-            currents.as_mut().subcols_mut(first, at_once).copy_from(&right);
+            let again = self.sense_ohm * more;
+            *share = (drives - again * of_rest) / (1.0 + again * own);
+        }
+        let mut currents = vec![0.0; n * m];
+        for (i, row) in currents.chunks_exact_mut(m.max(1)).enumerate() {
+            solved.copy_row(i, row);
+            let rest = solved.at(i, m);
+            for (current, share) in row.iter_mut().zip(&share) {
+                *current = *current * share + rest;
+            }
+        }
+        if let Some(limit) = self.limit {
+            limit.apply(self.sense_ohm, sense_v, &mut currents, || {
+                if let Some(factor) = &factor {
+                    factor.solve(&mut k_matrix);
+                }
+                let mut response = vec![0.0; n * n];
+                response.chunks_exact_mut(n).enumerate().for_each(|(i, row)| k_matrix.copy_row(i, row));
+                Ok(response)
+            })?;
         }
         Ok(currents)
     }
 
     /// Unknowns: the sense lines' voltages at the crossings, then the driven lines'; ends at row 0 and column 0.
-    fn with_wires(&self, g: &Mat<f64>, drive_v: f64, sense_v: &[f64], stop: Stop<'_>) -> Result<Mat<f64>> {
+    fn with_wires(&self, g: &[f64], drive_v: f64, sense_v: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
         let (n, m) = (self.rows, self.columns);
         let (sense, driven) = (|i: usize, k: usize| i * m + k, |i: usize, k: usize| n * m + i * m + k);
         let wire = self.wire_ohm.recip();
@@ -143,7 +183,7 @@ impl Grid {
         };
         for i in 0..n {
             for k in 0..m {
-                tie(sense(i, k), driven(i, k), g[(i, k)]);
+                tie(sense(i, k), driven(i, k), g[sense(i, k)]);
                 if k > 0 {
                     tie(sense(i, k - 1), sense(i, k), wire);
                 }
@@ -153,14 +193,20 @@ impl Grid {
             }
         }
         entries.extend((0..n).map(|i| Triplet::new(sense(i, 0), sense(i, 0), sense_end)));
-        let mut currents = Mat::zeros(n, m);
+        // Into the network from a sense line, through its taxels.
+        let into = |volts: &Mat<f64>, i: usize, c: usize| -> f64 {
+            (0..m).map(|k| g[sense(i, k)] * (volts[(sense(i, k), c)] - volts[(driven(i, k), c)])).sum()
+        };
+        let untouched = |k: usize| (0..n).all(|i| g[sense(i, k)] == 0.0);
+        let mut currents = vec![0.0; n * m];
+        // Lines that are held have one matrix for all that are read, lines that float one for each.
         let at_once = if self.idle == Idle::Held { m } else { 1 };
         let fixed = entries.len();
         for first in (0..m).step_by(at_once) {
             stop.check()?;
             entries.truncate(fixed);
             // A line that floats and that no taxel touches has no current, whatever holds it.
-            let ends = |k: &usize| (first..first + at_once).contains(k) || g.col(*k).iter().all(|g| *g == 0.0);
+            let ends = |k: &usize| (first..first + at_once).contains(k) || untouched(*k);
             entries.extend((0..m).filter(ends).map(|k| Triplet::new(driven(0, k), driven(0, k), driven_end)));
             let mut volts = Mat::zeros(2 * n * m, at_once);
             for c in 0..at_once {
@@ -169,11 +215,23 @@ impl Grid {
                 }
                 volts[(driven(0, first + c), c)] = driven_end * drive_v;
             }
-            solve_sparse(&entries, volts.as_mut(), stop)?;
-            for c in 0..at_once {
-                for i in 0..n {
-                    currents[(i, first + c)] =
-                        (0..m).map(|k| g[(i, k)] * (volts[(sense(i, k), c)] - volts[(driven(i, k), c)])).sum();
+            let factor = Sparse::factor(2 * n * m, &entries, stop)?;
+            factor.solve(volts.as_mut())?;
+            for i in 0..n {
+                (0..at_once).for_each(|c| currents[i * m + first + c] = into(&volts, i, c));
+            }
+            if let Some(limit) = self.limit {
+                let mut read: Vec<f64> =
+                    (0..n).flat_map(|i| currents[i * m + first..i * m + first + at_once].to_vec()).collect();
+                limit.apply(self.sense_ohm, sense_v, &mut read, || {
+                    stop.check()?;
+                    let mut volts = Mat::zeros(2 * n * m, n);
+                    (0..n).for_each(|i| volts[(sense(i, 0), i)] = sense_end);
+                    factor.solve(volts.as_mut())?;
+                    Ok((0..n * n).map(|at| into(&volts, at / n, at % n)).collect())
+                })?;
+                for (i, read) in read.chunks_exact(at_once).enumerate() {
+                    currents[i * m + first..i * m + first + at_once].copy_from_slice(read);
                 }
             }
         }
@@ -181,48 +239,50 @@ impl Grid {
     }
 }
 
-fn beyond() -> crate::Error {
-    problem!("the network's conductances lie too far apart to be solved in float64")
+/// A sparse matrix, factored.
+struct Sparse {
+    symbolic: SymbolicCholesky<usize>,
+    values: Vec<f64>,
 }
 
-/// Solves a dense system in place, of which the lower triangle is given.
-fn factor_and_solve(mut matrix: Mat<f64>, mut right: MatMut<'_, f64>) -> Result<()> {
-    let n = matrix.nrows();
-    let mut memory = MemBuffer::new(llt::factor::cholesky_in_place_scratch::<f64>(n, Par::Seq, Default::default()));
-    let stack = MemStack::new(&mut memory);
-    llt::factor::cholesky_in_place(matrix.as_mut(), Default::default(), Par::Seq, stack, Default::default())
-        .map_err(|_| beyond())?;
-    solve_lower_triangular_in_place(matrix.as_ref(), right.as_mut(), Par::Seq);
-    solve_upper_triangular_in_place(matrix.transpose(), right, Par::Seq);
-    Ok(())
-}
+impl Sparse {
+    /// Factors a symmetric matrix of which the lower triangle is given; entries of one place are summed.
+    fn factor(n: usize, entries: &[Triplet<usize, usize, f64>], stop: Stop<'_>) -> Result<Self> {
+        let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, entries).map_err(|_| beyond())?;
+        let symbolic =
+            factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, Default::default(), Default::default())
+                .map_err(|_| beyond())?;
+        stop.check()?;
+        let scratch = symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default());
+        let mut memory = MemBuffer::try_new(scratch).map_err(|_| beyond())?;
+        let mut values = vec![0.0; symbolic.len_val()];
+        symbolic
+            .factorize_numeric_llt(
+                &mut values,
+                matrix.as_ref(),
+                Side::Lower,
+                Default::default(),
+                Par::Seq,
+                MemStack::new(&mut memory),
+                Default::default(),
+            )
+            .map_err(|_| beyond())?;
+        stop.check()?;
+        Ok(Self { symbolic, values })
+    }
 
-/// Solves a sparse system in place, of which the lower triangle is given; entries of one place are summed.
-fn solve_sparse(entries: &[Triplet<usize, usize, f64>], right: MatMut<'_, f64>, stop: Stop<'_>) -> Result<()> {
-    let n = right.nrows();
-    let matrix = SparseColMat::<usize, f64>::try_new_from_triplets(n, n, entries).map_err(|_| beyond())?;
-    let symbolic = factorize_symbolic_cholesky(matrix.symbolic(), Side::Lower, Default::default(), Default::default())
-        .map_err(|_| beyond())?;
-    stop.check()?;
-    let scratch = symbolic
-        .factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default())
-        .or(symbolic.solve_in_place_scratch::<f64>(right.ncols(), Par::Seq));
-    let mut memory = MemBuffer::try_new(scratch).map_err(|_| beyond())?;
-    let mut values = vec![0.0; symbolic.len_val()];
-    let factor = symbolic
-        .factorize_numeric_llt(
-            &mut values,
-            matrix.as_ref(),
-            Side::Lower,
-            Default::default(),
+    /// Solves for all columns, in place.
+    fn solve(&self, right: MatMut<'_, f64>) -> Result<()> {
+        let scratch = self.symbolic.solve_in_place_scratch::<f64>(right.ncols(), Par::Seq);
+        let mut memory = MemBuffer::try_new(scratch).map_err(|_| beyond())?;
+        LltRef::new(&self.symbolic, &self.values).solve_in_place_with_conj(
+            Conj::No,
+            right,
             Par::Seq,
             MemStack::new(&mut memory),
-            Default::default(),
-        )
-        .map_err(|_| beyond())?;
-    stop.check()?;
-    factor.solve_in_place_with_conj(Conj::No, right, Par::Seq, MemStack::new(&mut memory));
-    Ok(())
+        );
+        Ok(())
+    }
 }
 
 #[cfg(test)]
@@ -230,7 +290,7 @@ mod tests {
     use super::*;
 
     fn grid(sense_ohm: f64, drive_ohm: f64, wire_ohm: f64, idle: Idle) -> Grid {
-        Grid { rows: 2, columns: 2, sense_ohm, drive_ohm, wire_ohm, idle }
+        Grid { rows: 2, columns: 2, sense_ohm, drive_ohm, wire_ohm, idle, limit: None }
     }
 
     fn currents(grid: &Grid, g: &[f64], sense_v: &[f64]) -> Vec<f64> {
@@ -276,7 +336,8 @@ mod tests {
         let g: Vec<f64> = (0..35).map(|k| 0.1 + f64::from(k * k % 17) * 30.0).collect();
         for idle in [Idle::Held, Idle::Floating] {
             let with = |wire_ohm| {
-                let grid = Grid { rows: 5, columns: 7, sense_ohm: 47.0, drive_ohm: 5.0, wire_ohm, idle };
+                let (rows, columns, sense_ohm, drive_ohm) = (5, 7, 47.0, 5.0);
+                let grid = Grid { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle, limit: None };
                 grid.currents_ua(&g, -1.3, &[0.0, 1e-3, 0.0, -2e-3, 0.0], Stop::never()).unwrap()
             };
             for (without, nearly) in with(0.0).iter().zip(with(LEAST_WIRE_OHM)) {

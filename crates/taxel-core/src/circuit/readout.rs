@@ -6,6 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::{Deserialize, Serialize};
 
 use super::grid::{Grid, Idle, LEAST_WIRE_OHM};
+use super::limit::Limit;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, Stop, problem};
@@ -119,6 +120,8 @@ impl VirtualGround {
             drive_ohm: self.switch_ohm,
             wire_ohm: self.wire_ohm,
             idle: Idle::Held,
+            // One that saturates holds its line no longer: that hangs on the rail by its feedback resistor.
+            limit: Some(Limit { least_v: -self.v_trans, most_v: self.rail_v - self.v_trans, ohm: feedback_ohm }),
         };
         let mut draw = StdRng::seed_from_u64(self.seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut draw) };
@@ -195,7 +198,7 @@ impl Divider {
     pub fn volts(&self, rows: usize, columns: usize, conductance_us: &[f64], stop: Stop<'_>) -> Result<Vec<f64>> {
         let sense_ohm = 1e3 * self.resistor_kohm;
         let (drive_ohm, wire_ohm, idle) = (self.switch_ohm, self.wire_ohm, self.idle);
-        let grid = Grid { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle };
+        let grid = Grid { rows, columns, sense_ohm, drive_ohm, wire_ohm, idle, limit: None };
         let currents = grid.currents_ua(conductance_us, self.supply_v, &vec![0.0; rows], stop)?;
         Ok(currents.iter().map(|current| -1e-6 * sense_ohm * current).collect())
     }

@@ -1,0 +1,156 @@
+"""Taxels that compare by themselves: against straight lines cut by hand, and beside the scanned board."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel.simulate import Board, Pictures, Scene, Silence, Version2, emulate, play, truth
+from taxel.simulate.circuit import Circuit, VirtualGround
+from taxel.wire import Registers
+
+
+def heard(board: Board, frames: np.ndarray) -> taxel.Events:
+    """What a host decodes of frames."""
+    sent = [datagram for picture in frames for datagram in board.frame(picture)]
+    events, counts, skipped = taxel.wire_v2.decode(
+        b"".join(len(d).to_bytes(2, "little") + d for d in sent), array=board.array
+    )
+    assert (counts.intact, counts.missing, skipped) == (len(sent), 0, 0)
+    return events
+
+
+def cut(frames: np.ndarray, registers: Registers, columns: int) -> list[tuple[float, int, int, bool, int]]:
+    """(us, x, y, p, value) of each step that straight lines between frames reach, by rational arithmetic."""
+    step, found = registers.noise_floor + 1, []
+    line = Fraction(round(100 * registers.line_period), 100)  # us; the board counts in 10 ns
+    for index, readings in enumerate(frames.T.tolist()):
+        x, y, sent = index % columns, index // columns, 0
+        if readings[0] > registers.noise_floor:
+            sent = readings[0]
+            found.append((0.0, x, y, True, sent))
+        for k, (before, now) in enumerate(pairwise(readings)):
+            while abs(now - sent) >= step:
+                rises = now > sent
+                sent += step if rises else -step
+                at = (k + Fraction(abs(sent - before), abs(now - before))) * columns * line + x * line
+                found.append((float(at), x, y, rises, sent))
+    return found
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_each_step_is_told_when_a_straight_line_reaches_it(seed):
+    random, array = np.random.default_rng(seed), taxel.Array(4, 6)
+    registers = Registers(array=array, wire_version=2, noise_floor=int(random.integers(0, 6)))
+    # A walk with rests and jumps, still at the end so that all is out.
+    steps = random.integers(-25, 26, (60, 24)) * (random.random((60, 24)) < 0.4)
+    walk = np.clip(60 + np.cumsum(steps, axis=0), 0, registers.ramp).astype(np.uint16)
+    walk = np.concatenate([walk, np.repeat(walk[-1:], 2, axis=0)])
+    quiet = Version2(states_us=0)
+    events = heard(Board(registers, array, version_2=quiet, asynchronous=True), walk)
+    wanted = cut(walk, registers, 6)
+    assert (np.diff(events.t) >= 0).all()
+    got = sorted(zip(events.y.tolist(), events.x.tolist(), events.t.tolist(), range(len(events)), strict=True))
+    assert len(got) == len(wanted) > 100
+    for (y, x, t, k), (at, *rest) in zip(got, wanted, strict=True):
+        assert [x, y, bool(events.p[k]), int(events.intensity[k])] == rest
+        assert at - 1.02 <= t <= at + 0.02, "whole microseconds"
+
+
+def test_what_a_host_holds_is_within_the_floor_and_steps_are_no_larger():
+    random, array = np.random.default_rng(1), taxel.Array(3, 3)
+    registers = Registers(array=array, wire_version=2, noise_floor=4)
+    board, decoder = Board(registers, array, asynchronous=True), taxel.wire_v2.Decoder(array=array)
+    walk = random.integers(0, 151, (200, 9)).astype(np.uint16)
+    for picture in [*walk, walk[-1], walk[-1]]:
+        for datagram in board.frame(picture):
+            decoder.push(datagram)
+    assert (np.abs(decoder.held.ravel() - walk[-1].astype(int)) <= 4).all()
+
+
+def test_a_fault_moves_nothing_and_a_reset_forgets():
+    array = taxel.Array(2, 2)
+    registers = Registers(array=array, wire_version=2)
+    board = Board(registers, array, asynchronous=True, version_2=Version2(states_us=0))
+    still = np.full((2, 4), 50, np.uint16)
+    first = heard(board, np.vstack([still, np.full((2, 4), taxel.simulate.NOT_RETURNED, np.uint16), still, still]))
+    assert len(first) == 4
+    assert board.counts["not_returned"] == 8
+    board.reset()
+    board.command(taxel.wire.Command(0, Registers(array=array, wire_version=2).words[0]).to_bytes())
+    again = heard(board, np.vstack([still, still]))
+    assert again.intensity.tolist() == [50] * 4
+
+
+def test_a_slow_press_is_told_between_the_frames_of_a_scan():
+    """Taxels that rise by a tick each 2 ms: whole frames when scanned, their own times when not."""
+    slope_us, frames = 2000.0, 1000
+    values = np.broadcast_to(np.arange(frames)[:, None, None] * 192.0 / slope_us / 150.0, (frames, 64, 64))
+    acts = [Silence(1.0), Pictures(values.astype(np.float32), 192.0)]
+    quiet = {"noise_ticks": 0.0, "gain_spread": 0.0, "offset_mv": 0.0}
+    scanned, alone = (
+        play(acts, seed=1, tare_ms=0.0, sensor=quiet, wire=2, asynchronous=which).events for which in (False, True)
+    )
+    assert len(alone) == pytest.approx(len(scanned), rel=0.02)
+    assert (scanned.t % 192 == 0).all()
+    assert len(np.unique(alone.t % 192)) > 30
+
+
+def test_an_array_by_itself_hears_the_same_touch_as_a_scanned_one():
+    acts = [Silence(60.0), Scene.draw(seed=3)]
+    contact = truth(acts)[0][0].start_us
+    scanned, alone = (play(acts, seed=3, wire=2, asynchronous=which) for which in (False, True))
+    assert [p for _, p in alone.events.markers] == [p for _, p in scanned.events.markers] == [True, False]
+    for played in (scanned, alone):
+        touched = played.events.t[(played.events.t > contact) & played.events.p]
+        # Half a frame, the fabric's 50 us and the foam's first touch.
+        assert 0 < touched[0] - contact < 2000
+        assert played.words == 0 < played.bytes
+    assert abs(np.percentile(alone.events.t, 50) - np.percentile(scanned.events.t, 50)) < 30_000
+
+
+def test_nonsense_is_refused_in_one_line():
+    version_2 = Registers(wire_version=2)
+    with pytest.raises(taxel.ProblemError, match="wire_version is 1: must be 2"):
+        Board(asynchronous=True)
+    with pytest.raises(taxel.ProblemError, match="previous is last_sample"):
+        Board(version_2, previous="last_sample", asynchronous=True)
+    with pytest.raises(taxel.ProblemError, match="mechanoreceptor"):
+        Board(version_2.replace(mechanoreceptor=True), asynchronous=True)
+    with pytest.raises(taxel.ProblemError, match="share no lines"):
+        Board(version_2, circuit=Circuit(), asynchronous=True)
+    with pytest.raises(taxel.ProblemError, match="share no lines"):
+        emulate("127.0.0.1:9", [Silence(60.0)], wire=2, circuit=Circuit(), asynchronous=True)
+    with pytest.raises(taxel.ProblemError, match="wire_version is 1: must be 2"):
+        play([Silence(60.0)], seed=1, wire=1, asynchronous=True)
+
+
+def test_a_board_alone_and_in_a_play_read_through_the_circuit():
+    """An ideal circuit changes nothing; a shared switch takes something from a pressed column."""
+    pressed = np.full((64, 64), 49, np.uint16)
+    pressed[:, 5] = 140
+    lines = VirtualGround(gain=None, switch_ohm=50.0)
+    plain = taxel.simulate.circuit.Converter(hysteresis_v=0.0, settle_us=0.0, discharge_us=0.0)
+    ideal = Circuit(readout=VirtualGround().ideal(), converter=plain)
+    values = {}
+    for name, circuit in (("none", None), ("ideal", ideal), ("shared", Circuit(readout=lines, converter=plain))):
+        decoder, board = taxel.wire_v2.Decoder(), Board(Registers(wire_version=2), circuit=circuit)
+        for datagram in [d for _ in range(2) for d in board.frame(pressed)]:
+            decoder.push(datagram)
+        values[name] = decoder.held
+    assert (values["ideal"] == values["none"]).all()
+    assert (values["shared"][:, 5] < 136).all()
+    assert (np.delete(values["shared"], 5, axis=1) == 49).all()
+    with pytest.raises(taxel.ProblemError, match="frame of 7 trip times"):
+        Board(circuit=Circuit()).frame(np.zeros(7, np.uint16))
+
+    acts = [Silence(60.0), Scene.draw(seed=2)]
+    plays = [play(acts, seed=2, circuit=circuit) for circuit in (None, ideal, Circuit())]
+    assert plays[0].events == plays[1].events
+    assert plays[0].events != plays[2].events
+    with pytest.raises(taxel.ProblemError, match=r"v_trans is 0.5: must be the sensor's, 1.3"):
+        play(acts, seed=2, circuit=Circuit(readout=VirtualGround(v_trans=0.5)))
