@@ -554,6 +554,8 @@ SOUND: dict[str, Sound] = {
         intensity="value",
         queue=100,
         version_2=None,
+        circuit=CIRCUIT.Circuit(),
+        asynchronous=False,
     ),
     "taxel.simulate.Version2": plain(
         taxel.simulate.Version2, board=1, seed=2, hold_us=0, heartbeat_us=10_000, states_us=1_000_000
