@@ -1,4 +1,5 @@
-//! UDP datagrams in, counted: a thread between the socket and a bounded queue.
+//! UDP datagrams in, counted: a thread between the socket and a bounded queue; or what another computer received
+//! ([`Feed`]), into the same queue.
 //!
 //! The sums close. At the socket: messages that came = [`Counts::messages`] + [`Counts::dropped_by_kernel`]. Behind it:
 //! [`Counts::datagrams`] = those taken + those waiting + [`Counts::dropped_by_queue`].
@@ -7,20 +8,25 @@
 //! one. The kernel counts its drops in messages, so a datagram-exact count of what it dropped needs `gro` off.
 
 mod counts;
+mod feed;
 mod options;
+mod parcel;
 mod queue;
 mod sender;
 mod socket;
 
 use std::io;
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crate::recording::now_ns;
 use crate::{Error, Result};
 pub use counts::Counts;
+pub use feed::{Bridged, Feed};
 pub use options::ReceiverOptions;
+pub use parcel::{LONGEST, Packer};
 use queue::Queue;
 pub use queue::{Batch, Datagram};
 pub use sender::{SendCounts, Sender};
@@ -29,12 +35,37 @@ use socket::Socket;
 /// After a stop the socket is emptied for no longer than this, even when a sender never pauses.
 const EMPTY_FOR: Duration = Duration::from_millis(50);
 
-/// Receives UDP datagrams in a thread of its own, from [`Receiver::bind`] until it is dropped.
+/// Where datagrams come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// A board sends to this address.
+    Udp(SocketAddr),
+    /// Another computer receives them, and bridges them to this one: its address and the board's name there.
+    Bridge(String),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Udp(address) => write!(f, "UDP {address}"),
+            Self::Bridge(name) => f.write_str(name),
+        }
+    }
+}
+
+/// Receives datagrams, from [`Receiver::bind`] or [`Receiver::fed`] until it is dropped.
 #[derive(Debug)]
 pub struct Receiver {
     queue: Arc<Queue>,
-    address: SocketAddr,
-    thread: Option<JoinHandle<()>>,
+    place: Place,
+    from: From,
+}
+
+#[derive(Debug)]
+enum From {
+    /// A thread of its own reads the socket.
+    Socket(Option<JoinHandle<()>>),
+    Feed(Feed),
 }
 
 impl Receiver {
@@ -64,13 +95,48 @@ impl Receiver {
             .name("taxel-receive".to_owned())
             .spawn(move || receive(socket, &theirs))
             .map_err(Error::socket(&place))?;
-        Ok(Self { queue, address, thread: Some(thread) })
+        Ok(Self { queue, place: Place::Udp(address), from: From::Socket(Some(thread)) })
+    }
+
+    /// Hears what another computer receives; parcels go into the [`Feed`].
+    #[must_use]
+    pub fn fed(name: &str, options: ReceiverOptions) -> (Self, Feed) {
+        let queue = Arc::new(Queue::new(options.queue_bytes, Counts::default()));
+        let feed = Feed::new(Arc::clone(&queue));
+        (Self { queue, place: Place::Bridge(name.to_owned()), from: From::Feed(feed.clone()) }, feed)
     }
 
     /// Where it listens; the port that was found where 0 was asked for.
     #[must_use]
+    pub fn place(&self) -> &Place {
+        &self.place
+    }
+
+    /// The address of a socket; unspecified, with port 0, where there is none.
+    #[must_use]
     pub fn address(&self) -> SocketAddr {
-        self.address
+        match self.place {
+            Place::Udp(address) => address,
+            Place::Bridge(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+        }
+    }
+
+    /// What came over the bridge, where it is one.
+    #[must_use]
+    pub fn bridged(&self) -> Option<Bridged> {
+        match &self.from {
+            From::Socket(_) => None,
+            From::Feed(feed) => Some(feed.bridged()),
+        }
+    }
+
+    /// While nothing waits: all that arrived before this was taken, ns of this computer's clock.
+    #[must_use]
+    pub fn silent_until(&self) -> Option<i64> {
+        match &self.from {
+            From::Socket(_) => Some(now_ns()),
+            From::Feed(_) => self.queue.silent_until(),
+        }
     }
 
     /// Waits until something is there and takes all of it into `batch`, whose memory is reused; false after `timeout`
@@ -80,7 +146,7 @@ impl Receiver {
     ///
     /// `Socket` where the receiving thread ended because the socket failed.
     pub fn take(&self, batch: &mut Batch, timeout: Duration) -> Result<bool> {
-        self.queue.take(batch, timeout).map_err(Error::socket(format!("UDP {}", self.address)))
+        self.queue.take(batch, timeout).map_err(Error::socket(&self.place))
     }
 
     /// What came and what was lost.
@@ -98,13 +164,18 @@ impl Receiver {
     /// Asks the thread to end: it takes in what the kernel still holds, then lets go of the socket.
     pub fn stop(&self) {
         self.queue.stop();
+        if let From::Feed(_) = self.from {
+            self.queue.close(None);
+        }
     }
 }
 
 impl Drop for Receiver {
     fn drop(&mut self) {
         self.stop();
-        if let Some(thread) = self.thread.take() {
+        if let From::Socket(thread) = &mut self.from
+            && let Some(thread) = thread.take()
+        {
             let _ = thread.join();
         }
     }

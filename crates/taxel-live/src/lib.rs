@@ -3,6 +3,7 @@
 pub mod address;
 pub mod clock;
 pub mod error;
+pub mod host_clock;
 pub mod latency;
 mod locked;
 pub mod ports;

@@ -5,6 +5,7 @@
 //! made it. Who looks on gets copies ([`Live::counters`], [`Live::picture`]) and slows nothing.
 
 mod ahead;
+mod copies;
 mod counters;
 mod decode;
 mod handle;
@@ -31,9 +32,10 @@ use taxel_core::encode::Tare;
 use taxel_core::wire::{self, Decoder};
 use taxel_core::{Marker, Stop};
 
-use crate::capture::Receiver;
+use crate::capture::{Place, Receiver};
 use crate::locked::lock;
 use crate::{Error, Result};
+pub use copies::{Copied, Copies};
 pub use counters::{Counters, Summary};
 pub use handle::Handle;
 use handover::Handover;
@@ -70,17 +72,37 @@ impl Live {
     /// `Socket` where the port is taken, `File` where the file exists or cannot be created, or a destination cannot be
     /// opened, `Core(Problem)` for options that make no sense.
     pub fn start(address: SocketAddr, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+        let capture = options.capture;
+        // The socket is opened before the file: where the port is taken no empty file is left behind.
+        Self::start_from(|| Receiver::bind(address, capture), options, ear, sinks)
+    }
+
+    /// As [`Live::start`], from what another computer receives ([`Receiver::fed`]).
+    ///
+    /// # Errors
+    ///
+    /// As [`Live::start`], without those of the socket.
+    pub fn start_fed(receiver: Receiver, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+        Self::start_from(|| Ok(receiver), options, ear, sinks)
+    }
+
+    fn start_from(
+        receiver: impl FnOnce() -> Result<Receiver>,
+        options: LiveOptions,
+        ear: Ear,
+        sinks: Vec<Box<dyn Sink>>,
+    ) -> Result<Self> {
         if let (None, Some(source)) = (&options.record, options.sources.first()) {
             return Err(
                 taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
             );
         }
-        Self::begin(address, options, ear, sinks, None)
+        Self::begin(receiver, options, ear, sinks, None)
     }
 
     /// Begins; `host` is whose recording this one's is a part of.
     fn begin(
-        address: SocketAddr,
+        receiver: impl FnOnce() -> Result<Receiver>,
         options: LiveOptions,
         ear: Ear,
         sinks: Vec<Box<dyn Sink>>,
@@ -106,13 +128,11 @@ impl Live {
             Ear::Deaf | Ear::Reading(_) => {}
         }
         let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
-        // The socket first: where the port is taken no empty file is left behind.
-        let receiver = Receiver::bind(address, options.capture)?;
-        let address = receiver.address();
+        let receiver = receiver()?;
         let recorder = match (&options.record, host) {
             (None, _) => None,
-            (Some(record), None) => Some(Recorder::create(record, &options, address)?),
-            (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, address)),
+            (Some(record), None) => Some(Recorder::create(record, &options, receiver.place())?),
+            (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, receiver.place())),
         };
         let shown = Shown { picture: vec![0; options.array.len()], ..Shown::default() };
         let shared = Arc::new(Shared {
@@ -161,10 +181,17 @@ impl Live {
         Ok(())
     }
 
-    /// Where it listens; the port that was found where 0 was asked for.
+    /// The address that it listens on, the port that was found where 0 was asked for; unspecified, with port 0, where a
+    /// bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()
+    }
+
+    /// Where datagrams come from.
+    #[must_use]
+    pub fn place(&self) -> &Place {
+        self.shared.receiver.place()
     }
 
     /// What others may do with it.
@@ -308,12 +335,7 @@ impl Live {
         let recorder = lock(&self.shared.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
         let verdict = if counters.nothing_came() {
-            let address = self.address();
-            format!(
-                "nothing arrived at UDP {address} in {:.1} s: does the board send to this machine, and to port {}?",
-                counters.seconds,
-                address.port()
-            )
+            nothing_came(self.place(), counters.seconds)
         } else {
             recorder::losses(&counters, None).verdict()
         };
@@ -338,6 +360,15 @@ impl Live {
         }
         Ok(())
     }
+}
+
+/// What to say where nothing came, and what to look at.
+fn nothing_came(place: &Place, seconds: f64) -> String {
+    let ask = match place {
+        Place::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),
+        Place::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
+    };
+    format!("nothing arrived at {place} in {seconds:.1} s: {ask}")
 }
 
 impl Drop for Live {

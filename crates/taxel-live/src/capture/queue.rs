@@ -73,6 +73,11 @@ impl Batch {
         }
     }
 
+    /// Adds a datagram that came at `arrived_ns`.
+    pub(super) fn push_arrived(&mut self, arrived_ns: i64, bytes: &[u8]) {
+        self.push(Datagram { arrived_ns, number: 0, start: 0, end: 0 }, bytes);
+    }
+
     fn push(&mut self, datagram: Datagram, bytes: &[u8]) {
         let start = self.bytes.len();
         self.bytes.extend_from_slice(bytes);
@@ -99,13 +104,15 @@ pub(super) struct Queue {
 struct Received {
     waiting: Batch,
     counts: Counts,
+    /// What is promised of a feed: nothing that arrived before this follows, ns.
+    until_ns: Option<i64>,
     closed: bool,
     failed: Option<io::Error>,
 }
 
 impl Queue {
     pub(super) fn new(limit: usize, counts: Counts) -> Self {
-        let state = Received { waiting: Batch::new(), counts, closed: false, failed: None };
+        let state = Received { waiting: Batch::new(), counts, until_ns: None, closed: false, failed: None };
         Self { state: Mutex::new(state), came: Condvar::new(), stop: AtomicBool::new(false), limit }
     }
 
@@ -149,6 +156,18 @@ impl Queue {
         Ok(!batch.is_empty())
     }
 
+    /// Nothing that arrived before this will be put in any more.
+    pub(super) fn promise(&self, until_ns: i64) {
+        let mut state = self.state();
+        state.until_ns = state.until_ns.max(Some(until_ns));
+    }
+
+    /// What was promised, where nothing waits.
+    pub(super) fn silent_until(&self) -> Option<i64> {
+        let state = self.state();
+        state.until_ns.filter(|_| state.waiting.is_empty())
+    }
+
     pub(super) fn counts(&self) -> Counts {
         let state = self.state();
         Counts { waiting: state.waiting.len() as u64, ..state.counts }
@@ -157,7 +176,7 @@ impl Queue {
     pub(super) fn close(&self, failed: Option<io::Error>) {
         let mut state = self.state();
         state.closed = true;
-        state.failed = failed;
+        state.failed = failed.or(state.failed.take());
         drop(state);
         self.came.notify_all();
     }

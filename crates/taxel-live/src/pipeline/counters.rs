@@ -20,6 +20,8 @@ use crate::latency::Quantiles;
 pub struct Counters {
     /// At the socket and in the queue behind it.
     pub capture: capture::Counts,
+    /// On the way from another computer, where that receives.
+    pub bridged: Option<capture::Bridged>,
     /// Datagrams that were decoded.
     pub decoded: u64,
     /// What the decoder saw in them.

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use taxel_core::Events;
 use taxel_core::wire::{Decoder, Receiver, Took};
 
+use super::copies::{Copier, GATHER, copier};
 use super::options::LiveOptions;
 use super::recorder::Recorder;
 use super::shared::{Shared, Wish};
@@ -45,6 +46,8 @@ pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, list
         events: Events::empty(options.array.clone()),
         held: vec![UNKNOWN; options.array.len()],
         taps: vec![],
+        copiers: vec![],
+        received: 0,
         frame_us: options.registers.frame_us(),
         fresh: None,
         has_intensities: false,
@@ -79,6 +82,9 @@ struct Work<'a> {
     /// [`UNKNOWN`] until a taxel was heard of.
     held: Vec<u16>,
     taps: Vec<Tap>,
+    copiers: Vec<Copier>,
+    /// How many datagrams were received before the next one.
+    received: u64,
     frame_us: f64,
     /// Decodes from a recording's first datagram on, until it is known by how much the recording's clock is behind.
     fresh: Option<Box<Receiver>>,
@@ -129,12 +135,17 @@ impl Work<'_> {
         let mut batch = Batch::new();
         while !self.shared.receiver.is_done() {
             self.expect()?;
-            if self.shared.receiver.take(&mut batch, tick)? {
+            let wait = if self.copiers.is_empty() { tick } else { tick.min(GATHER) };
+            let silent_until = if self.shared.receiver.take(&mut batch, wait)? {
                 self.decode(&batch)?;
                 self.record(|recorder| recorder.datagrams(&batch))?;
+                None
             } else {
-                self.silence();
-            }
+                let until = self.shared.receiver.silent_until();
+                self.silence(until);
+                until
+            };
+            self.copy(&batch, silent_until);
             self.taps.retain_mut(Tap::tick);
             self.look()?;
             if self.shared.wished.swap(false, Ordering::Acquire) {
@@ -143,9 +154,30 @@ impl Work<'_> {
         }
         self.sender.finish_into(&mut self.events);
         self.hand_on()?;
-        self.silence();
+        self.silence(self.shared.receiver.silent_until());
         self.taps.retain_mut(Tap::tick);
+        let dropped = self.dropped_by_kernel();
+        self.copiers.iter_mut().for_each(|copier| copier.finish(dropped));
         self.fulfil()
+    }
+
+    /// What came goes to other computers.
+    fn copy(&mut self, batch: &Batch, silent_until: Option<i64>) {
+        if let Some((last, _)) = batch.iter().last() {
+            self.received = last.number + 1;
+        }
+        if self.copiers.is_empty() {
+            return;
+        }
+        let dropped = self.dropped_by_kernel();
+        self.copiers.retain_mut(|copier| {
+            copier.take(batch, dropped);
+            copier.tick(silent_until, dropped)
+        });
+    }
+
+    fn dropped_by_kernel(&self) -> u64 {
+        self.shared.receiver.counts().dropped_by_kernel
     }
 
     /// Does something with the recording that runs. An error ends all where the recording was asked for from the
@@ -191,6 +223,12 @@ impl Work<'_> {
                     let (tap, outlet) = tap(&self.options.array, self.held.clone(), counters.board_us, counters.events);
                     if give.send(outlet).is_ok() {
                         self.taps.push(tap);
+                    }
+                }
+                Wish::Copy(give) => {
+                    let (copier, parcels) = copier(self.received);
+                    if give.send(parcels).is_ok() {
+                        self.copiers.push(copier);
                     }
                 }
                 Wish::Registers(registers) => {
@@ -337,14 +375,14 @@ impl Work<'_> {
 
     /// Nothing waits: of a board that makes no promises the readout's time may move on by the host's clock.
     #[allow(clippy::cast_possible_truncation)]
-    fn silence(&self) {
+    fn silence(&self, until_ns: Option<i64>) {
         if self.listens
             && self.sender.version() == 1
-            && let Some(offset) = self.clock.offset()
+            && let (Some(offset), Some(until_ns)) = (self.clock.offset(), until_ns)
         {
             let guard = (self.options.guard_frames * self.frame_us) as i64;
             // What a frame sees leaves at its end: before the start of the frame that ends now all has come.
-            self.shared.handover.quiet(offset.board_us(now_ns()) - self.frame_us() - guard);
+            self.shared.handover.quiet(offset.board_us(until_ns) - self.frame_us() - guard);
         }
     }
 

@@ -9,6 +9,7 @@ use std::time::Duration;
 use crossbeam_channel as channel;
 use taxel_core::wire::Registers;
 
+use super::copies::Copies;
 use super::counters::Counters;
 use super::options::{LiveOptions, Record};
 use super::recorder::Recorder;
@@ -16,7 +17,11 @@ use super::said::Said;
 use super::shared::{Shared, Wish};
 use super::tap::Outlet;
 use crate::Result;
+use crate::capture::Place;
 use crate::locked::lock;
+
+/// Detections that wait for another computer at most.
+const COPIED_WAITING: usize = 1 << 12;
 
 /// What others may do with a [`Live`](super::Live) while it runs, and after.
 #[derive(Clone)]
@@ -31,10 +36,16 @@ impl Handle {
         &self.shared.options
     }
 
-    /// Where it listens.
+    /// The address that it listens on; unspecified, with port 0, where a bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()
+    }
+
+    /// Where datagrams come from.
+    #[must_use]
+    pub fn place(&self) -> &Place {
+        self.shared.receiver.place()
     }
 
     /// As [`Live::counters`](super::Live::counters).
@@ -72,6 +83,18 @@ impl Handle {
         self.wait(&outlet)
     }
 
+    /// Copies what comes, for other computers, from the next batch on.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where all is over.
+    pub fn copy(&self) -> Result<Copies> {
+        let (give, parcels) = channel::bounded(1);
+        let said = self.hear(COPIED_WAITING);
+        self.shared.wish(Wish::Copy(give));
+        Ok(Copies::new(Arc::clone(&self.shared), self.wait(&parcels)?, said))
+    }
+
     /// Hears detections as they are said; so many may wait, and who is too slow misses some.
     #[must_use]
     pub fn hear(&self, waiting: usize) -> channel::Receiver<Said> {
@@ -90,7 +113,7 @@ impl Handle {
             return Err(taxel_core::problem!("a recording runs already: stop it first").into());
         }
         let header = LiveOptions { registers: self.registers(), ..self.shared.options.clone() };
-        let recorder = Recorder::reserve(record, &header, self.address())?;
+        let recorder = Recorder::reserve(record, &header, self.place())?;
         lock(&self.shared.broken).take();
         self.shared.records.store(true, Ordering::Release);
         let (give, begun) = channel::bounded(1);

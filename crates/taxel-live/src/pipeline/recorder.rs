@@ -1,7 +1,6 @@
 //! The two kinds of file that a [`Live`](super::Live) records to.
 
 use std::fs::OpenOptions;
-use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError, Weak};
@@ -15,7 +14,7 @@ use super::options::{LiveOptions, Record};
 use super::said::Said;
 use super::shared::Shared;
 use super::sources::Source;
-use crate::capture::Batch;
+use crate::capture::{Batch, Place};
 use crate::locked::lock;
 use crate::recording::{self, BoardChange, Header, LsaWriter, Track, Writer, now_ns};
 use crate::{Error, Result};
@@ -102,10 +101,10 @@ impl Part {
 
 impl Recorder {
     /// A part of another's recording.
-    pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, address: SocketAddr) -> Self {
+    pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, place: &Place) -> Self {
         let name = host.name.clone();
         let board =
-            Header::of_board(options.array.clone(), Some(options.registers), format!("udp {address}"), now_ns());
+            Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
         Self {
             record: record.clone(),
             header: Header { name, ..board },
@@ -128,9 +127,9 @@ impl Recorder {
         }
     }
 
-    pub(super) fn create(record: &Record, options: &LiveOptions, address: SocketAddr) -> Result<Self> {
+    pub(super) fn create(record: &Record, options: &LiveOptions, place: &Place) -> Result<Self> {
         let board =
-            Header::of_board(options.array.clone(), Some(options.registers), format!("udp {address}"), now_ns());
+            Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
         let sources = options.sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
         let header = Header { difference: options.differences, name: options.name.clone(), sources, ..board };
         let path = &record.path;
@@ -161,7 +160,7 @@ impl Recorder {
     }
 
     /// A recording that begins while listening: takes the name, so that nobody else can; the file is written later.
-    pub(super) fn reserve(record: &Record, options: &LiveOptions, address: SocketAddr) -> Result<Self> {
+    pub(super) fn reserve(record: &Record, options: &LiveOptions, place: &Place) -> Result<Self> {
         let path = &record.path;
         named(path)?;
         let done = path.with_extension("lss");
@@ -171,7 +170,7 @@ impl Recorder {
         OpenOptions::new().write(true).create_new(true).open(path).map_err(Error::file(path))?;
         // What else is heard belongs to the recording that it was begun with.
         let options = LiveOptions { sources: vec![], ..options.clone() };
-        let whole = Self::create(&Record { overwrite: true, ..record.clone() }, &options, address)?;
+        let whole = Self::create(&Record { overwrite: true, ..record.clone() }, &options, place)?;
         let guest = Guest { since: Counters::default(), waiting: Mutex::default(), bytes: AtomicUsize::new(0) };
         Ok(Self { new: true, guest: Some(guest), ..whole })
     }
@@ -383,6 +382,14 @@ impl Recorder {
             Some(Kind::Track(_)) | None => {}
         }
         Ok(Some(path))
+    }
+}
+
+/// Where datagrams come from, as files keep it.
+fn said_of(place: &Place) -> String {
+    match place {
+        Place::Udp(address) => format!("udp {address}"),
+        Place::Bridge(name) => name.clone(),
     }
 }
 

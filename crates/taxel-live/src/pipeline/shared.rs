@@ -67,6 +67,8 @@ pub(super) enum Wish {
     End(channel::Sender<(Option<Recorder>, Counters)>),
     /// Let somebody look on.
     Look(channel::Sender<Outlet>),
+    /// Give copies for other computers.
+    Copy(channel::Sender<channel::Receiver<Vec<u8>>>),
     /// The registers were written.
     Registers(Registers),
 }
@@ -82,10 +84,15 @@ impl Shared {
         self.wished.store(true, Ordering::Release);
     }
 
+    pub(super) fn has_ended(&self) -> bool {
+        self.ended.load(Ordering::Acquire)
+    }
+
     pub(super) fn counters(&self) -> Counters {
         let shown = self.shown();
         Counters {
             capture: self.receiver.counts(),
+            bridged: self.receiver.bridged(),
             decode_latency: shown.decode_latency.quantiles(),
             said_latency: shown.said_latency.quantiles(),
             sent: self.sending.iter().map(|line| line.counts()).collect(),

@@ -467,7 +467,9 @@ impl Others {
                         record: options.record.clone(),
                         ..super::LiveOptions::new((**array).clone())
                     };
-                    let board = super::Live::begin(*address, own, super::Ear::Deaf, vec![], Some(part))?;
+                    let capture = own.capture;
+                    let socket = || Receiver::bind(*address, capture);
+                    let board = super::Live::begin(socket, own, super::Ear::Deaf, vec![], Some(part))?;
                     others.boards.push((name.clone(), board));
                     continue;
                 }

@@ -1,0 +1,258 @@
+//! Datagrams as they travel to other computers: as they came, gathered, with what it takes to count every loss.
+//!
+//! Everything is little-endian. The transport reads and changes one field, the base time, so that trials can set the
+//! clocks of two computers apart; see docs/bridge.md.
+//!
+//! | bytes | field |
+//! |---|---|
+//! | 0-3 | `TXLP` |
+//! | 4 | 1, the version of this format |
+//! | 5 | 1 where it is the last of its session, else 0 |
+//! | 6-7 | 0 |
+//! | 8-15 | session: another one each time a bridge begins |
+//! | 16-23 | number of this parcel in its session, from 0 |
+//! | 24-31 | base time, ns since 1970 of the computer that the board sends to |
+//! | 32-35 | until, ns from the base (signed): nothing that arrived before it follows |
+//! | 36-39 | how many datagrams |
+//! | 40-47 | how many datagrams that computer had received before them |
+//! | 48-55 | how many of those it dropped, its queues being full |
+//! | 56-63 | how many messages its kernel had dropped |
+//! | 64... | each datagram: its length (u16), when it arrived in ns from the base (i32), its bytes |
+
+use std::hash::{BuildHasher, RandomState};
+
+const MAGIC: [u8; 4] = *b"TXLP";
+const VERSION: u8 = 1;
+const HEADER: usize = 64;
+
+/// Length and time before each datagram, bytes.
+const ENTRY: usize = 6;
+
+/// A parcel is closed when it holds so much, bytes.
+const FULL: usize = 1 << 18;
+
+/// No parcel is longer, bytes: a full one, and a datagram.
+pub const LONGEST: usize = FULL + HEADER + ENTRY + (1 << 16);
+
+/// A parcel that came.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Parcel<'a> {
+    pub(super) last: bool,
+    pub(super) session: u64,
+    pub(super) number: u64,
+    base_ns: i64,
+    until: i32,
+    pub(super) count: u32,
+    pub(super) before: u64,
+    pub(super) dropped: u64,
+    pub(super) dropped_by_kernel: u64,
+    body: &'a [u8],
+}
+
+impl<'a> Parcel<'a> {
+    /// Reads a parcel; `None` where it is none, or not whole.
+    pub(super) fn read(bytes: &'a [u8]) -> Option<Self> {
+        let (head, body) = bytes.split_first_chunk::<HEADER>()?;
+        let last = match head[4..8] {
+            [VERSION, last @ (0 | 1), 0, 0] => last == 1,
+            _ => return None,
+        };
+        let long = |at: usize| u64::from_le_bytes(std::array::from_fn(|k| head[at + k]));
+        let short = |at: usize| u32::from_le_bytes(std::array::from_fn(|k| head[at + k]));
+        let parcel = Self {
+            last,
+            session: long(8),
+            number: long(16),
+            base_ns: long(24).cast_signed(),
+            until: short(32).cast_signed(),
+            count: short(36),
+            before: long(40),
+            dropped: long(48),
+            dropped_by_kernel: long(56),
+            body,
+        };
+        let mut rest = body;
+        for _ in 0..parcel.count {
+            (_, _, rest) = first(rest)?;
+        }
+        (head[..4] == MAGIC && rest.is_empty() && bytes.len() <= LONGEST).then_some(parcel)
+    }
+
+    /// Nothing that arrived before this follows, ns of the other computer's clock.
+    pub(super) fn until_ns(&self) -> i64 {
+        self.base_ns.saturating_add(i64::from(self.until))
+    }
+
+    /// Each datagram with when it arrived, ns of the other computer's clock.
+    pub(super) fn datagrams(&self) -> impl Iterator<Item = (i64, &'a [u8])> {
+        let (mut rest, base) = (self.body, self.base_ns);
+        std::iter::from_fn(move || {
+            let (since, bytes, after) = first(rest)?;
+            rest = after;
+            Some((base.saturating_add(i64::from(since)), bytes))
+        })
+    }
+}
+
+/// When the first datagram of a body came, its bytes, and what follows.
+fn first(body: &[u8]) -> Option<(i32, &[u8], &[u8])> {
+    let (length, body) = body.split_first_chunk()?;
+    let (since, body) = body.split_first_chunk()?;
+    let (bytes, rest) = body.split_at_checked(usize::from(u16::from_le_bytes(*length)))?;
+    Some((i32::from_le_bytes(*since), bytes, rest))
+}
+
+/// Gathers datagrams into parcels.
+#[derive(Debug)]
+pub struct Packer {
+    session: u64,
+    number: u64,
+    base_ns: i64,
+    count: u32,
+    before: u64,
+    /// The number of the datagram that comes next if none is missing.
+    next: u64,
+    dropped: u64,
+    body: Vec<u8>,
+}
+
+impl Packer {
+    /// Begins a session after so many datagrams.
+    #[must_use]
+    pub fn after(received: u64) -> Self {
+        Self {
+            // The standard library's own source of chance.
+            session: RandomState::new().hash_one(std::process::id()),
+            number: 0,
+            base_ns: 0,
+            count: 0,
+            before: 0,
+            next: received,
+            dropped: 0,
+            body: vec![],
+        }
+    }
+
+    /// How many datagrams wait.
+    #[must_use]
+    pub fn waiting(&self) -> u32 {
+        self.count
+    }
+
+    /// Adds a datagram, with its number among those received; gives the parcel before it where it does not fit in.
+    pub fn push(&mut self, number: u64, arrived_ns: i64, bytes: &[u8], dropped_by_kernel: u64) -> Option<Vec<u8>> {
+        let since = arrived_ns.checked_sub(self.base_ns).and_then(|since| i32::try_from(since).ok());
+        let fits = self.next == number && since.is_some() && self.body.len() + bytes.len() <= FULL;
+        let closed = (self.count > 0 && !fits).then(|| self.close(i64::MIN, dropped_by_kernel, false));
+        self.dropped += number.saturating_sub(self.next);
+        if self.count == 0 {
+            (self.base_ns, self.before) = (arrived_ns, number);
+        }
+        // No datagram is longer than a u16 can say, and of a parcel that was begun with it the time fits.
+        let length = u16::try_from(bytes.len()).unwrap_or(u16::MAX);
+        let since = i32::try_from(arrived_ns.saturating_sub(self.base_ns)).unwrap_or(0);
+        self.body.extend_from_slice(&length.to_le_bytes());
+        self.body.extend_from_slice(&since.to_le_bytes());
+        self.body.extend_from_slice(&bytes[..usize::from(length)]);
+        self.count += 1;
+        self.next = number + 1;
+        closed
+    }
+
+    /// Closes the parcel, which may be empty: nothing that arrived before `until_ns` follows, as far as it is told.
+    pub fn close(&mut self, until_ns: i64, dropped_by_kernel: u64, last: bool) -> Vec<u8> {
+        if self.count == 0 {
+            (self.base_ns, self.before) = (until_ns, self.next);
+        }
+        // What is not told is as old as can be; what is beyond, no promise.
+        let until = until_ns.saturating_sub(self.base_ns).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
+        let mut parcel = Vec::with_capacity(HEADER + self.body.len());
+        parcel.extend_from_slice(&MAGIC);
+        parcel.extend_from_slice(&[VERSION, u8::from(last), 0, 0]);
+        parcel.extend_from_slice(&self.session.to_le_bytes());
+        parcel.extend_from_slice(&self.number.to_le_bytes());
+        parcel.extend_from_slice(&self.base_ns.to_le_bytes());
+        parcel.extend_from_slice(&i32::try_from(until).unwrap_or(i32::MIN).to_le_bytes());
+        parcel.extend_from_slice(&self.count.to_le_bytes());
+        parcel.extend_from_slice(&self.before.to_le_bytes());
+        parcel.extend_from_slice(&self.dropped.to_le_bytes());
+        parcel.extend_from_slice(&dropped_by_kernel.to_le_bytes());
+        parcel.append(&mut self.body);
+        self.number += 1;
+        self.count = 0;
+        parcel
+    }
+
+    /// A parcel that was closed found no room on the way out: its datagrams are lost here.
+    pub fn lost(&mut self, parcel: &[u8]) {
+        self.dropped += Parcel::read(parcel).map_or(0, |parcel| u64::from(parcel.count));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_packed_is_unpacked() {
+        let mut packer = Packer::after(0);
+        let sent: Vec<(i64, Vec<u8>)> =
+            (0..3000).map(|k: i64| (7_000_000_000 + k * k * 1000, vec![(k % 251) as u8; (k * 7 % 1400) as usize])).collect();
+        let mut parcels = vec![];
+        for (k, (at, bytes)) in sent.iter().enumerate() {
+            parcels.extend(packer.push(k as u64, *at, bytes, 3));
+        }
+        parcels.push(packer.close(sent.last().expect("some").0 + 5, 3, true));
+        assert!(parcels.len() > 5, "full ones are closed, and those that last too long");
+        let mut got = vec![];
+        for (k, bytes) in parcels.iter().enumerate() {
+            assert!(bytes.len() <= LONGEST);
+            let parcel = Parcel::read(bytes).expect("whole");
+            assert_eq!((parcel.number, parcel.before), (k as u64, got.len() as u64));
+            assert_eq!((parcel.dropped, parcel.dropped_by_kernel), (0, 3));
+            assert_eq!(parcel.last, k + 1 == parcels.len());
+            got.extend(parcel.datagrams().map(|(at, bytes)| (at, bytes.to_vec())));
+        }
+        assert_eq!(got, sent);
+        assert_eq!(Parcel::read(parcels.last().expect("one")).expect("whole").until_ns(), sent[2999].0 + 5);
+    }
+
+    #[test]
+    fn what_the_queue_dropped_and_what_found_no_room_is_told() {
+        let mut packer = Packer::after(10);
+        assert!(packer.push(10, 0, b"ten", 0).is_none());
+        let parcel = packer.push(15, 0, b"fifteen", 0).expect("11 to 14 are missing");
+        assert_eq!(Parcel::read(&parcel).expect("whole").dropped, 0);
+        let parcel = packer.close(1, 0, false);
+        let read = Parcel::read(&parcel).expect("whole");
+        assert_eq!((read.before, read.dropped, read.count), (15, 4, 1));
+        packer.lost(&parcel);
+        let read = packer.close(2, 0, false);
+        let read = Parcel::read(&read).expect("whole");
+        assert_eq!((read.number, read.before, read.dropped, read.count), (2, 16, 5, 0));
+    }
+
+    #[test]
+    fn what_is_cut_or_changed_is_refused_or_read_and_never_a_panic() {
+        let mut packer = Packer::after(0);
+        for k in 0..3 {
+            packer.push(k, i64::MAX - 5, b"bytes", 0);
+        }
+        let whole = packer.close(i64::MAX, 0, false);
+        assert!(Parcel::read(&whole).is_some());
+        for cut in 0..whole.len() {
+            assert!(Parcel::read(&whole[..cut]).is_none(), "{cut}");
+        }
+        assert!(Parcel::read(&[&whole[..], &[0]].concat()).is_none());
+        for at in 0..whole.len() {
+            for bit in 0..8 {
+                let mut flipped = whole.clone();
+                flipped[at] ^= 1 << bit;
+                if let Some(parcel) = Parcel::read(&flipped) {
+                    assert_eq!(parcel.datagrams().count() as u32, parcel.count);
+                    let _ = parcel.until_ns();
+                }
+            }
+        }
+    }
+}

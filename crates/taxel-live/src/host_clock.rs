@@ -1,0 +1,271 @@
+//! Another computer's clock as this one sees it: offset and drift, from round trips.
+//!
+//! A question leaves here at t1, reaches the other at t2, its answer leaves there at t3 and is back at t4. Neither way takes
+//! less than no time, so the other clock is ahead by at most t2 - t1 and at least t3 - t4: an interval as wide as the round
+//! trip. Of each second the narrowest is kept (the filter of NTP, RFC 5905, section 10); the drift is the median slope
+//! between their middles, and the offset is the middle of what all of the last seconds allow with that drift. It is wrong by
+//! half the difference between the shortest ways there and back, which no exchange can show, and by no more than
+//! [`HostOffset::within_ns`] beside the drift's own error.
+
+use std::collections::VecDeque;
+
+use serde::{Deserialize, Serialize};
+
+/// Of each stretch of this length the narrowest exchange is kept, ns ...
+const STRETCH_NS: i64 = 1_000_000_000;
+/// ... for so many stretches, from which the drift comes ...
+const STRETCHES: usize = 64;
+/// ... and the offset from the newest of them ...
+const NEWEST: usize = 16;
+/// ... once there are so many; before, the newest alone counts.
+const BELIEVED: usize = 4;
+/// Quartz is good for 100 ppm, so two of them for 200: what is beyond is no drift.
+const MOST_DRIFT: f64 = 200e-6;
+/// An exchange that contradicts what was expected by more than this ...
+const ASTRAY_NS: i64 = 5_000_000;
+/// ... so often in a row says that a clock was set.
+const ASTRAY: u32 = 4;
+/// A round trip that takes longer says nothing, ns.
+const LONGEST_NS: i64 = 2_000_000_000;
+
+/// What another computer's clock shows when this one's shows a time: a line.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct HostOffset {
+    /// A time of this computer, ns since 1970 ...
+    pub here_ns: i64,
+    /// ... and by how much the other's clock was ahead then, ns.
+    pub ahead_ns: i64,
+    /// How much faster the other's clock runs, parts per million.
+    pub drift_ppm: f64,
+    /// Half of what the shortest round trips leave open, ns.
+    pub within_ns: i64,
+}
+
+impl HostOffset {
+    /// This computer's time at a time of the other's, both ns since 1970.
+    #[must_use]
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
+    pub fn here_ns(&self, there_ns: i64) -> i64 {
+        let since = there_ns.saturating_sub(self.ahead_ns).saturating_sub(self.here_ns);
+        // Less the drift over the stretch, so that nothing is lost to the precision of a float.
+        let drift = self.drift_ppm * 1e-6;
+        self.here_ns.saturating_add(since).saturating_sub((since as f64 * (drift / (1.0 + drift))) as i64)
+    }
+}
+
+/// The four times of a round trip, ns since 1970 of the clock of where they were taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RoundTrip {
+    /// The question left here.
+    pub asked: i64,
+    /// It reached the other.
+    pub came: i64,
+    /// The answer left there.
+    pub answered: i64,
+    /// It was back here.
+    pub back: i64,
+}
+
+/// What a round trip allows.
+#[derive(Debug, Clone, Copy)]
+struct Allowed {
+    here: i64,
+    least: i64,
+    most: i64,
+}
+
+impl Allowed {
+    fn width(&self) -> i64 {
+        self.most - self.least
+    }
+
+    fn middle(&self) -> i64 {
+        self.least + self.width() / 2
+    }
+}
+
+/// Estimates a [`HostOffset`] from round trips.
+#[derive(Debug, Clone, Default)]
+pub struct HostClock {
+    /// The narrowest of each finished stretch.
+    kept: VecDeque<Allowed>,
+    /// The narrowest of the stretch that runs.
+    narrowest: Option<Allowed>,
+    astray: u32,
+    offset: Option<HostOffset>,
+}
+
+impl HostClock {
+    /// Takes a round trip; one whose times cannot be true, or that took too long, is left out.
+    pub fn note(&mut self, trip: RoundTrip) {
+        let (Some(most), Some(least)) = (trip.came.checked_sub(trip.asked), trip.answered.checked_sub(trip.back)) else {
+            return;
+        };
+        let Some(here) = trip.back.checked_sub(trip.asked).map(|took| trip.asked + took / 2) else { return };
+        let allowed = Allowed { here, least, most };
+        if !(0..=LONGEST_NS).contains(&most.saturating_sub(least)) {
+            return;
+        }
+        if self.contradicts(&allowed) {
+            self.astray += 1;
+            if self.astray < ASTRAY {
+                return;
+            }
+            *self = Self::default();
+        }
+        self.astray = 0;
+        match self.narrowest {
+            Some(before) if allowed.here.div_euclid(STRETCH_NS) == before.here.div_euclid(STRETCH_NS) => {
+                if allowed.width() < before.width() {
+                    self.narrowest = Some(allowed);
+                }
+            }
+            before => {
+                if self.kept.len() == STRETCHES {
+                    self.kept.pop_front();
+                }
+                self.kept.extend(before);
+                self.narrowest = Some(allowed);
+            }
+        }
+        self.fit();
+    }
+
+    /// The estimate, once there was an exchange.
+    #[must_use]
+    pub fn offset(&self) -> Option<HostOffset> {
+        self.offset
+    }
+
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
+    fn contradicts(&self, allowed: &Allowed) -> bool {
+        let Some(offset) = self.offset else { return false };
+        let since = allowed.here - offset.here_ns;
+        let expected = offset.ahead_ns + (since as f64 * offset.drift_ppm * 1e-6) as i64;
+        let slack = ASTRAY_NS + (since.abs() as f64 * MOST_DRIFT) as i64;
+        expected < allowed.least - slack || expected > allowed.most + slack
+    }
+
+    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
+    fn fit(&mut self) {
+        let Some(last) = self.narrowest else { return };
+        let kept: Vec<Allowed> = self.kept.iter().copied().chain([last]).collect();
+        let (mut drift, mut counts) = (0.0, 1);
+        if kept.len() >= BELIEVED {
+            let mut slopes: Vec<f64> = kept
+                .iter()
+                .enumerate()
+                .flat_map(|(k, a)| kept.iter().skip(k + 1).map(move |b| (a, b)))
+                .filter(|(a, b)| b.here > a.here)
+                .map(|(a, b)| (b.middle() - a.middle()) as f64 / (b.here - a.here) as f64)
+                .collect();
+            if !slopes.is_empty() {
+                let middle = slopes.len() / 2;
+                drift = slopes.select_nth_unstable_by(middle, f64::total_cmp).1.clamp(-MOST_DRIFT, MOST_DRIFT);
+                counts = NEWEST;
+            }
+        }
+        let newest = kept.iter().rev().take(counts);
+        let moved = |bound: i64, at: i64| bound - ((at - last.here) as f64 * drift) as i64;
+        let least = newest.clone().map(|a| moved(a.least, a.here)).max().unwrap_or(last.least);
+        let most = newest.map(|a| moved(a.most, a.here)).min().unwrap_or(last.most);
+        self.offset = Some(HostOffset {
+            here_ns: last.here,
+            ahead_ns: least + (most - least) / 2,
+            drift_ppm: drift * 1e6,
+            within_ns: (most - least).abs() / 2,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HERE: i64 = 1_700_000_000_000_000_000;
+
+    /// A source of numbers between 0 and 1.
+    struct Chance(u64);
+
+    impl Chance {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (self.0 >> 40) as f64 / (1 << 24) as f64
+        }
+    }
+
+    struct Other {
+        ahead_ns: i64,
+        drift: f64,
+    }
+
+    impl Other {
+        fn there(&self, here: i64) -> i64 {
+            here + self.ahead_ns + ((here - HERE) as f64 * self.drift) as i64
+        }
+
+        /// Four times a second for `seconds`; each way takes 100 us and, now and then, up to 20 ms more.
+        fn heard(&self, clock: &mut HostClock, from: i64, seconds: i64, chance: &mut Chance) -> i64 {
+            for k in 0..seconds * 4 {
+                let mut way = || 100_000 + (chance.next().powi(8) * 20e6) as i64;
+                let asked = HERE + from * 1_000_000_000 + k * 250_000_000;
+                let reached = asked + way();
+                let left = reached + 30_000;
+                let back = left + way();
+                clock.note(RoundTrip { asked, came: self.there(reached), answered: self.there(left), back });
+            }
+            HERE + (from + seconds) * 1_000_000_000
+        }
+    }
+
+    #[test]
+    fn offset_and_drift_come_out_whatever_the_delays() {
+        for (ahead_ns, drift) in [(0, 0.0), (3_700_000_000, 50e-6), (-86_400_000_000_000, -120e-6)] {
+            let (mut clock, other) = (HostClock::default(), Other { ahead_ns, drift });
+            let now = other.heard(&mut clock, 0, 30, &mut Chance(7));
+            let offset = clock.offset().expect("something came");
+            assert!((offset.drift_ppm - drift * 1e6).abs() < 1.0, "{offset:?}");
+            assert!((offset.here_ns(other.there(now)) - now).abs() < 20_000, "{offset:?}");
+            assert!(offset.within_ns < 200_000, "{offset:?}");
+        }
+    }
+
+    #[test]
+    fn the_first_round_trip_is_believed_within_its_half() {
+        let mut clock = HostClock::default();
+        assert_eq!(clock.offset(), None);
+        // 2 ms there, 1 ms back, the other is 10 s ahead.
+        let came = HERE + 10_002_000_000;
+        clock.note(RoundTrip { asked: HERE, came, answered: came, back: HERE + 3_000_000 });
+        let offset = clock.offset().expect("one came");
+        assert_eq!((offset.ahead_ns, offset.within_ns), (10_000_500_000, 1_500_000));
+    }
+
+    #[test]
+    fn a_clock_that_was_set_is_followed_and_one_late_answer_is_not() {
+        let (mut clock, mut chance) = (HostClock::default(), Chance(3));
+        let other = Other { ahead_ns: 1_000_000_000, drift: 0.0 };
+        other.heard(&mut clock, 0, 10, &mut chance);
+        let before = clock.offset().expect("some came").ahead_ns;
+        let set = Other { ahead_ns: -5_000_000_000, drift: 0.0 };
+        let mut one = clock.clone();
+        set.heard(&mut one, 10, 0, &mut chance);
+        assert_eq!(one.offset().expect("some came").ahead_ns, before);
+        set.heard(&mut clock, 10, 2, &mut chance);
+        assert!((clock.offset().expect("some came").ahead_ns + 5_000_000_000).abs() < 100_000);
+    }
+
+    #[test]
+    fn times_that_cannot_be_true_are_left_out() {
+        let mut clock = HostClock::default();
+        for trip in [
+            RoundTrip { asked: i64::MIN, came: i64::MAX, answered: 0, back: 0 },
+            RoundTrip { asked: 0, came: i64::MAX, answered: i64::MIN, back: 1 },
+            RoundTrip { asked: 10, came: 0, answered: 100, back: 20 },
+            RoundTrip { asked: 0, came: 0, answered: 0, back: 3_000_000_000 },
+        ] {
+            clock.note(trip);
+        }
+        assert_eq!(clock.offset(), None);
+    }
+}

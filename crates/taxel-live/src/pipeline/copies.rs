@@ -1,0 +1,160 @@
+//! What goes to other computers: datagrams as they came, the low-rate picture, detections as they are said.
+//!
+//! The decoding thread gathers datagrams into parcels and hands them over where there is room; it never waits. What finds
+//! no room is counted in the parcels that follow.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crossbeam_channel as channel;
+use serde_json::json;
+
+use super::said::Said;
+use super::shared::Shared;
+use crate::capture::{Batch, Packer};
+use crate::recording::now_ns;
+
+/// So long a parcel gathers ...
+pub(super) const GATHER: Duration = Duration::from_millis(5);
+/// ... and after so long without one an empty parcel says how far time has come.
+const STILL_HERE: Duration = Duration::from_millis(10);
+
+/// From picture to picture.
+const PICTURE_EVERY: Duration = Duration::from_millis(100);
+
+/// Parcels that wait at most: 64 MiB.
+const WAITING: usize = 1 << 8;
+
+/// Something that goes to other computers.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Copied {
+    /// Datagrams.
+    Parcel(Vec<u8>),
+    /// What the taxels hold: JSON.
+    Picture(Vec<u8>),
+    /// A detection: a line of JSON.
+    Said(Vec<u8>),
+}
+
+/// Where they come out.
+pub struct Copies {
+    shared: Arc<Shared>,
+    parcels: channel::Receiver<Vec<u8>>,
+    said: channel::Receiver<Said>,
+    pictured: Instant,
+    decoded: u64,
+}
+
+impl Copies {
+    pub(super) fn new(
+        shared: Arc<Shared>,
+        parcels: channel::Receiver<Vec<u8>>,
+        said: channel::Receiver<Said>,
+    ) -> Self {
+        Self { shared, parcels, said, pictured: Instant::now(), decoded: 0 }
+    }
+
+    /// The next; `None` after `timeout` without one.
+    pub fn next(&mut self, timeout: Duration) -> Option<Copied> {
+        if let Some(picture) = self.picture() {
+            return Some(picture);
+        }
+        channel::select! {
+            recv(self.parcels) -> parcel => parcel.ok().map(Copied::Parcel),
+            recv(self.said) -> said => said.ok().and_then(spoken),
+            default(timeout) => None,
+        }
+    }
+
+    /// Whether all is over, and everything was given.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.shared.has_ended() && self.parcels.is_empty() && self.said.is_empty()
+    }
+
+    /// A picture, where it is time and something came since the last.
+    fn picture(&mut self) -> Option<Copied> {
+        if self.pictured.elapsed() < PICTURE_EVERY {
+            return None;
+        }
+        self.pictured = Instant::now();
+        let shown = self.shared.shown();
+        if shown.counters.decoded == self.decoded {
+            return None;
+        }
+        self.decoded = shown.counters.decoded;
+        let array = &self.shared.options.array;
+        let said = json!({
+            "t_us": shown.counters.board_us,
+            "rows": array.rows,
+            "columns": array.columns,
+            "ticks": shown.picture,
+        });
+        Some(Copied::Picture(said.to_string().into_bytes()))
+    }
+}
+
+fn spoken(said: Said) -> Option<Copied> {
+    said.line().ok().map(Copied::Said)
+}
+
+/// The decoding thread's end.
+pub(super) struct Copier {
+    parcels: channel::Sender<Vec<u8>>,
+    packer: Packer,
+    /// When the parcel that gathers was begun, or the last one was closed.
+    since: Instant,
+}
+
+/// A copier that begins after so many datagrams, and where its parcels come out.
+pub(super) fn copier(received: u64) -> (Copier, channel::Receiver<Vec<u8>>) {
+    let (give, parcels) = channel::bounded(WAITING);
+    (Copier { parcels: give, packer: Packer::after(received), since: Instant::now() }, parcels)
+}
+
+impl Copier {
+    /// Takes what came.
+    pub(super) fn take(&mut self, batch: &Batch, dropped_by_kernel: u64) {
+        for (datagram, bytes) in batch.iter() {
+            if self.packer.waiting() == 0 {
+                self.since = Instant::now();
+            }
+            let full = self.packer.push(datagram.number, datagram.arrived_ns, bytes, dropped_by_kernel);
+            if let Some(full) = full {
+                self.give(full);
+                self.since = Instant::now();
+            }
+        }
+    }
+
+    /// Closes what has gathered for long enough, or says that nothing came before `silent_until`; false where nobody
+    /// listens any more.
+    pub(super) fn tick(&mut self, silent_until: Option<i64>, dropped_by_kernel: u64) -> bool {
+        let since = self.since.elapsed();
+        let due = if self.packer.waiting() > 0 { since >= GATHER } else { since >= STILL_HERE && silent_until.is_some() };
+        if !due {
+            return true;
+        }
+        self.since = Instant::now();
+        let parcel = self.packer.close(silent_until.unwrap_or(i64::MIN), dropped_by_kernel, false);
+        self.give(parcel)
+    }
+
+    /// The last parcel, with what still waits.
+    pub(super) fn finish(&mut self, dropped_by_kernel: u64) {
+        let parcel = self.packer.close(now_ns(), dropped_by_kernel, true);
+        // It waits for room, as what it says of losses is said nowhere else; who listens no more lets it go.
+        let _ = self.parcels.send_timeout(parcel, STILL_HERE * 10);
+    }
+
+    fn give(&mut self, parcel: Vec<u8>) -> bool {
+        match self.parcels.try_send(parcel) {
+            Ok(()) => true,
+            Err(channel::TrySendError::Full(parcel)) => {
+                self.packer.lost(&parcel);
+                true
+            }
+            Err(channel::TrySendError::Disconnected(_)) => false,
+        }
+    }
+}
