@@ -2,15 +2,16 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SOURCES := Cargo.toml Cargo.lock $(shell find crates -name '*.rs' -o -name Cargo.toml -o -path '*/web/*' -type f)
+SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-bridge/*' -name '*.rs' -o -name Cargo.toml -o -path '*/web/*' -type f)
 
-.PHONY: help check setup build demo test slow lint format registers bench docs dist clean
+.PHONY: help check setup build bridge demo test slow lint format registers bench docs dist clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
 	@echo "make test   all tests but the slow ones     make slow   the slow ones"
 	@echo "make lint   format, lint, types, floors     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
+	@echo "make bridge what carries a board to other computers: ten minutes of a core, for those who have several"
 	@echo "make dist   a wheel for machines without cargo, and the source package, to dist/"
 
 check:
@@ -31,8 +32,16 @@ $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --quiet
 	@touch $@
 
+# Outside the workspace: 260 crates for those only who have more than one computer.
+BRIDGE := --release --manifest-path crates/taxel-bridge/Cargo.toml --target-dir target/bridge
+$(VENV)/.bridge: $(VENV)/.installed $(shell find crates/taxel-bridge -type f)
+	$(BIN)/maturin build $(BRIDGE) --out target/bridge/wheels
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_bridge-*.whl
+	@touch $@
+
 setup: $(VENV)/.installed
 build: $(VENV)/.built
+bridge: $(VENV)/.bridge
 
 demo: build
 	$(BIN)/taxel demo
@@ -41,12 +50,13 @@ test: build
 	cargo test --release --workspace --quiet
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow"
 
-slow: build dist
+slow: build dist bridge
 	cargo test --release --workspace --quiet -- --ignored
 	$(BIN)/python -m pytest -q -m slow
 
 lint: build
 	cargo fmt --all --check
+	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
 	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
@@ -60,6 +70,7 @@ lint: build
 
 format:
 	cargo fmt --all
+	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml
 	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
@@ -74,7 +85,7 @@ $(VENV)/.peers: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/peers.txt
 	@touch $@
 
-bench: build $(VENV)/.peers
+bench: build bridge $(VENV)/.peers
 	$(BIN)/taxel bench all
 
 docs: build

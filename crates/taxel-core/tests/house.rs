@@ -29,8 +29,8 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
     (
         "taxel-live",
         &[
-            &["error", "clock", "latency", "locked"],
-            &["address", "ports"],
+            &["error", "clock", "host_clock", "latency", "locked"],
+            &["address", "bridged", "ports"],
             &["recording"],
             &["capture"],
             &["emulate", "pipeline"],
@@ -42,6 +42,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
         &[
             &["errors"],
             &["enter", "convert", "parameters"],
+            &["bridge"],
             &[
                 "calibration",
                 "circuit",

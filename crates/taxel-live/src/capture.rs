@@ -21,10 +21,11 @@ use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use crate::bridged::Bridged;
 use crate::recording::now_ns;
 use crate::{Error, Result};
 pub use counts::Counts;
-pub use feed::{Bridged, Feed};
+pub use feed::Feed;
 pub use options::ReceiverOptions;
 pub use parcel::{LONGEST, Packer};
 use queue::Queue;

@@ -98,7 +98,8 @@ pub struct HostClock {
 impl HostClock {
     /// Takes a round trip; one whose times cannot be true, or that took too long, is left out.
     pub fn note(&mut self, trip: RoundTrip) {
-        let (Some(most), Some(least)) = (trip.came.checked_sub(trip.asked), trip.answered.checked_sub(trip.back)) else {
+        let (Some(most), Some(least)) = (trip.came.checked_sub(trip.asked), trip.answered.checked_sub(trip.back))
+        else {
             return;
         };
         let Some(here) = trip.back.checked_sub(trip.asked).map(|took| trip.asked + took / 2) else { return };

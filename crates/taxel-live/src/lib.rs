@@ -1,6 +1,7 @@
 //! Where the world comes in: sockets, files and threads around `taxel-core`.
 
 pub mod address;
+pub mod bridged;
 pub mod clock;
 pub mod error;
 pub mod host_clock;

@@ -23,6 +23,8 @@ use serde::{Deserialize, Serialize};
 use taxel_core::wire::{self, Registers};
 use taxel_core::{Array, problem};
 
+use crate::bridged::Bridged;
+
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks};
 pub use mcap_writer::{Track, Writer};
@@ -116,7 +118,7 @@ impl std::str::FromStr for Compression {
 }
 
 /// What happened to datagrams and bytes, by cause; the sums close.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Counts {
     /// Datagrams that the socket handed over.
@@ -129,6 +131,9 @@ pub struct Counts {
     pub dropped_by_queue: u64,
     /// What the decoder could not use of the bytes that came, by cause; see [`damage`].
     pub decoder: BTreeMap<String, u64>,
+    /// What was lost between the computer that received and this one, where there are two.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bridged: Option<Bridged>,
     /// Of a board that speaks version 2: datagrams that it sent and that never came intact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u64>,
@@ -220,10 +225,14 @@ impl Counts {
     #[must_use]
     pub fn verdict(&self) -> String {
         let missing = self.received.saturating_sub(self.dropped_by_queue + self.recorded);
+        let bridged = self.bridged.unwrap_or_default();
         let lost: Vec<String> = [
             (self.dropped_by_kernel, "messages dropped by the kernel"),
             (self.dropped_by_queue, "datagrams dropped by taxel's queue"),
             (missing, "datagrams received but not recorded"),
+            (bridged.missing, "datagrams lost between the computers"),
+            (bridged.dropped, "datagrams dropped by the other computer"),
+            (bridged.dropped_by_kernel, "messages dropped by the other computer's kernel"),
             (self.missing.unwrap_or(0), "datagrams lost or damaged on the way"),
         ]
         .iter()
@@ -245,6 +254,12 @@ impl Counts {
         };
         if !damage.is_empty() {
             line = format!("{line}; in the bytes that came: {}", damage.join(", "));
+        }
+        if bridged.silences > 0 || bridged.restarts > 0 {
+            line = format!(
+                "{line}; the other computer was silent for a second or more {} times, and began anew {} times",
+                bridged.silences, bridged.restarts
+            );
         }
         if let Some(said) = &self.converted {
             line = format!("converted from a recording that says: {said}");

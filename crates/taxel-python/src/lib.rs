@@ -5,6 +5,7 @@ mod enter;
 mod errors;
 mod knock;
 
+mod bridge;
 mod calibration;
 mod circuit;
 mod cone_x;
@@ -32,6 +33,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     knock::register(module)?;
     nouns::register(module)?;
+    bridge::register(module)?;
     calibration::register(module)?;
     circuit::register(module)?;
     cone_x::register(module)?;

@@ -16,6 +16,7 @@ use taxel_live::address::of_host;
 use taxel_live::capture::{self, Sender};
 use taxel_live::pipeline::{Ear, Handle, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink, Source};
 
+use crate::bridge::{Copies, Feed};
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core, live};
@@ -93,7 +94,7 @@ impl Live {
     /// Opens the socket, and the file where one is named (path, compression, overwrite).
     ///
     /// `options`, `readout` and `tare` are JSON; `tare_us` takes a fresh tare. `say` is called with each detection in the
-    /// thread that made it, `lines` writes it to the standard output as JSON.
+    /// thread that made it, `lines` writes it to the standard output as JSON. With a `feed` no socket is opened.
     #[new]
     #[allow(clippy::too_many_arguments)]
     fn start(
@@ -108,6 +109,7 @@ impl Live {
         tare_us: Option<i64>,
         say: Option<Py<PyAny>>,
         lines: bool,
+        feed: Option<PyRef<'_, Feed>>,
     ) -> PyResult<Self> {
         let chosen: Chosen = parsed("options", options)?;
         let record = match record {
@@ -151,7 +153,11 @@ impl Live {
         let readout = readout.map(Readout::from_json).transpose().map_err(core)?;
         let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
         let ear = Ear::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
-        let pipeline = enter(py, |_| Pipeline::start(of_host(host, port)?, options, ear, sinks))?;
+        let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
+        let pipeline = enter(py, |_| match fed {
+            Some(receiver) => Pipeline::start_fed(receiver, options, ear, sinks),
+            None => Pipeline::start(of_host(host, port)?, options, ear, sinks),
+        })?;
         Ok(Self { pipeline: RwLock::new(Some(pipeline)) })
     }
 
@@ -159,6 +165,21 @@ impl Live {
     fn address(&self, py: Python<'_>) -> PyResult<(String, u16)> {
         let address = self.with(py, |pipeline| Ok(pipeline.address()))?;
         Ok((address.ip().to_string(), address.port()))
+    }
+
+    /// Where datagrams come from, in words.
+    fn place(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |pipeline| Ok(pipeline.place().to_string()))
+    }
+
+    /// What the board's registers hold, as far as it was told: JSON.
+    fn registers(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |pipeline| Ok(json!(pipeline.handle().registers()).to_string()))
+    }
+
+    /// Copies for other computers, from the next batch on.
+    fn copy(&self, py: Python<'_>) -> PyResult<Copies> {
+        self.with(py, |pipeline| pipeline.handle().copy()).map(Copies::new)
     }
 
     /// The next detection; None after `timeout` seconds without one, or when all is over.

@@ -96,6 +96,7 @@ def _said(error: OSError) -> str:
 # One line a command; they stand at the end because each registers itself with `app`.
 for _command in (
     "bench",
+    "bridge",
     "calibrate",
     "convert",
     "cut",

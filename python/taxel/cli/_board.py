@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from typing import Annotated, Any
 
@@ -11,10 +12,13 @@ from rich.table import Table
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import OUTSIDE, WRONG_INPUT
-from taxel.live import Summary, delays
+from taxel.live import Remote, Summary, delays
+from taxel.tare import Tare
 
 __all__ = [
     "ArrayOption",
+    "CongestionOption",
+    "FromOption",
     "HostOption",
     "PortOption",
     "PresetOption",
@@ -22,12 +26,48 @@ __all__ = [
     "exit_code",
     "geometry",
     "outside",
+    "remote",
+    "rest_of",
 ]
 
 PortOption = Annotated[int, typer.Option(min=0, max=65_535, help="The UDP port that the board sends to.")]
 HostOption = Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: every one.")]
-ArrayOption = Annotated[str, typer.Option(help="Rows x columns of the sensor, as 64x64.")]
-PresetOption = Annotated[str, typer.Option(help='The board\'s registers: "5.2 kHz", "2 kHz", "20.8 kHz".')]
+ArrayOption = Annotated[
+    str | None, typer.Option(help="Rows x columns of the sensor; 64x64 where left out, or what is told with --from.")
+]
+PresetOption = Annotated[
+    str | None,
+    typer.Option(
+        help='The board\'s registers: "5.2 kHz" (where left out), "2 kHz", "20.8 kHz"; with --from it is told.'
+    ),
+]
+
+FromOption = Annotated[
+    str | None,
+    typer.Option(
+        "--from",
+        metavar="ADDRESS",
+        help="A board of another computer, in place of --port: zenoh:HOST:PORT/NAME, as taxel bridge says it there.",
+    ),
+]
+CongestionOption = Annotated[
+    str | None,
+    typer.Option(
+        help="With --from, where this computer is too slow: block, so that the other waits, or drop what is too much; "
+        "block where something is recorded or read out."
+    ),
+]
+
+
+def remote(
+    address: str | None, congestion: str | None, *, keeps: bool
+) -> contextlib.AbstractContextManager[Remote | None]:
+    """Return what hears the board of another computer, where one is named."""
+    if address is None:
+        if congestion is not None:
+            raise ProblemError("--congestion belongs to a board of another computer: give --from ADDRESS")
+        return contextlib.nullcontext()
+    return Remote(address, congestion=congestion or ("block" if keeps else "drop"))
 
 
 def geometry(said: str) -> Array:
@@ -38,6 +78,19 @@ def geometry(said: str) -> Array:
     thesis = Array.thesis()
     rows, columns = int(match[1]), int(match[2])
     return thesis if thesis.shape == (rows, columns) else Array(rows, columns, pitch_mm=thesis.pitch_mm, name=said)
+
+
+def rest_of(said: str | None) -> Tare | float | None:
+    """Return the tare that --tare names: a file, or how long to take a fresh one, s."""
+    if said is None:
+        return None
+    try:
+        seconds = float(said)
+    except ValueError:
+        return Tare.load(said)
+    if not 1e-6 <= seconds <= 3600:
+        raise ProblemError(f"--tare {said}: must be seconds from 1e-6 to 3600, or a file")
+    return seconds
 
 
 #: From so many words outside the array, and from this share of all on, they are no damage: it is another array.
@@ -64,6 +117,25 @@ def exit_code(summary: Summary, array: Array) -> int:
     return WRONG_INPUT if outside(summary.counters, array) else 0
 
 
+def _bridged(counted: dict[str, Any] | None) -> list[tuple[str, str, str]]:
+    """Return what to show of the way from another computer."""
+    if counted is None:
+        return []
+    if counted["ended"]:
+        said = "ended there; waiting for another"
+    elif counted["heard"]:
+        said = "heard"
+    else:
+        said = "SILENT: the other computer, or the way to it, is gone; waiting"
+    lost = f"{counted['missing']:,} on the way, {counted['dropped'] + counted['dropped_by_kernel']:,} there"
+    clock = counted["clock"]
+    compared = "not compared yet"
+    if clock is not None:
+        ahead, within = (clock[name] / 1e6 for name in ("ahead_ns", "within_ns"))
+        compared = f"{ahead:+,.3f} ms, within {within:.3f} ms, {clock['drift_ppm']:+.1f} ppm"
+    return [("other computer", said, ""), ("lost between", lost, ""), ("its clock", compared, "")]
+
+
 def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
     """Return rates since `before`, totals and losses, as rows that do not move about."""
     passed = max(now["seconds"] - before["seconds"], 1e-9)
@@ -81,6 +153,7 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         ("bytes", f"{capture['bytes']:,}", rate(capture["bytes"], earlier["bytes"])),
         ("events", f"{now['events']:,}", rate(now["events"], before["events"])),
         ("lost", f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue", ""),
+        *_bridged(now["bridged"]),
         ("damaged", f"{damaged:,} bytes and words, {wire['back']:,} steps back in time", ""),
         ("arrival to decoded", delays(now["decode_latency"]), ""),
         ("board's clock", f"{board}{drift}", ""),

@@ -16,7 +16,19 @@ from rich.text import Text
 from taxel._core import ProblemError
 from taxel._files import try_whole
 from taxel.cli._app import app
-from taxel.cli._board import HostOption, PortOption, PresetOption, counters_table, exit_code, geometry, outside
+from taxel.cli._board import (
+    CongestionOption,
+    FromOption,
+    HostOption,
+    PortOption,
+    PresetOption,
+    counters_table,
+    exit_code,
+    geometry,
+    outside,
+    remote,
+    rest_of,
+)
 from taxel.cli._listening import new_report
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
 from taxel.detect import Readout
@@ -42,7 +54,9 @@ def live(
     port: PortOption = 5208,
     host: HostOption = "0.0.0.0",
     array: Annotated[str | None, typer.Option(help="Rows x columns; the readout's own where left out.")] = None,
-    preset: PresetOption = "5.2 kHz",
+    preset: PresetOption = None,
+    address: FromOption = None,
+    congestion: CongestionOption = None,
     tare: Annotated[
         str | None, typer.Option(help="Seconds at rest for a fresh one, or the file of an earlier one (JSON).")
     ] = None,
@@ -87,10 +101,11 @@ def live(
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
     Example: taxel live --panel --control 127.0.0.1:5209
+    Example: taxel live --from zenoh:192.168.1.5:7447/left --panel
     """
     _together(readout, panel=panel, of_a_readout=bool(tare or report or send), of_a_panel=folder is not None)
     heard = None if readout is None else Readout.load(readout)
-    rest = _tare(tare)
+    rest = rest_of(tare)
     _fresh(rest, save_tare, None if panel else control)
     if report is not None:
         if record is None or record.suffix != ".mcap":
@@ -100,9 +115,11 @@ def live(
     with contextlib.ExitStack() as at_rest:
         if control is not None and isinstance(rest, float):
             at_rest.enter_context(at_rest.enter_context(Cable(control)).floor(0))
+        far = at_rest.enter_context(remote(address, congestion, keeps=record is not None or heard is not None))
         with Live(
             port,
             host=host,
+            remote=far,
             array=None if array is None else geometry(array),
             registers=preset,
             readout=heard,
@@ -230,7 +247,7 @@ def _watch(
 ) -> None:
     """Show what comes and what is said until the time is over; what holds `at_rest` ends with the tare."""
     shown: deque[Said] = deque(maxlen=_SHOWN)
-    console.print(f"listening on UDP {pipeline.address[0]}:{pipeline.address[1]}; Ctrl-C ends")
+    console.print(f"listening on {pipeline.place}; Ctrl-C ends")
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
         before, told = pipeline.counters, False
         taring = before["taring"]
@@ -255,18 +272,6 @@ def _watch(
             if now["seconds"] - before["seconds"] >= _REDRAW:
                 display.update(Group(counters_table(before, now), _state(now, shown)))
                 before = now
-
-
-def _tare(said: str | None) -> Tare | float | None:
-    if said is None:
-        return None
-    try:
-        seconds = float(said)
-    except ValueError:
-        return Tare.load(said)
-    if not 1e-6 <= seconds <= 3600:
-        raise ProblemError(f"--tare {said}: must be seconds from 1e-6 to 3600, or a file")
-    return seconds
 
 
 def _state(now: dict[str, Any], shown: deque[Said]) -> Text:

@@ -19,6 +19,7 @@ from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._board import (
     ArrayOption,
+    FromOption,
     HostOption,
     PortOption,
     PresetOption,
@@ -26,6 +27,7 @@ from taxel.cli._board import (
     exit_code,
     geometry,
     outside,
+    remote,
 )
 from taxel.cli._noting import noting
 from taxel.live import Live, Summary
@@ -41,8 +43,9 @@ def record(
     file: Annotated[Path, typer.Argument(help="A new file: .mcap keeps all that is known, .lsa raw bytes.")],
     port: PortOption = 5208,
     host: HostOption = "0.0.0.0",
-    array: ArrayOption = "64x64",
-    preset: PresetOption = "5.2 kHz",
+    array: ArrayOption = None,
+    preset: PresetOption = None,
+    address: FromOption = None,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
     markers: Annotated[bool, typer.Option("--markers", help="End where the board marks a stop.")] = False,
     compression: Annotated[str, typer.Option(help="Of .mcap: none, lz4 or zstd.")] = "none",
@@ -78,6 +81,7 @@ def record(
 
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay
+    Example: taxel record --from zenoh:192.168.1.5:7447/left walk.mcap
     """
     if length is None and trials is not None:
         raise ProblemError("--trials without --length: automatic mode needs how long each trial is")
@@ -86,19 +90,19 @@ def record(
     live: dict[str, Any] = {
         "port": port,
         "host": host,
-        "array": geometry(array),
+        "array": None if array is None else geometry(array),
         "registers": preset,
         "compression": compression,
         "overwrite": overwrite,
         "differences": differences,
         "name": name,
         "sources": _named(source or []),
+        "remote": address,
     }
     console = Console(stderr=True, quiet=as_json)
     if length is None:
-        summary, _ = _one(file, live, seconds, markers, console)
+        summary, _, code = _one(file, live, seconds, markers, console)
         _say(summary, as_json)
-        code = exit_code(summary, live["array"])
     else:
         code = _automatic(file, live, length, countdown, start_index, trials, markers, console, as_json)
     if code:
@@ -126,9 +130,9 @@ def _automatic(
             _count_down(name, countdown, console)
         except KeyboardInterrupt:
             break
-        summary, stopped = _one(name, live, length, markers, console)
+        summary, stopped, ended = _one(name, live, length, markers, console)
         _say(summary, as_json)
-        code, done = max(code, exit_code(summary, live["array"])), done + 1
+        code, done = max(code, ended), done + 1
         if stopped:
             break
     return code
@@ -146,9 +150,9 @@ def _count_down(name: Path, seconds: int, console: Console) -> None:
 
 def _one(
     file: Path, options: dict[str, Any], seconds: float | None, markers: bool, console: Console
-) -> tuple[Summary, bool]:
-    """Record one file until its time is over, the board marks a stop, or Ctrl-C; return whether it was that."""
-    with Live(record=file, **options) as live:
+) -> tuple[Summary, bool, int]:
+    """Record one file until its time is over, the board marks a stop, or Ctrl-C; return that, and a code."""
+    with remote(options["remote"], None, keeps=True) as far, Live(record=file, **{**options, "remote": far}) as live:
         try:
             # A .lsa holds no notes, and a source may have the standard input for itself.
             notes = file.suffix == ".mcap" and not any(
@@ -156,14 +160,15 @@ def _one(
             )
             takes = noting(live.note, console.print) if notes else nullcontext("")
             with takes as how:
-                console.print(f"listening on UDP {live.address[0]}:{live.address[1]}, recording to {file}; Ctrl-C ends")
+                console.print(f"listening on {live.place}, recording to {file}; Ctrl-C ends")
                 if how:
                     console.print(how)
                 _watch(live, seconds, markers, console)
             stopped = False
         except KeyboardInterrupt:
             stopped = True
-        return live.stop(), stopped
+        summary = live.stop()
+        return summary, stopped, exit_code(summary, live.array)
 
 
 def _watch(live: Live, seconds: float | None, markers: bool, console: Console) -> None:

@@ -1,7 +1,8 @@
 """From a board's datagrams to detections, while they come, and what a browser is shown of them."""
 
+from taxel.live.bridge import Bridge, Remote
 from taxel.live.panel import Panel
 from taxel.live.way import PORT, Live, Said, Source, Summary, heard, send
 from taxel.live.way import delays as delays
 
-__all__ = ["PORT", "Live", "Panel", "Said", "Source", "Summary", "heard", "send"]
+__all__ = ["PORT", "Bridge", "Live", "Panel", "Remote", "Said", "Source", "Summary", "heard", "send"]

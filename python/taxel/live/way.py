@@ -23,6 +23,7 @@ from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.live.lsl import LslInlet, LslOutlet
+from taxel.live.bridge import Remote
 from taxel.tare import Tare
 from taxel.wire import FRAME_US, Registers
 
@@ -90,9 +91,14 @@ class Summary:
 
     @property
     def lost(self) -> int:
-        """How much was lost after it had arrived: messages in the kernel, datagrams in our queue; 0 is nothing."""
+        """How much was lost after it had arrived: messages in the kernel, datagrams in our queue; 0 is nothing.
+
+        Of a board of another computer also what was lost there and between the two.
+        """
         boards = [self.counters, *(one for one in self.counters["sources"].values() if "capture" in one)]
-        return sum(int(one["capture"]["dropped_by_kernel"] + one["capture"]["dropped_by_queue"]) for one in boards)
+        lost = sum(int(one["capture"]["dropped_by_kernel"] + one["capture"]["dropped_by_queue"]) for one in boards)
+        bridged = self.counters["bridged"] or {}
+        return lost + sum(int(bridged.get(cause, 0)) for cause in ("missing", "dropped", "dropped_by_kernel"))
 
     @property
     def nothing_came(self) -> bool:
@@ -113,11 +119,13 @@ class Live:
         UDP; 0 finds a free one, see `address`.
     host : str
         The address of this machine on which to listen: every one of its addresses by default.
+    remote : Remote, optional
+        A board of another computer, in place of `port` and `host`. End this before that.
     array : Array
-        The sensor; by default the readout's own, or the thesis' 64 x 64.
+        The sensor; by default the remote board's or the readout's own, or the thesis' 64 x 64.
     registers : str or taxel.wire.Registers
         What the board's registers hold: themselves, or a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz", of
-        which a smaller array drives fewer lines.
+        which a smaller array drives fewer lines. By default the first; a remote board says what they hold.
     differences : bool
         Whether the board sends differences for intensities (the panel's "delta intensity").
     readout : Readout, optional
@@ -187,8 +195,9 @@ class Live:
         port: int = PORT,
         *,
         host: str = "0.0.0.0",
+        remote: Remote | None = None,
         array: Array | None = None,
-        registers: str | Registers = "5.2 kHz",
+        registers: str | Registers | None = None,
         differences: bool = False,
         readout: Readout | None = None,
         tare: Tare | float | None = None,
@@ -209,6 +218,11 @@ class Live:
     ) -> None:
         if readout is not None:
             instance("readout", readout, Readout)
+        if remote is not None:
+            instance("remote", remote, Remote)
+            array = remote.array if array is None else array
+            registers = Registers._of(remote.registers, remote.array) if registers is None else registers
+            differences = flag("differences", differences) or remote.differences
         if array is None and readout is not None:
             array = readout.array
         self.array = Array._of(array)
@@ -217,6 +231,7 @@ class Live:
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in goes if to.startswith(_LSL)]
         inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in heard_of if how.startswith(_LSL)}
         self._inlets = list(inlets.values())
+        registers = "5.2 kHz" if registers is None else registers
         sizes = {
             "kernel_buffer_bytes": kernel_buffer_bytes,
             "queue_bytes": queue_bytes,
@@ -251,6 +266,7 @@ class Live:
         if record is not None:
             recording = (checked_path("record", record), text("compression", compression), flag("overwrite", overwrite))
         self._summary: Summary | None = None
+        feed = None if remote is None else remote._fed(queue_bytes)
         self._core = _core.Live(
             text("host", host),
             whole("port", port, 0, 65_535),
@@ -262,14 +278,30 @@ class Live:
             None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
             None if not listeners else lambda *said: [hear(Said(*said)) for hear in listeners],
             flag("lines", lines),
+            feed,
         )
+        self._remote, self._place = remote, self._core.place()
+        if remote is not None and feed is not None:
+            remote._begin(feed)
         for what, inlet in inlets.items():
             inlet.begin(partial(self._core.sample, what))
 
     @property
     def address(self) -> tuple[str, int]:
-        """Host and port that it listens on."""
+        """Host and port that it listens on.
+
+        Raises
+        ------
+        ProblemError : the board is another computer's
+        """
+        if self._remote is not None:
+            raise ProblemError(f"live: hears {self.place}, and listens on no address of this computer")
         return self._core.address()
+
+    @property
+    def place(self) -> str:
+        """Where datagrams come from, in words: "UDP 127.0.0.1:5208", or a remote board's address."""
+        return self._place
 
     def next(self, timeout: float = 1.0) -> Said | None:
         """Return the next detection, or None after `timeout` s without one, or at once after the end.
@@ -299,8 +331,9 @@ class Live:
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
         `taxel.wire_v2.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
-        `wire_late` (events of version 2 that came when time had gone on without them), `events`, `read_out`,
-        `events_dropped`,
+        `wire_late` (events of version 2 that came when time had gone on without them), `bridged` (None, or of a board
+        of another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
+        ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
         `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence
         that was none, because events came later than the guard), `detections_dropped`, `sources` (what came of
         each other source), `sent` (of each destination: to,
@@ -414,8 +447,7 @@ class Live:
     def __repr__(self) -> str:
         if self._summary is not None:
             return f"Live(ended; {self._summary.verdict})"
-        host, port = self.address
-        return f"Live({host}:{port}, {self.array.rows} x {self.array.columns} taxels)"
+        return f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)"
 
 
 class Source:

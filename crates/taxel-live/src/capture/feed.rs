@@ -4,46 +4,14 @@ use std::io;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use serde::{Deserialize, Serialize};
-
 use super::parcel::Parcel;
 use super::queue::{Batch, Queue};
-use crate::host_clock::{HostClock, HostOffset, RoundTrip};
+use crate::bridged::Bridged;
+use crate::host_clock::{HostClock, RoundTrip};
 use crate::locked::lock;
 
 /// A bridge sends something each 10 ms: one that was not heard for so long is gone, or the way to it.
 const SILENT: Duration = Duration::from_secs(1);
-
-/// What came over a bridge, and what was lost on the way.
-///
-/// Between the first and the last parcel of a session, datagrams that the other computer received = those that came +
-/// [`Bridged::missing`] + [`Bridged::dropped`].
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Bridged {
-    /// Parcels that came, the empty ones that say "still here" among them.
-    pub parcels: u64,
-    /// Datagrams that were sent over the bridge and never came.
-    pub missing: u64,
-    /// Datagrams that the other computer dropped, its queues being full.
-    pub dropped: u64,
-    /// Messages that the other computer's kernel dropped.
-    pub dropped_by_kernel: u64,
-    /// Parcels that came again; they were left out.
-    pub repeated: u64,
-    /// Parcels that could not be read.
-    pub refused: u64,
-    /// How often the bridge was begun anew while it was listened to.
-    pub restarts: u64,
-    /// How often nothing was heard for a second or more.
-    pub silences: u64,
-    /// Whether something was heard within the last second.
-    pub heard: bool,
-    /// Whether the bridge said that it ends.
-    pub ended: bool,
-    /// The other computer's clock against this one's.
-    pub clock: Option<HostOffset>,
-}
 
 #[derive(Debug, Clone, Copy)]
 struct Session {

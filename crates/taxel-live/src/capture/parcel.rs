@@ -196,8 +196,9 @@ mod tests {
     #[test]
     fn what_is_packed_is_unpacked() {
         let mut packer = Packer::after(0);
-        let sent: Vec<(i64, Vec<u8>)> =
-            (0..3000).map(|k: i64| (7_000_000_000 + k * k * 1000, vec![(k % 251) as u8; (k * 7 % 1400) as usize])).collect();
+        let sent: Vec<(i64, Vec<u8>)> = (0..3000)
+            .map(|k: i64| (7_000_000_000 + k * k * 1000, vec![(k % 251) as u8; (k * 7 % 1400) as usize]))
+            .collect();
         let mut parcels = vec![];
         for (k, (at, bytes)) in sent.iter().enumerate() {
             parcels.extend(packer.push(k as u64, *at, bytes, 3));

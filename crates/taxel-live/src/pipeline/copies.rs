@@ -46,11 +46,7 @@ pub struct Copies {
 }
 
 impl Copies {
-    pub(super) fn new(
-        shared: Arc<Shared>,
-        parcels: channel::Receiver<Vec<u8>>,
-        said: channel::Receiver<Said>,
-    ) -> Self {
+    pub(super) fn new(shared: Arc<Shared>, parcels: channel::Receiver<Vec<u8>>, said: channel::Receiver<Said>) -> Self {
         Self { shared, parcels, said, pictured: Instant::now(), decoded: 0 }
     }
 
@@ -131,7 +127,8 @@ impl Copier {
     /// listens any more.
     pub(super) fn tick(&mut self, silent_until: Option<i64>, dropped_by_kernel: u64) -> bool {
         let since = self.since.elapsed();
-        let due = if self.packer.waiting() > 0 { since >= GATHER } else { since >= STILL_HERE && silent_until.is_some() };
+        let due =
+            if self.packer.waiting() > 0 { since >= GATHER } else { since >= STILL_HERE && silent_until.is_some() };
         if !due {
             return true;
         }

@@ -8,6 +8,7 @@ use taxel_core::wire;
 
 use super::sending::Sent;
 use super::sources::SourceCounts;
+use crate::bridged::Bridged;
 use crate::capture;
 use crate::clock::Offset;
 use crate::latency::Quantiles;
@@ -21,7 +22,7 @@ pub struct Counters {
     /// At the socket and in the queue behind it.
     pub capture: capture::Counts,
     /// On the way from another computer, where that receives.
-    pub bridged: Option<capture::Bridged>,
+    pub bridged: Option<Bridged>,
     /// Datagrams that were decoded.
     pub decoded: u64,
     /// What the decoder saw in them.

@@ -412,7 +412,7 @@ impl Work<'_> {
         if tell {
             self.told = Instant::now();
         }
-        let capture = self.shared.receiver.counts();
+        let (capture, bridged) = (self.shared.receiver.counts(), self.shared.receiver.bridged());
         self.record(|recorder| {
             if let Some(tare) = tare {
                 recorder.tare(&tare)?;
@@ -421,7 +421,7 @@ impl Work<'_> {
             if new && let Some(board_us) = counters.board_us {
                 recorder.picture(board_us, self.options.array.columns, &picture)?;
             }
-            if tell { recorder.so_far(&super::counters::Counters { capture, ..counters }) } else { Ok(()) }
+            if tell { recorder.so_far(&super::counters::Counters { capture, bridged, ..counters }) } else { Ok(()) }
         })
     }
 }

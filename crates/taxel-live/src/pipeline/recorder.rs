@@ -103,8 +103,7 @@ impl Recorder {
     /// A part of another's recording.
     pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, place: &Place) -> Self {
         let name = host.name.clone();
-        let board =
-            Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
+        let board = Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
         Self {
             record: record.clone(),
             header: Header { name, ..board },
@@ -128,8 +127,7 @@ impl Recorder {
     }
 
     pub(super) fn create(record: &Record, options: &LiveOptions, place: &Place) -> Result<Self> {
-        let board =
-            Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
+        let board = Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
         let sources = options.sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
         let header = Header { difference: options.differences, name: options.name.clone(), sources, ..board };
         let path = &record.path;
@@ -429,6 +427,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         dropped_by_queue,
         decoder,
         missing: missing.map(|n| n.saturating_sub(missed.unwrap_or(0))),
+        bridged: counters.bridged.map(|now| now.since(&begun.bridged.unwrap_or_default())),
         converted: None,
     }
 }

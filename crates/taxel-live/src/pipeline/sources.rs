@@ -24,6 +24,7 @@ use super::counters::Counters;
 use super::recorder::Part;
 use super::sending::serial;
 use super::shared::Shared;
+use crate::capture::Receiver;
 use crate::locked::lock;
 use crate::recording::{self, Header, Stream, Track, fields, now_ns};
 use crate::{Error, Result, address};

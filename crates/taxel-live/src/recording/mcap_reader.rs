@@ -41,7 +41,7 @@ pub struct Reader {
 }
 
 /// How a recording says that it ended.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Ending {
     /// As planned, with what was lost.

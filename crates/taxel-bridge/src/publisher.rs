@@ -1,0 +1,202 @@
+//! The computer that the board sends to.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, RwLock};
+use std::thread::JoinHandle;
+
+use crossbeam_channel as channel;
+use pyo3::exceptions::{PyConnectionError, PyValueError};
+use pyo3::prelude::*;
+use zenoh::bytes::ZBytes;
+use zenoh::qos::{CongestionControl, Priority};
+use zenoh::query::Query;
+use zenoh::{Session, Wait};
+
+use crate::keys::{self, is_name, key};
+use crate::session::{first_line, open};
+use crate::skew::Skew;
+
+/// Parcels that wait for a lane at most: 64 MiB.
+const WAITING: usize = 1 << 8;
+
+/// What is sent to those who asked for it in one way.
+struct Lane {
+    parcels: Option<channel::Sender<ZBytes>>,
+    sent: Arc<AtomicU64>,
+    dropped: u64,
+    listened: zenoh::pubsub::Publisher<'static>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Lane {
+    fn begin(session: &Session, key: String, congestion: CongestionControl, priority: Priority) -> zenoh::Result<Self> {
+        let declare = |key: String| {
+            session.declare_publisher(key).congestion_control(congestion).priority(priority).express(true).wait()
+        };
+        let (publisher, listened) = (declare(key.clone())?, declare(key)?);
+        let (parcels, waiting) = channel::bounded::<ZBytes>(WAITING);
+        let sent = Arc::new(AtomicU64::new(0));
+        let counted = Arc::clone(&sent);
+        // A lane that waits for somebody slow holds up neither the other nor the one who hands parcels in.
+        let thread = std::thread::Builder::new().name("taxel-lane".to_owned()).spawn(move || {
+            for parcel in waiting {
+                // What cannot be sent shows in the numbers of the parcels that follow.
+                if publisher.put(parcel).wait().is_ok() {
+                    counted.fetch_add(1, Ordering::Relaxed);
+                }
+            }
+        })?;
+        Ok(Self { parcels: Some(parcels), sent, dropped: 0, listened, thread: Some(thread) })
+    }
+
+    /// Whether somebody listens.
+    fn heard(&self) -> bool {
+        self.listened.matching_status().wait().is_ok_and(|status| status.matching())
+    }
+
+    fn put(&mut self, parcel: &ZBytes) {
+        if self.heard()
+            && let Some(parcels) = &self.parcels
+            && parcels.try_send(parcel.clone()).is_err()
+        {
+            self.dropped += 1;
+        }
+    }
+
+    fn end(&mut self) {
+        self.parcels = None;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Open {
+    session: Session,
+    block: Lane,
+    drop: Lane,
+    pictures: zenoh::pubsub::Publisher<'static>,
+    detections: zenoh::pubsub::Publisher<'static>,
+}
+
+/// Publishes what a board sends to this computer.
+#[pyclass(frozen)]
+pub(crate) struct Publisher {
+    open: Mutex<Option<Open>>,
+    about: Arc<RwLock<String>>,
+    skew: Skew,
+}
+
+impl Publisher {
+    fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut Open) -> zenoh::Result<T> + Send) -> PyResult<T> {
+        py.detach(|| match &mut *self.open.lock().unwrap_or_else(PoisonError::into_inner) {
+            Some(open) => work(open).map_err(|e| PyConnectionError::new_err(first_line(&e))),
+            None => Err(PyValueError::new_err("publisher: has been closed")),
+        })
+    }
+}
+
+#[pymethods]
+impl Publisher {
+    /// Begins to publish as `name`: listens at and connects to HOST:PORT. `about` is what askers are told of the sensor.
+    /// For trials the clock is set off: ahead by `ahead_ns`, and running faster by `drift_ppm`.
+    #[new]
+    #[pyo3(signature = (name, listen, connect, about, ahead_ns = 0, drift_ppm = 0.0))]
+    fn new(
+        py: Python<'_>,
+        name: &str,
+        listen: Vec<String>,
+        connect: Vec<String>,
+        about: String,
+        ahead_ns: i64,
+        drift_ppm: f64,
+    ) -> PyResult<Self> {
+        if !is_name(name) {
+            return Err(PyValueError::new_err(format!("name is {name:?}: must be 1 to 64 letters, digits, - _ or .")));
+        }
+        let (about, skew) = (Arc::new(RwLock::new(about)), Skew::new(ahead_ns, drift_ppm));
+        let told = Arc::clone(&about);
+        let open = py.detach(|| {
+            let session = open(&listen, &connect)?;
+            begin(session, name, told, skew).map_err(|e| PyConnectionError::new_err(first_line(&e)))
+        })?;
+        Ok(Self { open: Mutex::new(Some(open)), about, skew })
+    }
+
+    /// Sends a parcel to those who listen; never waits.
+    fn parcel(&self, py: Python<'_>, parcel: Vec<u8>) -> PyResult<()> {
+        self.with(py, |open| {
+            let mut parcel = parcel;
+            self.skew.stamp(&mut parcel);
+            let parcel = ZBytes::from(parcel);
+            open.block.put(&parcel);
+            open.drop.put(&parcel);
+            Ok(())
+        })
+    }
+
+    /// Sends a picture.
+    fn picture(&self, py: Python<'_>, picture: Vec<u8>) -> PyResult<()> {
+        self.with(py, |open| open.pictures.put(picture).wait())
+    }
+
+    /// Sends a detection.
+    fn detection(&self, py: Python<'_>, line: Vec<u8>) -> PyResult<()> {
+        self.with(py, |open| open.detections.put(line).wait())
+    }
+
+    /// What askers are told from here on.
+    fn tell(&self, about: String) {
+        *self.about.write().unwrap_or_else(PoisonError::into_inner) = about;
+    }
+
+    /// Parcels sent and dropped for want of room, to those who must have all and to those who look on; whether somebody of
+    /// either kind listens.
+    #[allow(clippy::type_complexity)]
+    fn counts(&self, py: Python<'_>) -> PyResult<((u64, u64, bool), (u64, u64, bool))> {
+        self.with(py, |open| {
+            let of = |lane: &Lane| (lane.sent.load(Ordering::Relaxed), lane.dropped, lane.heard());
+            Ok((of(&open.block), of(&open.drop)))
+        })
+    }
+
+    /// Sends what waits, and ends.
+    fn close(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| {
+            let Some(mut open) = self.open.lock().unwrap_or_else(PoisonError::into_inner).take() else { return Ok(()) };
+            open.block.end();
+            open.drop.end();
+            open.session.close().wait().map_err(|e| PyConnectionError::new_err(first_line(&e)))
+        })
+    }
+}
+
+fn begin(session: Session, name: &str, about: Arc<RwLock<String>>, skew: Skew) -> zenoh::Result<Open> {
+    let clock = move |query: Query| {
+        let came = skew.now_ns();
+        let mut answer = came.to_le_bytes().to_vec();
+        answer.extend_from_slice(&skew.now_ns().to_le_bytes());
+        // Who asked may have gone.
+        let _ = query.reply(query.key_expr().clone(), answer).express(true).wait();
+    };
+    session.declare_queryable(key(name, keys::CLOCK)).callback(clock).background().wait()?;
+    let told = key(name, keys::ABOUT);
+    let tell = move |query: Query| {
+        let about = about.read().unwrap_or_else(PoisonError::into_inner).clone();
+        let _ = query.reply(told.clone(), about).wait();
+    };
+    session.declare_queryable(key(name, keys::ABOUT)).callback(tell).background().wait()?;
+    let block = Lane::begin(&session, key(name, keys::BLOCK), CongestionControl::Block, Priority::Data)?;
+    let drop = Lane::begin(&session, key(name, keys::DROP), CongestionControl::Drop, Priority::DataHigh)?;
+    let declare = |what: &str, priority| {
+        session
+            .declare_publisher(key(name, what))
+            .congestion_control(CongestionControl::Drop)
+            .priority(priority)
+            .express(true)
+            .wait()
+    };
+    let pictures = declare(keys::PICTURE, Priority::DataLow)?;
+    let detections = declare(keys::DETECTION, Priority::InteractiveHigh)?;
+    Ok(Open { session, block, drop, pictures, detections })
+}

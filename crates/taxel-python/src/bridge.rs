@@ -1,0 +1,108 @@
+//! What travels between computers: parcels out of a pipeline, and into one.
+
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use serde_json::json;
+use taxel_core::problem;
+use taxel_live::capture::{self, Receiver, ReceiverOptions};
+use taxel_live::host_clock::RoundTrip;
+use taxel_live::pipeline::{Copied, Copies as Outlet};
+
+use crate::enter::{Shared, enter};
+use crate::errors::ProblemError;
+
+/// Where parcels of another computer go in.
+#[pyclass(frozen)]
+pub(crate) struct Feed {
+    feed: capture::Feed,
+    /// Until a pipeline takes it.
+    receiver: Mutex<Option<Receiver>>,
+}
+
+impl Feed {
+    /// The pipeline's end; it can be had once.
+    pub(crate) fn receiver(&self) -> taxel_live::Result<Receiver> {
+        let taken = self.receiver.lock().unwrap_or_else(PoisonError::into_inner).take();
+        taken.ok_or_else(|| problem!("feed: is heard already").into())
+    }
+}
+
+#[pymethods]
+impl Feed {
+    /// A feed from `place`; so many bytes may wait for the decoder.
+    #[new]
+    fn new(place: &str, queue_bytes: Option<usize>) -> Self {
+        let usual = ReceiverOptions::default();
+        let options = ReceiverOptions { queue_bytes: queue_bytes.unwrap_or(usual.queue_bytes), ..usual };
+        let (receiver, feed) = Receiver::fed(place, options);
+        Self { feed, receiver: Mutex::new(Some(receiver)) }
+    }
+
+    /// Takes a parcel; False where it begins a session and `meet` has to come first.
+    fn take(&self, py: Python<'_>, parcel: Vec<u8>) -> bool {
+        py.detach(|| self.feed.take(&parcel))
+    }
+
+    /// A session begins.
+    fn meet(&self) {
+        self.feed.meet();
+    }
+
+    /// Takes a round trip to the other computer's clock: four times, ns since 1970.
+    fn compare(&self, asked: i64, came: i64, answered: i64, back: i64) {
+        self.feed.compare(RoundTrip { asked, came, answered, back });
+    }
+
+    /// What came and what was lost: JSON.
+    fn bridged(&self) -> String {
+        json!(self.feed.bridged()).to_string()
+    }
+
+    /// Ends the pipeline because of an error.
+    fn fail(&self, said: &str) {
+        self.feed.fail(said);
+    }
+
+    /// Whether nobody takes any more.
+    fn is_over(&self) -> bool {
+        self.feed.is_over()
+    }
+}
+
+/// Where a pipeline's copies come out.
+#[pyclass(frozen)]
+pub(crate) struct Copies(Shared<Outlet>);
+
+impl Copies {
+    pub(crate) fn new(copies: Outlet) -> Self {
+        Self(Shared::new(copies))
+    }
+}
+
+#[pymethods]
+impl Copies {
+    /// The next: "parcel", "picture" or "detection", and its bytes; None after `timeout` s without one.
+    fn next<'py>(&self, py: Python<'py>, timeout: f64) -> PyResult<Option<(&'static str, Bound<'py, PyBytes>)>> {
+        let timeout = Duration::try_from_secs_f64(timeout)
+            .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
+        let copied = enter(py, |_| Ok::<_, taxel_live::Error>(self.0.lock().next(timeout)))?;
+        Ok(copied.map(|copied| match copied {
+            Copied::Parcel(bytes) => ("parcel", PyBytes::new(py, &bytes)),
+            Copied::Picture(bytes) => ("picture", PyBytes::new(py, &bytes)),
+            Copied::Said(bytes) => ("detection", PyBytes::new(py, &bytes)),
+        }))
+    }
+
+    /// Whether the pipeline has ended and everything was given.
+    fn is_over(&self, py: Python<'_>) -> bool {
+        self.0.look(py, |copies| copies.is_over())
+    }
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Feed>()?;
+    module.add_class::<Copies>()
+}

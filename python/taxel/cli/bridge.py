@@ -1,0 +1,156 @@
+"""``taxel bridge``: a board for other computers."""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console, Group
+from rich.live import Live as Display
+from rich.text import Text
+
+from taxel._core import ProblemError
+from taxel.cli._app import app
+from taxel.cli._board import (
+    ArrayOption,
+    HostOption,
+    PortOption,
+    PresetOption,
+    counters_table,
+    exit_code,
+    geometry,
+    rest_of,
+)
+from taxel.detect import Readout
+from taxel.live import Bridge, Live
+from taxel.live.bridge import PLACE
+
+__all__ = ["bridge"]
+
+#: How often the display is drawn anew, and the end looked for, s.
+_REDRAW = 0.1
+
+
+@app.command()
+def bridge(
+    port: PortOption = 5208,
+    host: HostOption = "0.0.0.0",
+    array: ArrayOption = None,
+    preset: PresetOption = None,
+    differences: Annotated[bool, typer.Option("--differences", help="The board sends intensity differences.")] = False,
+    name: Annotated[str, typer.Option(help="Of the board: letters, digits, - _ or .")] = "board",
+    listen: Annotated[
+        list[str], typer.Option(help="HOST:PORT (TCP) of this computer for others to connect to; may be repeated.")
+    ] = [PLACE],  # noqa: B006  typer reads it and never writes
+    connect: Annotated[
+        list[str] | None, typer.Option(help="HOST:PORT of a Zenoh router to publish at; may be repeated.")
+    ] = None,
+    readout: Annotated[
+        Path | None, typer.Option(help="A trained readout (JSON), whose detections are published too.")
+    ] = None,
+    tare: Annotated[
+        str | None, typer.Option(help="Seconds at rest for a fresh one, or the file of an earlier one (JSON).")
+    ] = None,
+    record: Annotated[
+        Path | None, typer.Option(help="Keep everything here too, in a new file (.mcap or .lsa).")
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
+    clock_ahead: Annotated[
+        float, typer.Option(help="For trials: set this computer's clock ahead by so much, s.")
+    ] = 0.0,
+    clock_drift: Annotated[float, typer.Option(help="For trials: let it run faster, parts per million.")] = 0.0,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print the counts at the end as JSON, and nothing else.")
+    ] = False,
+) -> None:
+    """Publish a board for other computers: datagrams as they are, pictures ten times a second, detections.
+
+    There taxel live, and taxel record, hear it with --from zenoh:HOST:PORT/NAME as if the board were there. Listens on
+    this computer alone unless --listen says more; what is published is neither encrypted nor guarded. Needs the wheel
+    taxel-bridge (make bridge). Exit code 3 where nothing came or something was lost here after it had arrived.
+
+    Example: taxel bridge --port 5208 --name left --listen 192.168.1.5:7447
+    """
+    if readout is None and tare is not None:
+        raise ProblemError("--tare belongs to a readout: give --readout FILE")
+    heard = None if readout is None else Readout.load(readout)
+    console = Console(stderr=True, quiet=as_json)
+    with (
+        Live(
+            port,
+            host=host,
+            array=None if array is None else geometry(array),
+            registers=preset,
+            differences=differences,
+            readout=heard,
+            tare=rest_of(tare),
+            record=record,
+        ) as live,
+        Bridge(
+            live,
+            name=name,
+            listen=listen,
+            connect=connect or (),
+            clock_ahead_s=clock_ahead,
+            clock_drift_ppm=clock_drift,
+        ) as published,
+    ):
+        for place in listen:
+            _announce(place, name, console)
+        console.print(f"listening on {live.place}; Ctrl-C ends")
+        with contextlib.suppress(KeyboardInterrupt):
+            _watch(live, published, seconds, console)
+        # What came is published before the end is told.
+        summary = live.stop()
+        counts = published.counts
+    if as_json:
+        path = None if summary.path is None else str(summary.path)
+        typer.echo(json.dumps(asdict(summary) | {"path": path, "published": counts}))
+    else:
+        sent = counts["block"]["sent"] + counts["drop"]["sent"]
+        typer.echo(f"{summary.counters['capture']['datagrams']} datagrams came, {sent} parcels were sent on")
+        typer.echo(summary.verdict)
+    raise typer.Exit(exit_code(summary, live.array))
+
+
+def _announce(place: str, name: str, console: Console) -> None:
+    """Say where it is heard, and warn where others can reach it."""
+    host = place.rpartition(":")[0].strip("[]")
+    try:
+        alone = ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        alone = host == "localhost"
+    if not alone:
+        console.print(
+            f"warning: whoever reaches {place} can listen, and the way there is not encrypted: "
+            "only on a network that you trust, or through a tunnel",
+            soft_wrap=True,
+        )
+    console.print(f"hear it with --from zenoh:{place}/{name}", soft_wrap=True, highlight=False)
+
+
+def _watch(live: Live, published: Bridge, seconds: float | None, console: Console) -> None:
+    """Show what comes and who listens until the time is over."""
+    with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
+        before = live.counters
+        while seconds is None or before["seconds"] < seconds:
+            said = live.next(_REDRAW)
+            while said is not None:
+                said = live.next(0.0)
+            now = live.counters
+            if now["seconds"] - before["seconds"] >= _REDRAW:
+                display.update(Group(counters_table(before, now), Text(_listeners(published.counts))))
+                before = now
+
+
+def _listeners(counts: dict[str, dict[str, Any]]) -> str:
+    said = []
+    for what, row in (("recorders", counts["block"]), ("viewers", counts["drop"])):
+        if row["heard"]:
+            said.append(f"{what} listen: {row['sent']:,} parcels sent, {row['dropped']:,} dropped")
+    return "; ".join(said) or "nobody listens"
