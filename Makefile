@@ -11,7 +11,7 @@ help:
 	@echo "make test   all tests but the slow ones     make slow   the slow ones"
 	@echo "make lint   format, lint, types, floors     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
-	@echo "make bridge what carries a board to other computers: ten minutes of a core, for those who have several"
+	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
 	@echo "make dist   a wheel for machines without cargo, and the source package, to dist/"
 
 check:

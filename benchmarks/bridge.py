@@ -133,7 +133,7 @@ def clocks(seconds: float) -> dict[str, Any]:
             other.end()
             wait_for(lambda: live.counters["bridged"]["ended"])
             clock = live.stop().counters["bridged"]["clock"]
-        there, here = (taxel.open(path).datagrams.arrived_ns for path in (near, far))
+        there, here = (taxel.open(path).datagrams().arrived_ns for path in (near, far))
     since = (there - there[0]) / 1e9
     apart_us = (here - there) / 1e3
     return {

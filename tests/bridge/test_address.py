@@ -12,7 +12,7 @@ import taxel
 from taxel import _core
 from taxel.cli import main
 from taxel.live import Bridge, Live, Remote
-from taxel.live.bridge import Address
+from taxel.live.remote import Address
 from taxel.simulate import Silence, emulate
 
 HOSTS = st.one_of(

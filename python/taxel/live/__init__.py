@@ -1,7 +1,8 @@
 """From a board's datagrams to detections, while they come, and what a browser is shown of them."""
 
-from taxel.live.bridge import Bridge, Remote
+from taxel.live.bridge import Bridge
 from taxel.live.panel import Panel
+from taxel.live.remote import Remote
 from taxel.live.way import PORT, Live, Said, Source, Summary, heard, send
 from taxel.live.way import delays as delays
 

@@ -23,7 +23,7 @@ from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.live.lsl import LslInlet, LslOutlet
-from taxel.live.bridge import Remote
+from taxel.live.remote import Remote
 from taxel.tare import Tare
 from taxel.wire import FRAME_US, Registers
 
