@@ -133,7 +133,7 @@ pub struct Counts {
     pub decoder: BTreeMap<String, u64>,
     /// What was lost between the computer that received and this one, where there are two.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub bridged: Option<Bridged>,
+    pub bridged: Option<Box<Bridged>>,
     /// Of a board that speaks version 2: datagrams that it sent and that never came intact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub missing: Option<u64>,
@@ -225,7 +225,7 @@ impl Counts {
     #[must_use]
     pub fn verdict(&self) -> String {
         let missing = self.received.saturating_sub(self.dropped_by_queue + self.recorded);
-        let bridged = self.bridged.unwrap_or_default();
+        let bridged = self.bridged.as_deref().copied().unwrap_or_default();
         let lost: Vec<String> = [
             (self.dropped_by_kernel, "messages dropped by the kernel"),
             (self.dropped_by_queue, "datagrams dropped by taxel's queue"),

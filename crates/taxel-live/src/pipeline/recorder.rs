@@ -427,7 +427,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         dropped_by_queue,
         decoder,
         missing: missing.map(|n| n.saturating_sub(missed.unwrap_or(0))),
-        bridged: counters.bridged.map(|now| now.since(&begun.bridged.unwrap_or_default())),
+        bridged: counters.bridged.map(|now| Box::new(now.since(&begun.bridged.unwrap_or_default()))),
         converted: None,
     }
 }
