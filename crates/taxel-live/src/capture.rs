@@ -38,14 +38,14 @@ const EMPTY_FOR: Duration = Duration::from_millis(50);
 
 /// Where datagrams come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum Origin {
     /// A board sends to this address.
     Udp(SocketAddr),
     /// Another computer receives them, and bridges them to this one: its address and the board's name there.
     Bridge(String),
 }
 
-impl std::fmt::Display for Place {
+impl std::fmt::Display for Origin {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::Udp(address) => write!(f, "UDP {address}"),
@@ -58,7 +58,7 @@ impl std::fmt::Display for Place {
 #[derive(Debug)]
 pub struct Receiver {
     queue: Arc<Queue>,
-    place: Place,
+    place: Origin,
     from: From,
 }
 
@@ -96,7 +96,7 @@ impl Receiver {
             .name("taxel-receive".to_owned())
             .spawn(move || receive(socket, &theirs))
             .map_err(Error::socket(&place))?;
-        Ok(Self { queue, place: Place::Udp(address), from: From::Socket(Some(thread)) })
+        Ok(Self { queue, place: Origin::Udp(address), from: From::Socket(Some(thread)) })
     }
 
     /// Hears what another computer receives; parcels go into the [`Feed`].
@@ -104,12 +104,12 @@ impl Receiver {
     pub fn fed(name: &str, options: ReceiverOptions) -> (Self, Feed) {
         let queue = Arc::new(Queue::new(options.queue_bytes, Counts::default()));
         let feed = Feed::new(Arc::clone(&queue));
-        (Self { queue, place: Place::Bridge(name.to_owned()), from: From::Feed(feed.clone()) }, feed)
+        (Self { queue, place: Origin::Bridge(name.to_owned()), from: From::Feed(feed.clone()) }, feed)
     }
 
     /// Where it listens; the port that was found where 0 was asked for.
     #[must_use]
-    pub fn place(&self) -> &Place {
+    pub fn place(&self) -> &Origin {
         &self.place
     }
 
@@ -117,8 +117,8 @@ impl Receiver {
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         match self.place {
-            Place::Udp(address) => address,
-            Place::Bridge(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+            Origin::Udp(address) => address,
+            Origin::Bridge(_) => (Ipv4Addr::UNSPECIFIED, 0).into(),
         }
     }
 

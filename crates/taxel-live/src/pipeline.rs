@@ -32,7 +32,7 @@ use taxel_core::encode::Tare;
 use taxel_core::wire::{self, Decoder};
 use taxel_core::{Marker, Stop};
 
-use crate::capture::{Place, Receiver};
+use crate::capture::{Origin, Receiver};
 use crate::locked::lock;
 use crate::{Error, Result};
 pub use copies::{Copied, Copies};
@@ -190,7 +190,7 @@ impl Live {
 
     /// Where datagrams come from.
     #[must_use]
-    pub fn place(&self) -> &Place {
+    pub fn place(&self) -> &Origin {
         self.shared.receiver.place()
     }
 
@@ -363,10 +363,10 @@ impl Live {
 }
 
 /// What to say where nothing came, and what to look at.
-fn nothing_came(place: &Place, seconds: f64) -> String {
+fn nothing_came(place: &Origin, seconds: f64) -> String {
     let ask = match place {
-        Place::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),
-        Place::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
+        Origin::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),
+        Origin::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
     };
     format!("nothing arrived at {place} in {seconds:.1} s: {ask}")
 }

@@ -18,7 +18,7 @@ use super::lens::{COLUMN_US, Keyframe, Lens, SPAN};
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::options::PanelOptions;
 use super::recorder::Recorder;
-use crate::capture::Place;
+use crate::capture::Origin;
 use crate::locked::lock;
 use crate::pipeline::{Counters, Handle, Outlet, Said, UNKNOWN};
 use crate::recording::now_ns;
@@ -342,8 +342,8 @@ impl Hub {
             "live": live.is_some(),
             "array": array,
             "udp": live.as_ref().and_then(|live| match live.handle.place() {
-                Place::Udp(address) => Some(address.to_string()),
-                Place::Bridge(_) => None,
+                Origin::Udp(address) => Some(address.to_string()),
+                Origin::Bridge(_) => None,
             }),
             "delta_intensity": live.as_ref().map(|live| live.handle.options().differences),
             "control": self.state().control,

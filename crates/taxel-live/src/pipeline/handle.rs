@@ -17,7 +17,7 @@ use super::said::Said;
 use super::shared::{Shared, Wish};
 use super::tap::Outlet;
 use crate::Result;
-use crate::capture::Place;
+use crate::capture::Origin;
 use crate::locked::lock;
 
 /// Detections that wait for another computer at most.
@@ -44,7 +44,7 @@ impl Handle {
 
     /// Where datagrams come from.
     #[must_use]
-    pub fn place(&self) -> &Place {
+    pub fn place(&self) -> &Origin {
         self.shared.receiver.place()
     }
 

@@ -14,7 +14,7 @@ use super::options::{LiveOptions, Record};
 use super::said::Said;
 use super::shared::Shared;
 use super::sources::Source;
-use crate::capture::{Batch, Place};
+use crate::capture::{Batch, Origin};
 use crate::locked::lock;
 use crate::recording::{self, BoardChange, Header, LsaWriter, Track, Writer, now_ns};
 use crate::{Error, Result};
@@ -101,7 +101,7 @@ impl Part {
 
 impl Recorder {
     /// A part of another's recording.
-    pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, place: &Place) -> Self {
+    pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, place: &Origin) -> Self {
         let name = host.name.clone();
         let board = Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
         Self {
@@ -126,7 +126,7 @@ impl Recorder {
         }
     }
 
-    pub(super) fn create(record: &Record, options: &LiveOptions, place: &Place) -> Result<Self> {
+    pub(super) fn create(record: &Record, options: &LiveOptions, place: &Origin) -> Result<Self> {
         let board = Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
         let sources = options.sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
         let header = Header { difference: options.differences, name: options.name.clone(), sources, ..board };
@@ -158,7 +158,7 @@ impl Recorder {
     }
 
     /// A recording that begins while listening: takes the name, so that nobody else can; the file is written later.
-    pub(super) fn reserve(record: &Record, options: &LiveOptions, place: &Place) -> Result<Self> {
+    pub(super) fn reserve(record: &Record, options: &LiveOptions, place: &Origin) -> Result<Self> {
         let path = &record.path;
         named(path)?;
         let done = path.with_extension("lss");
@@ -384,10 +384,10 @@ impl Recorder {
 }
 
 /// Where datagrams come from, as files keep it.
-fn said_of(place: &Place) -> String {
+fn said_of(place: &Origin) -> String {
     match place {
-        Place::Udp(address) => format!("udp {address}"),
-        Place::Bridge(name) => name.clone(),
+        Origin::Udp(address) => format!("udp {address}"),
+        Origin::Bridge(name) => name.clone(),
     }
 }
 
