@@ -63,6 +63,15 @@ def ratio(results: Mapping[str, Mapping[str, Any]], ours: str, peer: str) -> flo
     return float(results[ours]["rate"] / results[peer]["rate"])
 
 
+def thread_seconds() -> dict[str, float]:
+    """Return the CPU time of each named thread of this process so far, s."""
+    seconds: dict[str, float] = {}
+    for task in Path("/proc/self/task").iterdir():
+        name = (task / "comm").read_text().strip()
+        seconds[name] = seconds.get(name, 0.0) + int((task / "schedstat").read_text().split()[0]) / 1e9
+    return seconds
+
+
 def stamp(*packages: str) -> dict[str, Any]:
     """Return machine, versions and commit; `taxel bench` writes a result only where that is all that ran."""
     cpu = next(

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 from _peer import missing
-from _rounds import stamp
+from _rounds import stamp, thread_seconds
 
 from taxel import Array, Events
 from taxel.live import Live
@@ -98,15 +98,6 @@ def datagrams(rate: float, frames: int) -> tuple[list[bytes], int]:
         part = words[frame * changes * 5 : (frame + 1) * changes * 5]
         cut += [part[k : k + DATAGRAM_WORDS * 5] for k in range(0, len(part), DATAGRAM_WORDS * 5)]
     return cut, each
-
-
-def thread_seconds() -> dict[str, float]:
-    """Return the CPU time of each named thread of this process so far, s."""
-    seconds: dict[str, float] = {}
-    for task in Path("/proc/self/task").iterdir():
-        name = (task / "comm").read_text().strip()
-        seconds[name] = seconds.get(name, 0.0) + int((task / "schedstat").read_text().split()[0]) / 1e9
-    return seconds
 
 
 def ours(rate: float, seconds: float, scratch: Path, *, segment: bool = True) -> dict[str, Any]:

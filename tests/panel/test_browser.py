@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.detect.test_readout import recipe, tare, touches
 from tests.panel.browser import PATIENCE, chromium, free_port, running
 
 import taxel
 import taxel.device
+from taxel.detect import Example, train
 
 __all__ = ["chromium"]
 
@@ -74,7 +76,7 @@ def live(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SimpleNamespace]:
     pytest.importorskip("playwright", reason="no Playwright: pip install playwright")
     folder = tmp_path_factory.mktemp("live")
     port = str(free_port())
-    with running("emulate", "--port", port, "--scenes", "150", "--seed", "1", "--control", "0", folder=folder) as board:
+    with running("emulate", "--port", port, "--seed", "1", "--control", "0", folder=folder) as board:
         control = board.wait_for(r"commands are taken at (\S+)")
         panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
         with running(*panel, "--folder", str(folder), folder=folder) as server:
@@ -111,19 +113,21 @@ def record_form(page: Any, **values: Any) -> None:
             page.locator(f"#record-{name}").fill(str(value))
 
 
-def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live: SimpleNamespace) -> None:
+def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
+    """Set a register, see the map move, record, label, stop, replay, and look into the file."""
     before = page.evaluate(PIXELS, "pressure-map")
+    press(page, "1")
     floor = page.get_by_label("Noise floor", exact=True)
-    floor.fill("5")
+    floor.fill(str(floor_ticks))
     floor.press("Tab")
     # What the board says counts, not what was typed.
     page.locator("#read-back").click()
     shows(page, "registers-why", "^$")
-    until(lambda: floor.input_value() == "5", "the board holds the floor")
+    until(lambda: floor.input_value() == str(floor_ticks), "the board holds the floor")
     until(lambda: page.evaluate(PIXELS, "pressure-map") != before, "the map moves")
-    record_form(page, name="walk", index="7", label="heel", length="", countdown="0")
+    record_form(page, name=name, index="7", label="heel", length="", countdown="0")
     press(page, "r")
-    shows(page, "state-word", r"Recording walk7\.mcap")
+    shows(page, "state-word", rf"Recording {name}7\.mcap")
     page.locator("#label-name").evaluate(
         "input => { input.value = 'contact'; input.dispatchEvent(new Event('input')) }"
     )
@@ -131,23 +135,33 @@ def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live
     shows(page, "label-count", "^1 label")
     until(lambda: float((page.locator("#record-state").inner_text().split() or ["0"])[0]) >= 2, "two seconds of it")
     press(page, "r")
-    shows(page, "record-last-file", r"^walk7\.mcap$")
-    page.locator("#files").select_option("walk7.mcap")
+    shows(page, "record-last-file", rf"^{name}7\.mcap$")
+    page.locator("#files").select_option(f"{name}7.mcap")
     shows(page, "state-word", "^Replay$")
     shows(page, "label-count", "^1 label")
     start = still(page)
     press(page, "Space")
     until(lambda: clock(page) > start + 1, "it plays")
-    file = taxel.open(live.folder / "walk7.mcap")
+    file = taxel.open(folder / f"{name}7.mcap")
     assert len(file.events.t) > 0
     assert file.registers is not None
-    assert file.registers.noise_floor == 5
-    rows = list(csv.DictReader((live.folder / "walk7.notes.csv").open()))
+    assert file.registers.noise_floor == floor_ticks
+    rows = list(csv.DictReader((folder / f"{name}7.notes.csv").open()))
     assert [row["label"] for row in rows] == ["contact"]
     # The trial's label is no event: it has no time. The recording may begin in silence.
     said = {note.text: note.t for note in file.notes}
     assert said == {"heel": None, "contact": int(rows[0]["t_us"])}
     assert file.events.t[0] - 2_500_000 <= said["contact"] <= file.events.t[-1] + 2_500_000
+
+
+def test_a_register_a_recording_and_a_label_reach_board_and_file(page: Any, live: SimpleNamespace) -> None:
+    story(page, live.folder, "walk", 5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turn", range(20))
+def test_the_story_holds_every_time(page: Any, live: SimpleNamespace, turn: int) -> None:
+    story(page, live.folder, f"again{turn:02}-", 3 + turn % 5)
 
 
 def test_a_board_is_chosen_connected_and_remembered(chromium: Any, tmp_path: Path) -> None:
@@ -246,6 +260,35 @@ def test_recordings_count_down_go_on_by_themselves_and_overwrite_nothing(page: A
     record_form(page, name="auto", index="one")
     press(page, "r")
     shows(page, "record-reason", "index: one is no number")
+
+
+def test_a_trained_readout_is_heard_in_the_page_with_its_latency(chromium: Any, tmp_path: Path) -> None:
+    readout = train([Example(*touches(seed), tare()) for seed in (1, 2, 3)], recipe())
+    readout.save(tmp_path / "touch.json")
+    tare().save(tmp_path / "tare.json")
+    events, truth = touches(11)
+    taxel.convert(events, tmp_path / "played.mcap")
+    port = str(free_port())
+    given = ("--readout", "touch.json", "--tare", "tare.json", "--array", "8x8")
+    with running("live", "--panel", "--port", port, "--host", "127.0.0.1", *given, folder=tmp_path) as server:
+        page = opened(chromium, server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        shows(page, "state-word", "^Live$")
+        shows(page, "detections-none", "^None yet")
+        with running("emulate", "--replay", "played.mcap", "--port", port, folder=tmp_path):
+            shows(page, "detection-count", "^12$")
+        rows = page.locator("#detection-list li").all_inner_texts()
+        assert sorted(re.match(r"\w+", row.strip()).group() for row in rows) == ["contact"] * 6 + ["lift"] * 6  # type: ignore[union-attr]
+        # Time and latency of each, and the place on the time line where it was.
+        assert all(re.search(r"\d+\.\d{3} s\s+-?\d[\d.]* (µs|ms|s)$", row) for row in rows), rows
+        at = sorted(float(re.findall(r"([\d.]+) s", row)[0]) * 1e6 for row in rows)
+        wanted = sorted(truth["contact"] + truth["lift"])
+        assert np.diff(at) == pytest.approx(np.diff(wanted), abs=4000)
+        assert page.locator("#detection-marks span").count() > 0
+        until(lambda: page.locator("#latency").inner_text() != "–", "latency is counted")
+        page.locator("#detection-list button").last.click()
+        shows(page, "state-word", "^Held$")
+        assert not page.errors
+        page.context.close()
 
 
 def test_looking_back_while_live_holds_the_view_and_not_the_board(page: Any) -> None:
@@ -376,6 +419,55 @@ def test_steps_leap_over_silence_both_ways(replay: Any) -> None:
     at = still(replay)
     press(replay, ".")
     until(lambda: clock(replay) > at, "on over the silence")
+
+
+def test_the_lanes_zoom_around_the_cursor_and_the_time_stays(replay: Any) -> None:
+    press(replay, "End")
+    until(lambda: clock(replay) > 9, "the end")
+    before = still(replay)
+    shows(replay, "span", r"^5\.0 s$")
+    box = replay.locator("#raster").bounding_box()
+    replay.mouse.move(box["x"] + box["width"] * 0.6, box["y"] + 5)
+    shows(replay, "cursor-time", r"\d s")
+    pointed = float(replay.locator("#cursor-time").inner_text().split()[0])
+    for span in (r"^2\.5 s$", r"^1\.3 s$", r"^625 ms$"):
+        replay.keyboard.press("z")
+        shows(replay, "span", span)
+        still(replay)
+    # What was pointed at is there still, and the map shows its time, as the end has left the window.
+    until(lambda: abs(clock(replay) - pointed) < 0.02, "the time pointed at")
+    replay.mouse.move(box["x"] + box["width"] * 0.6, box["y"] + 6)
+    until(
+        lambda: abs(float(replay.locator("#cursor-time").inner_text().split()[0]) - pointed) < 0.02,
+        "it is where it was",
+    )
+    shows(replay, "axis", "^−625 ms−500 ms")
+    for _ in range(3):
+        replay.keyboard.press("x")
+        still(replay)
+    shows(replay, "span", r"^5\.0 s$")
+    replay.locator("#zoom-out").click()
+    shows(replay, "span", r"^10\.0 s$")
+    still(replay)
+    press(replay, "End")
+    until(lambda: clock(replay) == pytest.approx(before, abs=1e-4), "the end again")
+    # All ten footfalls are in sight now.
+    force = replay.evaluate("document.querySelector('#force-lane canvas').toDataURL().length")
+    assert force > 0
+    replay.locator("#zoom-in").click()
+    shows(replay, "span", r"^5\.0 s$")
+
+
+def test_spikes_of_an_encoder_are_shown_in_a_recording(replay: Any) -> None:
+    press(replay, "End", "4")
+    until(lambda: clock(replay) > 9, "the end")
+    still(replay)
+    changes = replay.evaluate(PIXELS, "raster")
+    replay.locator("#encoder").select_option("change_events")
+    shows(replay, "spikes-said", "change events, latency")
+    until(lambda: replay.evaluate(PIXELS, "raster") != changes, "the raster is of spikes")
+    replay.locator("#encoder").select_option("")
+    until(lambda: replay.evaluate(PIXELS, "raster") == changes, "and of changes again")
 
 
 def test_ten_footfalls_are_labelled_moved_named_and_deleted(replay: Any, recording: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import json
 import socket
@@ -28,7 +29,7 @@ class Client:
     """Somebody else's page."""
 
     def __init__(self, panel, **changed):
-        self.host = "{}:{}".format(*panel.address)
+        self.host, self.token = "{}:{}".format(*panel.address), panel.token
         how = {"origin": f"http://{self.host}", "subprotocols": ["taxel.panel.1", f"token.{panel.token}"], **changed}
         self.door = client.connect(f"ws://{self.host}/socket", max_size=None, open_timeout=SOON, **how)
         self.socket = self.door.__enter__()
@@ -206,6 +207,34 @@ def test_a_foreign_or_nameless_visitor_is_not_let_in(panel):
     line = http.client.HTTPConnection(*panel.address, timeout=SOON)
     line.request("POST", "/", b"")
     assert line.getresponse().status == 405
+
+
+def test_connections_that_say_nothing_are_so_many_and_no_more(live, panel):
+    with Client(panel) as page, contextlib.ExitStack() as idle:
+        crowd = [idle.enter_context(socket.create_connection(panel.address, SOON)) for _ in range(600)]
+        assert page.ask("recordings")["type"] == "done", "who was in is served"
+
+        def closed():
+            count = 0
+            for one in crowd:
+                one.setblocking(False)
+                with contextlib.suppress(BlockingIOError):
+                    count += one.recv(1) == b""
+            return count
+
+        until = time.monotonic() + SOON
+        while closed() < 600 - 511:
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        assert closed() == 600 - 511
+        idle.close()
+        while True:
+            # They are gone as soon as the server has seen it.
+            with contextlib.suppress(OSError, websockets.exceptions.InvalidHandshake), Client(panel) as other:
+                assert other.until("hello")["live"]
+                break
+            assert time.monotonic() < until
+            time.sleep(0.05)
 
 
 @pytest.mark.parametrize(
@@ -393,6 +422,94 @@ def test_differences_add_up_once_the_page_says_that_they_are_some(panel):
         heard(panel.live, 5)
         assert page.ask("stop")["type"] == "done"
         page.until("recorder", state="idle")
+
+
+def spikes_of(page, columns):
+    """The section of spikes, by column of time, of the last picture."""
+    picture = page.pictures[-1]
+    first, rows = head(picture)[0]["first"], head(picture)[0]["rows"]
+    ups = section(picture, 6, "u1").reshape(-1, rows)
+    return {column: list(np.flatnonzero(ups[column - first])) for column in columns}
+
+
+def test_spikes_of_a_recording_and_any_width_of_its_columns_are_shown(tmp_path):
+    # Row 2 rises by 20 ticks at each whole second, and falls half a second later; a quiet row tells that it is there.
+    t = np.arange(0, 10_000_000, 500_000)
+    p = np.arange(len(t)) % 2 == 0
+    events = taxel.Events(t, 0 * t + 3, 0 * t + 2, p, intensity=np.where(p, 70, 50), array=taxel.Array(8, 8))
+    taxel.convert(events, tmp_path / "steps.mcap")
+    with Panel(tmp_path / "steps.mcap") as panel, Client(panel) as page:
+        page.send(type="credit", n=2)
+        assert page.ask("open", name="steps.mcap")["type"] == "done"
+        assert page.ask("encode", encoder={"name": "change_events"})["type"] == "done"
+        for column_us in (4000, 1000, 125, 64_000, 256_000):
+            assert page.ask("zoom", column_us=column_us)["type"] == "done"
+            for t_us in (9_000_000, 6_500_000, 100, 8_250_000):
+                assert page.ask("seek", t_us=t_us)["type"] == "done"
+                while True:
+                    about = head(page.until("picture"))[0]
+                    if about["t_us"] == t_us and about["flags"] & 4:
+                        break
+                assert about["column_us"] == column_us
+                last = t_us // column_us
+                assert about["first"] + about["count"] - 1 == last
+                assert about["first"] <= max(0, last - 1249) + 1
+                shown = range(about["first"], last + 1)
+                raster = section(page.pictures[-1], 2, "u1").reshape(-1, 8)
+                sums = section(page.pictures[-1], 3, "<u4").reshape(-1, 4)[:, 0]
+                for column in shown:
+                    ups, downs = (
+                        sum(t // column_us == column and t <= t_us for t in t[p == which]) for which in (True, False)
+                    )
+                    assert raster[column - shown[0], 2] == ups | downs << 4, (column_us, t_us, column)
+                    held = t[t <= min(t_us, (column + 1) * column_us - 1)]
+                    assert sums[column - shown[0]] == (20 if len(held) and p[len(held) - 1] and held[-1] else 0)
+                # The first change has nothing to be compared with; that of now is a spike when its sample is over.
+                changed = {int(k) for k in t[(t < t_us) & (t > 0)] // column_us} & set(shown)
+                assert spikes_of(page, changed) == {column: [2] for column in changed}
+                assert (
+                    not section(page.pictures[-1], 6, "u1")
+                    .reshape(-1, 8)[[c - shown[0] for c in shown if c not in changed]]
+                    .any()
+                )
+        assert page.ask("zoom", column_us=3000)["field"] == "column_us"
+        assert page.ask("zoom", column_us=512_000)["field"] == "column_us"
+        told = [m for m in page.said if m["type"] == "spikes"]
+        assert {round(t_ms) for m in told for t_ms in m["t_ms"]} <= {int(k) // 1000 for k in t}
+        assert {m["encoder"] for m in told} == {"change_events"}
+
+
+def test_narrow_and_wide_columns_follow_the_board_too(live, panel):
+    with Client(panel) as page:
+        page.send(type="credit", n=2)
+        sent = 0
+        for column_us in (500, 4000, 32_000):
+            assert page.ask("zoom", column_us=column_us)["type"] == "done"
+            for _ in range(50):
+                sent += 1
+                say(live, word(20_000 * sent, 3, 5, 40 + sent % 2 * 20, sent % 2 == 1))
+                time.sleep(0.002)
+            heard(live, sent)
+            seen = {}
+            while True:
+                picture = page.until("picture")
+                about = head(picture)[0]
+                if about["column_us"] != column_us:
+                    continue
+                if about["flags"] & 4:
+                    seen = {}
+                raster = section(picture, 2, "u1").reshape(-1, 64)
+                seen.update((about["first"] + k, raster[k, 5]) for k in range(about["count"]))
+                if about["events"] >= sent:
+                    break
+            last = 20_000 * sent // column_us
+            for n in range(sent, 0, -1):
+                column = 20_000 * n // column_us
+                if column <= last - 1249:
+                    break
+                here = [k for k in range(1, sent + 1) if 20_000 * k // column_us == column]
+                ups = sum(k % 2 for k in here)
+                assert seen[column] == ups | (len(here) - ups) << 4, (column_us, n)
 
 
 def test_health_of_what_is_shown_is_that_of_taxel_health(live, panel):

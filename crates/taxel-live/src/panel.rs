@@ -7,6 +7,7 @@
 pub mod assets;
 mod door;
 pub mod film;
+mod guests;
 mod hub;
 pub mod lens;
 mod limits;
@@ -15,6 +16,7 @@ mod picture;
 mod recorder;
 mod requests;
 mod session;
+mod spikes;
 mod take;
 
 pub use door::Panel;

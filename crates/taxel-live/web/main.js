@@ -14,7 +14,7 @@ import { Recorder } from "./recorder.js";
 import { Server } from "./server.js";
 import { Settings } from "./settings.js";
 import { Strip } from "./strip.js";
-import { Timeline } from "./timeline.js";
+import { SPAN, Timeline } from "./timeline.js";
 import { View } from "./view.js";
 import { counted, seconds, short, whole } from "./words.js";
 
@@ -101,7 +101,10 @@ function connection(state, reason) {
   connected = state === "open";
   why = reason;
   anew = true;
+  // A server that was away knows nothing of this view.
   if (connected && maps.taxel) watch(maps.taxel);
+  if (connected) view.encode();
+  if (connected && timeline && timeline.column_us !== (hello?.column_us ?? timeline.column_us)) server.say({ type: "zoom", column_us: timeline.column_us });
   showState();
 }
 
@@ -123,6 +126,42 @@ function size(array) {
   write(part("raster-rows", HTMLElement), String(array.rows - 1));
 }
 
+/** Of which columns the axis is written. */
+let axisOf = 0;
+
+/** @param {number} column_us */
+function showAxis(column_us) {
+  axisOf = column_us;
+  const span_us = SPAN * column_us;
+  const places = part("axis", HTMLElement).children;
+  [...places].forEach((place, i) => write(place, i + 1 < places.length ? `−${short((span_us * (places.length - 1 - i)) / (places.length - 1))}` : "0"));
+  write(part("span", HTMLElement), short(span_us));
+  const [least, most] = hello?.columns_us ?? [column_us, column_us];
+  part("zoom-in", HTMLButtonElement).disabled = column_us <= least;
+  part("zoom-out", HTMLButtonElement).disabled = column_us >= most;
+}
+
+/**
+ * Shows half or twice the stretch of time; where the view holds, the time at the cursor stays where it is.
+ * @param {1 | -1} by 1: half, -1: twice
+ */
+async function zoom(by) {
+  const [least, most] = hello?.columns_us ?? [0, 0];
+  if (!timeline) return;
+  const column_us = by > 0 ? timeline.column_us / 2 : timeline.column_us * 2;
+  if (column_us < least || column_us > most) return;
+  const held = player.transport.state === "paused";
+  const { t_us, end_us } = timeline;
+  const cursor = timeline.cursor_us ?? t_us;
+  await server.ask({ type: "zoom", column_us }).catch(failed);
+  if (!held || t_us === null || end_us === null || cursor === null) return;
+  const end = cursor + (end_us - cursor) * (by > 0 ? 0.5 : 2);
+  // The window first, then the time in it.
+  player.seek(end);
+  await player.settled();
+  player.seek(t_us <= end && t_us > end - SPAN * column_us ? t_us : cursor);
+}
+
 /** @param {ArrayBuffer} buffer */
 function takePicture(buffer) {
   const picture = readPicture(buffer);
@@ -133,6 +172,7 @@ function takePicture(buffer) {
   // A restart of a view that follows is a board that began anew; any other comes of our own seek, and the window stays.
   timeline.put(picture, anew || (picture.restart && picture.following));
   anew = false;
+  if (picture.column_us !== axisOf) showAxis(picture.column_us);
   maps.take(picture);
   player.t_us = picture.t_us;
   if (picture.following && player.transport.state !== "following" && player.transport.source === null) move({ ...player.transport, source: null, state: "following" });
@@ -162,8 +202,6 @@ function hear(message) {
       if (player.transport.source === null) showDetections(liveDetections);
       return;
     case "spikes":
-      timeline?.putSpikes(message.t_ms, message.train, message.value, message.trains);
-      lanesDue = true;
       return write(part("spikes-said", HTMLElement), spikesSaid(message));
     case "recorder":
       recorder.take(message);
@@ -553,6 +591,11 @@ settings.watch((name) => {
 });
 matchMedia("(prefers-color-scheme: light)").addEventListener("change", dress);
 
+/** How far a wheel turns for one step of the zoom, pixels. */
+const TURN = 40;
+let turned = 0;
+let zooming = false;
+
 // One cursor for all that has time.
 const stack = part("lanes", HTMLElement);
 const track = part("track", HTMLElement);
@@ -570,6 +613,18 @@ stack.addEventListener("pointerleave", () => {
   if (timeline) timeline.cursor_us = null;
   placeMarks();
 });
+// With Ctrl, as two fingers on a touch pad send it too: the wheel alone scrolls.
+stack.addEventListener("wheel", (event) => {
+  if (!event.ctrlKey && !event.metaKey) return;
+  event.preventDefault();
+  turned += event.deltaY;
+  if (zooming || Math.abs(turned) < TURN) return;
+  zooming = true;
+  zoom(turned < 0 ? 1 : -1).finally(() => {
+    zooming = false;
+    turned = 0;
+  });
+}, { passive: false });
 stack.addEventListener("click", (event) => {
   const t_us = pointedTime(event);
   if (t_us !== null && event.target instanceof Element && !event.target.closest("#label-lane, button, h2")) player.seek(t_us);
@@ -635,6 +690,8 @@ hearKeys(
     last: () => (player.transport.source === null ? player.follow() : player.reach && player.seek(player.reach[1])),
     faster: () => player.faster(1),
     slower: () => player.faster(-1),
+    zoomIn: () => zoom(1),
+    zoomOut: () => zoom(-1),
     live: () => player.follow(),
     mark: () => labels.markHere(),
     nextLabel: () => labels.go(1),
@@ -672,6 +729,8 @@ part("help-button", HTMLButtonElement).onclick = () => help.showModal();
 part("help-close", HTMLButtonElement).onclick = () => help.close();
 part("picture", HTMLButtonElement).onclick = picture;
 part("health", HTMLButtonElement).onclick = health;
+part("zoom-in", HTMLButtonElement).onclick = () => zoom(1);
+part("zoom-out", HTMLButtonElement).onclick = () => zoom(-1);
 part("said-close", HTMLButtonElement).onclick = () => {
   part("said", HTMLElement).hidden = true;
 };

@@ -23,6 +23,8 @@ export class Player {
     /** @type {number | null} */
     this.t_us = null;
     this.seeking = false;
+    /** @type {Promise<void>} of the seeks under way */
+    this.sought = Promise.resolve();
     /** @type {number | null} */
     this.wanted = null;
     /** @type {number | null} */
@@ -111,7 +113,12 @@ export class Player {
   seek(t_us) {
     const [from, to] = this.reach ?? [t_us, t_us];
     this.asked = this.wanted = Math.round(Math.max(from, Math.min(to, t_us)));
-    if (!this.seeking) this.seekNext();
+    if (!this.seeking) this.sought = this.seekNext();
+  }
+
+  /** @returns {Promise<void>} fulfilled when the view is where it was asked to be */
+  settled() {
+    return this.sought;
   }
 
   async seekNext() {

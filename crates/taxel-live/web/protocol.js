@@ -8,7 +8,7 @@ export const UNKNOWN_VALUE = 65535;
 /**
  * @typedef {{ rows: number, columns: number, pitch_mm: number, name: string, exists: string | null }} ArrayTold
  * @typedef {{ type: "hello", protocol: number, taxel: string, live: boolean, array: ArrayTold | null, udp: string | null, control: string | null,
- *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, time_columns: number,
+ *   folder: string, open: string | null, readout: string[] | null, encoders: string[], column_us: number, columns_us: [number, number], time_columns: number,
  *   delta_intensity: boolean | null }} Hello
  * @typedef {{ type: "registers", known: boolean, values: Record<string, number | boolean>, preset: string | null, frame_us: number,
  *   warnings: string[] }} RegistersTold
@@ -68,6 +68,7 @@ export const UNKNOWN_VALUE = 65535;
  * @property {Float32Array | null} centres the same words as floats: x at 2, y at 3
  * @property {Uint16Array | null} history least, greatest, last
  * @property {Uint16Array | null} rest
+ * @property {Uint8Array | null} spikes of the encoder, as the raster
  */
 
 /**
@@ -117,5 +118,6 @@ export function readPicture(buffer) {
     centres: words(3, Float32Array),
     history: words(4, Uint16Array),
     rest: words(5, Uint16Array),
+    spikes: words(6, Uint8Array),
   };
 }

@@ -1,4 +1,4 @@
-// Ups and downs of each row over the last five seconds; or an encoder's spikes.
+// Ups and downs of each row over time; or an encoder's spikes.
 
 import { fitted, ground, themed } from "./dom.js";
 import { SPAN } from "./timeline.js";
@@ -52,7 +52,7 @@ export class Raster {
       this.image = new ImageData(wide, high);
       this.pixels = new Uint32Array(this.image.data.buffer);
     }
-    const [values, numbers] = what === "spikes" ? [timeline.spikes, timeline.spiked] : [timeline.raster, timeline.number];
+    const values = what === "spikes" ? timeline.spikes : timeline.raster;
     this.pixels.fill(this.words[0]);
     // Groups begin at whole multiples of their width, so that what is seen moves and does not flicker.
     const begin = end - SPAN + 1;
@@ -62,7 +62,7 @@ export class Raster {
       seen.fill(0);
       for (let k = (group + i) * columns; k < (group + i + 1) * columns; k++) {
         const place = timeline.place(k);
-        if (k < begin || k > end || numbers[place] !== k) continue;
+        if (k < begin || k > end || timeline.number[place] !== k) continue;
         for (let row = 0; row < rows; row++) {
           const value = values[place * rows + row];
           if (!value) continue;

@@ -1,4 +1,4 @@
-// The last five seconds, by columns of time, and the one time cursor that every view shares.
+// What the lanes show, by columns of time, and the one time cursor that every view shares.
 
 import { UNKNOWN_VALUE } from "./protocol.js";
 
@@ -24,7 +24,6 @@ export class Timeline {
     this.y = new Float32Array(SPAN);
     this.history = new Uint16Array(SPAN * 3);
     this.number = new Float64Array(SPAN);
-    this.spiked = new Float64Array(SPAN);
     /** Number of the last column shown. @type {number | null} */
     this.end = null;
     /** Time of the picture. @type {number | null} */
@@ -37,7 +36,6 @@ export class Timeline {
   /** Forgets every column. */
   forget() {
     this.number.fill(NaN);
-    this.spiked.fill(NaN);
     this.end = this.t_us = this.cursor_us = null;
   }
 
@@ -59,16 +57,24 @@ export class Timeline {
    * @param {boolean} anew forget what came before
    */
   put(picture, anew) {
-    if (anew) this.forget();
+    if (anew || picture.column_us !== this.column_us) {
+      // Where a person points stays the same time.
+      const cursor_us = this.cursor_us;
+      this.forget();
+      if (!anew) this.cursor_us = cursor_us;
+    }
+    this.column_us = picture.column_us;
     this.t_us = picture.t_us;
     if (picture.t_us === null) return;
     const now = Math.floor(picture.t_us / this.column_us);
     if (this.end === null || picture.following || now > this.end || now <= this.end - SPAN) this.end = now;
-    const { first, count, raster, sums, centres, history } = picture;
+    const { first, count, raster, spikes, sums, centres, history } = picture;
     for (let i = Math.max(0, this.end - SPAN + 1 - first); i < count && first + i <= this.end; i++) {
       const place = this.place(first + i);
       this.number[place] = first + i;
       if (raster) this.raster.set(raster.subarray(i * this.rows, (i + 1) * this.rows), place * this.rows);
+      if (spikes) this.spikes.set(spikes.subarray(i * this.rows, (i + 1) * this.rows), place * this.rows);
+      else this.spikes.fill(0, place * this.rows, (place + 1) * this.rows);
       if (sums && centres) {
         this.sum[place] = sums[4 * i];
         this.area[place] = sums[4 * i + 1];
@@ -83,28 +89,6 @@ export class Timeline {
   /** Another taxel is watched: what was kept of the last one does not count. */
   unwatch() {
     this.history.fill(UNKNOWN_VALUE);
-  }
-
-  /**
-   * Takes spikes, by the rows that they belong to.
-   * @param {number[]} t_ms
-   * @param {number[]} train
-   * @param {number[] | null} value
-   * @param {number} trains
-   */
-  putSpikes(t_ms, train, value, trains) {
-    for (let i = 0; i < t_ms.length; i++) {
-      const number = Math.floor((t_ms[i] * 1000) / this.column_us);
-      const place = this.place(number);
-      if (this.spiked[place] !== number) {
-        if (this.spiked[place] > number) continue;
-        this.spiked[place] = number;
-        this.spikes.fill(0, place * this.rows, (place + 1) * this.rows);
-      }
-      const at = place * this.rows + Math.min(this.rows - 1, Math.floor((train[i] * this.rows) / trains));
-      const shift = value && value[i] < 0 ? 4 : 0;
-      if (((this.spikes[at] >> shift) & 15) < 15) this.spikes[at] += 1 << shift;
-    }
   }
 
   /** @returns {number | null} us at the right edge of the window */

@@ -56,12 +56,8 @@ export class View {
       part("theme", HTMLSelectElement).value = settings.values.theme;
       part("raster-what", HTMLSelectElement).value = settings.values.raster;
     });
-    part("encoder", HTMLSelectElement).onchange = ({ target }) => {
-      const name = /** @type {HTMLSelectElement} */ (target).value;
-      this.server.ask({ type: "encode", encoder: name ? { name } : null }).then(() => {
-        settings.set("raster", name ? "spikes" : "changes");
-      }, failed);
-    };
+    this.encoder = part("encoder", HTMLSelectElement);
+    this.encoder.onchange = () => this.encode();
     part("rest-now", HTMLButtonElement).onclick = () => this.rest("now");
     part("rest-lowest", HTMLButtonElement).onclick = () => this.rest("lowest");
     part("look", HTMLButtonElement).onclick = () => this.look();
@@ -100,6 +96,15 @@ export class View {
     encoder.value = hello.encoders.includes(now) ? now : "";
     if (!encoder.value) this.settings.set("raster", "changes");
     part("live-view", HTMLElement).hidden = !hello.live;
+  }
+
+  /** Asks for the spikes of the encoder that is chosen, or for none. */
+  encode() {
+    const { value: name } = this.encoder;
+    if (!name && this.settings.values.raster === "changes") return;
+    this.server.ask({ type: "encode", encoder: name ? { name } : null }).then(() => {
+      this.settings.set("raster", name ? "spikes" : "changes");
+    }, this.failed);
   }
 
   /** @param {"now" | "lowest"} how */

@@ -13,6 +13,7 @@ use axum::response::{IntoResponse, Response};
 use tokio::sync::watch;
 
 use super::assets::ASSETS;
+use super::guests::Guests;
 use super::hub::{Hub, Office};
 use super::limits::MOST_BYTES;
 use super::options::PanelOptions;
@@ -166,7 +167,7 @@ async fn serve(listener: std::net::TcpListener, door: Arc<Door>) {
         tokio::time::sleep(Duration::from_millis(200)).await;
     };
     tokio::select! {
-        _ = std::future::IntoFuture::into_future(axum::serve(listener, app)) => {}
+        _ = std::future::IntoFuture::into_future(axum::serve(Guests::new(listener), app)) => {}
         () = ended => {}
     }
     pump.abort();

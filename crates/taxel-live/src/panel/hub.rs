@@ -13,8 +13,8 @@ use taxel_core::wire::registers::PRESETS;
 use taxel_core::{encode, problem};
 use tokio::sync::{broadcast, watch};
 
-use super::film::{Activity, FileFilm, Film, RingFilm};
-use super::lens::{COLUMN_US, Keyframe, Lens, SPAN};
+use super::film::{Activity, FileFilm, Film, REACH_US, RingFilm};
+use super::lens::{COLUMN_US, COLUMNS_US, Keyframe, Lens, SPAN, Strip};
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::options::PanelOptions;
 use super::recorder::Recorder;
@@ -157,8 +157,10 @@ impl Hub {
         let floor = u16::from(registers.noise_floor);
         let blank =
             Keyframe { latest: None, events: 0, held: vec![UNKNOWN; array.len()], rest: vec![UNKNOWN; array.len()] };
+        // As far as a view may look back, at the widest columns too.
+        let strip = Strip::room(array.rows.into(), REACH_US / COLUMN_US);
         let side = LiveSide {
-            lens: Mutex::new(Lens::new(array.columns, floor, &blank, 0)),
+            lens: Mutex::new(Lens::new(array.columns, floor, &blank, COLUMN_US, strip)),
             activity: Mutex::new(Activity::new(array.len())),
             film: RingFilm::new(array, floor),
             outlet: Mutex::new(outlet),
@@ -352,6 +354,7 @@ impl Hub {
             "readout": self.options.readout,
             "encoders": encode::NAMES,
             "column_us": COLUMN_US,
+            "columns_us": COLUMNS_US,
             "time_columns": SPAN,
             "most_message_bytes": MOST_BYTES,
             "most_credits": MOST_CREDITS,

@@ -8,13 +8,19 @@ use std::sync::Arc;
 
 use crate::pipeline::{Change, UNKNOWN};
 
-/// A column of time, us.
+/// A column of time where nobody asked for another, us.
 pub const COLUMN_US: i64 = 4000;
 
-/// Columns of time that a picture shows: 5 s.
+/// The narrowest and the widest column of time, us: each twice the one before.
+pub const COLUMNS_US: (i64, i64) = (125, 256_000);
+
+/// Columns of time that a picture shows: 5 s, of the narrowest 0.16 s, of the widest 320 s.
 pub const SPAN: i64 = 1250;
 
-/// After so many columns of time no change is seen any more: 127 less a sixteenth each time is 0.
+/// How far behind the latest a change may come and be in raster and curves, us.
+pub const LATE_US: i64 = 120_000;
+
+/// After so many columns of [`COLUMN_US`] no change is seen any more: 127 less a sixteenth each time is 0.
 pub const FORGET: i64 = 64;
 
 /// What a change without a value counts.
@@ -36,10 +42,17 @@ pub struct Curve {
     pub y: f32,
 }
 
-/// The column of time in which a moment lies.
+/// The column of time in which a moment lies, of columns of so many us.
 #[must_use]
-pub fn column_of(t: i64) -> i64 {
-    t.div_euclid(COLUMN_US)
+pub fn column_of(t: i64, column_us: i64) -> i64 {
+    t.div_euclid(column_us)
+}
+
+/// Whether a column of time may have so many us.
+#[must_use]
+pub fn is_column(us: i64) -> bool {
+    let (least, most) = COLUMNS_US;
+    (least..=most).contains(&us) && us % least == 0 && (us / least).count_ones() == 1
 }
 
 #[derive(Debug, Clone)]
@@ -71,6 +84,24 @@ impl Strip {
             reach: None,
             most: (bytes / block).max(SPAN.unsigned_abs() as usize / BLOCK.unsigned_abs() as usize + 2),
         }
+    }
+
+    /// Bytes in which so many columns of an array of so many rows find room.
+    #[must_use]
+    pub fn room(rows: usize, columns: i64) -> usize {
+        (usize::try_from(columns / BLOCK).unwrap_or(0) + 2) * Self::block_bytes(rows)
+    }
+
+    /// Rows of the array.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Whether nothing happened in a column, nor near it.
+    #[must_use]
+    pub fn is_silent(&self, column: i64) -> bool {
+        self.place(column.div_euclid(BLOCK)).is_err()
     }
 
     fn block_bytes(rows: usize) -> usize {
@@ -217,8 +248,13 @@ pub struct Lens {
     rests: u64,
     change: Vec<i8>,
     strip: Strip,
+    column_us: i64,
     /// The column that is not over.
     column: Option<i64>,
+    /// Of [`COLUMN_US`]: what changes fade by.
+    fades: i64,
+    /// From where to where a moment is in both, us.
+    within: std::ops::Range<i64>,
     latest: Option<i64>,
     /// How often time was set back.
     set_back: u64,
@@ -230,9 +266,9 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// A lens on an array of so many columns that begins with a keyframe.
+    /// A lens on an array of so many columns that begins with a keyframe; its columns of time have `column_us`.
     #[must_use]
-    pub fn new(columns: u16, floor: u16, from: &Keyframe, strip_bytes: usize) -> Self {
+    pub fn new(columns: u16, floor: u16, from: &Keyframe, column_us: i64, strip_bytes: usize) -> Self {
         let columns = usize::from(columns).max(1);
         // A sensor has 2^22 taxels at most (recording's limits).
         #[allow(clippy::cast_possible_truncation)]
@@ -246,7 +282,10 @@ impl Lens {
             rests: 1,
             change: vec![0; from.held.len()],
             strip: Strip::new(from.held.len() / columns, strip_bytes),
+            column_us,
             column: None,
+            fades: 0,
+            within: 0..0,
             latest: from.latest,
             set_back: 0,
             events: from.events,
@@ -336,7 +375,12 @@ impl Lens {
             }
             self.weigh(taxel, true);
         }
-        self.strip.mark(column_of(change.t), self.at[taxel].1 as usize, change.up);
+        let column = match self.column {
+            // A division a change would take much of its time.
+            Some(column) if self.within.contains(&change.t) => column,
+            _ => column_of(change.t, self.column_us),
+        };
+        self.strip.mark(column, self.at[taxel].1 as usize, change.up);
     }
 
     /// Moves time on; back does nothing.
@@ -345,18 +389,22 @@ impl Lens {
             return;
         }
         self.latest = Some(t);
-        let column = column_of(t);
-        let Some(now) = self.column else {
-            self.column = Some(column);
-            self.strip.come_to(column);
-            return;
-        };
-        if column == now {
+        if self.within.contains(&t) {
             return;
         }
-        let curve = self.curve();
-        self.strip.set_curve(now, curve);
-        for _ in 0..(column - now).min(FORGET) {
+        let (column, fades) = (column_of(t, self.column_us), column_of(t, COLUMN_US));
+        match self.column {
+            None => self.fades = fades,
+            Some(now) if now == column => {}
+            Some(now) => {
+                let curve = self.curve();
+                self.strip.set_curve(now, curve);
+                if column > now + 1 {
+                    self.strip.set_curve(now + 1, curve);
+                }
+            }
+        }
+        for _ in 0..(fades - self.fades).min(FORGET) {
             for change in &mut self.change {
                 // Towards 0, so that 1 becomes 0.
                 #[allow(clippy::cast_possible_truncation)]
@@ -365,10 +413,13 @@ impl Lens {
                 }
             }
         }
-        if column > now + 1 {
-            self.strip.set_curve(now + 1, curve);
-        }
-        self.column = Some(column);
+        self.come_to(column, fades);
+    }
+
+    fn come_to(&mut self, column: i64, fades: i64) {
+        (self.column, self.fades) = (Some(column), fades);
+        let begin = (column * self.column_us).max(fades * COLUMN_US);
+        self.within = begin..((column + 1) * self.column_us).min((fades + 1) * COLUMN_US);
         self.strip.come_to(column);
     }
 
@@ -378,8 +429,9 @@ impl Lens {
             return;
         }
         self.latest = Some(t);
-        self.column = Some(column_of(t));
-        self.strip.cut(column_of(t));
+        let column = column_of(t, self.column_us);
+        self.strip.cut(column);
+        self.come_to(column, column_of(t, COLUMN_US));
         self.set_back += 1;
     }
 
@@ -414,6 +466,16 @@ impl Lens {
         self.rest.copy_from_slice(&self.held);
         (self.lowest, self.rests) = (true, self.rests + 1);
         self.reckon();
+    }
+
+    /// Takes rest and noise floor from another lens on the same source, where they differ.
+    pub fn rest_as(&mut self, other: &Self) {
+        if self.floor != other.floor || self.rest != other.rest {
+            self.floor = other.floor;
+            self.rest.copy_from_slice(&other.rest);
+            self.reckon();
+        }
+        self.lowest = other.lowest;
     }
 
     /// Changes up to the noise floor are none.
@@ -458,13 +520,17 @@ impl Lens {
         self.events
     }
 
-    /// Raster and curves; of the column that is not over the curves of now.
-    #[must_use]
-    pub fn strip(&mut self) -> &Strip {
+    /// Gives the column that is not over the curves of now.
+    pub fn settle(&mut self) {
         if let Some(now) = self.column {
             let curve = self.curve();
             self.strip.set_curve(now, curve);
         }
+    }
+
+    /// Raster and curves, as they were settled last.
+    #[must_use]
+    pub fn strip(&self) -> &Strip {
         &self.strip
     }
 }
@@ -474,15 +540,19 @@ impl Lens {
 pub struct History {
     /// Its index.
     pub taxel: u32,
+    column_us: i64,
+    /// What it held when it began to be watched, and in which column that was; nothing is known before.
+    first: (i64, u16),
     last: u16,
     columns: VecDeque<(i64, [u16; 3])>,
 }
 
 impl History {
-    /// Begins to watch a taxel that holds this value.
+    /// Begins to watch a taxel that holds this value at this time (us; `None`: before anything came), by columns of so many us.
     #[must_use]
-    pub fn new(taxel: u32, held: u16) -> Self {
-        Self { taxel, last: held, columns: VecDeque::new() }
+    pub fn new(taxel: u32, held: u16, since: Option<i64>, column_us: i64) -> Self {
+        let first = since.map_or(i64::MIN, |t| column_of(t, column_us));
+        Self { taxel, column_us, first: (first, held), last: held, columns: VecDeque::new() }
     }
 
     /// Takes a change, of any taxel.
@@ -490,7 +560,7 @@ impl History {
         if change.taxel != self.taxel || change.ticks == UNKNOWN {
             return;
         }
-        let column = column_of(change.t);
+        let column = column_of(change.t, self.column_us);
         let before = self.last;
         self.last = change.ticks;
         match self.columns.back_mut() {
@@ -507,15 +577,22 @@ impl History {
             }
         }
         while self.columns.len() > 1 && self.columns[1].0 <= column - SPAN {
-            self.columns.pop_front();
+            if let Some((gone, [_, _, last])) = self.columns.pop_front() {
+                self.first = (gone, last);
+            }
         }
     }
 
-    /// Appends least, greatest and last of these columns; `held` is what it held before all that is known.
-    pub fn write(&self, columns: std::ops::Range<i64>, held: u16, out: &mut Vec<u8>) {
+    /// Appends least, greatest and last of these columns; [`UNKNOWN`] where it was not watched yet.
+    pub fn write(&self, columns: std::ops::Range<i64>, out: &mut Vec<u8>) {
         let mut place = self.columns.partition_point(|(column, _)| *column < columns.start);
+        let (since, held) = self.first;
         let mut last = if place == 0 { held } else { self.columns[place - 1].1[2] };
         for column in columns {
+            if column < since {
+                out.extend_from_slice(&[0xFF; 6]);
+                continue;
+            }
             let three = match self.columns.get(place) {
                 Some((there, three)) if *there == column => {
                     place += 1;
@@ -543,6 +620,10 @@ mod tests {
 
     #[test]
     fn a_lens_from_a_keyframe_shows_what_one_from_the_beginning_shows() {
+        [COLUMN_US, 500].into_iter().for_each(from_a_keyframe);
+    }
+
+    fn from_a_keyframe(us: i64) {
         use rand::{Rng, SeedableRng, rngs::StdRng};
         let mut random = StdRng::seed_from_u64(18);
         let (taxels, mut t) = (12, 0_i64);
@@ -554,7 +635,7 @@ mod tests {
             let back = if random.random_range(0..9) == 0 { random.random_range(0..9000) } else { 0 };
             changes.push(change(t - back, random.random_range(0..taxels), random.random_range(0..300)));
         }
-        let mut whole = Lens::new(4, 3, &blank(taxels as usize), 1 << 20);
+        let mut whole = Lens::new(4, 3, &blank(taxels as usize), us, 1 << 20);
         let mut keyframes = vec![];
         for (k, one) in changes.iter().enumerate() {
             if k % 100 == 0 {
@@ -563,17 +644,19 @@ mod tests {
             whole.take(one);
         }
         for (k, keyframe) in keyframes {
-            let mut fresh = Lens::new(4, 3, &keyframe, 1 << 20);
+            let mut fresh = Lens::new(4, 3, &keyframe, us, 1 << 20);
             changes[k..].iter().for_each(|one| fresh.take(one));
             assert_eq!(fresh.held(), whole.held());
             assert_eq!(fresh.rest(), whole.rest());
             assert_eq!((fresh.events(), fresh.latest()), (whole.events(), whole.latest()));
-            let begun = keyframe.latest.map_or(0, column_of);
-            let now = column_of(whole.latest().unwrap());
-            if now - begun > FORGET {
+            let begun = keyframe.latest.map_or(0, |t| column_of(t, us));
+            let now = column_of(whole.latest().unwrap(), us);
+            if (now - begun) * us > FORGET * COLUMN_US {
                 assert_eq!(fresh.change(), whole.change());
             }
-            let (one, other) = (fresh.strip().clone(), whole.strip().clone());
+            fresh.settle();
+            whole.settle();
+            let (one, other) = (fresh.strip(), whole.strip());
             for column in (begun + 30).max(now - SPAN)..=now {
                 let (mut a, mut b) = (vec![], vec![]);
                 one.raster(column, &mut a);
@@ -586,18 +669,21 @@ mod tests {
 
     #[test]
     fn above_rest_is_more_than_the_floor_and_its_centre_is_known() {
-        let mut lens = Lens::new(2, 3, &blank(4), 1 << 20);
+        let mut lens = Lens::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
         for taxel in 0..4 {
             lens.take(&change(0, taxel, 48));
         }
         lens.take(&change(100, 0, 51));
+        lens.settle();
         assert_eq!(lens.strip().curve(0).sum, 0, "the floor is no touch");
         lens.take(&change(200, 0, 58));
         lens.take(&change(300, 3, 78));
+        lens.settle();
         let curve = lens.strip().curve(0);
         assert_eq!((curve.sum, curve.area, curve.x, curve.y), (40, 2, 0.75, 0.75));
         assert_eq!(lens.change(), [7, 0, 0, 30], "the larger of two changes, 3 and 7");
         lens.rest_now();
+        lens.settle();
         assert_eq!(lens.strip().curve(0).sum, 0);
         lens.advance(FORGET * COLUMN_US);
         assert_eq!(lens.change(), [0; 4]);
@@ -605,7 +691,7 @@ mod tests {
 
     #[test]
     fn time_set_back_forgets_what_silence_had_brought_and_goes_on() {
-        let mut once = Lens::new(2, 3, &blank(4), 1 << 20);
+        let mut once = Lens::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
         let mut stalled = once.clone();
         for t in [0, 40_000] {
             once.take(&change(t, 1, 60));
@@ -618,9 +704,11 @@ mod tests {
             once.take(&change(t, 2, 70));
             stalled.take(&change(t, 2, 70));
         }
+        once.settle();
+        stalled.settle();
         assert_eq!(stalled.times_set_back(), 1);
         assert_eq!(stalled.strip().reach(), once.strip().reach());
-        for column in 0..=column_of(81_000) {
+        for column in 0..=column_of(81_000, COLUMN_US) {
             let (mut a, mut b) = (vec![], vec![]);
             once.strip().raster(column, &mut a);
             stalled.strip().raster(column, &mut b);
@@ -632,15 +720,16 @@ mod tests {
 
     #[test]
     fn a_history_has_every_extreme_and_goes_on_through_silence() {
-        let mut history = History::new(1, 40);
+        let mut history = History::new(1, 40, Some(-4000), COLUMN_US);
         for (t, ticks) in [(0, 50), (1000, 20), (2000, 45), (12_000, 60)] {
             history.take(&change(t, 1, ticks));
             history.take(&change(t, 0, 999));
         }
         let mut bytes = vec![];
-        history.write(-1..5, 40, &mut bytes);
+        history.write(-2..5, &mut bytes);
         let values: Vec<u16> = bytes.chunks(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
-        let expected = [[40, 40, 40], [20, 50, 45], [45, 45, 45], [45, 45, 45], [45, 60, 60], [60, 60, 60]];
+        let expected =
+            [[UNKNOWN; 3], [40, 40, 40], [20, 50, 45], [45, 45, 45], [45, 45, 45], [45, 60, 60], [60, 60, 60]];
         assert_eq!(values, expected.concat());
     }
 }

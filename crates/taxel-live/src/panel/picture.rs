@@ -2,7 +2,7 @@
 
 use super::film::Player;
 use super::lens::{COLUMN_US, History, Lens, SPAN, Strip, column_of};
-use crate::pipeline::UNKNOWN;
+use super::spikes::Spikes;
 use crate::recording::now_ns;
 
 /// Bytes of the header.
@@ -27,50 +27,102 @@ pub(super) struct About {
     pub(super) from: i64,
     pub(super) with_rest: bool,
     pub(super) watched: Option<u32>,
+    /// A column of time, us.
+    pub(super) column_us: i64,
 }
 
-/// Raster and curves of a column of time, wherever they are.
-trait Columns {
-    fn of(&self, column: i64) -> &Strip;
-}
-
-struct Two<'a> {
+/// Raster and curves of a column of time, wherever they are; several columns of a strip may make one.
+struct Strips<'a> {
     own: &'a Strip,
     from: i64,
     whole: Option<&'a Strip>,
+    /// The last column of the strips.
+    last: i64,
+    /// Columns of the strips in one that is shown.
+    together: i64,
 }
 
-impl Columns for Two<'_> {
-    fn of(&self, column: i64) -> &Strip {
+impl<'a> Strips<'a> {
+    /// `from` the column on from which a strip holds by itself; before it the whole, where there is one.
+    fn of(own: &'a Strip, from: i64, whole: Option<&'a Strip>, shown: &Head, about: About) -> Self {
+        let unit_us = about.column_us.min(COLUMN_US);
+        let last = shown.latest.map_or(i64::MIN, |t| column_of(t, unit_us));
+        // A long view has left the beginning of its own behind.
+        let from = from.max(own.reach().map_or(i64::MAX, |(first, _)| first));
+        Self { own, from, whole, last, together: about.column_us / unit_us }
+    }
+
+    /// The first column that is known, of those that are shown.
+    fn first(&self) -> i64 {
+        let first = self.whole.and_then(Strip::reach).map_or(self.from, |(first, _)| first.min(self.from));
+        first.div_euclid(self.together)
+    }
+
+    fn at(&self, column: i64) -> &Strip {
         match self.whole {
             Some(whole) if column < self.from => whole,
             _ => self.own,
         }
     }
+
+    fn raster(&self, column: i64, out: &mut Vec<u8>) {
+        if self.together == 1 {
+            return self.at(column).raster(column, out);
+        }
+        let (begin, mut one) = (out.len(), vec![]);
+        out.resize(begin + self.own.rows(), 0);
+        for part in column * self.together..((column + 1) * self.together).min(self.last + 1) {
+            if self.at(part).is_silent(part) {
+                continue;
+            }
+            one.clear();
+            self.at(part).raster(part, &mut one);
+            for (sum, cell) in out[begin..].iter_mut().zip(&one).filter(|(_, cell)| **cell > 0) {
+                let (ups, downs) = ((*sum & 15) + (cell & 15), (*sum >> 4) + (cell >> 4));
+                *sum = ups.min(15) | downs.min(15) << 4;
+            }
+        }
+    }
+
+    fn curve(&self, column: i64) -> super::lens::Curve {
+        let end = ((column + 1) * self.together - 1).min(self.last);
+        self.at(end).curve(end)
+    }
 }
 
-/// Of the newest.
-pub(super) fn of_lens(lens: &mut Lens, columns: u16, history: Option<&History>, about: About) -> (Vec<u8>, i64) {
+/// Of the newest; where its columns are narrower than those of the lens, `near` has them.
+pub(super) fn of_lens(
+    lens: &mut Lens,
+    near: Option<&mut Player>,
+    columns: u16,
+    history: Option<&History>,
+    spikes: Option<&Spikes>,
+    about: About,
+) -> (Vec<u8>, i64) {
     let shown = lens.clone_head();
-    let strip = lens.strip();
-    let two = Two { own: strip, from: i64::MIN, whole: None };
-    let history = history.map(|history| (history, UNKNOWN));
-    picture(&shown, columns, &two, strip.reach(), history, about)
+    lens.settle();
+    let (own, from) = match near {
+        Some(near) => {
+            near.lens_mut().settle();
+            let (own, from, _) = near.strips();
+            (own, from)
+        }
+        // Without one nothing is known by such columns.
+        None if about.column_us < COLUMN_US => (lens.strip(), i64::MAX),
+        None => (lens.strip(), i64::MIN),
+    };
+    picture(&shown, columns, &Strips::of(own, from, None, &shown, about), history, spikes, about)
 }
 
 /// Of a film at its time.
 pub(super) fn of_player(player: &mut Player, about: About) -> (Vec<u8>, i64) {
+    player.lens_mut().settle();
+    let player = &*player;
     let columns = player.film().array().columns;
     let shown = player.lens().clone_head();
-    let history = player.history().cloned();
     let (own, from, whole) = player.strips();
-    let first = match whole.and_then(Strip::reach) {
-        Some((first, _)) => Some(first),
-        None => own.reach().map(|(first, _)| first.max(from)),
-    };
-    let reach = first.zip(own.reach()).map(|(first, (_, last))| (first.min(last), last));
-    let two = Two { own, from, whole };
-    picture(&shown, columns, &two, reach, history.as_ref().map(|(history, held)| (history, *held)), about)
+    let strips = Strips::of(own, from, whole, &shown, about);
+    picture(&shown, columns, &strips, player.history(), player.spikes(), about)
 }
 
 /// What of a lens is no strip.
@@ -97,20 +149,18 @@ impl Lens {
 fn picture(
     shown: &Head,
     columns: u16,
-    strips: &dyn Columns,
-    reach: Option<(i64, i64)>,
-    history: Option<(&History, u16)>,
+    strips: &Strips<'_>,
+    history: Option<&History>,
+    spikes: Option<&Spikes>,
     about: About,
 ) -> (Vec<u8>, i64) {
     let taxels = shown.held.len();
     let rows = taxels / usize::from(columns.max(1));
-    let last = shown.latest.map_or(i64::MIN, column_of);
-    let range = match (shown.latest, reach) {
-        (Some(_), Some((first, _))) => about.from.max(first).max(last + 1 - SPAN).min(last)..last + 1,
-        _ => 0..0,
-    };
+    let last = shown.latest.map_or(i64::MIN, |t| column_of(t, about.column_us));
+    let first = about.from.max(strips.first()).max(last.saturating_add(1 - SPAN));
+    let range = if first <= last { first..last + 1 } else { 0..0 };
     let n = usize::try_from(range.end - range.start).unwrap_or(0);
-    let mut out = Vec::with_capacity(HEADER + taxels * 5 + n * (rows + 22) + 64);
+    let mut out = Vec::with_capacity(HEADER + taxels * 5 + n * (2 * rows + 22) + 64);
     out.resize(HEADER, 0);
     let mut sections = [(0_usize, 0_usize); 8];
     let mut begin = |out: &mut Vec<u8>, k: usize| {
@@ -130,22 +180,22 @@ fn picture(
     lengths[k] = end(&out, from);
     let k = begin(&mut out, 2);
     let from = out.len();
-    range.clone().for_each(|column| strips.of(column).raster(column, &mut out));
+    range.clone().for_each(|column| strips.raster(column, &mut out));
     lengths[k] = end(&out, from);
     let k = begin(&mut out, 3);
     let from = out.len();
     for column in range.clone() {
-        let curve = strips.of(column).curve(column);
+        let curve = strips.curve(column);
         out.extend_from_slice(&curve.sum.to_le_bytes());
         out.extend_from_slice(&curve.area.to_le_bytes());
         out.extend_from_slice(&curve.x.to_le_bytes());
         out.extend_from_slice(&curve.y.to_le_bytes());
     }
     lengths[k] = end(&out, from);
-    if let Some((history, held)) = history {
+    if let Some(history) = history {
         let k = begin(&mut out, 4);
         let from = out.len();
-        history.write(range.clone(), held, &mut out);
+        history.write(range.clone(), &mut out);
         lengths[k] = end(&out, from);
     }
     if about.with_rest {
@@ -154,13 +204,19 @@ fn picture(
         shown.rest.iter().for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
         lengths[k] = end(&out, from);
     }
+    if let Some(spikes) = spikes {
+        let k = begin(&mut out, 6);
+        let from = out.len();
+        spikes.write(range.clone(), &mut out);
+        lengths[k] = end(&out, from);
+    }
     let mut put = |at: usize, bytes: &[u8]| out[at..at + bytes.len()].copy_from_slice(bytes);
     put(0, b"TXP1");
     #[allow(clippy::cast_possible_truncation)]
     {
         put(4, &(HEADER as u16).to_le_bytes());
         put(12, &(rows as u16).to_le_bytes());
-        put(44, &(COLUMN_US as u32).to_le_bytes());
+        put(44, &(about.column_us as u32).to_le_bytes());
         put(56, &(n as u32).to_le_bytes());
         for (k, ((begin, _), length)) in sections.iter().zip(lengths).enumerate().filter(|(_, (_, length))| *length > 0)
         {

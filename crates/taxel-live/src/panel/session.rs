@@ -5,18 +5,17 @@ use std::time::{Duration, Instant};
 
 use axum::extract::ws::{CloseFrame, Message, WebSocket};
 use serde_json::{Map, Value, json};
-use taxel_core::encode::{Encoder, Stream};
-use taxel_core::{Events, Intensities, Spike};
+use taxel_core::encode::Encoder;
 use tokio::sync::{broadcast, mpsc, watch};
 
-use super::film::{FileFilm, Film, Player};
+use super::film::{FileFilm, Film, Gaze, Player};
 use super::hub::{Hub, LiveSide, Seat, Told, said_of};
-use super::lens::{History, SPAN};
+use super::lens::{COLUMN_US, COLUMNS_US, History, LATE_US, is_column};
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::picture::{self, About, FOLLOWS, LIVE, MOVES, RECORDS, RESTART};
 use super::requests::{Answer, Asked, Refused, carry_out, prepare};
+use super::spikes::Spikes;
 use crate::locked::lock;
-use crate::pipeline::{Change, UNKNOWN};
 
 /// From picture to picture at least.
 const FRAME: Duration = Duration::from_micros(16_000);
@@ -31,8 +30,8 @@ const ALIVE_WITHIN: Duration = Duration::from_secs(30);
 const MOST_REFUSALS: usize = 100;
 const REFUSALS_WITHIN: Duration = Duration::from_secs(10);
 
-/// Spikes that are told at once at most.
-const MOST_SPIKES: usize = 4096;
+/// Who follows by narrow columns and has left off for so long begins anew, us.
+const NEAR_US: i64 = 1_000_000;
 
 /// How often a rest that changes is sent.
 const REST_EVERY: Duration = Duration::from_millis(500);
@@ -58,16 +57,6 @@ enum View {
     At(Option<Box<Player>>),
 }
 
-struct Spikes {
-    name: String,
-    stream: Box<dyn Stream>,
-    latency_ms: f64,
-    next: u64,
-    told: Instant,
-    waiting: Vec<Spike>,
-    left_out: usize,
-}
-
 struct Session {
     hub: Arc<Hub>,
     socket: WebSocket,
@@ -84,9 +73,15 @@ struct Session {
     rests: Option<u64>,
     set_back: u64,
     rest_sent: Option<Instant>,
+    /// A column of time, us.
+    column_us: i64,
     watched: Option<u32>,
+    encoder: Option<Encoder>,
+    /// While following: history and spikes, and where to go on; and the time shown by narrower columns than the lens has.
     history: Option<(History, u64)>,
-    spikes: Option<Spikes>,
+    spikes: Option<(Spikes, u64)>,
+    near: Option<Box<Player>>,
+    spikes_told: Instant,
     live: Option<Arc<LiveSide>>,
     pictured: Instant,
     sent: u32,
@@ -114,9 +109,13 @@ pub(super) async fn run(socket: WebSocket, hub: Arc<Hub>, end: watch::Receiver<b
         rests: None,
         set_back: 0,
         rest_sent: None,
+        column_us: COLUMN_US,
         watched: None,
+        encoder: None,
         history: None,
         spikes: None,
+        near: None,
+        spikes_told: Instant::now(),
         pictured: Instant::now(),
         sent: 0,
         refusals: std::collections::VecDeque::new(),
@@ -214,7 +213,6 @@ impl Session {
                 if self.recording.is_none() {
                     self.follow();
                 }
-                self.spikes = None;
                 self.say(&self.hub.hello()).await?;
                 self.say(&self.hub.registers()).await
             }
@@ -270,6 +268,9 @@ impl Session {
             return Ok(());
         }
         self.dirty = false;
+        if let Err(refused) = self.come_near().await {
+            self.say(&json!({ "type": "warning", "text": refused.reason })).await?;
+        }
         let Some(bytes) = self.picture() else { return Ok(()) };
         (self.credits, self.number, self.sent) = (self.credits - 1, self.number.wrapping_add(1), self.sent + 1);
         self.pictured = Instant::now();
@@ -291,6 +292,7 @@ impl Session {
             from: if self.restart { i64::MIN } else { self.from },
             with_rest: false,
             watched: self.watched,
+            column_us: self.column_us,
         };
         let rest_is_due = self.rest_sent.is_none_or(|at| at.elapsed() >= REST_EVERY);
         let (restart, known) = (self.restart, self.rests);
@@ -299,14 +301,17 @@ impl Session {
             View::Following => {
                 let live = self.live.clone()?;
                 if let Some(watched) = self.watched {
-                    let (history, next) = self.history.get_or_insert_with(|| live.film.history(watched));
+                    let (history, next) =
+                        self.history.get_or_insert_with(|| live.film.history(watched, about.column_us));
                     *next = live.film.changes_from(*next, |changes| changes.iter().for_each(|c| history.take(c)));
                 }
                 let mut lens = lock(&live.lens);
                 let (columns, rests) = (live.film.array().columns, lens.rests());
                 let about = About { flags: about.flags | MOVES | FOLLOWS, with_rest: with_rest(rests), ..about };
+                let near = self.near.as_deref_mut();
                 let history = self.history.as_ref().map(|(history, _)| history);
-                let (bytes, last) = picture::of_lens(&mut lens, columns, history, about);
+                let spikes = self.spikes.as_ref().map(|(spikes, _)| spikes);
+                let (bytes, last) = picture::of_lens(&mut lens, near, columns, history, spikes, about);
                 (bytes, last, rests)
             }
             View::At(player) => {
@@ -321,9 +326,34 @@ impl Session {
         if with_rest(rests) {
             (self.rests, self.rest_sent) = (Some(rests), Some(Instant::now()));
         }
-        // What comes late still changes the columns of the last 0.1 s.
-        (self.restart, self.from) = (false, last.saturating_sub(LATE));
+        // What comes late still changes the last columns.
+        (self.restart, self.from) = (false, last.saturating_sub(LATE_US / self.column_us + 1));
         Some(bytes)
+    }
+
+    /// While following by columns that are narrower than the lens has: reads on as far as the lens has come.
+    async fn come_near(&mut self) -> Answer {
+        let live = match (&self.view, &self.live) {
+            (View::Following, Some(live)) if self.column_us < COLUMN_US => Arc::clone(live),
+            _ => {
+                self.near = None;
+                return Ok(());
+            }
+        };
+        let Some(t) = lock(&live.lens).latest() else { return Ok(()) };
+        let (near, column_us) = (self.near.take(), self.column_us);
+        let moved = tokio::task::spawn_blocking(move || -> crate::Result<Box<Player>> {
+            let mut near = match near {
+                // Who left off reads anew: from the last keyframe on it is less.
+                Some(near) if near.t() + NEAR_US >= t && near.t() <= t => near,
+                _ => Box::new(Player::open(Arc::new(live.film.clone()), t, Gaze::plain(column_us))?),
+            };
+            near.follow(t)?;
+            near.lens_mut().rest_as(&lock(&live.lens));
+            Ok(near)
+        });
+        self.near = Some(moved.await.map_err(|_| Refused::from("the view failed within taxel; please report it"))??);
+        Ok(())
     }
 
     /// Works on the view elsewhere: a disk may be slow.
@@ -359,73 +389,121 @@ impl Session {
 
     /// Shows another time.
     async fn seek(&mut self, t: i64) -> Answer {
-        let (film, watched) = (self.film()?, self.watched);
-        let opened = tokio::task::spawn_blocking(move || Player::open(film, t, watched)).await;
+        let film = self.film()?;
+        if let Some(encoder) = &self.encoder
+            && let Err(error) = encoder.stream(film.array())
+        {
+            self.encoder = None;
+            let _ = self.answers.try_send(json!({ "type": "warning", "text": error.to_string() }));
+        }
+        let (column_us, watched, encoder) = (self.column_us, self.watched, self.encoder.clone());
+        // A live past at wide columns: the lens has kept them.
+        let live = self.live.as_ref().filter(|_| self.recording.is_none() && column_us > COLUMN_US);
+        let whole = live.map(|live| {
+            let mut lens = lock(&live.lens);
+            lens.settle();
+            Arc::new(lens.strip().clone())
+        });
+        let gaze = Gaze { column_us, watched, encoder, whole };
+        let opened = tokio::task::spawn_blocking(move || Player::open(film, t, gaze)).await;
         let player = opened.map_err(|_| Refused::from("the view failed within taxel; please report it"))??;
         self.view = View::At(Some(Box::new(player)));
-        (self.restart, self.dirty, self.history) = (true, true, None);
+        self.look_anew();
+        self.spikes = None;
         Ok(())
+    }
+
+    /// All that was sent is of no more use.
+    fn look_anew(&mut self) {
+        (self.restart, self.dirty, self.history, self.near) = (true, true, None, None);
     }
 
     fn follow(&mut self) {
         (self.view, self.plays, self.recording) = (View::Following, None, None);
-        (self.restart, self.dirty, self.history) = (true, true, None);
+        self.look_anew();
+        self.listen();
+    }
+
+    /// Shows the same time in another way.
+    async fn again(&mut self) -> Answer {
+        self.look_anew();
+        match self.t() {
+            Some(t) if matches!(self.view, View::At(_)) => {
+                self.seek(t).await?;
+                self.plays = self.plays.map(|(speed, _, _)| (speed, Instant::now(), t));
+            }
+            _ => self.listen(),
+        }
+        Ok(())
     }
 
     // ------------------------------------------------------------------------------------------ spikes
 
-    async fn tell_spikes(&mut self) -> Result<(), End> {
-        let (Some(spikes), Some(live)) = (&mut self.spikes, &self.live) else { return Ok(()) };
-        if spikes.told.elapsed() < FRAME {
-            return Ok(());
-        }
-        spikes.told = Instant::now();
-        let array = live.film.array().clone();
-        let mut failed = None;
-        let (stream, waiting) = (&mut spikes.stream, &mut spikes.waiting);
-        spikes.next = live.film.changes_from(spikes.next, |changes| {
-            if failed.is_none() && !changes.is_empty() {
-                failed = stream.push_events(events_of(changes, &array).view(), waiting).err();
+    /// While following: the encoder begins here.
+    fn listen(&mut self) {
+        self.spikes = None;
+        let (View::Following, Some(encoder), Some(live)) = (&self.view, &self.encoder, &self.live) else { return };
+        let lens = lock(&live.lens);
+        let begun = Spikes::new(encoder, live.film.array(), self.column_us, lens.held(), lens.latest());
+        let next = live.film.come_to();
+        drop(lens);
+        match begun {
+            Ok(spikes) => self.spikes = Some((spikes, next)),
+            Err(error) => {
+                self.encoder = None;
+                let _ = self.answers.try_send(json!({ "type": "warning", "text": error.to_string() }));
             }
-        });
-        let more = spikes.waiting.len().saturating_sub(MOST_SPIKES);
-        spikes.left_out += more;
-        spikes.waiting.drain(..more);
-        let said = match failed {
-            Some(error) => json!({ "type": "warning", "text": format!("encoder {}: {error}", spikes.name) }),
-            None if spikes.waiting.is_empty() => return Ok(()),
-            None => json!({
-                "type": "spikes", "encoder": spikes.name, "trains": spikes.stream.trains(), "signed": spikes.stream.signed(),
-                "latency_ms": spikes.latency_ms, "left_out": spikes.left_out,
-                "t_ms": spikes.waiting.iter().map(|s| s.t).collect::<Vec<_>>(),
-                "train": spikes.waiting.iter().map(|s| s.train).collect::<Vec<_>>(),
-                "value": spikes.waiting.iter().map(|s| s.value).collect::<Vec<_>>(),
-            }),
-        };
-        spikes.waiting.clear();
-        spikes.left_out = 0;
-        if said["type"] == "warning" {
-            self.spikes = None;
         }
-        self.say(&said).await
     }
 
-    fn encode(&mut self, asked: &Asked<'_>) -> Answer {
-        if !asked.has("encoder") {
-            self.spikes = None;
+    async fn tell_spikes(&mut self) -> Result<(), End> {
+        if self.encoder.is_none() || self.spikes_told.elapsed() < FRAME {
             return Ok(());
         }
-        let live = self.live.as_ref().ok_or("no board is listened to")?;
-        let said = asked.0.get("encoder").map(Value::to_string).unwrap_or_default();
-        let refused =
-            |error: taxel_core::Error| Refused { reason: error.to_string(), field: Some("encoder".to_owned()) };
-        let encoder = Encoder::from_json(&said).map_err(refused)?;
-        let stream = encoder.stream(live.film.array()).map_err(refused)?;
-        let name = asked.0.get("encoder").and_then(|e| e["name"].as_str()).unwrap_or_default().to_owned();
-        let (latency_ms, next) = (encoder.latency_ms(), live.film.come_to());
-        let told = Instant::now();
-        self.spikes = Some(Spikes { name, stream, latency_ms, next, told, waiting: vec![], left_out: 0 });
-        Ok(())
+        self.spikes_told = Instant::now();
+        if let (Some((spikes, next)), Some(live)) = (&mut self.spikes, &self.live) {
+            *next = live.film.changes_from(*next, |changes| spikes.take(changes));
+            if let Some(t) = lock(&live.lens).latest() {
+                spikes.advance(t);
+            }
+        }
+        let spikes = match &mut self.view {
+            View::Following => self.spikes.as_mut().map(|(spikes, _)| spikes),
+            View::At(player) => player.as_mut().and_then(|player| player.spikes_mut()),
+        };
+        let Some(spikes) = spikes else { return Ok(()) };
+        let (said, failed) = (spikes.tell(), spikes.failed().map(str::to_owned));
+        if let Some(text) = failed {
+            (self.encoder, self.spikes) = (None, None);
+            self.say(&json!({ "type": "warning", "text": text })).await?;
+        }
+        match said {
+            Some(said) => self.say(&said).await,
+            None => Ok(()),
+        }
+    }
+
+    async fn encode(&mut self, asked: &Asked<'_>) -> Answer {
+        self.encoder = None;
+        if asked.has("encoder") {
+            let said = asked.0.get("encoder").map(Value::to_string).unwrap_or_default();
+            let refused =
+                |error: taxel_core::Error| Refused { reason: error.to_string(), field: Some("encoder".to_owned()) };
+            let encoder = Encoder::from_json(&said).map_err(refused)?;
+            encoder.stream(self.film()?.array()).map_err(refused)?;
+            self.encoder = Some(encoder);
+        }
+        self.again().await
+    }
+
+    async fn zoom(&mut self, asked: &Asked<'_>) -> Answer {
+        let (least, most) = COLUMNS_US;
+        let column_us = asked.whole("column_us", least, most)?;
+        if !is_column(column_us) {
+            return Err(Refused::of("column_us", format!("must be {least} times a power of two, up to {most}")));
+        }
+        self.column_us = column_us;
+        self.again().await
     }
 
     // ------------------------------------------------------------------------------------------ what he asks
@@ -473,7 +551,8 @@ impl Session {
                 self.credits = (self.credits + u32::try_from(n).unwrap_or(0)).min(MOST_CREDITS);
             })),
             "watch" => quiet(self.watch(asked).await),
-            "encode" => quiet(self.encode(asked)),
+            "encode" => quiet(self.encode(asked).await),
+            "zoom" => quiet(self.zoom(asked).await),
             "seek" => match asked.time("t_us") {
                 Ok(t) => {
                     self.plays = None;
@@ -519,15 +598,12 @@ impl Session {
         } else {
             None
         };
-        (self.watched, self.history, self.restart, self.dirty) = (taxel, None, true, true);
-        match self.t() {
-            Some(t) if matches!(self.view, View::At(_)) => {
-                self.seek(t).await?;
-                self.plays = self.plays.map(|(speed, _, _)| (speed, Instant::now(), t));
-                Ok(())
-            }
-            _ => Ok(()),
+        self.watched = taxel;
+        if matches!(self.view, View::Following) {
+            (self.history, self.restart, self.dirty) = (None, true, true);
+            return Ok(());
         }
+        self.again().await
     }
 
     async fn play(&mut self, asked: &Asked<'_>) -> Answer {
@@ -690,29 +766,6 @@ impl Session {
     }
 }
 
-/// Columns of time that a late event may still change.
-const LATE: i64 = 25;
-const _: () = assert!(LATE < SPAN);
-
 fn refusal(id: &Value, what: &str, refused: &Refused) -> Value {
     json!({ "type": "refused", "id": id, "what": what, "reason": refused.reason, "field": refused.field })
-}
-
-fn events_of(changes: &[Change], array: &taxel_core::Array) -> Events {
-    let columns = u32::from(array.columns.max(1));
-    // A taxel lies on the array, whose sides fit.
-    #[allow(clippy::cast_possible_truncation)]
-    let place = |taxel: u32| ((taxel % columns) as u16, (taxel / columns) as u16);
-    let valued = changes.iter().any(|change| change.ticks != UNKNOWN);
-    Events {
-        t: changes.iter().map(|c| c.t).collect(),
-        x: changes.iter().map(|c| place(c.taxel).0).collect(),
-        y: changes.iter().map(|c| place(c.taxel).1).collect(),
-        p: changes.iter().map(|c| c.up).collect(),
-        intensity: valued.then(|| Intensities {
-            ticks: changes.iter().map(|c| if c.ticks == UNKNOWN { 0 } else { c.ticks }).collect(),
-            present: changes.iter().map(|c| c.ticks != UNKNOWN).collect(),
-        }),
-        ..Events::empty(array.clone())
-    }
 }

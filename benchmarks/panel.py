@@ -1,0 +1,160 @@
+"""What the live panel costs and holds: pictures a second beside 99 others, the server's thread, seeking in a recording.
+
+Sender and clients share this machine, over loopback, the sender a process of its own. The good client reads all that it
+is sent and gives a credit for each picture; of the others every second one asks for pictures and never reads. CPU is of
+the thread `taxel-panel` alone. Times of a seek are from the request to the picture with its 5 s of raster.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from _rounds import stamp, thread_seconds
+from websockets.sync.client import ClientConnection, connect
+
+import taxel
+from taxel.live import Live, Panel
+
+SIDES, CHANGES_PER_S, OTHERS = (64,), 1e5, 99
+
+#: Bytes of a datagram: 19 changes and their values, 192 us of them.
+EACH = 190
+
+SEND = """
+import pickle, sys
+from taxel.live import send
+send(pickle.load(open(sys.argv[1], "rb")), port=int(sys.argv[2]), period_us=190.0, seconds=float(sys.argv[3]))
+"""
+
+
+def events(side: int, count: int, seconds: float) -> taxel.Events:
+    """Return changes spread over an array and over time, ten touches a second."""
+    random = np.random.default_rng(18)
+    t = np.sort(random.uniform(0, seconds * 1e6, count).astype(np.int64) // 100 * 100)
+    middle = (t // 100_000 * 17) % side
+    x, y = (np.clip(middle + random.integers(-6, 7, count), 0, side - 1) for _ in range(2))
+    p = random.integers(0, 2, count) == 1
+    return taxel.Events(
+        t, x, y, p, intensity=random.integers(40, 140, count), array=taxel.Array(side, side, name="bench")
+    )
+
+
+def looking(panel: Panel) -> ClientConnection:
+    """Open a client's connection."""
+    host = "{}:{}".format(*panel.address)
+    door = connect(
+        f"ws://{host}/socket",
+        origin=f"http://{host}",
+        subprotocols=["taxel.panel.1", f"token.{panel.token}"],
+        max_size=None,
+        open_timeout=60,
+    )
+    door.send(json.dumps({"type": "credit", "n": 2}))
+    return door
+
+
+def following(side: int, others: int, seconds: float, scratch: Path) -> dict[str, Any]:
+    """Count pictures of a good client while events come."""
+    words = taxel.wire.encode(events(side, round(CHANGES_PER_S), 1.0))
+    cut = [words[k : k + EACH] for k in range(0, len(words), EACH)]
+    payload = scratch / f"{side}.pickle"
+    payload.write_bytes(pickle.dumps(cut))
+    array = taxel.Array(side, side, name="bench")
+    with Live(0, host="127.0.0.1", array=array) as live, Panel(live, folder=scratch) as panel:
+        crowd = [looking(panel) for _ in range(others)]
+        good = looking(panel)
+        arguments = [str(payload), str(live.address[1]), str(seconds + 1.0)]
+        sender = subprocess.Popen([sys.executable, "-c", SEND, *arguments])
+        time.sleep(0.5)
+        pictures, before, begun = 0, thread_seconds().get("taxel-panel", 0.0), time.perf_counter()
+        while time.perf_counter() - begun < seconds:
+            if isinstance(good.recv(timeout=60), bytes):
+                pictures += 1
+                good.send(json.dumps({"type": "credit", "n": 1}))
+        wall = time.perf_counter() - begun
+        cpu = thread_seconds()["taxel-panel"] - before
+        sender.wait()
+        for one in [good, *crowd]:
+            one.socket.close()
+        capture = live.counters["capture"]
+    return {
+        "side": side,
+        "others": others,
+        "pictures_per_s": pictures / wall,
+        "server_cores": cpu / wall,
+        "lost": capture["dropped_by_kernel"] + capture["dropped_by_queue"],
+    }
+
+
+def seeking(count: int, seeks: int, scratch: Path) -> dict[str, Any]:
+    """Seek in a recording of so many changes."""
+    path = scratch / "seek.mcap"
+    taxel.convert(events(64, count, count / CHANGES_PER_S), path)
+    size, random = path.stat().st_size, np.random.default_rng(1)
+    with Panel(path) as panel:
+        door = looking(panel)
+        door.send(json.dumps({"type": "watch", "taxel": [32, 32]}))
+        cpu = time.process_time()
+        begun = time.perf_counter()
+        door.send(json.dumps({"type": "open", "name": path.name, "id": 1}))
+        opened: dict[str, Any] = {}
+        while opened.get("type") != "opened":
+            said = door.recv(timeout=600)
+            opened = {} if isinstance(said, bytes) else json.loads(said)
+        index = {"wall_s": time.perf_counter() - begun, "cpu_s": time.process_time() - cpu}
+        walls, cpus = [], []
+        for t_us in random.integers(opened["start_us"], opened["stop_us"], seeks):
+            cpu, begun = time.process_time(), time.perf_counter()
+            door.send(json.dumps({"type": "seek", "t_us": int(t_us)}))
+            while True:
+                said = door.recv(timeout=60)
+                if isinstance(said, bytes):
+                    door.send(json.dumps({"type": "credit", "n": 1}))
+                    if int.from_bytes(said[16:24], "little", signed=True) == t_us:
+                        break
+            walls.append(1e3 * (time.perf_counter() - begun))
+            cpus.append(1e3 * (time.process_time() - cpu))
+        door.socket.close()
+    return {
+        "file_mb": size / 1e6,
+        "changes": count,
+        "index": {**index, "cpu_s_per_gb": index["cpu_s"] / size * 1e9, "wall_s_per_gb": index["wall_s"] / size * 1e9},
+        "seek_ms": {"median": float(np.median(walls)), "max": max(walls), "cpu_median": float(np.median(cpus))},
+    }
+
+
+def run(*, quick: bool) -> dict[str, Any]:
+    seconds = 1.0 if quick else 5.0
+    load = os.getloadavg()[0]
+    with tempfile.TemporaryDirectory() as folder:
+        scratch = Path(folder)
+        rows = [following(side, others, seconds, scratch) for side in SIDES for others in (0, OTHERS)]
+        sought = seeking(200_000 if quick else 20_000_000, 5 if quick else 50, scratch)
+    return {
+        "question": (__doc__ or "").splitlines()[0],
+        **stamp(),
+        "load_before": load,
+        "load_after": os.getloadavg()[0],
+        "following": rows,
+        "seeking": sought,
+        "ratios": {
+            f"{row['side']} x {row['side']}, {row['others']} others: pictures/s over 50": row["pictures_per_s"] / 50
+            for row in rows
+        },
+        "goals": {
+            "50 pictures/s beside 99 others": all(row["pictures_per_s"] >= 50 for row in rows),
+            "nothing lost": not any(row["lost"] for row in rows),
+            "a GB indexed within 2 s": sought["index"]["wall_s_per_gb"] < 2,
+            "any time within 50 ms": sought["seek_ms"]["max"] < 50,
+        },
+        "stable": load < (os.cpu_count() or 1),
+    }
