@@ -216,7 +216,12 @@ export class Board {
     this.select = part("preset", HTMLSelectElement);
     this.select.onchange = () => {
       this.restoreAll();
-      if (this.select.value) this.ask({ type: "preset_apply", name: this.select.value });
+      if (!this.select.value) return;
+      this.server.ask({ type: "preset_apply", name: this.select.value }).catch((error) => {
+        // What the board holds is another one still.
+        this.showPresets();
+        this.failed(error);
+      });
     };
     part("preset-form", HTMLFormElement).onsubmit = (event) => {
       event.preventDefault();

@@ -92,6 +92,12 @@ class Office:
                 raise ProblemError("the board's serial line is not connected")
             return {"value": self._cable.command(Command(asked["register"], asked["value"]))}
 
+    def _greeting(self, _: Mapping[str, Any]) -> object:
+        with self._at_cable:
+            if self._cable is None:
+                raise ProblemError("the board's serial line is not connected")
+            return {"channels": self._cable.greeting().channels}
+
     def _lines(self, _: Mapping[str, Any]) -> object:
         with self._at_cable:
             return [] if self._cable is None else self._cable.said()

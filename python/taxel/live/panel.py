@@ -157,6 +157,8 @@ class Panel:
             raise ProblemError(f"{what}: this panel shows recordings only")
         if self._live._how.get("record") is not None:
             raise ProblemError(f"{what}: a recording was begun with this address; end it first")
+        if self._live._remote is not None:
+            raise ProblemError(f"{what}: the board is another computer's, which says where and how it is heard")
         return self._live
 
     def stop(self) -> None:

@@ -125,7 +125,8 @@ class Live:
         The sensor; by default the remote board's or the readout's own, or the thesis' 64 x 64.
     registers : str or taxel.wire.Registers
         What the board's registers hold: themselves, or a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz", of
-        which a smaller array drives fewer lines. By default the first; a remote board says what they hold.
+        which a smaller array drives fewer lines. Left out: as a board of this array is at reset, up to 64 x 64 at
+        5.2 kHz; a remote board says what they hold.
     differences : bool
         Whether the board sends differences for intensities (the panel's "delta intensity").
     readout : Readout, optional
@@ -231,7 +232,7 @@ class Live:
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in goes if to.startswith(_LSL)]
         inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in heard_of if how.startswith(_LSL)}
         self._inlets = list(inlets.values())
-        registers = "5.2 kHz" if registers is None else registers
+        registers = Registers(array=self.array) if registers is None else registers
         sizes = {
             "kernel_buffer_bytes": kernel_buffer_bytes,
             "queue_bytes": queue_bytes,

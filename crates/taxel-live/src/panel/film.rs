@@ -276,9 +276,9 @@ impl Film for RingFilm {
     fn range(&self) -> Option<(i64, i64)> {
         let ring = self.ring();
         let latest = ring.latest?;
-        let first = ring.pieces.front()?;
-        let since = first.piece.since.or(first.piece.changes.first().map(|c| c.t));
-        Some((since.unwrap_or(latest), latest))
+        // Before anything came there are pieces that hold nothing.
+        let begin = |kept: &Arc<Kept>| kept.piece.since.or(kept.piece.changes.first().map(|c| c.t));
+        Some((ring.pieces.iter().find_map(begin).unwrap_or(latest), latest))
     }
 
     fn open(&self, t: i64) -> Result<(Keyframe, Box<dyn Reel>)> {
@@ -1176,6 +1176,13 @@ mod tests {
         let blank = vec![UNKNOWN; array.len()];
         let start = Keyframe { latest: None, events: 0, held: blank.clone(), rest: blank.clone() };
         let mut lens = Lens::new(array.columns, 3, &start, COLUMN_US, 0);
+        // Who looks before anything came is told so.
+        film.keep(Piece { held: Some(blank.clone()), ..Piece::default() }, &lens);
+        assert_eq!(film.range(), None);
+        film.keep(Piece { changes: vec![Change { t: 5, taxel: 0, ticks: 50, up: true }], ..Piece::default() }, &lens);
+        film.keep(Piece { changes: vec![Change { t: 9, taxel: 0, ticks: 51, up: true }], ..Piece::default() }, &lens);
+        assert_eq!(film.range(), Some((5, 9)));
+        let film = RingFilm::new(array.clone(), 3);
         let (mut held, mut all, mut random) = (blank, vec![], StdRng::seed_from_u64(9));
         for n in 0..900_i64 {
             let changes: Vec<Change> = (0..40)

@@ -147,14 +147,23 @@ async fn read(hub: &Hub) -> Answer {
     if hub.state().control.is_none() {
         return Err("the board's serial line is not connected: give --control, or connect it here".into());
     }
+    // Channels are no register: the board greets with them. One that does not greet has as many as it was said to have.
+    let greeting = hub.ask("greeting", json!({})).await.unwrap_or_default();
+    let channels = greeting["channels"].as_u64().and_then(|n| u8::try_from(n).ok());
+    let channels = channels.unwrap_or(hub.state().registers.channels);
     let mut words = [0; 8];
     for register in [0_u8, 1, 2, 3, 4, 5, 7] {
         let answer = hub.ask("command", json!({ "register": 6, "value": register })).await?;
         let word = answer["value"].as_u64().and_then(|word| u32::try_from(word).ok());
         words[usize::from(register)] = word.ok_or("the board's answer is no register")?;
     }
-    let registers = Registers::of_words(&words, hub.state().registers.channels);
+    let registers = Registers::of_words(&words, channels);
+    let other = channels != hub.state().registers.channels;
     took(hub, registers, true);
+    if other {
+        // Other presets fit it.
+        hub.tell_all(&hub.presets());
+    }
     Ok(())
 }
 
