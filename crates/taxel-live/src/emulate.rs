@@ -205,6 +205,7 @@ impl Emulator {
         stop: Stop<'_>,
     ) -> Result<Report> {
         let mut ticks = vec![0; self.array.len()];
+        let mut leaving = Leaving::default();
         let mut late = Latencies::default();
         let mut schedule = std::mem::take(&mut self.options.commands).into_iter().peekable();
         if self.options.real_time {
@@ -259,27 +260,23 @@ impl Emulator {
                 flawed.read(since_us, &mut ticks);
             }
             let (sender, network) = (&mut self.sender, &mut self.network);
-            let mut sent = Ok(());
             if frame == 0 && self.options.arms {
                 self.board.arm(&ticks)?;
                 continue;
             }
+            leaving.clear();
             self.board.frame(&ticks, |datagram| {
                 match network {
-                    None => sent = sender.push(datagram),
-                    Some(network) => network.pass(datagram, &mut |out| {
-                        if sent.is_ok() && !out.is_empty() {
-                            sent = sender.push(out);
-                        }
-                    }),
+                    None => leaving.push(datagram),
+                    Some(network) => network.pass(datagram, &mut |out| leaving.push(out)),
                 }
-                sent.is_ok()
+                true
             })?;
-            sent?;
             // The board knows how long its frame was: a command may have changed that.
             let before = due;
             due = begun + Duration::from_secs_f64((before_reset_us + self.board.time_us()) * host_s_per_us);
             let now = if self.options.real_time { wait_until(due) } else { Instant::now() };
+            leaving.iter().try_for_each(|datagram| sender.push(datagram))?;
             self.sender.flush()?;
             if self.options.real_time {
                 let behind = now.saturating_duration_since(due);
@@ -322,6 +319,32 @@ impl Emulator {
         report.late = late.quantiles();
         report.board_seconds = board_us * 1e-6;
         report.seconds = begun.elapsed().as_secs_f64();
+    }
+}
+
+/// What leaves when the frame ends, not sooner: a train of datagrams goes as soon as one of another length follows.
+#[derive(Default)]
+struct Leaving {
+    bytes: Vec<u8>,
+    ends: Vec<usize>,
+}
+
+impl Leaving {
+    fn push(&mut self, datagram: &[u8]) {
+        if !datagram.is_empty() {
+            self.bytes.extend_from_slice(datagram);
+            self.ends.push(self.bytes.len());
+        }
+    }
+
+    fn clear(&mut self) {
+        self.bytes.clear();
+        self.ends.clear();
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &[u8]> {
+        let starts = std::iter::once(0).chain(self.ends.iter().copied());
+        starts.zip(&self.ends).map(|(start, &end)| &self.bytes[start..end])
     }
 }
 
