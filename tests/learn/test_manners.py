@@ -223,3 +223,12 @@ def test_tags_are_asked_by_scikit_learn_alone():
     assert not sklearn.base.is_classifier(Tempotron())
     code = "import sys, taxel; taxel.learn.ConeX(); assert not any(name.startswith('sklearn') for name in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+def test_a_fit_without_weights_says_so_where_it_is_used():
+    trains = SpikeTrains.from_lists([[10.0], [20.0]], stop=100.0)
+    cone = ConeX().fit([trains], [[5.0]])
+    assert cone.status_ == "infeasible"
+    for use in (lambda: cone.predict([trains]), lambda: cone.score([trains], [[5.0]])):
+        with pytest.raises(taxel.ProblemError, match="the fit is infeasible"):
+            use()

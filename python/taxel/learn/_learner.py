@@ -10,7 +10,7 @@ from numpy import float64
 from numpy.typing import ArrayLike, NDArray
 
 from taxel._arguments import floats, instance, several
-from taxel._core import NotFittedError
+from taxel._core import NotFittedError, ProblemError
 from taxel._parameters import Parameters, defaults
 from taxel.learn._examples import examples
 from taxel.metrics import f1
@@ -70,5 +70,9 @@ class SpikeLearner(Learner, ABC):
 def predicted(learner: Any, patterns: Sequence[SpikeTrains]) -> list[NDArray[float64]]:
     """Return the output spikes of a learner's `neuron_` with its weights."""
     weights = learner._fitted()
+    if getattr(learner, "status_", None) == "infeasible":
+        raise ProblemError(
+            "the fit is infeasible: no weights meet its targets (status_, certificate_), so none can be run"
+        )
     given = enumerate(several("patterns", patterns))
     return [learner.neuron_.run(weights, instance(f"pattern {p}", one, SpikeTrains)) for p, one in given]
