@@ -170,7 +170,7 @@ def killed() -> dict[str, float]:
 
 
 def run(*, quick: bool) -> dict[str, Any]:
-    absent = missing({"taxel_bridge": "taxel-bridge"})
+    absent = missing({"taxel-bridge": "taxel_bridge"})
     if absent:
         raise ProblemError("bridge: the wheel taxel-bridge is not built: make bridge")
     rounds, seconds = (1, 1.0) if quick else (3, 2.0)

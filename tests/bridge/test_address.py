@@ -95,4 +95,12 @@ def test_parcels_alone_carry_a_board_and_a_spoilt_one_is_refused(tmp_path):
     assert len(ours)
 
 
-OPTIONS = {"registers": "5.2 kHz", "differences": False, "guard_frames": 5.0, "gap_frames": 1.0, "send": []}
+OPTIONS = {
+    "name": "board",
+    "sources": [],
+    "registers": "5.2 kHz",
+    "differences": False,
+    "guard_frames": 5.0,
+    "gap_frames": 1.0,
+    "send": [],
+}
