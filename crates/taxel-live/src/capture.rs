@@ -1,5 +1,8 @@
-//! UDP datagrams in, counted: a thread between the socket and a bounded queue; or what another computer received
-//! ([`Feed`]), into the same queue.
+//! UDP datagrams in, counted: by whoever takes them, or by a thread of its own between the socket and a bounded queue; or
+//! what another computer received ([`Feed`]), into the same queue.
+//!
+//! Who takes datagrams receives them himself, which spares a wake-up and a copy. Who may be held up meanwhile (by a disk) asks
+//! for a thread ([`Receiver::apart`]): it receives while he is.
 //!
 //! The sums close. At the socket: messages that came = [`Counts::messages`] + [`Counts::dropped_by_kernel`]. Behind it:
 //! [`Counts::datagrams`] = those taken + those waiting + [`Counts::dropped_by_queue`].
@@ -17,11 +20,12 @@ mod socket;
 
 use std::io;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::bridged::Bridged;
+use crate::locked::lock;
 use crate::recording::now_ns;
 use crate::{Error, Result};
 pub use counts::Counts;
@@ -33,8 +37,11 @@ pub use queue::{Batch, Datagram};
 pub use sender::{SendCounts, Sender};
 use socket::Socket;
 
-/// After a stop the socket is emptied for no longer than this, even when a sender never pauses.
-const EMPTY_FOR: Duration = Duration::from_millis(50);
+/// How often the thread looks whether it was asked to stop.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
+/// What is received at once at most, bytes.
+const AT_ONCE: usize = 4 * socket::LARGEST;
 
 /// Where datagrams come from.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,13 +71,13 @@ pub struct Receiver {
 
 #[derive(Debug)]
 enum From {
-    /// A thread of its own reads the socket.
-    Socket(Option<JoinHandle<()>>),
+    /// The socket as long as no thread has it, locked by the one who takes, all the while that he waits; and the thread.
+    Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
     Feed(Feed),
 }
 
 impl Receiver {
-    /// Opens `address` and begins to receive.
+    /// Opens `address`; from then on the kernel keeps what comes.
     ///
     /// # Errors
     ///
@@ -91,12 +98,29 @@ impl Receiver {
         let counts =
             Counts { kernel_buffer_bytes: socket.kernel_buffer_bytes(), gro: socket.gro(), ..Counts::default() };
         let queue = Arc::new(Queue::new(options.queue_bytes, counts));
-        let theirs = Arc::clone(&queue);
-        let thread = std::thread::Builder::new()
+        let from = From::Socket(Mutex::new(Some(socket)), Mutex::default());
+        Ok(Self { queue, place: Origin::Udp(address), from })
+    }
+
+    /// From now on a thread of its own receives, until the end; a feed has one anyway.
+    ///
+    /// # Errors
+    ///
+    /// `Socket` where the system has no thread left.
+    pub fn apart(&self) -> Result<()> {
+        let From::Socket(socket, thread) = &self.from else { return Ok(()) };
+        let Some(socket) = lock(socket).take() else { return Ok(()) };
+        let queue = Arc::clone(&self.queue);
+        let begun = std::thread::Builder::new()
             .name("taxel-receive".to_owned())
-            .spawn(move || receive(socket, &theirs))
-            .map_err(Error::socket(&place))?;
-        Ok(Self { queue, place: Origin::Udp(address), from: From::Socket(Some(thread)) })
+            .spawn(move || receive(socket, &queue))
+            .map_err(|error| {
+                // The socket went with the thread that did not begin: nothing can come any more.
+                self.queue.close(None);
+                Error::socket(&self.place)(error)
+            })?;
+        *lock(thread) = Some(begun);
+        Ok(())
     }
 
     /// Hears what another computer receives; parcels go into the [`Feed`].
@@ -126,7 +150,7 @@ impl Receiver {
     #[must_use]
     pub fn bridged(&self) -> Option<Bridged> {
         match &self.from {
-            From::Socket(_) => None,
+            From::Socket(..) => None,
             From::Feed(feed) => Some(feed.bridged()),
         }
     }
@@ -135,19 +159,43 @@ impl Receiver {
     #[must_use]
     pub fn silent_until(&self) -> Option<i64> {
         match &self.from {
-            From::Socket(_) => Some(now_ns()),
+            From::Socket(..) => Some(now_ns()),
             From::Feed(_) => self.queue.silent_until(),
         }
     }
 
-    /// Waits until something is there and takes all of it into `batch`, whose memory is reused; false after `timeout`
-    /// with nothing, or at once when everything was taken after [`Receiver::stop`].
+    /// Waits until something is there and takes it into `batch`, whose memory is reused; false after `timeout` with nothing,
+    /// or at once when everything was taken after [`Receiver::stop`].
     ///
     /// # Errors
     ///
-    /// `Socket` where the receiving thread ended because the socket failed.
+    /// `Socket` where receiving ended because the socket failed.
     pub fn take(&self, batch: &mut Batch, timeout: Duration) -> Result<bool> {
-        self.queue.take(batch, timeout).map_err(Error::socket(&self.place))
+        let taken = match &self.from {
+            From::Socket(socket, _) => match &mut *lock(socket) {
+                Some(socket) => self.receive(socket, batch, timeout),
+                None => self.queue.take(batch, timeout),
+            },
+            From::Feed(_) => self.queue.take(batch, timeout),
+        };
+        taken.map_err(Error::socket(&self.place))
+    }
+
+    /// Receives in the thread of the one who takes.
+    fn receive(&self, socket: &mut Socket, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
+        batch.begin(AT_ONCE);
+        if self.queue.is_done() {
+            return Ok(false);
+        }
+        let stopped_ns = self.queue.stopped_ns();
+        let filled = fill(socket, batch, stopped_ns.map_or(Some(timeout), |_| None));
+        if let Ok(messages) = filled {
+            self.queue.count(batch, messages, socket.dropped());
+        }
+        if filled.is_err() || stopped_ns.is_some_and(|stopped_ns| batch.ends_after(stopped_ns)) {
+            self.queue.close(None);
+        }
+        filled.map(|messages| messages > 0)
     }
 
     /// What came and what was lost.
@@ -162,7 +210,7 @@ impl Receiver {
         self.queue.is_done()
     }
 
-    /// Asks the thread to end: it takes in what the kernel still holds, then lets go of the socket.
+    /// Asks for the end: what has come by now is taken in, then nothing more.
     pub fn stop(&self) {
         self.queue.stop();
         if let From::Feed(_) = self.from {
@@ -174,8 +222,8 @@ impl Receiver {
 impl Drop for Receiver {
     fn drop(&mut self) {
         self.stop();
-        if let From::Socket(thread) = &mut self.from
-            && let Some(thread) = thread.take()
+        if let From::Socket(_, thread) = &self.from
+            && let Some(thread) = lock(thread).take()
         {
             let _ = thread.join();
         }
@@ -184,37 +232,33 @@ impl Drop for Receiver {
 
 /// The thread's one job: from the socket into the queue, until told to stop or the socket fails.
 fn receive(mut socket: Socket, queue: &Queue) {
-    let mut scratch = Batch::with_room(4 * socket::LARGEST);
+    let mut scratch = Batch::new();
     let ended = loop {
-        if queue.stop_asked() {
-            break empty(&mut socket, &mut scratch, queue);
-        }
-        match fill(&mut socket, &mut scratch, true) {
-            Ok(messages) => queue.put(&mut scratch, messages, socket.dropped()),
+        scratch.begin(AT_ONCE);
+        let stopped_ns = queue.stopped_ns();
+        match fill(&mut socket, &mut scratch, stopped_ns.map_or(Some(LOOK_EVERY), |_| None)) {
+            Ok(messages) => {
+                let ended = stopped_ns.is_some_and(|stopped_ns| scratch.ends_after(stopped_ns));
+                queue.put(&mut scratch, messages, socket.dropped());
+                if ended {
+                    break Ok(());
+                }
+            }
             Err(error) => break Err(error),
         }
     };
     queue.close(ended.err());
 }
 
-/// Takes in what the kernel still holds.
-fn empty(socket: &mut Socket, scratch: &mut Batch, queue: &Queue) -> io::Result<()> {
-    let begun = Instant::now();
-    loop {
-        let messages = fill(socket, scratch, false)?;
-        socket.ask_dropped()?;
-        queue.put(scratch, messages, socket.dropped());
-        if messages == 0 || begun.elapsed() > EMPTY_FOR {
-            return Ok(());
-        }
-    }
-}
-
-/// Receives until nothing waits or the batch is full; `wait`s for the first message no longer than [`socket::LOOK_EVERY`].
-fn fill(socket: &mut Socket, batch: &mut Batch, wait: bool) -> io::Result<u64> {
+/// Receives until nothing waits or the batch is full; waits for the first message no longer than `wait`.
+fn fill(socket: &mut Socket, batch: &mut Batch, wait: Option<Duration>) -> io::Result<u64> {
     let mut messages = 0;
-    while batch.room() >= socket::LARGEST && socket.receive(batch, wait && messages == 0)? {
-        messages += 1;
+    while batch.room() >= socket::LARGEST {
+        if socket.receive(batch)? {
+            messages += 1;
+        } else if messages > 0 || !wait.map_or(Ok(false), |timeout| socket.wait(timeout))? {
+            break;
+        }
     }
     if messages == 0 {
         socket.ask_dropped()?;

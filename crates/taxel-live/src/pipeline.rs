@@ -1,7 +1,8 @@
 //! Datagrams to detections, as they come.
 //!
-//! Threads with fixed jobs: *receive* ([`crate::capture`]), *decode and record*, *encode and read out*. What waits between
-//! two of them is bounded, and what finds no room is counted where it was lost. A detection leaves from the thread that
+//! Threads with fixed jobs: *receive, decode and record*, *encode and read out*; while something is recorded, which a disk may hold
+//! up, *receive* has a thread of its own ([`crate::capture`]). What waits between two of them is bounded, and what finds no room is
+//! counted where it was lost. A detection leaves from the thread that
 //! made it. Who looks on gets copies ([`Live::counters`], [`Live::picture`]) and slows nothing.
 
 mod ahead;

@@ -1,6 +1,7 @@
 //! The sums of capture close, with the sender's own count, whatever is lost where.
 
 use std::net::{Ipv4Addr, SocketAddr, UdpSocket};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use taxel_live::Error;
@@ -8,8 +9,11 @@ use taxel_live::capture::{Batch, Counts, Receiver, ReceiverOptions, SendCounts, 
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
 
+/// A receiver whose thread takes in what comes while nobody takes it.
 fn bind(options: ReceiverOptions) -> Receiver {
-    Receiver::bind(ANY, options).expect("loopback binds")
+    let receiver = Receiver::bind(ANY, options).expect("loopback binds");
+    receiver.apart().expect("a thread");
+    receiver
 }
 
 /// Datagram `k` holds its own number, in a length that changes now and then, so that trains begin and end.
@@ -61,6 +65,66 @@ fn every_datagram_comes_once_in_order_with_and_without_trains() {
         } else {
             assert_eq!(counts.messages, sent.datagrams);
         }
+    }
+}
+
+#[test]
+fn who_takes_receives_by_himself_until_a_thread_does() {
+    for (segment, gro, apart) in [(false, false, 60), (false, true, 0), (true, true, 25), (true, false, 99)] {
+        let receiver = Receiver::bind(ANY, ReceiverOptions { gro, ..ReceiverOptions::default() }).expect("a port");
+        let mut sender = Sender::open(receiver.address(), segment).expect("a socket");
+        let (mut batch, mut taken) = (Batch::new(), vec![]);
+        assert!(!receiver.take(&mut batch, Duration::from_millis(1)).expect("a sound socket"), "nothing came");
+        for round in 0..60 {
+            if round == apart {
+                receiver.apart().expect("a thread");
+            }
+            for k in 10 * round..10 * round + 10 {
+                sender.push(&datagram(k)).expect("sent");
+            }
+            sender.flush().expect("sent");
+            // The last of them are taken after the stop.
+            let begun = Instant::now();
+            while round < 59 && taken.len() < 10 * (round as usize + 1) && begun.elapsed() < Duration::from_secs(10) {
+                receiver.take(&mut batch, Duration::from_millis(100)).expect("a sound socket");
+                taken.extend(batch.iter().map(|(d, bytes)| (bytes.to_vec(), d.number)));
+            }
+        }
+        let (rest, counts) = drain(&receiver);
+        assert_eq!(rest, (590..600).map(|k| (k, k)).collect::<Vec<_>>());
+        assert_eq!(taken, (0..590).map(|k| (datagram(k), k)).collect::<Vec<_>>());
+        assert_eq!((counts.datagrams, counts.bytes), (600, sender.counts().bytes));
+        assert_eq!((counts.dropped_by_kernel, counts.dropped_by_queue, counts.waiting), (0, 0, 0));
+        assert!(!receiver.take(&mut batch, Duration::from_secs(9)).expect("ended"), "after the end at once");
+    }
+}
+
+#[test]
+fn what_came_after_the_stop_is_left() {
+    for apart in [false, true] {
+        let receiver = Receiver::bind(ANY, ReceiverOptions::default()).expect("a port");
+        if apart {
+            receiver.apart().expect("a thread");
+        }
+        let to = receiver.address();
+        let ended = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            // A sender that never pauses keeps nobody from ending.
+            scope.spawn(|| {
+                let mut sender = Sender::open(to, true).expect("a socket");
+                while !ended.load(Ordering::Relaxed) {
+                    sender.push(&datagram(0)).expect("sent");
+                }
+            });
+            let (mut batch, begun) = (Batch::new(), Instant::now());
+            receiver.take(&mut batch, Duration::from_secs(10)).expect("a sound socket");
+            receiver.stop();
+            while !receiver.is_done() && begun.elapsed() < Duration::from_secs(60) {
+                receiver.take(&mut batch, Duration::from_millis(100)).expect("a sound socket");
+            }
+            ended.store(true, Ordering::Relaxed);
+        });
+        assert!(receiver.is_done());
     }
 }
 

@@ -111,7 +111,8 @@ class Live:
     """Receive a board's datagrams, record them, read them out, while they come.
 
     A context manager, and an iterator of detections that ends when `stop` was called. The work is done in threads of
-    its own: receive; decode and record; encode and read out. What is too slow loses data where it is counted.
+    its own: receive, decode and record; encode and read out; while it records, a third receives. What is too slow loses
+    data where it is counted.
 
     Parameters
     ----------

@@ -24,3 +24,15 @@ pub struct Counts {
     /// Whether trains of datagrams come in one call.
     pub gro: bool,
 }
+
+impl Counts {
+    /// Adds what receive calls gave, and how many messages the kernel has dropped so far; gives the first datagram's number.
+    pub(super) fn add(&mut self, datagrams: usize, bytes: usize, messages: u64, dropped_by_kernel: u64) -> u64 {
+        let first = self.datagrams;
+        self.messages += messages;
+        self.datagrams += datagrams as u64;
+        self.bytes += bytes as u64;
+        self.dropped_by_kernel = dropped_by_kernel;
+        first
+    }
+}

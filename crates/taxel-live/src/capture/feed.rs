@@ -122,6 +122,6 @@ impl Feed {
     /// Whether nobody takes any more.
     #[must_use]
     pub fn is_over(&self) -> bool {
-        self.queue.stop_asked()
+        self.queue.stopped_ns().is_some()
     }
 }

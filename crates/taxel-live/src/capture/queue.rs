@@ -1,11 +1,11 @@
 //! What waits between the receiving thread and the one who takes.
 
 use std::io;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use super::counts::Counts;
+use crate::recording::now_ns;
 
 /// One datagram of a [`Batch`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,10 +30,6 @@ impl Batch {
     #[must_use]
     pub fn new() -> Self {
         Self::default()
-    }
-
-    pub(super) fn with_room(bytes: usize) -> Self {
-        Self { bytes: Vec::with_capacity(bytes), datagrams: Vec::new() }
     }
 
     /// How many datagrams.
@@ -88,6 +84,17 @@ impl Batch {
         self.bytes.clear();
         self.datagrams.clear();
     }
+
+    /// Whether it holds nothing, or something that came at `ns` or later.
+    pub(super) fn ends_after(&self, ns: i64) -> bool {
+        self.datagrams.last().is_none_or(|last| last.arrived_ns >= ns)
+    }
+
+    /// Forgets what it holds and makes room for so many bytes.
+    pub(super) fn begin(&mut self, bytes: usize) {
+        self.clear();
+        self.bytes.reserve(bytes);
+    }
 }
 
 /// Two batches take turns: one fills while the other is worked on. A copy of each byte buys that any number of small
@@ -96,7 +103,8 @@ impl Batch {
 pub(super) struct Queue {
     state: Mutex<Received>,
     came: Condvar,
-    stop: AtomicBool,
+    /// When the end was asked for, ns of the host's clock since 1970.
+    stop: OnceLock<i64>,
     limit: usize,
 }
 
@@ -113,19 +121,15 @@ struct Received {
 impl Queue {
     pub(super) fn new(limit: usize, counts: Counts) -> Self {
         let state = Received { waiting: Batch::new(), counts, until_ns: None, closed: false, failed: None };
-        Self { state: Mutex::new(state), came: Condvar::new(), stop: AtomicBool::new(false), limit }
+        Self { state: Mutex::new(state), came: Condvar::new(), stop: OnceLock::new(), limit }
     }
 
     /// Moves what was received into the waiting batch; what has no room is dropped and counted.
     pub(super) fn put(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
         let mut state = self.state();
         let Received { waiting, counts, .. } = &mut *state;
-        counts.messages += messages;
-        counts.dropped_by_kernel = dropped_by_kernel;
-        for (datagram, bytes) in received.iter() {
-            let number = counts.datagrams;
-            counts.datagrams += 1;
-            counts.bytes += bytes.len() as u64;
+        let first = counts.add(received.datagrams.len(), received.bytes.len(), messages, dropped_by_kernel);
+        for (number, (datagram, bytes)) in (first..).zip(received.iter()) {
             if waiting.bytes.len() + bytes.len() <= self.limit {
                 waiting.push(Datagram { number, ..*datagram }, bytes);
             } else {
@@ -138,6 +142,15 @@ impl Queue {
         received.clear();
         if some {
             self.came.notify_one();
+        }
+    }
+
+    /// Counts and numbers what was received by the one who takes it.
+    pub(super) fn count(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
+        let (datagrams, bytes) = (received.datagrams.len(), received.bytes.len());
+        let first = self.state().counts.add(datagrams, bytes, messages, dropped_by_kernel);
+        for (number, datagram) in (first..).zip(&mut received.datagrams) {
+            datagram.number = number;
         }
     }
 
@@ -187,11 +200,12 @@ impl Queue {
     }
 
     pub(super) fn stop(&self) {
-        self.stop.store(true, Ordering::Relaxed);
+        self.stop.get_or_init(now_ns);
     }
 
-    pub(super) fn stop_asked(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
+    /// When the end was asked for, ns of the host's clock since 1970; none where it was not.
+    pub(super) fn stopped_ns(&self) -> Option<i64> {
+        self.stop.get().copied()
     }
 
     /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.

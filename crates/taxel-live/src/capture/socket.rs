@@ -13,9 +13,6 @@ use super::options::ReceiverOptions;
 use super::queue::Batch;
 use crate::recording::now_ns;
 
-/// A blocking receive ends after this, to look whether the owner asked to stop.
-pub(super) const LOOK_EVERY: Duration = Duration::from_millis(50);
-
 /// No UDP message, train or single, is longer than this, bytes.
 pub(super) const LARGEST: usize = 1 << 16;
 
@@ -47,7 +44,7 @@ impl Socket {
         }
         set(fd, libc::SOL_SOCKET, libc::SO_TIMESTAMPNS, &1_i32)?;
         set(fd, libc::SOL_SOCKET, libc::SO_RXQ_OVFL, &1_i32)?;
-        socket.set_read_timeout(Some(LOOK_EVERY))?;
+        socket.set_nonblocking(true)?;
         // Kernels before 5.0 have no UDP_GRO: then each datagram costs a call of its own, and `gro` says so.
         let gro = options.gro && set(fd, libc::SOL_UDP, libc::UDP_GRO, &1_i32).is_ok();
         Ok(Self { socket, gro, dropped: 0 })
@@ -72,9 +69,27 @@ impl Socket {
         if got.is_ok() { u64::from(bytes[0]) } else { 0 }
     }
 
-    /// Appends the next message to `batch`, which has room for [`LARGEST`] bytes; false where none is there, after
-    /// [`LOOK_EVERY`] when `wait` is set.
-    pub(super) fn receive(&mut self, batch: &mut Batch, wait: bool) -> io::Result<bool> {
+    /// Waits until a message is there, no longer than `timeout`; false where none came.
+    pub(super) fn wait(&self, timeout: Duration) -> io::Result<bool> {
+        let mut asked = libc::pollfd { fd: self.socket.as_raw_fd(), events: libc::POLLIN, revents: 0 };
+        let timeout = libc::timespec {
+            tv_sec: timeout.as_secs().try_into().unwrap_or(libc::time_t::MAX),
+            tv_nsec: timeout.subsec_nanos().into(),
+        };
+        // SAFETY: one pollfd and the timeout live through the call; no signal mask is given.
+        let ready = unsafe { libc::ppoll(&raw mut asked, 1, &raw const timeout, std::ptr::null()) };
+        match ready {
+            1.. => Ok(true),
+            0 => Ok(false),
+            _ => match io::Error::last_os_error() {
+                error if error.kind() == io::ErrorKind::Interrupted => Ok(false),
+                error => Err(error),
+            },
+        }
+    }
+
+    /// Appends the next message to `batch`, which has room for [`LARGEST`] bytes; false where none is there.
+    pub(super) fn receive(&mut self, batch: &mut Batch) -> io::Result<bool> {
         let start = batch.bytes.len();
         let room = batch.bytes.spare_capacity_mut();
         let mut part = libc::iovec { iov_base: room.as_mut_ptr().cast::<c_void>(), iov_len: room.len() };
@@ -85,9 +100,8 @@ impl Socket {
         message.msg_iovlen = 1;
         message.msg_control = from_mut(&mut control).cast::<c_void>();
         message.msg_controllen = CONTROL_BYTES as _;
-        let flags = if wait { 0 } else { libc::MSG_DONTWAIT };
         // SAFETY: `message` names memory that lives through the call: the spare room of `batch`, and `control`.
-        let got = unsafe { libc::recvmsg(self.socket.as_raw_fd(), &raw mut message, flags) };
+        let got = unsafe { libc::recvmsg(self.socket.as_raw_fd(), &raw mut message, 0) };
         let Ok(got) = usize::try_from(got) else {
             let error = io::Error::last_os_error();
             return match error.kind() {

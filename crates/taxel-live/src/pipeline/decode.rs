@@ -1,4 +1,4 @@
-//! The second thread: decodes what was received, hands the events on, and records.
+//! The first thread: receives and decodes, hands the events on, and records. While it records, another one receives.
 
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -131,10 +131,15 @@ impl Promise {
 
 impl Work<'_> {
     fn all(&mut self) -> Result<()> {
-        let tick = if self.listens { TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)) } else { IDLE };
         let mut batch = Batch::new();
+        if lock(&self.shared.recorder).is_some() {
+            self.shared.receiver.apart()?;
+        }
         while !self.shared.receiver.is_done() {
             self.expect()?;
+            // Only where a board makes no promises does silence say anything.
+            let guesses = self.listens && self.sender.version() == 1;
+            let tick = if guesses { TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)) } else { IDLE };
             let wait = if self.copiers.is_empty() { tick } else { tick.min(GATHER) };
             let silent_until = if self.shared.receiver.take(&mut batch, wait)? {
                 self.decode(&batch)?;
@@ -202,6 +207,8 @@ impl Work<'_> {
         for wish in wishes {
             match wish {
                 Wish::Begin(mut recorder, give) => {
+                    // A disk may hold this thread up.
+                    self.shared.receiver.apart()?;
                     let begun = recorder.begin(&self.shared.counters(), &self.held);
                     if begun.is_ok() {
                         let decoder = Decoder::new(self.options.array.clone()).differences(self.options.differences);
@@ -358,15 +365,13 @@ impl Work<'_> {
             counters.markers += events.markers.len() as u64;
             counters.marked_start = events.markers.last().map(|m| m.start).or(counters.marked_start);
         }
-        if self.listens {
-            let dropped = self.shared.handover.put(events);
+        let promised = self.promise.take();
+        if self.listens && (promised.is_some() || !events.is_empty() || !events.markers.is_empty()) {
+            let dropped = self.shared.handover.put(events, promised);
             self.shared.shown().counters.events_dropped = dropped;
+            self.believed = self.believed.max(promised);
         }
         events.clear();
-        if let Some(until) = self.promise.take().filter(|_| self.listens) {
-            self.shared.handover.quiet(until);
-            self.believed = self.believed.max(Some(until));
-        }
         if self.has_intensities {
             events.intensity.get_or_insert_default();
         }

@@ -15,29 +15,47 @@ pub(super) struct Handover {
 #[derive(Debug)]
 struct Waiting {
     events: Events,
-    /// After these events there is nothing before this time, us.
-    quiet_until: Option<i64>,
+    quiet: Option<Quiet>,
     dropped: u64,
     closed: bool,
+}
+
+/// After the events that were handed over nothing comes before this time, us.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Quiet {
+    /// As the host's clock has it: what comes late may prove it wrong.
+    Believed(i64),
+    /// The board has promised it.
+    Promised(i64),
+}
+
+impl Quiet {
+    /// us.
+    pub(super) fn until(self) -> i64 {
+        match self {
+            Self::Believed(t) | Self::Promised(t) => t,
+        }
+    }
 }
 
 /// What the readout takes at once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Taken {
-    /// After the events there is nothing before this time, us.
-    pub quiet_until: Option<i64>,
+    /// How far time has come after the events.
+    pub quiet: Option<Quiet>,
     /// Nothing will come any more.
     pub last: bool,
 }
 
 impl Handover {
     pub(super) fn new(array: &Array, limit: usize) -> Self {
-        let state = Waiting { events: Events::empty(array.clone()), quiet_until: None, dropped: 0, closed: false };
+        let state = Waiting { events: Events::empty(array.clone()), quiet: None, dropped: 0, closed: false };
         Self { state: Mutex::new(state), came: Condvar::new(), limit }
     }
 
-    /// Hands events over and leaves `events` empty; those that find no room are dropped, and counted in what this gives.
-    pub(super) fn put(&self, events: &mut Events) -> u64 {
+    /// Hands events over, with what the board promises behind them, and leaves `events` empty; those that find no room are dropped,
+    /// and counted in what this gives. One wake-up.
+    pub(super) fn put(&self, events: &mut Events, promised: Option<i64>) -> u64 {
         let mut state = self.state();
         let room = self.limit.saturating_sub(state.events.len());
         if state.events.is_empty() && state.events.markers.is_empty() && events.len() <= room {
@@ -48,16 +66,16 @@ impl Handover {
             state.events.append(events, room.min(events.len()));
             events.clear();
         }
-        state.quiet_until = None;
+        state.quiet = promised.map(Quiet::Promised);
         let dropped = state.dropped;
         drop(state);
         self.came.notify_one();
         dropped
     }
 
-    /// Says that after all that was handed over nothing comes before `t` us.
+    /// Believes that after all that was handed over nothing comes before `t` us.
     pub(super) fn quiet(&self, t: i64) {
-        self.state().quiet_until = Some(t);
+        self.state().quiet = Some(Quiet::Believed(t));
         self.came.notify_one();
     }
 
@@ -69,12 +87,11 @@ impl Handover {
     /// Waits for something and takes all of it.
     pub(super) fn take(&self, events: &mut Events) -> Taken {
         events.clear();
-        let nothing = |s: &mut Waiting| {
-            s.events.is_empty() && s.events.markers.is_empty() && s.quiet_until.is_none() && !s.closed
-        };
+        let nothing =
+            |s: &mut Waiting| s.events.is_empty() && s.events.markers.is_empty() && s.quiet.is_none() && !s.closed;
         let mut state = self.came.wait_while(self.state(), nothing).unwrap_or_else(PoisonError::into_inner);
         std::mem::swap(&mut state.events, events);
-        Taken { quiet_until: state.quiet_until.take(), last: state.closed }
+        Taken { quiet: state.quiet.take(), last: state.closed }
     }
 
     /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
@@ -101,11 +118,11 @@ mod tests {
         let handover = Handover::new(&Array::thesis(), 10);
         for (t, ticks) in [(&[1, 2][..], None), (&[3], Some(7)), (&[4], None)] {
             let mut piece = events(t, ticks);
-            assert_eq!(handover.put(&mut piece), 0);
+            assert_eq!(handover.put(&mut piece, None), 0);
             assert!(piece.is_empty());
         }
         let mut taken = Events::empty(Array::thesis());
-        assert_eq!(handover.take(&mut taken), Taken { quiet_until: None, last: false });
+        assert_eq!(handover.take(&mut taken), Taken { quiet: None, last: false });
         assert_eq!(taken.t, [1, 2, 3, 4]);
         let intensity = taken.intensity.as_ref().expect("one had an intensity");
         assert_eq!(intensity.ticks, [0, 0, 7, 0]);
@@ -116,8 +133,8 @@ mod tests {
     #[test]
     fn what_finds_no_room_is_counted() {
         let handover = Handover::new(&Array::thesis(), 3);
-        assert_eq!(handover.put(&mut events(&[1, 2], None)), 0);
-        assert_eq!(handover.put(&mut events(&[3, 4, 5], None)), 2);
+        assert_eq!(handover.put(&mut events(&[1, 2], None), None), 0);
+        assert_eq!(handover.put(&mut events(&[3, 4, 5], None), None), 2);
         let mut taken = Events::empty(Array::thesis());
         handover.take(&mut taken);
         assert_eq!(taken.t, [1, 2, 3]);
@@ -128,10 +145,12 @@ mod tests {
         let handover = Handover::new(&Array::thesis(), 10);
         let mut taken = Events::empty(Array::thesis());
         handover.quiet(100);
-        assert_eq!(handover.take(&mut taken).quiet_until, Some(100));
+        assert_eq!(handover.take(&mut taken).quiet, Some(Quiet::Believed(100)));
         handover.quiet(200);
-        handover.put(&mut events(&[150], None));
-        assert_eq!(handover.take(&mut taken).quiet_until, None);
+        handover.put(&mut events(&[150], None), None);
+        assert_eq!(handover.take(&mut taken).quiet, None);
+        handover.put(&mut events(&[], None), Some(300));
+        assert_eq!(handover.take(&mut taken).quiet, Some(Quiet::Promised(300)));
         handover.close();
         assert!(handover.take(&mut taken).last);
     }

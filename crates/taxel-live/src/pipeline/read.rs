@@ -1,4 +1,4 @@
-//! The third thread: encodes, reads out, and says.
+//! The thread behind decoding: encodes, reads out, and says.
 
 use std::sync::atomic::Ordering;
 
@@ -8,7 +8,7 @@ use taxel_core::detect::{Detection, Readout, ReadoutStream};
 use taxel_core::encode::Tare;
 
 use super::ahead::Ahead;
-use super::handover::Taken;
+use super::handover::{Quiet, Taken};
 use super::options::LiveOptions;
 use super::rest::Rest;
 use super::said::{Said, Sink};
@@ -97,14 +97,15 @@ impl Reader {
         match &mut self.mode {
             Mode::Reading(readout) => {
                 readout.push(self.events.view(), &mut self.found)?;
-                match taken.quiet_until {
-                    Some(t) if taken.last => readout.advance(t, &mut self.found)?,
-                    Some(t) => readout.quiet(t, &mut self.found)?,
+                match taken.quiet {
+                    Some(Quiet::Promised(t)) => readout.advance(t, &mut self.found)?,
+                    Some(Quiet::Believed(t)) if taken.last => readout.advance(t, &mut self.found)?,
+                    Some(Quiet::Believed(t)) => readout.quiet(t, &mut self.found)?,
                     None => {}
                 }
             }
             Mode::Taring(rest) => {
-                if let Some((stop, inside)) = rest.hear(&self.events, taken.quiet_until)? {
+                if let Some((stop, inside)) = rest.hear(&self.events, taken.quiet.map(Quiet::until))? {
                     self.begin(shared, stop, inside)?;
                 }
             }
