@@ -9,6 +9,7 @@ import time
 import numpy as np
 import pytest
 from bruteforce import looked_at, potential
+from sklearn.base import clone
 from stated import examples
 
 from taxel import Neuron, ProblemError, SpikeTrains
@@ -25,12 +26,17 @@ def judged(cone, patterns, targets):
     if cone.status_ == "infeasible":
         assert check_certificate(cone.problem_, cone.certificate_), said
         return cone.status_
-    assert cone.status_ == "solved", said
+    if cone.status_ == "stopped" and "it hears them too late" in cone.reason_:
+        return cone.status_
+    assert cone.status_ == "solved", f"{said}: {cone.reason_}"
     assert min(cone.margin_) >= 0.499 * min(cone.problem_.margin), said
     for pattern, times in zip(patterns, targets, strict=True):
         fired = cone.neuron_.run(cone.weights_, pattern)
         assert len(fired) == len(times), f"{said}: fires at {fired[:9]}, not at {times}"
-        assert np.abs(fired - times).max(initial=0) <= 1e-6, f"{said}: {fired - times}"
+        rounding = np.spacing(pattern.stop)
+        assert np.abs(fired - times).max(initial=0) <= 1e-6 + 4 * rounding, f"{said}: {fired - times}"
+        if rounding > 1e-10:
+            continue  # the sums below take differences of times that are as close as 1e-9 ms
         missed, room, slope = looked_at(cone.neuron_, cone.weights_, pattern, times)
         assert missed <= 2e-12, f"{said}: {missed}"
         assert room >= 0.499 * min(cone.margin_), f"{said}: {room}"
@@ -104,6 +110,37 @@ def beside(seed):
     return cone, lists, wanted
 
 
+def just_before(seed):
+    """Inputs 1e-6 to 1e-4 ms before targets, where rows of silence are all but the target's own."""
+    random = np.random.default_rng([20, seed])
+    trains, lists, wanted = int(random.integers(10, 40)), [], []
+    for _ in range(int(random.integers(1, 4))):
+        own = np.cumsum(random.uniform(12, 40, random.integers(1, 4))) + 10
+        times = [list(random.uniform(0, own[-1] + 10, random.integers(1, 4))) for _ in range(trains)]
+        for n in random.choice(trains, random.integers(1, 6), replace=False):
+            times[n].append(float(random.choice(own)) - 10 ** random.uniform(-5.9, -4))
+        lists.append(SpikeTrains.from_lists([sorted(t) for t in times], stop=own[-1] + 20))
+        wanted.append(own.tolist())
+    lambdas = [(1, 0, 0), (2, 2, 200), (0, 1, 0), (0, 0, 1)][random.integers(4)]
+    return ConeX(lambdas=lambdas, lb=-2, ub=2), lists, wanted
+
+
+def far_from_0(seed):
+    """Patterns that start hours, months or decades from time 0, where neighbouring times are up to 2e-4 ms apart."""
+    random = np.random.default_rng([21, seed])
+    start, trains, lists, wanted = float(random.choice([2.0**28, 2.0**34, 2.0**40])), 25, [], []
+    for _ in range(3):
+        times = [np.sort(np.round(random.uniform(0, 100, random.integers(1, 4)) * 64) / 64) for _ in range(trains)]
+        lists.append(SpikeTrains.from_lists([start + t for t in times], start=start, stop=start + 120))
+        wanted.append([start + float(np.round(random.uniform(35, 90) * 64) / 64)])
+    neuron = Neuron(
+        first_threshold=str(random.choice(["theta_0", "printed"])),
+        after_spike=str(random.choice(["keep", "ignore", "reset"])),
+        refractory=float(random.choice([4.0, 30.0])),
+    )
+    return ConeX(neuron=neuron, lambdas=[(0, 1, 0), (1, 0, 0)][random.integers(2)], lb=-2, ub=2), lists, wanted
+
+
 def lifted(seed):
     """B alone."""
     random = np.random.default_rng([19, seed])
@@ -118,13 +155,14 @@ def lifted(seed):
     return cone, lists, wanted
 
 
-KINDS = {"paused": paused, "beside": beside, "lifted": lifted}
+KINDS = {"paused": paused, "beside": beside, "just_before": just_before, "far_from_0": far_from_0, "lifted": lifted}
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_says_solved_fires_at_its_targets_and_nowhere_else(kind):
     said = [judged(*KINDS[kind](seed)) for seed in range(QUICK)]
     assert said.count("solved") > QUICK / 3
+    assert said.count("stopped") < QUICK / 5 if kind == "just_before" else "stopped" not in said
 
 
 @pytest.mark.slow
@@ -132,6 +170,21 @@ def test_what_says_solved_fires_at_its_targets_and_nowhere_else(kind):
 def test_a_thousand_that_say_solved_fire_at_their_targets_and_nowhere_else(kind):
     for seed in range(QUICK, ALL):
         judged(*KINDS[kind](seed))
+
+
+@pytest.mark.parametrize("factor", [2.0**-40, 0.25, 2.0**20])
+def test_potentials_in_another_unit_give_the_same_fit(factor):
+    for seed in range(20):
+        cone, patterns, targets = paused(seed)
+        cone.fit(patterns, targets)
+        neuron = clone(cone.neuron).set_params(
+            theta_0=factor * cone.neuron.theta_0, theta_plus=factor * cone.neuron.theta_plus
+        )
+        other = clone(cone).set_params(neuron=neuron, lb=-3 * factor, ub=3 * factor).fit(patterns, targets)
+        assert other.status_ == cone.status_, f"seed {seed}"
+        if cone.status_ == "solved":
+            assert np.array_equal(other.weights_, factor * cone.weights_), f"seed {seed}"
+            assert other.margin_.mv == factor * cone.margin_.mv, f"seed {seed}"
 
 
 @pytest.mark.parametrize("margin", [None, 1e-3])

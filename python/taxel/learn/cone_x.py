@@ -114,15 +114,15 @@ class ConeX(SpikeLearner):
     norm : {"norm", "square"}
         The l2 term as printed, or squared.
     margin : float, mV, 0 or more, optional
-        How far below the threshold silence shall stay; where left out 1e-3 in continuous time, 0 on the grid. Where
-        neither it nor `slope` is given and no weights keep it, in continuous time a tenth, a hundredth and a
-        thousandth of both are tried (`problem_.margin` says which it was), so that "infeasible" holds for any margin
-        (``certificate_.at_all``); with one that is given it holds for that one. On the grid the
-        best weights touch the threshold at many points, and a neuron that is run on the grid fires where it is touched:
-        ask for 1e-9 or more.
+        How far below the threshold silence shall stay; where left out ``theta_0 / 300`` (1e-3 by default) in
+        continuous time, 0 on the grid. Where neither it nor `slope` is given and no weights keep it, in continuous time
+        a tenth, a hundredth and a thousandth of both are tried (`problem_.margin` says which it was), so that
+        "infeasible" holds for any margin (``certificate_.at_all``); with one that is given it holds for that one. On
+        the grid the best weights touch the threshold at many points, and a neuron that is run on the grid fires where
+        it is touched: ask for 1e-9 or more.
     slope : float, mV/ms, 0 or more, optional
         How steeply that margin falls to 0 at a target, and how much steeper than the threshold the potential comes up
-        there; 1e-3 where left out. Continuous time only.
+        there; ``theta_0 / 300`` a ms where left out. Continuous time only.
     horizon : float or float64 of shape (patterns,), ms, optional
         Where silence ends; the later of a pattern's stop and its last target + `tau` where left out.
     tolerance : float, from 1e-12 to 0.1

@@ -19,12 +19,12 @@ use crate::neuron::{Neuron, Time};
 use crate::parameters::Described;
 use crate::{Result, SpikeTrains, Stop, problem};
 
-/// The margin and the slope in continuous time where none is given, mV and mV/ms.
+/// The margin and the slope in continuous time where none is given, mV and mV/ms, at the default threshold; else in proportion.
 const MARGIN: f64 = 1e-3;
-/// Where no weights keep it, a smaller one is tried, down to this share of it, and to so many units.
+/// Where no weights keep it, a smaller one is tried, down to this share of it.
 const SMALLER: f64 = 0.1;
-const LEAST_SHARE: f64 = 1e-3;
-const LEAST_MARGIN: f64 = 0.99e-6;
+const LEAST_SHARE: f64 = 0.99e-3;
+
 /// Parameters of CONE-X; defaults from Table 6.1 and 6.4.3.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -45,9 +45,9 @@ pub struct ConeX {
     pub divide_b_by: Divisor,
     /// The l2 term as norm or as square.
     pub norm: Norm,
-    /// How far below the threshold silence shall stay, mV; where left out 1e-3 in continuous time, 0 on the grid.
+    /// How far below the threshold silence shall stay, mV; where left out `theta_0` / 300 in continuous time, 0 on the grid.
     pub margin: Option<f64>,
-    /// How steeply that margin falls to 0 at a target, mV/ms; continuous time only, 1e-3 where left out.
+    /// How steeply that margin falls to 0 at a target, mV/ms; continuous time only, `theta_0` / 300 a ms where left out.
     pub slope: Option<f64>,
     /// Where silence ends, ms, one for all or one a pattern; the later of a pattern's end and its last target + `tau` where
     /// left out.
@@ -166,7 +166,8 @@ impl ConeX {
     /// The margin that silence keeps.
     #[must_use]
     pub fn margin(&self) -> Margin {
-        let left_out = if self.neuron.time == Time::Continuous { MARGIN } else { 0.0 };
+        let continuous = self.neuron.time == Time::Continuous;
+        let left_out = if continuous { MARGIN * (self.neuron.theta_0 / Neuron::default().theta_0) } else { 0.0 };
         Margin { height: self.margin.unwrap_or(left_out), slope: self.slope.unwrap_or(left_out) }
     }
 
@@ -332,7 +333,7 @@ impl ConeXProblem {
         }
         while self.free_margin && not_at_all(&found) {
             let margin = found.asked.times(SMALLER);
-            if margin.height < (0.99 * LEAST_SHARE * first.height).max(LEAST_MARGIN) {
+            if margin.height < LEAST_SHARE * first.height {
                 found = self.undecided(&found);
                 break;
             }
@@ -384,11 +385,13 @@ impl Exact {
             End::Infeasible(certificate) => self.refuted(certificate, rounds),
             End::Met if self.objective.l1 > 0.0 || self.objective.b > 0.0 => {
                 let best = self.mix(best, start, progress, stop)?;
-                self.report(best, stop.asked().then_some(ASKED))
+                self.report(best, stop.asked().then_some(ASKED))?
             }
-            End::Met => self.report(best, None),
-            End::Stopped if stop.asked() => self.report(best, Some(ASKED)),
-            End::Stopped => self.report(best, Some("rows that rounding cannot tell apart are neither met nor refuted")),
+            End::Met => self.report(best, None)?,
+            End::Stopped if stop.asked() => self.report(best, Some(ASKED))?,
+            End::Stopped => {
+                self.report(best, Some("rows that rounding cannot tell apart are neither met nor refuted"))?
+            }
         })
     }
 
@@ -414,7 +417,7 @@ impl Exact {
     }
 
     /// Measures the weights over all rows, whatever engine they come from.
-    fn report(&self, best: Best, cut_short: Option<&str>) -> ConeXFit {
+    fn report(&self, best: Best, cut_short: Option<&str>) -> Result<ConeXFit> {
         let Best { mut weights, least, held, engine, rounds } = best;
         let Bounds { lower, upper } = &self.objective.bounds;
         // A bound that binds is met to rounding, from either side.
@@ -441,10 +444,10 @@ impl Exact {
         } else if !known {
             Some(format!("the objective is only proven to lie within {gap:.1e} of its least value"))
         } else {
-            None
+            self.fires_elsewhere(&weights)?
         };
         let status = if reason.is_none() { Status::Solved } else { Status::Stopped };
-        ConeXFit {
+        Ok(ConeXFit {
             margin: self.kept_margin(&weights),
             fit: Fit { status, weights, objective, parts, gap, rounds, engine },
             asked: self.statement.margin,
@@ -452,6 +455,6 @@ impl Exact {
             violation: largest([missed, broken, 0.0]),
             held,
             certificate: None,
-        }
+        })
     }
 }

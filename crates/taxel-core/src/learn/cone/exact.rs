@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::learn::fit::Engine;
 use crate::learn::statement::{Margin, Objective, Parts, Peak, Row, Silence, Stated, Statement, Targets, largest};
-use crate::neuron::Time;
+use crate::neuron::{AT_EDGE, Time};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -15,6 +15,8 @@ const BROKEN: f64 = 1e-13;
 const BROKEN_SHARE: f64 = 2e-16;
 /// The share of the margin that weights must keep to count as a solution.
 const KEPT_SHARE: f64 = 0.5;
+/// A spike may lie so many neighbouring times beside its target.
+const ROUNDINGS: f64 = 4.0;
 /// Rounds end without a verdict after so many.
 pub(super) const MOST_ROUNDS: usize = 1000;
 
@@ -87,6 +89,44 @@ impl Exact {
     pub(super) fn rounding(&self, weights: &[f64]) -> f64 {
         let least = if self.is_grid() { MET } else { BROKEN };
         least.max(BROKEN_SHARE * weights.iter().map(|w| w.abs()).sum::<f64>())
+    }
+
+    /// Where the neuron itself, run on the patterns, does not fire as asked; continuous time only.
+    ///
+    /// It hears an input within 1e-6 ms before a crossing too late (`AT_EDGE`), the rows one so near before a target: an
+    /// input that turns the potential down a few such times before a target can be heard in the rows and too late for the
+    /// neuron.
+    pub(super) fn fires_elsewhere(&self, weights: &[f64]) -> Result<Option<String>> {
+        if self.is_grid() {
+            return Ok(None);
+        }
+        for (p, sheet) in self.statement.sheets.iter().enumerate() {
+            let (mut fired, mut stream) = (vec![], self.statement.neuron.stream(weights, 1.0, sheet.start)?);
+            for &(t, train) in sheet.inputs.iter().take_while(|input| input.0 <= sheet.end) {
+                stream.push(t, train, &mut fired)?;
+            }
+            stream.advance(sheet.end, &mut fired);
+            let asked = sheet.targets.iter().map(Some).chain(std::iter::repeat(None));
+            let fired = fired.iter().map(|spike| Some(spike.t)).chain(std::iter::repeat(None));
+            let most = sheet.targets.len() + 1;
+            for (target, spike) in asked.zip(fired).take(most) {
+                let reason = match (target, spike) {
+                    (Some(target), Some(t))
+                        if (t - target).abs() <= AT_EDGE + ROUNDINGS * (target.next_up() - target) =>
+                    {
+                        continue;
+                    }
+                    (None, None) => continue,
+                    (Some(target), Some(t)) => format!("fires at {t:.7} ms, not at its target {target:.7} ms"),
+                    (Some(target), None) => format!("does not fire at its target {target:.7} ms"),
+                    (None, Some(t)) => format!("fires at {t:.7} ms too"),
+                };
+                return Ok(Some(format!(
+                    "the neuron {reason} (pattern {p}): inputs lie so near before a target that it hears them too late"
+                )));
+            }
+        }
+        Ok(None)
     }
 
     fn is_grid(&self) -> bool {

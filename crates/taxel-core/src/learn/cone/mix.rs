@@ -7,7 +7,7 @@ use super::exact::{Best, Exact, MET, MOST_ROUNDS, Slopes};
 use crate::learn::engines::mixed::{self, Terms};
 use crate::learn::engines::{HardRows, nearest};
 use crate::learn::fit::{Left, Round};
-use crate::learn::statement::{Bounds, Peak, Row, Targets, largest};
+use crate::learn::statement::{Bounds, Peak, Row, Stated, Targets, largest};
 use crate::vectors::dot;
 use crate::{Result, Stop};
 
@@ -20,6 +20,8 @@ const NEAR_SHARE: f64 = 1e-4;
 const SLACK_SHARE: f64 = 0.05;
 /// Rounds in which rows go: later ones only add, so that they end.
 const DROPPING: usize = 10;
+/// So near before a target, in `tau`, a row of silence is all but the target's own.
+const BESIDE: f64 = 1e-2;
 
 impl Exact {
     /// Goes on from weights that meet every row.
@@ -144,8 +146,16 @@ impl Dense {
     fn add_silence(&mut self, problem: &Exact, pattern: usize, t: f64) -> Result<()> {
         if self.there.insert((pattern, t.to_bits())) {
             let row = Row::Silence { pattern, t };
-            let stated = problem.statement.state(row)?;
-            self.push(row, &stated.coefficients, stated.limit);
+            let Stated { mut coefficients, mut limit } = problem.statement.state(row)?;
+            // Less the target's row, which is met with equality, over the time between, it asks for a slope: a row as long as
+            // the others. As it stands the two are parallel to rounding.
+            let tau = problem.statement.neuron.tau;
+            if let Some((target, at)) = self.targets.next(pattern, t).filter(|(target, _)| target - t < BESIDE * tau) {
+                let steep = tau / (target - t);
+                coefficients.iter_mut().zip(at.at).for_each(|(c, at)| *c = steep * (*c - at));
+                limit = steep * (limit - at.threshold);
+            }
+            self.push(row, &coefficients, limit);
         }
         Ok(())
     }

@@ -138,7 +138,8 @@ fn strip(statement: &Statement, sheet: &Sheet) -> Strip {
     }
     if neuron.first_threshold == FirstThreshold::Printed {
         let rise = sheet.start + neuron.refractory;
-        times.extend([rise - BEFORE_RISE, rise]);
+        // Far from time 0 two neighbouring times are farther apart than that.
+        times.extend([(rise - BEFORE_RISE).min(rise.next_down()), rise]);
     }
     times.retain(|&t| sheet.start <= t && t <= sheet.end);
     times.sort_unstable_by(f64::total_cmp);

@@ -90,6 +90,12 @@ impl Targets {
         TargetRow { threshold: self.thresholds[k], at: &self.at[columns.clone()], behind: &self.behind[columns] }
     }
 
+    /// The pattern's first target at `t` or later: when it is, ms, and what is asked there.
+    pub(crate) fn next(&self, pattern: usize, t: f64) -> Option<(f64, TargetRow<'_>)> {
+        let k = self.names.iter().zip(&self.times).position(|(name, &time)| name.0 == pattern && time >= t)?;
+        Some((self.times[k], self.row(k)))
+    }
+
     pub(crate) fn iter(&self) -> impl Iterator<Item = TargetRow<'_>> + Clone {
         (0..self.len()).map(|k| self.row(k))
     }
