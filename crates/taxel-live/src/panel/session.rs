@@ -10,7 +10,7 @@ use tokio::sync::{broadcast, mpsc, watch};
 
 use super::film::{FileFilm, Film, Gaze, Player};
 use super::hub::{Hub, LiveSide, Seat, Told, said_of};
-use super::lens::{COLUMN_US, COLUMNS_US, History, LATE_US, is_column};
+use super::lens::{COLUMN_US, COLUMNS_US, History, LATE_US, column_of, is_column};
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::picture::{self, About, FOLLOWS, LIVE, MOVES, RECORDS, RESTART};
 use super::requests::{Answer, Asked, Refused, carry_out, prepare};
@@ -311,7 +311,10 @@ impl Session {
                 let near = self.near.as_deref_mut();
                 let history = self.history.as_ref().map(|(history, _)| history);
                 let spikes = self.spikes.as_ref().map(|(spikes, _)| spikes);
+                let come = near.as_ref().map_or(i64::MAX, |near| column_of(near.t(), about.column_us));
                 let (bytes, last) = picture::of_lens(&mut lens, near, columns, history, spikes, about);
+                // The lens may have gone on since the narrow columns were read: those in between come again.
+                let last = last.min(come);
                 (bytes, last, rests)
             }
             View::At(player) => {
