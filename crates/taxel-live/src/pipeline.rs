@@ -18,6 +18,7 @@ mod rest;
 mod said;
 mod sending;
 mod shared;
+mod source;
 mod sources;
 mod tap;
 
@@ -37,7 +38,7 @@ use crate::capture::{Origin, Receiver};
 use crate::locked::lock;
 use crate::{Error, Result};
 pub use copies::{Copied, Copies};
-pub use counters::{Counters, Summary};
+pub use counters::{Counters, SourceCounts, Summary};
 pub use handle::Handle;
 use handover::Handover;
 pub use options::{LiveOptions, Record};
@@ -47,8 +48,8 @@ pub use said::{Lines, Said, Sink};
 use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{Shared, Shown};
+pub use source::{Place, Source, SourceKind};
 use sources::Others;
-pub use sources::{Place, Source, SourceCounts, SourceKind};
 pub use tap::{Change, Outlet, Piece, UNKNOWN};
 
 /// How long a wait lasts before it is asked whether to stop.
@@ -62,7 +63,7 @@ pub struct Live {
     shared: Arc<Shared>,
     said: channel::Receiver<Said>,
     threads: Vec<JoinHandle<()>>,
-    others: Mutex<Others>,
+    others: Mutex<Others<Live>>,
 }
 
 impl Live {
@@ -157,7 +158,11 @@ impl Live {
         let decoder = Decoder::new(options.array.clone()).differences(options.differences);
         let sender = wire::Receiver::new(decoder, 1);
         let listens = !matches!(ear, Ear::Deaf);
-        let others = Others::start(&shared).inspect_err(|_| {
+        let board = |address, own: LiveOptions, part| {
+            let capture = own.capture;
+            Self::begin(|| Receiver::bind(address, capture), own, Ear::Deaf, vec![], Some(part))
+        };
+        let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing came: a new file is not left behind.
             let recorder = lock(&shared.recorder).take();
             drop(recorder.map(|recorder| recorder.finish(&Counters::default())));
@@ -329,7 +334,7 @@ impl Live {
     ///
     /// What ended the way early, or `File` where the end of the recording cannot be written.
     pub fn stop(mut self) -> Result<Summary> {
-        let others = lock(&self.others).stop();
+        let others = lock(&self.others).stop(|board| Ok(board.stop()?.counters));
         let joined = self.join();
         let (sources, ended) = others.map_or_else(|error| (BTreeMap::new(), Err(error)), |counts| (counts, Ok(())));
         let counters = Counters { sources, ..self.shared.counters() };

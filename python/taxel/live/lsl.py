@@ -23,7 +23,7 @@ _LOOK_S, _WAIT_S = 3.0, 0.05
 
 def _pylsl() -> Any:
     try:
-        import pylsl  # type: ignore[import-untyped,unused-ignore]  # noqa: PLC0415  an extra
+        import pylsl  # noqa: PLC0415  an extra
     except ImportError:
         raise ImportError("pylsl is not installed: pip install taxel[lsl]") from None
     warnings.warn(

@@ -7,7 +7,6 @@ use serde::Serialize;
 use taxel_core::wire;
 
 use super::sending::Sent;
-use super::sources::SourceCounts;
 use crate::bridged::Bridged;
 use crate::capture;
 use crate::clock::Offset;
@@ -93,4 +92,21 @@ pub struct Summary {
     pub verdict: String,
     /// The file, where something was recorded: one to which nothing came is not kept, and none is replaced by it.
     pub path: Option<PathBuf>,
+}
+
+/// What came of a source, and what was lost.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum SourceCounts {
+    /// Of a board all that is counted of one.
+    Board(Box<Counters>),
+    /// Of numbers.
+    Numbers {
+        /// Lines, or samples given.
+        lines: u64,
+        /// Those that could not be read; they are kept as they came.
+        strange: u64,
+        /// What the system said last, where the line broke.
+        trouble: Option<String>,
+    },
 }

@@ -6,7 +6,7 @@ use taxel_core::Array;
 use taxel_core::wire::Registers;
 
 use super::sending::Destination;
-use super::sources::Source;
+use super::source::Source;
 use crate::capture::ReceiverOptions;
 use crate::recording::Compression;
 

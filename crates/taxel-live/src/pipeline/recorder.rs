@@ -12,8 +12,7 @@ use taxel_core::{Marker, problem};
 use super::counters::Counters;
 use super::options::{LiveOptions, Record};
 use super::said::Said;
-use super::shared::Shared;
-use super::sources::Source;
+use super::source::Source;
 use crate::capture::{Batch, Origin};
 use crate::locked::lock;
 use crate::recording::{self, BoardChange, Header, LsaWriter, Track, Writer, now_ns};
@@ -81,10 +80,19 @@ impl Kind {
     }
 }
 
+/// The pipeline whose recording it is.
+pub(super) trait Host: Send + Sync {
+    /// Opens another source's part of it.
+    fn part(&self, name: &str) -> Result<Track>;
+
+    /// Ends everything because of an error.
+    fn fail(&self, error: Error);
+}
+
 /// A source's part of a recording that another pipeline began.
 #[derive(Clone)]
 pub(super) struct Part {
-    pub(super) host: Weak<Shared>,
+    pub(super) host: Weak<dyn Host>,
     pub(super) name: String,
 }
 
@@ -92,10 +100,7 @@ impl Part {
     /// Opens it: the file is there from then on.
     pub(super) fn open(&self) -> Result<Track> {
         let host = self.host.upgrade().ok_or_else(|| problem!("source {}: the recording has ended", self.name))?;
-        match &*lock(&host.recorder) {
-            Some(recorder) => recorder.writer(&self.name),
-            None => Err(problem!("source {}: nothing is recorded", self.name).into()),
-        }
+        host.part(&self.name)
     }
 }
 
@@ -119,7 +124,7 @@ impl Recorder {
     }
 
     /// Another source's part of this recording.
-    fn writer(&self, name: &str) -> Result<Track> {
+    pub(super) fn writer(&self, name: &str) -> Result<Track> {
         match self.kind()? {
             Kind::Mcap(writer) => writer.track(name),
             Kind::Track(_) | Kind::Lsa(_) => Err(problem!("source {name}: only a .mcap holds several sources").into()),

@@ -12,13 +12,14 @@ use taxel_core::wire::Registers;
 use super::counters::Counters;
 use super::handover::Handover;
 use super::options::LiveOptions;
-use super::recorder::Recorder;
+use super::recorder::{Host, Recorder};
 use super::said::Said;
 use super::sending::Line;
 use super::tap::Outlet;
 use crate::capture::Receiver;
 use crate::latency::Latencies;
 use crate::locked::lock;
+use crate::recording::Track;
 use crate::{Error, Result};
 
 /// What the threads tell those who look on.
@@ -114,5 +115,18 @@ impl Shared {
     pub(super) fn fail(&self, error: Error) {
         self.shown().failed.get_or_insert(error);
         self.receiver.stop();
+    }
+}
+
+impl Host for Shared {
+    fn part(&self, name: &str) -> Result<Track> {
+        match &*lock(&self.recorder) {
+            Some(recorder) => recorder.writer(name),
+            None => Err(taxel_core::problem!("source {name}: nothing is recorded").into()),
+        }
+    }
+
+    fn fail(&self, error: Error) {
+        Self::fail(self, error);
     }
 }

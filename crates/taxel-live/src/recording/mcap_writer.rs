@@ -271,7 +271,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where columns differ in length or name bytes that are not there; else as [`Writer::datagram`].
+    /// `Core(Problem)` where columns differ in length or name bytes that are not there; else as [`Track::datagram`].
     pub fn datagrams(&self, arrived_ns: &[i64], number: &[u64], offsets: &[i64], bytes: &[u8]) -> Result<()> {
         if number.len() != arrived_ns.len() || offsets.len() != arrived_ns.len() + 1 {
             let n = arrived_ns.len();
@@ -291,7 +291,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Writer::datagram`], also below.
+    /// As [`Track::datagram`], also below.
     pub fn registers(&self, at_ns: i64, registers: &Registers) -> Result<()> {
         self.push_json(Topic::Registers, at_ns, &json!(registers))
     }
@@ -300,7 +300,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Writer::datagram`].
+    /// As [`Track::datagram`].
     pub fn marker(&self, at_ns: i64, marker: Marker) -> Result<()> {
         self.push_json(Topic::Markers, at_ns, &json!({ "t_us": marker.t, "start": marker.start }))
     }
@@ -309,7 +309,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Writer::datagram`].
+    /// As [`Track::datagram`].
     pub fn note(&self, at_ns: i64, t_us: Option<i64>, text: &str) -> Result<()> {
         let note = json!({
             "timestamp": time(at_ns), "level": 2, "message": text, "name": "taxel", "file": "", "line": 0, "t_us": t_us,
@@ -321,7 +321,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Writer::datagram`].
+    /// As [`Track::datagram`].
     pub fn board_change(&self, change: &BoardChange) -> Result<()> {
         let said = serde_json::to_value(change).unwrap_or_default();
         self.push_json(Topic::Board, change.at_ns, &said)
@@ -331,7 +331,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Writer::datagram`].
+    /// As [`Track::datagram`].
     pub fn detection(&self, at_ns: i64, detection: &Detection) -> Result<()> {
         let Detection { label, t, known, slope, repaired } = detection;
         let said = json!({ "label": label, "t_us": t, "known_us": known, "slope": slope, "repaired": repaired });
@@ -342,7 +342,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Writer::datagram`].
+    /// As [`Track::datagram`].
     pub fn counts(&self, at_ns: i64, counts: &Counts) -> Result<()> {
         self.push_json(Topic::Counts, at_ns, &json!(counts))
     }
@@ -361,7 +361,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Writer::datagram`]; `Core` where `ticks` are not rows of `columns`.
+    /// As [`Track::datagram`]; `Core` where `ticks` are not rows of `columns`.
     pub fn picture(&self, at_ns: i64, t_us: i64, columns: u16, ticks: &[u16]) -> Result<()> {
         let columns = usize::from(columns);
         if columns == 0 || ticks.is_empty() || !ticks.len().is_multiple_of(columns) {
@@ -382,7 +382,7 @@ impl Track {
     ///
     /// # Errors
     ///
-    /// As [`Writer::datagram`].
+    /// As [`Track::datagram`].
     pub fn held(&self, at_ns: i64, t_us: Option<i64>, ticks: &[u16]) -> Result<()> {
         let bytes: Vec<u8> = ticks.iter().flat_map(|value| value.to_le_bytes()).collect();
         let held = json!({ "t_us": t_us, "encoding": "uint16, little-endian", "ticks": base64(&bytes) });

@@ -1,0 +1,337 @@
+//! What a further source of a recording is, as it is written: another board, lines of numbers from a serial line or a pipe, numbers
+//! that a program gives; and its lines, as they come.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::net::SocketAddr;
+use std::os::fd::{AsRawFd, RawFd};
+use std::os::unix::fs::OpenOptionsExt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::time::{Duration, Instant};
+
+use taxel_core::wire::Registers;
+use taxel_core::{Array, problem};
+
+use super::sending::serial;
+use crate::recording::{Header, Stream, fields, now_ns};
+use crate::{Error, Result, address};
+
+/// How long the first line of a source is waited for, from which its columns are known.
+const FIRST_LINE: Duration = Duration::from_secs(3);
+
+/// How often a line that broke is tried again, and the end looked for.
+const LOOK_EVERY: Duration = Duration::from_millis(50);
+
+/// The longest line, bytes; more is no line of numbers.
+const LONGEST: usize = 1 << 16;
+
+/// Of a serial line, where no speed is named.
+const BAUD: u32 = 115_200;
+
+/// A further source of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    /// What it is called.
+    pub name: String,
+    /// What it is.
+    pub kind: SourceKind,
+}
+
+/// What a further source is.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SourceKind {
+    /// A board that sends to this address of ours.
+    Board(SocketAddr, Box<Array>, Registers),
+    /// Lines of numbers.
+    Lines(Place, Stream),
+    /// Numbers that a program gives ([`Live::sample`](super::Live::sample)).
+    Given(Stream),
+}
+
+/// Where lines of numbers come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// A serial line and its speed, 8 data bits, no parity, 1 stop bit.
+    Serial(PathBuf, u32),
+    /// A named pipe, or any file that is read to its end and then waited at; `-` is the standard input.
+    Pipe(PathBuf),
+}
+
+impl std::fmt::Display for Place {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Serial(path, baud) => write!(f, "serial {}@{baud}", path.display()),
+            Self::Pipe(path) => write!(f, "pipe {}", path.display()),
+        }
+    }
+}
+
+impl Source {
+    /// What the recording says of it.
+    pub(super) fn header(&self) -> taxel_core::Result<Header> {
+        match &self.kind {
+            SourceKind::Board(address, array, registers) => {
+                let board = Header::of_board((**array).clone(), Some(*registers), format!("udp {address}"), now_ns());
+                Ok(Header { name: self.name.clone(), ..board })
+            }
+            SourceKind::Lines(place, stream) => {
+                Header::of_stream(&self.name, stream.clone(), place.to_string(), now_ns())
+            }
+            SourceKind::Given(stream) => {
+                Header::of_stream(&self.name, stream.clone(), "given by a program".to_owned(), now_ns())
+            }
+        }
+    }
+}
+
+/// `udp:HOST:PORT`, `serial:PATH@BAUD`, `pipe:PATH` or `given`, then options after commas: `array=RxC` and `preset=NAME` of a
+/// board, `columns=A:B:C` and `time=NAME:UNIT` of numbers. Lines without `columns` are waited for, to see what they hold.
+impl FromStr for SourceKind {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let mut parts = text.split(',');
+        let what = parts.next().unwrap_or_default();
+        let mut options = BTreeMap::new();
+        for part in parts {
+            let Some((key, value)) = part.split_once('=') else {
+                return Err(problem!("source {text:?}: {part:?} must be KEY=VALUE").into());
+            };
+            options.insert(key.trim(), value.trim());
+        }
+        let kind = match what.split_once(':') {
+            Some(("udp", place)) => {
+                let array = options.remove("array").map_or(Ok(Array::thesis()), |size| array_of(text, size))?;
+                let registers = Registers::preset_on(options.remove("preset").unwrap_or("5.2 kHz"), &array)?;
+                Self::Board(address::of_text(place)?, Box::new(array), registers)
+            }
+            Some(("serial", place)) if !place.is_empty() => {
+                let (path, baud) = match place.rsplit_once('@') {
+                    None => (place, BAUD),
+                    Some((path, baud)) => match baud.parse() {
+                        Ok(baud) if baud > 0 => (path, baud),
+                        _ => return Err(problem!("source {text:?}: {baud:?} is no speed, as 115200").into()),
+                    },
+                };
+                let place = Place::Serial(path.into(), baud);
+                let stream = stream_of(text, &mut options)?.map_or_else(|| first_line(&place), Ok)?;
+                Self::Lines(place, stream)
+            }
+            Some(("pipe", place)) if !place.is_empty() => {
+                let place = Place::Pipe(place.into());
+                let stream = stream_of(text, &mut options)?.map_or_else(|| first_line(&place), Ok)?;
+                Self::Lines(place, stream)
+            }
+            None if what == "given" => match stream_of(text, &mut options)? {
+                Some(stream) => Self::Given(stream),
+                None => return Err(problem!("source {text:?}: needs columns=A:B:C").into()),
+            },
+            _ => {
+                return Err(problem!(
+                    "source {text:?}: must be udp:HOST:PORT, serial:PATH@BAUD, pipe:PATH or given, then options after \
+                     commas"
+                )
+                .into());
+            }
+        };
+        match options.keys().next() {
+            Some(key) => Err(problem!("source {text:?}: has no option {key:?}").into()),
+            None => Ok(kind),
+        }
+    }
+}
+
+/// The array of rows x columns, at the thesis' pitch.
+fn array_of(text: &str, size: &str) -> Result<Array> {
+    let sides = size.split_once('x').and_then(|(rows, columns)| Some((rows.parse().ok()?, columns.parse().ok()?)));
+    let Some((rows, columns)) = sides else {
+        return Err(problem!("source {text:?}: array {size:?} must be rows x columns, as 64x64").into());
+    };
+    let thesis = Array::thesis();
+    if (rows, columns) == (thesis.rows, thesis.columns) {
+        return Ok(thesis);
+    }
+    Ok(Array::new(rows, columns, thesis.pitch_mm, size)?)
+}
+
+/// What the options say of the columns; `None` where they say nothing.
+fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<Stream>> {
+    let columns = options.remove("columns").map(|names| names.split(':').map(str::to_owned).collect());
+    let time = options.remove("time");
+    let Some(columns) = columns else {
+        if time.is_some() {
+            return Err(problem!("source {text:?}: time without columns").into());
+        }
+        return Ok(None);
+    };
+    let mut stream = Stream::of_columns(columns);
+    if let Some(time) = time {
+        let (name, unit) = time.split_once(':').unwrap_or((time, "us"));
+        let unit_us =
+            [("ns", 1e-3), ("us", 1.0), ("ms", 1e3), ("s", 1e6)].into_iter().find(|(known, _)| *known == unit);
+        let Some((_, unit_us)) = unit_us else {
+            return Err(problem!("source {text:?}: unit {unit:?} must be ns, us, ms or s").into());
+        };
+        stream = Stream { time: Some(name.to_owned()), unit_us, ..stream };
+    }
+    Ok(Some(stream))
+}
+
+/// Opens lines and waits for the first that tells the columns: a line of names, or of numbers, which are then called a, b, c ...
+fn first_line(place: &Place) -> Result<Stream> {
+    let mut tap = Tap::open(place)?;
+    let until = Instant::now() + FIRST_LINE;
+    // Who opens a serial line in the middle of a line hears its end first.
+    let mut skip = matches!(place, Place::Serial(..));
+    let mut numbers = None;
+    while Instant::now() < until {
+        let ended = tap.fill().map_err(|error| tap.broken(error))?;
+        while let Some(line) = tap.line() {
+            if std::mem::take(&mut skip) {
+                continue;
+            }
+            let found: Vec<&str> = fields(&line).collect();
+            if found.is_empty() || line.starts_with('#') {
+                continue;
+            }
+            if found.iter().all(|field| field.parse::<f64>().is_ok()) {
+                numbers = Some(found.len());
+                break;
+            }
+            return Ok(Stream::of_columns(found.into_iter().map(str::to_owned).collect()));
+        }
+        if numbers.is_some() || ended {
+            break;
+        }
+    }
+    match numbers {
+        Some(n) => Ok(Stream::of_columns((0..n).map(|k| format!("column_{k}")).collect())),
+        None => {
+            let waited = FIRST_LINE.as_secs();
+            Err(problem!("{place}: no line within {waited} s; name its columns, as columns=t_us:ax:ay:az").into())
+        }
+    }
+}
+
+/// Lines of text from a serial line, a pipe or the standard input, as they come.
+pub(super) struct Tap {
+    place: Place,
+    file: Option<Box<dyn ReadsAsItComes>>,
+    bytes: Vec<u8>,
+    /// When the last of them came, ns since 1970.
+    pub(super) came_ns: i64,
+}
+
+trait ReadsAsItComes: Read + AsRawFd + Send {}
+impl<T: Read + AsRawFd + Send> ReadsAsItComes for T {}
+
+impl Tap {
+    pub(super) fn open(place: &Place) -> Result<Self> {
+        Ok(Self { place: place.clone(), file: Some(open(place)?), bytes: vec![], came_ns: 0 })
+    }
+
+    pub(super) fn is_serial(&self) -> bool {
+        matches!(self.place, Place::Serial(..))
+    }
+
+    /// Waits a little for more; gives whether nothing comes any more.
+    pub(super) fn fill(&mut self) -> io::Result<bool> {
+        let is_input = self.place == Place::Pipe(PathBuf::from("-"));
+        let Some(file) = &mut self.file else {
+            std::thread::sleep(LOOK_EVERY);
+            return Ok(false);
+        };
+        if !comes(file.as_raw_fd(), LOOK_EVERY) {
+            return Ok(false);
+        }
+        let mut piece = [0; 4096];
+        match file.read(&mut piece) {
+            // A pipe that nobody writes to, or the end of a file: somebody may write again.
+            Ok(0) if is_input => return Ok(true),
+            Ok(0) if matches!(self.place, Place::Serial(..)) => return Err(ErrorKind::BrokenPipe.into()),
+            Ok(0) => std::thread::sleep(LOOK_EVERY),
+            Ok(n) => {
+                self.came_ns = now_ns();
+                self.bytes.extend_from_slice(&piece[..n]);
+            }
+            Err(error)
+                if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted) => {}
+            Err(error) => return Err(error),
+        }
+        Ok(false)
+    }
+
+    /// The next whole line of what came; of one that is too long what there is.
+    pub(super) fn line(&mut self) -> Option<String> {
+        let end =
+            self.bytes.iter().position(|&byte| byte == b'\n').or((self.bytes.len() > LONGEST).then_some(LONGEST))?;
+        let line: Vec<u8> = self.bytes.drain(..=end.min(self.bytes.len() - 1)).collect();
+        Some(String::from_utf8_lossy(&line).trim_end_matches(['\r', '\n']).to_owned())
+    }
+
+    pub(super) fn broken(&self, error: io::Error) -> Error {
+        let (Place::Serial(path, _) | Place::Pipe(path)) = &self.place;
+        Error::file(path)(error)
+    }
+
+    /// Tries the line again; what had come of a line is no line.
+    pub(super) fn again(&mut self) {
+        self.bytes.clear();
+        self.file = open(&self.place).ok();
+        if self.file.is_none() {
+            std::thread::sleep(LOOK_EVERY);
+            self.file = open(&self.place).ok();
+        }
+    }
+}
+
+fn open(place: &Place) -> Result<Box<dyn ReadsAsItComes>> {
+    match place {
+        Place::Serial(path, baud) => Ok(Box::new(serial(path, *baud)?)),
+        Place::Pipe(path) if path == Path::new("-") => Ok(Box::new(io::stdin())),
+        Place::Pipe(path) => {
+            let file = File::options().read(true).custom_flags(libc::O_NONBLOCK).open(path);
+            Ok(Box::new(file.map_err(Error::file(path))?))
+        }
+    }
+}
+
+/// Waits until something can be read, or an end was reached.
+fn comes(descriptor: RawFd, most: Duration) -> bool {
+    let mut asked = libc::pollfd { fd: descriptor, events: libc::POLLIN, revents: 0 };
+    let most = i32::try_from(most.as_millis()).unwrap_or(i32::MAX);
+    // SAFETY: one entry, on our stack, of a descriptor that the caller holds open.
+    unsafe { libc::poll(&raw mut asked, 1, most) > 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sources_are_read_as_they_are_written() {
+        let board: SourceKind = "udp:127.0.0.1:5209,array=16x8,preset=2 kHz".parse().unwrap();
+        let SourceKind::Board(address, array, _) = &board else { panic!("{board:?}") };
+        assert_eq!((address.port(), array.rows, array.columns), (5209, 16, 8));
+        let imu: SourceKind = "serial:/dev/ttyACM0@9600,columns=n:ax:ay,time=n:ms".parse().unwrap();
+        let SourceKind::Lines(Place::Serial(path, 9600), stream) = &imu else { panic!("{imu:?}") };
+        assert_eq!(path, Path::new("/dev/ttyACM0"));
+        assert_eq!((stream.time.as_deref(), stream.unit_us), (Some("n"), 1e3));
+        for text in [
+            "",
+            "udp:5209",
+            "udp:127.0.0.1:5209,array=16",
+            "udp:127.0.0.1:5209,columns=a",
+            "serial:/dev/x@fast,columns=a",
+            "serial:/dev/x,columns=a,time=a:h",
+            "given",
+            "given,columns=a,rate=4",
+            "given,columns",
+            "pipe:,columns=a",
+        ] {
+            assert!(text.parse::<SourceKind>().is_err(), "{text}");
+        }
+    }
+}
