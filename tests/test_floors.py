@@ -101,6 +101,7 @@ THOUSANDS = {
     "taxel._convert": "ns of the host's clock",
     "taxel.recording": "ns of the host's clock",
     "taxel.cli.emulate": "seconds; ns of the host's clock",
+    "taxel._clock": "ns of the host, us of the board",
     "taxel.detect.exchange": "NIR counts in seconds and volts",
     "taxel.demo": "seconds, kbit/s, seeds",
     "taxel.information.answers": "bits a thousand events",

@@ -99,12 +99,12 @@ impl Live {
                 taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
             );
         }
-        Self::begin(receiver, options, ear, sinks, None)
+        Self::begin(Box::new(receiver), options, ear, sinks, None)
     }
 
     /// Begins; `host` is whose recording this one's is a part of.
     fn begin(
-        receiver: impl FnOnce() -> Result<Receiver>,
+        receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
         options: LiveOptions,
         ear: Ear,
         sinks: Vec<Box<dyn Sink>>,
@@ -160,7 +160,7 @@ impl Live {
         let listens = !matches!(ear, Ear::Deaf);
         let board = |address, own: LiveOptions, part| {
             let capture = own.capture;
-            Self::begin(|| Receiver::bind(address, capture), own, Ear::Deaf, vec![], Some(part))
+            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Ear::Deaf, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing came: a new file is not left behind.
