@@ -15,14 +15,16 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from _rounds import stamp, thread_seconds
-from websockets.sync.client import ClientConnection, connect
 
 import taxel
 from taxel.live import Live, Panel
+
+if TYPE_CHECKING:
+    from websockets.sync.client import ClientConnection
 
 SIDES, CHANGES_PER_S, OTHERS = (64,), 1e5, 99
 
@@ -50,6 +52,8 @@ def events(side: int, count: int, seconds: float) -> taxel.Events:
 
 def looking(panel: Panel) -> ClientConnection:
     """Open a client's connection."""
+    from websockets.sync.client import connect  # noqa: PLC0415  an extra
+
     host = "{}:{}".format(*panel.address)
     door = connect(
         f"ws://{host}/socket",

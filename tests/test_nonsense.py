@@ -193,7 +193,9 @@ SOUND: dict[str, Sound] = {
     "taxel.Frames": plain(taxel.Frames, values=np.ones((2, 4, 4)), t=[0, 5], unit="N", array=ARRAY),
     "taxel.Frames.area": method(FRAMES, "area", above=0.5),
     "taxel.Frames.centre": method(FRAMES, "centre", above=0.5),
-    "taxel.Frames.from_events": plain(taxel.Frames.from_events, events=EVENTS, period_us=100, start=0, stop=500),
+    "taxel.Frames.from_events": plain(
+        taxel.Frames.from_events, events=EVENTS, period_us=100, start=0, stop=500, held=np.ones((4, 4))
+    ),
     "taxel.Frames.between": method(FRAMES, "between", start=0, stop=200),
     "taxel.Frames.region": method(FRAMES, "region", x=slice(0, 2), y=slice(0, 2)),
     "taxel.SpikeTrains": plain(
@@ -621,6 +623,9 @@ SOUND: dict[str, Sound] = {
         readout=None,
         tare=None,
         record="live.mcap",
+        name="board",
+        sources={"imu": "given,columns=a"},
+        send=[],
         compression="none",
         overwrite=True,
         guard_frames=5.0,
@@ -943,6 +948,7 @@ LEFT_OUT = {
     "taxel.Load": "what Calibration.fit checks",
     "taxel.Note": "of a recording",
     "taxel.Recording": "made by taxel.open",
+    "taxel.Recording.on_clock": "needs a recording of several sources; tried in tests/recording",
     "taxel.detect.Score": "a result",
     "taxel.detect.Spread": "a result",
     "taxel.detect.Example": "checked by train",
@@ -974,6 +980,8 @@ LEFT_OUT = {
     "taxel.live.Panel.delta_intensity": "begins a Live; its flag is checked, and tests/panel tries it",
     "taxel.live.Live.next": "waits",
     "taxel.live.Live.note": "tried with Live's own tests",
+    "taxel.live.Live.sample": "tried with Live's own tests",
+    "taxel.live.Live.source_address": "tried with Live's own tests",
     "taxel.simulate.circuit.Converted": "a result",
     "taxel.simulate.circuit.Trace": "a result",
     "taxel.simulate.Contact": "a result",

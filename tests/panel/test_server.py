@@ -405,7 +405,8 @@ def test_differences_add_up_once_the_page_says_that_they_are_some(panel):
             pass
         where = panel.live.address
         assert page.ask("delta_intensity", on="yes")["field"] == "on"
-        assert page.ask("delta_intensity", on=True)["type"] == "done"
+        said = page.ask("delta_intensity", on=True)
+        assert said["type"] == "done", said
         told = next((m for m in page.said[1:] if m["type"] == "hello"), None) or page.until("hello")
         assert (told["delta_intensity"], told["udp"]) == (True, "{}:{}".format(*where))
         say(

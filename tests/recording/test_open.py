@@ -29,7 +29,7 @@ def npz(**columns: object) -> bytes:
     [
         (
             "a.mcap",
-            gzip.compress(b"x"),
+            gzip.compress(b"x", mtime=0),
             "byte 0: starts with 1F 8B 08 00 (gzip), not with the MCAP magic; unpack it first",
         ),
         ("a.mcap", b"", "byte 0: the file ends inside the MCAP magic"),

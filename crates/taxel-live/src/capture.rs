@@ -172,10 +172,20 @@ impl Receiver {
     /// `Socket` where receiving ended because the socket failed.
     pub fn take(&self, batch: &mut Batch, timeout: Duration) -> Result<bool> {
         let taken = match &self.from {
-            From::Socket(socket, _) => match &mut *lock(socket) {
-                Some(socket) => self.receive(socket, batch, timeout),
-                None => self.queue.take(batch, timeout),
-            },
+            From::Socket(socket, _) => {
+                let mut socket = lock(socket);
+                match &mut *socket {
+                    Some(own) => {
+                        let taken = self.receive(own, batch, timeout);
+                        if self.queue.is_done() {
+                            // The address is free for the next, also while somebody still looks at the counts.
+                            *socket = None;
+                        }
+                        taken
+                    }
+                    None => self.queue.take(batch, timeout),
+                }
+            }
             From::Feed(_) => self.queue.take(batch, timeout),
         };
         taken.map_err(Error::socket(&self.place))

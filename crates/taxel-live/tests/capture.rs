@@ -100,6 +100,19 @@ fn who_takes_receives_by_himself_until_a_thread_does() {
 }
 
 #[test]
+fn an_address_is_free_again_when_all_was_taken_though_the_receiver_lives() {
+    for apart in [false, true] {
+        let receiver = bind(ReceiverOptions::default());
+        if apart {
+            receiver.apart().expect("a thread");
+        }
+        send(receiver.address(), 3, false);
+        assert_eq!(drain(&receiver).0.len(), 3);
+        Receiver::bind(receiver.address(), ReceiverOptions::default()).expect("a free address");
+    }
+}
+
+#[test]
 fn what_came_after_the_stop_is_left() {
     for apart in [false, true] {
         let receiver = Receiver::bind(ANY, ReceiverOptions::default()).expect("a port");
