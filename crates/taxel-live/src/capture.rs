@@ -257,6 +257,8 @@ fn receive(mut socket: Socket, queue: &Queue) {
             Err(error) => break Err(error),
         }
     };
+    // The address is free before anybody hears of the end.
+    drop(socket);
     queue.close(ended.err());
 }
 
