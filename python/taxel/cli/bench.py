@@ -80,6 +80,7 @@ def _load(path: Path) -> Any:
     if spec is None or spec.loader is None:
         raise ProblemError(f"{path}: cannot be loaded as Python")
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # as an import does: a dataclass looks its module up
     spec.loader.exec_module(module)
     if not hasattr(module, "run"):
         raise ProblemError(f"{path}: defines no run(quick=...)")
