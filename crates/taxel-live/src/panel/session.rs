@@ -154,7 +154,9 @@ impl Session {
         }
         let (mut heard, mut pinged) = (Instant::now(), Instant::now());
         loop {
-            let soon = tokio::time::sleep(if self.plays.is_some() { FRAME } else { Duration::from_secs(1) });
+            // What is new less than a frame after the last picture is due with the next frame.
+            let due = self.plays.is_some() || self.dirty && self.credits > 0;
+            let soon = tokio::time::sleep(if due { FRAME } else { Duration::from_secs(1) });
             tokio::select! {
                 biased;
                 () = async { drop(end.wait_for(|ended| *ended).await) } => return Err(End::Close(GOING_AWAY, "the server ends")),
