@@ -99,6 +99,8 @@ def test_a_sensor_that_is_too_large_is_refused(tmp_path: Path) -> None:
     huge = {"rows": 65_535, "columns": 65_535, "pitch_mm": 1.0, "name": ""}
     with pytest.raises(taxel.ProblemError, match="65535 x 65535 taxels; at most"):
         record(tmp_path / "a.mcap", some_events(), header={"array": huge})
+    packed(tmp_path / "b.mcap", 1, array=huge)
+    refused(tmp_path / "b.mcap", "65535 x 65535 taxels; at most")
 
 
 def test_a_time_out_of_all_reason_is_refused(tmp_path: Path) -> None:
@@ -142,11 +144,12 @@ def test_a_chunk_that_says_it_unpacks_to_more_than_a_chunk_may_is_left_out_and_s
     assert "1 chunks skipped that say they unpack to more than 64 MiB" in rec.verdict
 
 
-def packed(path: Path, count: int) -> None:
-    """Write datagrams that pack by hundreds, by a writer that is not ours."""
+def packed(path: Path, count: int, **told: object) -> None:
+    """Write datagrams that pack by hundreds, by a writer that is not ours, whose header may say otherwise."""
     record(path.with_suffix(".own.mcap"), some_events(40))
     with path.with_suffix(".own.mcap").open("rb") as file:
         header = next(m.metadata for m in make_reader(file).iter_metadata() if m.name == "taxel")
+    header["header"] = json.dumps({**json.loads(header["header"]), **told})
     with path.open("wb") as out:
         writer = Writer(out, chunk_size=8 << 20, compression=CompressionType.ZSTD)
         writer.start()

@@ -140,7 +140,8 @@ def live(
                         Panel(pipeline, control=control, folder=folder, host=panel_host, port=panel_port)
                     )
                     announce(shows, opens, console)
-                _watch(pipeline, shows, seconds, console, at_rest)
+                fresh = isinstance(rest, float) and not panel
+                _watch(pipeline, shows, seconds, console, at_rest, fresh=fresh)
             last = pipeline if shows is None or shows.live is None else shows.live
             taken = last.tare
             summary = last.stop()
@@ -243,14 +244,19 @@ def _unheard(tare: Tare) -> None:
 
 
 def _watch(
-    pipeline: Live, panel: Panel | None, seconds: float | None, console: Console, at_rest: contextlib.ExitStack
+    pipeline: Live,
+    panel: Panel | None,
+    seconds: float | None,
+    console: Console,
+    at_rest: contextlib.ExitStack,
+    *,
+    fresh: bool,
 ) -> None:
-    """Show what comes and what is said until the time is over; what holds `at_rest` ends with the tare."""
+    """Show what comes and what is said until the time is over; what holds `at_rest` ends with a `fresh` tare."""
     shown: deque[Said] = deque(maxlen=_SHOWN)
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
         before, told = pipeline.counters, False
-        taring = before["taring"]
         while seconds is None or before["seconds"] < seconds:
             if panel is not None and panel.live is not None and panel.live is not pipeline:
                 # A page chose another address.
@@ -263,8 +269,8 @@ def _watch(
             now = pipeline.counters
             if not now["taring"]:
                 at_rest.close()
-                if taring and pipeline.tare is not None:
-                    taring = False
+                if fresh and pipeline.tare is not None:
+                    fresh = False
                     _unheard(pipeline.tare)
             if not told and (wrong := outside(now, pipeline.array)):
                 typer.echo(f"taxel: {wrong}", err=True)
