@@ -9,9 +9,12 @@ import socket
 import struct
 import threading
 import time
+from types import SimpleNamespace
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+from panel.browser import running
 
 import taxel
 import taxel.device
@@ -423,6 +426,20 @@ def test_differences_add_up_once_the_page_says_that_they_are_some(panel):
         heard(panel.live, 5)
         assert page.ask("stop")["type"] == "done"
         page.until("recorder", state="idle")
+
+
+def test_the_command_stays_while_a_page_begins_its_board_anew(tmp_path):
+    with running("live", "--panel", "--port", "0", "--host", "127.0.0.1", folder=tmp_path) as server:
+        url = urlsplit(server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+        with Client(
+            SimpleNamespace(address=(url.hostname, url.port), token=url.fragment.removeprefix("token="))
+        ) as page:
+            for n in range(12):
+                assert page.ask("delta_intensity", on=n % 2 == 0)["type"] == "done"
+                # The command looks every tenth of a second, at any moment of it.
+                assert page.ask("listen", host="127.0.0.1", port=0)["type"] == "done"
+        # Nothing came; that is all there is to complain of.
+        assert server.end() == 3, "".join([*server.said, *iter(server.lines.get, "")])
 
 
 def spikes_of(page, columns):

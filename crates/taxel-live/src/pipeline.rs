@@ -354,7 +354,7 @@ impl Live {
             SourceCounts::Numbers { strange, .. } => Some(format!("{name}: {strange} lines could not be read")),
         });
         let verdict = std::iter::once(verdict).chain(others).collect::<Vec<_>>().join("; ");
-        Ok(Summary { counters, verdict, path })
+        Ok(Summary { counters, verdict, path, tare: self.tare() })
     }
 
     fn join(&mut self) -> Result<()> {

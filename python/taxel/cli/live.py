@@ -143,8 +143,8 @@ def live(
                 fresh = isinstance(rest, float) and not panel
                 _watch(pipeline, shows, seconds, console, at_rest, fresh=fresh)
             last = pipeline if shows is None or shows.live is None else shows.live
-            taken = last.tare
             summary = last.stop()
+            taken = summary.tare
     if save_tare is not None and taken is not None:
         taken.save(save_tare)
         console.print(f"tare written to {save_tare}")
@@ -258,15 +258,21 @@ def _watch(
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
         before, told = pipeline.counters, False
         while seconds is None or before["seconds"] < seconds:
-            if panel is not None and panel.live is not None and panel.live is not pipeline:
-                # A page chose another address.
-                pipeline = panel.live
-                before = pipeline.counters
-            said = pipeline.next(_REDRAW)
-            while said is not None:
-                shown.append(said)
-                said = pipeline.next(0.0)
-            now = pipeline.counters
+            try:
+                if panel is not None and panel.live is not None and panel.live is not pipeline:
+                    # A page chose another address.
+                    pipeline = panel.live
+                    before = pipeline.counters
+                said = pipeline.next(_REDRAW)
+                while said is not None:
+                    shown.append(said)
+                    said = pipeline.next(0.0)
+                now = pipeline.counters
+            except ProblemError:
+                if panel is None or panel.live is pipeline:
+                    raise
+                # A page ended it, to begin another.
+                continue
             if not now["taring"]:
                 at_rest.close()
                 if fresh and pipeline.tare is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from pathlib import Path
 from types import TracebackType
 
@@ -58,6 +59,8 @@ class Panel:
         port: int = 0,
         host: str = "127.0.0.1",
     ) -> None:
+        # Held while one is ended and another begun.
+        self._anew = threading.Lock()
         self._live = shows if isinstance(shows, Live) else None
         opened = None
         if self._live is None:
@@ -115,8 +118,9 @@ class Panel:
 
     @property
     def live(self) -> Live | None:
-        """The board that is listened to; another one after a page chose another address."""
-        return self._live
+        """The board that is listened to; another one after a page chose another address. Waits while one begins."""
+        with self._anew:
+            return self._live
 
     def listen(self, host: str, port: int) -> None:
         """Listen on another address, with everything else as it was.
@@ -126,11 +130,12 @@ class Panel:
         ProblemError : no board is listened to, or to a file, which has to be ended first
         OSError : the port is taken; then it listens where it did
         """
-        before = self._may_begin_anew("listen")
-        after = Live(port, host=host, **before._how)
-        self._core.attach(after._core)
-        self._live = after
-        before.stop()
+        with self._anew:
+            before = self._may_begin_anew("listen")
+            after = Live(port, host=host, **before._how)
+            self._core.attach(after._core)
+            self._live = after
+            before.stop()
 
     def delta_intensity(self, on: bool) -> None:
         """Take intensities for differences from the value before, or for values, from here on.
@@ -143,14 +148,15 @@ class Panel:
         ProblemError : no board is listened to, or to a file, which has to be ended first
         OSError : the port was taken by another program in that moment
         """
-        before = self._may_begin_anew("delta_intensity")
-        if flag("on", on) == before._how["differences"]:
-            return
-        host, port = before.address
-        before.stop()
-        after = Live(port, host=host, **{**before._how, "differences": on})
-        self._core.attach(after._core)
-        self._live = after
+        with self._anew:
+            before = self._may_begin_anew("delta_intensity")
+            if flag("on", on) == before._how["differences"]:
+                return
+            host, port = before.address
+            before.stop()
+            after = Live(port, host=host, **{**before._how, "differences": on})
+            self._core.attach(after._core)
+            self._live = after
 
     def _may_begin_anew(self, what: str) -> Live:
         if self._live is None:

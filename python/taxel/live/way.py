@@ -83,11 +83,14 @@ class Summary:
         One line: nothing lost after arrival, what was lost where, or that nothing came.
     path : Path or None
         The recording; none where nothing came: then an empty one is not kept, and an earlier one is not replaced.
+    tare : Tare or None
+        The fresh tare, where one was completed.
     """
 
     counters: dict[str, Any]
     verdict: str
     path: Path | None
+    tare: Tare | None
 
     @property
     def lost(self) -> int:
@@ -360,6 +363,8 @@ class Live:
     @property
     def tare(self) -> Tare | None:
         """The fresh tare, once it is complete."""
+        if self._summary is not None:
+            return self._summary.tare
         taken = self._core.tare()
         return None if taken is None else Tare.from_json(taken)
 
@@ -428,7 +433,8 @@ class Live:
         if said is not None:
             values = json.loads(said)
             path = None if values["path"] is None else Path(values["path"])
-            self._summary = Summary(values["counters"], values["verdict"], path)
+            taken = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
+            self._summary = Summary(values["counters"], values["verdict"], path, taken)
         if self._summary is None:
             raise ProblemError("live: ended by an error, which was raised then")
         return self._summary

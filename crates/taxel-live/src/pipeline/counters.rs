@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use serde::Serialize;
+use taxel_core::encode::Tare;
 use taxel_core::wire;
 
 use super::sending::Sent;
@@ -92,6 +93,8 @@ pub struct Summary {
     pub verdict: String,
     /// The file, where something was recorded: one to which nothing came is not kept, and none is replaced by it.
     pub path: Option<PathBuf>,
+    /// The fresh tare, where one was completed.
+    pub tare: Option<Tare>,
 }
 
 /// What came of a source, and what was lost.
