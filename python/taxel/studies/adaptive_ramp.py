@@ -172,7 +172,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         ),
         Statement(
             "One ramp that adapts does both.",
-            "biomimetic sampling",
+            "held to be possible, not tried",
             f"at most {whole(own):.2f} times as wrong as the best fixed ramp of each phase; the best single fixed one, "
             f"{best} ticks, {whole(ramps[best]):.2f} times",
             whole(own) < whole(ramps[best]),
@@ -219,17 +219,31 @@ def tables(p: Parameters, said: Said) -> list[Table]:
 def draw(p: Parameters, said: Said) -> Figure:
     """Draw the two errors against each other, and a tap as the adaptive ramp and the gentlest read it."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+    from matplotlib.ticker import FixedLocator, NullLocator  # noqa: PLC0415
 
-    figure = Figure(figsize=(10, 3.8), layout="constrained")
+    figure = Figure(figsize=(11, 3.8), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     for name, one in said["ramps"].items():
         own = name == "adaptive"
-        left.plot(one["rms_mv"]["fine"], one["rms_mv"]["gross"], "o" if own else "s", color="C3" if own else "C0")
-        left.annotate(name, (one["rms_mv"]["fine"], one["rms_mv"]["gross"]), fontsize="small")
+        at = (one["rms_mv"]["fine"], one["rms_mv"]["gross"])
+        left.plot(*at, "o" if own else "s", color="C3" if own else "C0")
+        left.annotate(name if own else f"{name} ticks", at, (0, 6), textcoords="offset points", ha="center")
     left.set(xscale="log", yscale="log", xlabel="fine control, mV rms", ylabel="taps, mV rms")
+    left.margins(0.25, 0.2)
+    for axis, ticks in ((left.xaxis, (1, 2, 5, 10, 20, 50)), (left.yaxis, (10, 20, 30, 50, 70, 100))):
+        seen = axis.get_view_interval()
+        axis.set_major_locator(FixedLocator([tick for tick in ticks if seen[0] <= tick <= seen[1]]))
+        axis.set_minor_locator(NullLocator())
+        axis.set_major_formatter("{x:g}")
     for name, colour in (("adaptive", "C3"), (str(max(p["ramps"])), "C0")):
         course = said["ramps"][name]["course"]
-        middle.step(course["t_ms"], course["volts"], where="post", color=colour, label=name)
+        middle.step(
+            course["t_ms"],
+            course["volts"],
+            where="post",
+            color=colour,
+            label=name if name == "adaptive" else f"{name} ticks",
+        )
     middle.set(xlabel="time since a tap, ms", ylabel="what the host holds, V")
     middle.legend(fontsize="small")
     course = said["ramps"]["adaptive"]["course"]
