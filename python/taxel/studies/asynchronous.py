@@ -201,7 +201,7 @@ def tables(p: Parameters, said: Said) -> list[Table]:
             "While touched",
             ["array", *COSTS.values()],
             costs,
-            "Medians over trials. At rest: the same board untouched for as long (noise, headers, promises). The wire while "
+            "Medians over trials. At rest: the same board untouched for as long (noise, headers, promises). While "
             "touched: that, and what a scene's bytes have above it, over the time that the ball touches.",
         ),
     ]
