@@ -97,6 +97,12 @@ def word(t_us, x, y, ticks, more=True):
     return b"".join(bytes([a | b >> 14, b >> 7 & 127, b & 127, x, y]) for a, b in (first, second))
 
 
+def marker(t_us):
+    """The start of a recording, version 1 of the wire."""
+    t = t_us // 100 % 65_536
+    return bytes([0xC8 | t >> 14, t >> 7 & 127, t & 127, 0, 0])
+
+
 @pytest.fixture
 def live():
     with Live(0, host="127.0.0.1") as live:
@@ -426,6 +432,29 @@ def test_differences_add_up_once_the_page_says_that_they_are_some(panel):
         heard(panel.live, 5)
         assert page.ask("stop")["type"] == "done"
         page.until("recorder", state="idle")
+
+
+@pytest.mark.parametrize("first", ["event", "marker"])
+def test_a_recording_of_a_later_wrap_has_the_times_of_the_page(live, tmp_path, first):
+    with Panel(live, folder=tmp_path) as panel, Client(panel) as page:
+        # Version 1 says times modulo 6.5536 s: two wraps pass before it records.
+        for n in range(7):
+            say(live, word(2_000_000 * (n + 1), 3, 5, n + 1))
+            heard(live, n + 1)
+        assert page.ask("record", name="late")["type"] == "done"
+        page.until("recorder", state="recording")
+        if first == "marker":
+            say(live, marker(14_100_000))
+            while not live.counters["markers"]:
+                time.sleep(0.01)
+        say(live, word(14_200_000, 3, 5, 9))
+        heard(live, 8)
+        assert page.ask("stop")["type"] == "done"
+        last = page.until("recorder", state="idle")
+        assert last["error"] is None, last
+        found = taxel.open(tmp_path / "late.mcap").events
+        assert list(found.t) == [14_200_000]
+        assert [m.t for m in found.markers] == ([14_100_000] if first == "marker" else [])
 
 
 def test_the_command_stays_while_a_page_begins_its_board_anew(tmp_path):

@@ -256,12 +256,13 @@ def _watch(
     shown: deque[Said] = deque(maxlen=_SHOWN)
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
-        before, told = pipeline.counters, False
-        while seconds is None or before["seconds"] < seconds:
+        before, told = None, False
+        while before is None or seconds is None or before["seconds"] < seconds:
             try:
                 if panel is not None and panel.live is not None and panel.live is not pipeline:
                     # A page chose another address.
-                    pipeline = panel.live
+                    pipeline, before = panel.live, None
+                if before is None:
                     before = pipeline.counters
                 said = pipeline.next(_REDRAW)
                 while said is not None:

@@ -248,13 +248,16 @@ impl Work<'_> {
         Ok(())
     }
 
-    /// The recording's own decoder has come to its first event: from then on it is known what its clock lacks.
-    fn compare(&mut self, bytes: &[u8], arrived_us: i64, heard: usize) -> Result<()> {
+    /// The recording's own decoder has come to its first stamp, an event's or a marker's: from then on it is known what its
+    /// clock lacks. `heard` and `marked` are how many of each were there before the datagram.
+    fn compare(&mut self, bytes: &[u8], arrived_us: i64, heard: usize, marked: usize) -> Result<()> {
         let Some(fresh) = &mut self.fresh else { return Ok(()) };
         let mut events = Events::empty(self.options.array.clone());
         fresh.push(bytes, Some(arrived_us), &mut events);
-        if let (Some(ours), Some(theirs)) = (self.events.t.get(heard), events.t.first()) {
-            let origin_us = ours - theirs;
+        let by_event = self.events.t.get(heard).zip(events.t.first()).map(|(ours, theirs)| ours - theirs);
+        let by_marker =
+            self.events.markers.get(marked).zip(events.markers.first()).map(|(ours, theirs)| ours.t - theirs.t);
+        if let Some(origin_us) = by_event.or(by_marker) {
             self.fresh = None;
             self.record(|recorder| recorder.set_origin(origin_us))?;
         }
@@ -296,14 +299,14 @@ impl Work<'_> {
     #[allow(clippy::cast_possible_truncation)]
     fn decode(&mut self, batch: &Batch) -> Result<()> {
         for (datagram, bytes) in batch.iter() {
-            let before = self.events.len();
+            let (before, marked) = (self.events.len(), self.events.markers.len());
             let arrived_us = datagram.arrived_ns / 1000;
             let took = self.sender.push(bytes, Some(arrived_us), &mut self.events);
             let now = now_ns();
             self.decoded += 1;
             self.mark(&took, datagram.arrived_ns)?;
             self.heard = took.now.or(self.heard);
-            self.compare(bytes, arrived_us, before)?;
+            self.compare(bytes, arrived_us, before, marked)?;
             if took.version == 2 {
                 if took.reset {
                     self.believed = None;

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError, Weak};
 
+use taxel_core::detect::Detection;
 use taxel_core::encode::Tare;
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
@@ -56,6 +57,9 @@ enum Entry {
     Board(BoardChange),
     Held(i64, Option<i64>, Vec<u16>),
     Note(i64, Option<i64>, String),
+    Marker(i64, Marker),
+    Detection(i64, Detection),
+    Tare(Box<Tare>),
 }
 
 /// What may wait for a guest's first event, bytes: heartbeats of a board of version 2 at rest for hours.
@@ -223,6 +227,12 @@ impl Recorder {
             (_, Some(track), Entry::Board(change)) => track.board_change(&change),
             (_, Some(track), Entry::Held(at, t_us, held)) => track.held(at, t_us, &held),
             (_, Some(track), Entry::Note(at, t_us, text)) => track.note(at, t_us, &text),
+            (_, Some(track), Entry::Marker(at, marker)) => track.marker(at, marker),
+            (_, Some(track), Entry::Detection(at, detection)) => track.detection(at, &detection),
+            (_, Some(track), Entry::Tare(tare)) => {
+                track.tare(&tare);
+                Ok(())
+            }
             (_, None, _) => Ok(()),
         }
     }
@@ -294,19 +304,16 @@ impl Recorder {
     }
 
     pub(super) fn marker(&self, marker: Marker) -> Result<()> {
-        self.kind()?.track().map_or(Ok(()), |track| track.marker(now_ns(), marker))
+        self.push(Entry::Marker(now_ns(), marker))
     }
 
     pub(super) fn detection(&self, said: &Said) -> Result<()> {
-        self.kind()?.track().map_or(Ok(()), |track| track.detection(said.said_ns, &said.detection))
+        self.push(Entry::Detection(said.said_ns, said.detection.clone()))
     }
 
     /// What is taken off the pictures from here on.
     pub(super) fn tare(&self, tare: &Tare) -> Result<()> {
-        if let Some(track) = self.kind()?.track() {
-            track.tare(tare);
-        }
-        Ok(())
+        self.push(Entry::Tare(Box::new(tare.clone())))
     }
 
     pub(super) fn picture(&self, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
