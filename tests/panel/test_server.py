@@ -454,7 +454,7 @@ def test_a_recording_of_a_later_wrap_has_the_times_of_the_page(live, tmp_path, f
         assert last["error"] is None, last
         found = taxel.open(tmp_path / "late.mcap").events
         assert list(found.t) == [14_200_000]
-        assert [m.t for m in found.markers] == ([14_100_000] if first == "marker" else [])
+        assert found.markers == (((14_100_000, True),) if first == "marker" else ())
 
 
 def test_the_command_stays_while_a_page_begins_its_board_anew(tmp_path):
