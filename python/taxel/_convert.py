@@ -20,6 +20,7 @@ from taxel._files import whole_file, write_whole
 from taxel._h5 import write_h5
 from taxel._remarks import Remarks
 from taxel._tables import write_csv, write_npz
+from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.recording import Datagrams, Recording, _Source, open_recording, period_us
@@ -32,8 +33,8 @@ KINDS = (".mcap", ".lsa", ".npz", ".csv", ".h5")
 #: Events a datagram at most, as the board sends them: 1400 bytes.
 _DATAGRAM_BYTES = 1400
 
-#: Between the pictures that a converted file shows to viewers, us.
-_PICTURE_US = 100_000
+#: Between the pictures that a converted file shows to viewers, and at least between those around an event, us.
+_PICTURE_US, _NEAR_US = 100_000, 10_000
 
 #: Of a stream of numbers.
 _UNREAD = "lines_that_could_not_be_read"
@@ -266,20 +267,25 @@ def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64]
         )
 
 
-def _pictures(events: Events) -> Iterator[tuple[int, NDArray[np.uint16]]]:
-    """Give what the taxels hold, ten times a second where something came, as a board that is recorded does."""
+def _pictures(events: Events, around: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.uint16]]]:
+    """Give what the taxels hold: ten times a second where something came, and at whole 10 ms around `around`, us."""
     if events.intensity is None or events.present is None:
         return
     there = np.flatnonzero(events.present)
     order = there[np.argsort(events.t[there], kind="stable")]
-    place, ticks = events.array.index(events.x[order], events.y[order]), events.intensity[order]
+    if not len(order):
+        return
+    at, place, ticks = events.t[order], events.array.index(events.x[order], events.y[order]), events.intensity[order]
     # Each event is in the first picture from it on.
-    number = -(-events.t[order] // _PICTURE_US)
-    begins = np.flatnonzero(np.diff(number, prepend=number[:1] - 1))
+    tenths = -(-at // _PICTURE_US) * _PICTURE_US
+    near = -(-around // _NEAR_US) * _NEAR_US
+    near = np.concatenate([near - _NEAR_US, near])
+    times = np.union1d(tenths, near[(near >= at[0]) & (near <= tenths[-1])])
+    begins = [0, *np.searchsorted(at, times, side="right").tolist()]
     held = np.zeros(events.array.rows * events.array.columns, np.uint16)
-    for a, b in pairwise([*begins.tolist(), len(order)]):
+    for t, (a, b) in zip(times.tolist(), pairwise(begins), strict=True):
         held[place[a:b]] = ticks[a:b]
-        yield int(number[a]) * _PICTURE_US, held
+        yield t, held
 
 
 def _add_remarks(writer: Any, events: Events, recording: Recording | None) -> None:
@@ -288,9 +294,12 @@ def _add_remarks(writer: Any, events: Events, recording: Recording | None) -> No
     def at_ns(t: int) -> int:
         return int(clock.host_ns(t)) if clock is not None and len(clock.board_us) else t * 1000
 
+    found = Detections([], [], []) if recording is None else recording.detections
+    noted = [] if recording is None else [note.t for note in recording.notes if note.t is not None]
+    around = np.concatenate([found.t, found.known, np.array([*(t for t, _ in events.markers), *noted], np.int64)])
     for t, start in events.markers:
         writer.marker(max(0, at_ns(t)), t, start)
-    for t, ticks in _pictures(events):
+    for t, ticks in _pictures(events, around):
         writer.picture(max(0, at_ns(t)), t, events.array.columns, ticks)
     if recording is None:
         return
@@ -298,7 +307,6 @@ def _add_remarks(writer: Any, events: Events, recording: Recording | None) -> No
         writer.note(note.at_ns, note.t, note.text)
     for at, values in recording._source.register_changes:
         writer.registers(at, json.dumps(values))
-    found = recording.detections
     for d in found:
         writer.detection(max(0, at_ns(d.known)), d.label, d.t, d.known, d.slope, d.repaired)
 

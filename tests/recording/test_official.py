@@ -5,7 +5,9 @@ from __future__ import annotations
 import base64
 import json
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 
@@ -16,6 +18,12 @@ from .making import HEADER, record, some_events
 #: The fields that the standard schemas name (https://docs.foxglove.dev, RawImage and Log).
 RAW_IMAGE = {"timestamp", "frame_id", "width", "height", "encoding", "step", "data"}
 LOG = {"timestamp", "level", "message", "name", "file", "line"}
+
+
+def pressure(path: Path) -> list[dict[str, Any]]:
+    with path.open("rb") as file:
+        messages = make_reader(file).iter_messages()
+        return [json.loads(m.data) for _, channel, m in messages if channel.topic == "/pressure"]
 
 
 @pytest.mark.parametrize("compression", ["none", "lz4", "zstd"])
@@ -74,10 +82,7 @@ def test_a_converted_file_shows_what_was_held_where_something_came(tmp_path: Pat
     t = [0, 50_000, 3_600_000_000, 3_600_150_000]
     events = taxel.Events(t, [1, 1, 1, 2], [0] * 4, [True] * 4, array=taxel.Array(1, 4), intensity=[10, 40, 30, 50])
     taxel.convert(events, tmp_path / "a.mcap")
-    with (tmp_path / "a.mcap").open("rb") as file:
-        said = [
-            json.loads(m.data) for _, channel, m in make_reader(file).iter_messages() if channel.topic == "/pressure"
-        ]
+    said = pressure(tmp_path / "a.mcap")
     assert [p["t_us"] for p in said] == [0, 100_000, 3_600_000_000, 3_600_200_000]
     # Above the lowest so far, 10 at (1, 0) and 50 at (2, 0); white is the largest of 10 s.
     assert [list(base64.b64decode(p["data"])) for p in said] == [
@@ -87,3 +92,27 @@ def test_a_converted_file_shows_what_was_held_where_something_came(tmp_path: Pat
         [0, 255, 0, 0],
     ]
     assert [p["full_ticks"] for p in said] == [1.0, 30.0, 20.0, 20.0]
+
+
+def test_a_converted_file_shows_the_pictures_around_what_happened(tmp_path: Path) -> None:
+    # A taxel that gains a tick a ms for a second, in hours of silence.
+    t = [-3_600_000_000, *(1000 * np.arange(1000)).tolist(), 3_600_000_000]
+    ticks = np.array([1, *range(1, 1001), 1000])
+    ramp = {"array": taxel.Array(1, 2), "intensity": ticks}
+    happened = [(254_321, True), (600_000, True), (1_800_000_000, False), (9_000_000_000, True)]
+    events = taxel.Events(t, [0] * 1002, [0] * 1002, [True] * 1002, markers=happened, **ramp)
+    taxel.convert(events, tmp_path / "a.mcap")
+    said = pressure(tmp_path / "a.mcap")
+    near = [250_000, 260_000, 590_000, 600_000, 1_799_990_000, 1_800_000_000]
+    tenths = [-3_600_000_000, *range(0, 1_000_001, 100_000), 3_600_000_000]
+    assert [p["t_us"] for p in said] == sorted({*tenths, *near})
+    for picture in said:
+        held = ticks[np.asarray(t) <= picture["t_us"]][-1]
+        grey = base64.b64decode(picture["data"])[0]
+        assert abs(grey / 255 * picture["full_ticks"] - (held - 1)) <= picture["full_ticks"] / 255
+    # A note at 5 ms, a detection of 6 ms that was known at 6.2 ms.
+    plain = some_events()
+    plain.markers = []
+    record(tmp_path / "b.mcap", plain)
+    taxel.convert(tmp_path / "b.mcap", tmp_path / "c.mcap")
+    assert [p["t_us"] for p in pressure(tmp_path / "c.mcap")] == [10_000, 100_000]

@@ -20,6 +20,7 @@ mod sending;
 mod shared;
 mod source;
 mod sources;
+mod stills;
 mod tap;
 
 use std::collections::BTreeMap;
@@ -145,6 +146,7 @@ impl Live {
             broken: Mutex::default(),
             wishes: Mutex::default(),
             wished: AtomicBool::new(false),
+            happened: Mutex::default(),
             records: AtomicBool::new(false),
             listeners: Mutex::default(),
             sending: sending.iter().map(Sending::line).collect(),

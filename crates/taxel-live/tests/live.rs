@@ -211,6 +211,38 @@ fn what_is_said_live_is_what_the_recording_says() {
     assert!(heard.iter().all(|s| s.said >= s.detection.known - 192), "{heard:?}");
 }
 
+/// The board's times of a recording's pictures, us.
+fn pictured(path: &Scratch) -> Vec<i64> {
+    let mut times = vec![];
+    let reader = Reader::open(&path.0).expect("a recording");
+    reader
+        .messages(Stop::never(), |message| {
+            if message.topic == Topic::Pressure {
+                let picture: serde_json::Value = serde_json::from_slice(message.data).expect("JSON");
+                times.push(picture["t_us"].as_i64().expect("a time"));
+            }
+            Ok(())
+        })
+        .expect("sound chunks");
+    times
+}
+
+#[test]
+fn a_recording_has_pictures_around_detections_beside_ten_a_second() {
+    let path = Scratch::new("pictured.mcap");
+    let begun = Instant::now();
+    let live = Live::start(ANY, options(Some(&path)), reading(&readout(2.0)), vec![]).expect("a port and a file");
+    // A press begins each 40 ms; ten pictures a second would miss more than half of them.
+    emulate(live.address(), true, presses(6000, 6000));
+    while live.next(Duration::from_millis(200)).expect("a sound way").is_some() {}
+    live.stop().expect("a sound way");
+    let tenths = begun.elapsed().as_millis() / 100;
+    let (times, said) = (pictured(&path), recorded(&path).1);
+    assert!(said.len() > 20, "{}", said.len());
+    assert!(times.len() as u128 > 2 * tenths, "{} pictures in {tenths} tenths of a second", times.len());
+    assert!(times.len() as u128 <= 10 * tenths + 12, "{} pictures in {tenths} tenths of a second", times.len());
+}
+
 #[test]
 fn in_silence_time_moves_on_by_the_hosts_clock() {
     let live = Live::start(ANY, LiveOptions { guard_frames: 5.0, ..options(None) }, reading(&readout(20.0)), vec![])

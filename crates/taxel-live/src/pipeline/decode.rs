@@ -10,6 +10,7 @@ use super::copies::{Copier, GATHER, copier};
 use super::options::LiveOptions;
 use super::recorder::Recorder;
 use super::shared::{Shared, Wish};
+use super::stills::Stills;
 use super::tap::{Tap, UNKNOWN, tap};
 use crate::Result;
 use crate::capture::Batch;
@@ -18,7 +19,7 @@ use crate::locked::lock;
 use crate::recording::now_ns;
 use crate::recording::{BoardChange, Change};
 
-/// How often those who look on get a new picture, the recording too.
+/// How often those who look on get a new picture.
 const PICTURE_EVERY: Duration = Duration::from_millis(100);
 
 /// How often an unfinished recording learns what was lost.
@@ -56,6 +57,7 @@ pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, list
         counted: 0,
         tared: false,
         pictured: Instant::now(),
+        stills: Stills::new(),
         told: Instant::now(),
     };
     if let Err(error) = work.all() {
@@ -96,6 +98,7 @@ struct Work<'a> {
     /// Whether the recorder knows the tare.
     tared: bool,
     pictured: Instant,
+    stills: Stills,
     told: Instant,
 }
 
@@ -152,6 +155,7 @@ impl Work<'_> {
             };
             self.copy(&batch, silent_until);
             self.taps.retain_mut(Tap::tick);
+            self.still(false)?;
             self.look()?;
             if self.shared.wished.swap(false, Ordering::Acquire) {
                 self.fulfil()?;
@@ -159,6 +163,7 @@ impl Work<'_> {
         }
         self.sender.finish_into(&mut self.events);
         self.hand_on()?;
+        self.still(true)?;
         self.silence(self.shared.receiver.silent_until());
         self.taps.retain_mut(Tap::tick);
         let dropped = self.dropped_by_kernel();
@@ -219,6 +224,7 @@ impl Work<'_> {
                     let _ = give.send(begun);
                 }
                 Wish::End(give) => {
+                    self.still(true)?;
                     self.fresh = None;
                     let recorder = lock(&self.shared.recorder).take();
                     self.shared.records.store(false, Ordering::Release);
@@ -348,6 +354,7 @@ impl Work<'_> {
         if !events.markers.is_empty() {
             let markers = std::mem::take(&mut self.events.markers);
             self.record(|recorder| markers.iter().try_for_each(|m| recorder.marker(*m)))?;
+            self.shared.happened(markers.iter().map(|m| m.t));
             self.events.markers = markers;
         }
         let events = &mut self.events;
@@ -394,14 +401,40 @@ impl Work<'_> {
         }
     }
 
+    /// The pictures of the recording; the last one at its end.
+    fn still(&mut self, last: bool) -> Result<()> {
+        let now = Instant::now();
+        if !(last || self.stills.is_due(now)) {
+            return Ok(());
+        }
+        let happened = std::mem::take(&mut *lock(&self.shared.happened));
+        if lock(&self.shared.recorder).is_none() {
+            self.stills.clear();
+            return Ok(());
+        }
+        let new = self.decoded != self.counted;
+        self.counted = self.decoded;
+        if let (true, Some(t_us)) = (new, self.shared.shown().counters.board_us) {
+            // In a picture 0 is a taxel that was never heard of.
+            let held = self.held.iter().map(|&held| if held == UNKNOWN { 0 } else { held });
+            self.stills.take(now, now_ns(), t_us, held);
+        }
+        happened.into_iter().for_each(|t| self.stills.around(t));
+        let columns = self.options.array.columns;
+        let mut stills = std::mem::replace(&mut self.stills, Stills::new());
+        let kept = self.record(|recorder| {
+            stills.give().try_for_each(|still| recorder.picture(still.at_ns, still.t_us, columns, &still.held))
+        });
+        self.stills = stills;
+        kept
+    }
+
     /// What others look at, at their own pace.
     fn look(&mut self) -> Result<()> {
         if self.pictured.elapsed() < PICTURE_EVERY {
             return Ok(());
         }
         self.pictured = Instant::now();
-        let new = self.decoded != self.counted;
-        self.counted = self.decoded;
         let (counters, tare) = {
             let mut shown = self.shared.shown();
             // Who asks for a picture hears 0 of a taxel that was never heard of.
@@ -415,7 +448,6 @@ impl Work<'_> {
             return Ok(());
         }
         self.tared |= tare.is_some();
-        let picture = self.shared.shown().picture.clone();
         let tell = self.told.elapsed() >= COUNTS_EVERY;
         if tell {
             self.told = Instant::now();
@@ -426,9 +458,6 @@ impl Work<'_> {
                 recorder.tare(&tare)?;
             }
             recorder.flush()?;
-            if new && let Some(board_us) = counters.board_us {
-                recorder.picture(board_us, self.options.array.columns, &picture)?;
-            }
             if tell { recorder.so_far(&super::counters::Counters { capture, bridged, ..counters }) } else { Ok(()) }
         })
     }

@@ -145,6 +145,7 @@ impl Reader {
                 // Where only a guest's recording is broken, the decoding thread will find that too.
                 recorder.detection(&said).or_else(|error| if recorder.is_a_guest() { Ok(()) } else { Err(error) })?;
             }
+            shared.happened([said.detection.t, said.detection.known]);
             lock(&shared.listeners).retain(|listener| {
                 !matches!(listener.try_send(said.clone()), Err(crossbeam_channel::TrySendError::Disconnected(_)))
             });

@@ -316,11 +316,11 @@ impl Recorder {
         self.push(Entry::Tare(Box::new(tare.clone())))
     }
 
-    pub(super) fn picture(&self, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
+    pub(super) fn picture(&self, at_ns: i64, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
         if self.waits() {
             return Ok(());
         }
-        self.kind()?.track().map_or(Ok(()), |track| track.picture(now_ns(), board_us, columns, held))
+        self.kind()?.track().map_or(Ok(()), |track| track.picture(at_ns, board_us, columns, held))
     }
 
     /// What an unfinished recording will know of its losses; a raw one knows nothing, but its bytes reach the system.

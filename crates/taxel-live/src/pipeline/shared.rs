@@ -47,6 +47,8 @@ pub(super) struct Shared {
     /// What the decoding thread is asked for between two batches.
     pub(super) wishes: Mutex<Vec<Wish>>,
     pub(super) wished: AtomicBool,
+    /// Times of detections, markers and notes, us, since the recording's pictures were looked at last.
+    pub(super) happened: Mutex<Vec<i64>>,
     /// Whether a recording was begun while listening, and has not ended.
     pub(super) records: AtomicBool,
     /// Those who hear detections beside [`Live::next`](super::Live::next); who is too slow misses some.
@@ -85,6 +87,11 @@ impl Shared {
         self.wished.store(true, Ordering::Release);
     }
 
+    /// Something is worth a picture: the recording gets those around these times, us.
+    pub(super) fn happened(&self, times: impl IntoIterator<Item = i64>) {
+        lock(&self.happened).extend(times);
+    }
+
     pub(super) fn has_ended(&self) -> bool {
         self.ended.load(Ordering::Acquire)
     }
@@ -106,7 +113,10 @@ impl Shared {
     pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
         let board_us = self.shown().counters.board_us.filter(|_| timed);
         match &*lock(&self.recorder) {
-            Some(recorder) => recorder.note(board_us, text),
+            Some(recorder) => {
+                self.happened(board_us);
+                recorder.note(board_us, text)
+            }
             None => Err(taxel_core::problem!("a note is kept in a recording: record to a .mcap file").into()),
         }
     }

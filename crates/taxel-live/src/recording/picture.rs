@@ -7,6 +7,9 @@ use taxel_core::encode::Tare;
 /// White is the largest value of so long, us.
 const SCALE_US: i64 = 10_000_000;
 
+/// A picture of an event may be so much older than the last one, us: it is drawn on that one's scale.
+const LATE_US: i64 = 1_000_000;
+
 /// What pictures are made of: what each taxel reads at rest, and how strongly it was pressed lately.
 #[derive(Debug, Default)]
 pub(super) struct Pictures {
@@ -56,7 +59,9 @@ impl Pictures {
             .collect();
         let rest = if tare.is_some() { "tare" } else { "lowest so far" };
         let peak = above.iter().copied().fold(0.0, f64::max);
-        // Time that steps back begins the scale anew.
+        let late = self.peaks.back().is_some_and(|&(t, _)| (1..=LATE_US).contains(&t.saturating_sub(t_us)));
+        // Time that steps far back begins the scale anew.
+        let t_us = if late { self.peaks.back().map_or(t_us, |&(t, _)| t) } else { t_us };
         while self.peaks.front().is_some_and(|&(t, _)| t <= t_us.saturating_sub(SCALE_US) || t > t_us) {
             self.peaks.pop_front();
         }
@@ -89,6 +94,20 @@ mod tests {
         // A lower value than ever moves the rest.
         assert_eq!(pictures.take(10_200_000, &[90, 50, 7]).bytes, [0, 0, 0]);
         assert_eq!(pictures.take(30_000_000, &[100, 50, 7]).full, 10.0);
+    }
+
+    #[test]
+    fn a_picture_that_comes_late_keeps_the_scale() {
+        let mut pictures = Pictures::default();
+        pictures.take(0, &[100]);
+        assert_eq!(pictures.take(1_000_000, &[140]).full, 40.0);
+        assert_eq!(pictures.take(1_500_000, &[120]).full, 40.0);
+        // Of half a second ago, weaker and stronger than what came since.
+        assert_eq!(pictures.take(1_400_000, &[110]).bytes, [64]);
+        assert_eq!(pictures.take(1_450_000, &[180]).full, 80.0);
+        assert_eq!(pictures.take(1_600_000, &[140]).bytes, [128]);
+        // A clock that begins anew.
+        assert_eq!(pictures.take(0, &[140]).bytes, [255]);
     }
 
     #[test]
