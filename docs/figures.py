@@ -1,6 +1,6 @@
 """Keep what a report of studies found for the page of figures: numbers as JSON, pictures drawn from them as SVG.
 
-python docs/figures.py            draws all pictures again
+python docs/figures.py            judges all statements and draws all pictures again
 python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first, with the commit
 
 A report is taken as long as the code that ran it is the commit's: its digest is held against the checkout's.
@@ -11,7 +11,9 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from taxel.studies import STUDIES, load
 from taxel.studies.runner import code_digest
@@ -47,15 +49,21 @@ def git(*arguments: str) -> str:
     return ran.stdout.strip()
 
 
+def judged(section: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return a study's statements, judged from its numbers."""
+    statements = load(section["name"]).statements(section["parameters"], section["said"])
+    return [asdict(statement) for statement in statements]
+
+
 def draw(name: str) -> list[str]:
-    """Draw a study's pictures from its numbers, and name them there."""
+    """Judge a study's statements and draw its pictures from its numbers, and name them there."""
     file = FIGURES / f"{name}.json"
     section = json.loads(file.read_text())
     pictures = drawn(load(name), section["parameters"], section["said"])
     names = [f"{name}.svg"] if len(pictures) == 1 else [f"{name}-{k}.svg" for k in range(1, len(pictures) + 1)]
     for picture, data in zip(names, pictures, strict=True):
         (FIGURES / picture).write_bytes(data)
-    file.write_text(json.dumps(section | {"pictures": names}) + "\n")
+    file.write_text(json.dumps(section | {"statements": judged(section), "pictures": names}) + "\n")
     return names
 
 

@@ -50,3 +50,9 @@ def test_a_report_of_other_code_or_of_uncommitted_code_is_not_kept(
     with pytest.raises(SystemExit, match="other code"):
         figures.keep(report)
     assert list((report / "kept").iterdir()) == []
+
+
+@pytest.mark.parametrize("file", sorted(figures.FIGURES.glob("*.json")), ids=lambda file: file.stem)
+def test_statements_are_judged_from_the_numbers_that_stand_beside_them(file: Path) -> None:
+    section = json.loads(file.read_text())
+    assert section["statements"] == figures.judged(section), "run docs/figures.py"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from taxel.simulate import circuit
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -219,7 +219,6 @@ def tables(p: Parameters, said: Said) -> list[Table]:
 def draw(p: Parameters, said: Said) -> Figure:
     """Draw the two errors against each other, and a tap as the adaptive ramp and the gentlest read it."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-    from matplotlib.ticker import FixedLocator, NullLocator  # noqa: PLC0415
 
     figure = Figure(figsize=(11, 3.8), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
@@ -228,13 +227,9 @@ def draw(p: Parameters, said: Said) -> Figure:
         at = (one["rms_mv"]["fine"], one["rms_mv"]["gross"])
         left.plot(*at, "o" if own else "s", color="C3" if own else "C0")
         left.annotate(name if own else f"{name} ticks", at, (0, 6), textcoords="offset points", ha="center")
-    left.set(xscale="log", yscale="log", xlabel="fine control, mV rms", ylabel="taps, mV rms")
+    left.set(xlabel="fine control, mV rms", ylabel="taps, mV rms")
+    logarithmic(left, x=[1, 2, 5, 10, 20, 50], y=[20, 30, 50, 70, 100])
     left.margins(0.25, 0.2)
-    for axis, ticks in ((left.xaxis, (1, 2, 5, 10, 20, 50)), (left.yaxis, (10, 20, 30, 50, 70, 100))):
-        seen = axis.get_view_interval()
-        axis.set_major_locator(FixedLocator([tick for tick in ticks if seen[0] <= tick <= seen[1]]))
-        axis.set_minor_locator(NullLocator())
-        axis.set_major_formatter("{x:g}")
     for name, colour in (("adaptive", "C3"), (str(max(p["ramps"])), "C0")):
         course = said["ramps"][name]["course"]
         middle.step(

@@ -12,7 +12,7 @@ from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -210,7 +210,6 @@ def tables(p: Parameters, said: Said) -> list[Table]:
 def draw(p: Parameters, said: Said) -> Figure:
     """Draw the bits over time since contact, of both arrays."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-    from matplotlib.ticker import FixedLocator, NullLocator  # noqa: PLC0415
 
     del p
     figure = Figure(figsize=(9, 3.8), layout="constrained")
@@ -225,10 +224,8 @@ def draw(p: Parameters, said: Said) -> Figure:
             # A little apart, so that neither interval hides the other.
             ax.errorbar(np.multiply(windows, beside), found[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
         ax.axhline(said["most"], color="0.6", ls=":", label="ceiling")
-        ax.set(xscale="log", xlabel="time since contact, ms", title=title)
-        ax.xaxis.set_major_locator(FixedLocator(windows))
-        ax.xaxis.set_minor_locator(NullLocator())
-        ax.xaxis.set_major_formatter("{x:g}")
+        ax.set(xlabel="time since contact, ms", title=title)
+        logarithmic(ax, x=windows)
     axes[0].set_ylabel("bits")
     axes[0].legend(fontsize="small")
     return figure

@@ -18,7 +18,7 @@ from taxel.frames import Frames
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, logarithmic
 from taxel.tare import Tare
 
 if TYPE_CHECKING:
@@ -175,9 +175,8 @@ def draw(p: Parameters, said: Said) -> Figure:
             ends = [values[:, 0] - values[:, 1], values[:, 2] - values[:, 0]]
             axes.errorbar(windows, values[:, 0], ends, marker="o", markersize=4, capsize=2, label=name)
         axes.axhline(said["most"], color="0.7", linestyle=":")
-        axes.set(xscale="log", xlabel="listened, ms", title=title)
-        axes.set_xticks(windows, [f"{w:g}" for w in windows])
-        axes.set_xticks([], minor=True)
+        axes.set(xlabel="listened, ms", title=title)
+        logarithmic(axes, x=windows)
         axes.legend()
     left.set_ylabel("bits")
     return figure

@@ -12,7 +12,7 @@ from taxel.simulate import fem
 from taxel.simulate.fem import DRAGON_SKIN_10, Indentation, SamplingGrid, Yeoh
 from taxel.studies import indented
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -177,7 +177,7 @@ def draw(p: Parameters, said: Said) -> Figure:
             ls="-" if k <= 10 else "--",
             label=line["choice"],
         )
-    ax.set_xscale("log")
+    logarithmic(ax, x=said["periods_ms"])
     ax.set_xlabel("sampling period, ms")
     ax.set_ylabel("bits")
     ax.legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -14,7 +14,7 @@ from taxel.information import confusion_matrix, nested_predictions, panzeri_trev
 from taxel.studies import dropped
 from taxel.studies.dropped import TENNIS, Condition
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -191,7 +191,7 @@ def _draw_bits(said: Said) -> Figure:
     ax.plot(rates, [line["any_phase_bits"] for line in said["lines"]], "s--", mfc="w", label="at any phase")
     ax.axhline(np.log2(said["conditions"]), color="0.6", ls=":", label="ceiling")
     ax.axvline(1000 / SLOW_MS, color="0.8")
-    ax.set_xscale("log")
+    logarithmic(ax, x=rates)
     ax.set_ylim(0, None)
     ax.set_xlabel("pictures a second")
     ax.set_ylabel("bits")

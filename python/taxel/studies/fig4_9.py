@@ -99,8 +99,8 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "the picture",
             f"of the {NEIGHBOURS} nearest in the map are of one's own class: {listed}",
             bool(min(fast) >= CLEAR and max(slow) < min(fast)),
-            f"clearly: {CLEAR:.0%} or more; by chance {1 / len(said['classes']):.2f}; from any phase on, not from "
-            f"the impact on {any_phase}; {p['drops']} drops a class, perplexity {p['perplexity']:g}",
+            f"clearly: {CLEAR:.0%} or more; by chance {1 / len(said['classes']):.2f}; sampling begun at any "
+            f"phase instead of at the impact: {any_phase}; {p['drops']} drops a class, perplexity {p['perplexity']:g}",
         )
     ]
 

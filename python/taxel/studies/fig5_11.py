@@ -18,7 +18,7 @@ from taxel.spikes import to_ms
 from taxel.studies import dropped
 from taxel.studies.dropped import LENGTH_MS, REGION
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
 from taxel.wire import FRAME_US
 
 if TYPE_CHECKING:
@@ -330,7 +330,6 @@ def tables(p: Parameters, said: Said) -> list[Table]:
 
 def draw(p: Parameters, said: Said) -> list[Figure]:
     """Draw 5.11, 5.12 and 5.13."""
-    del p
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
     lines = said["lines"]
@@ -350,7 +349,7 @@ def draw(p: Parameters, said: Said) -> list[Figure]:
         else:
             for line in lines:
                 ax.plot(*zip(*line["times"], strict=True), ".-", label=_ms(line["period_ms"]))
-        ax.set_xscale("log")
+        logarithmic(ax, x=p["times_ms"] if title == "5.13" else periods)
         ax.set_xlabel("ms since impact" if title == "5.13" else "sampling period, ms")
         ax.set_ylabel(label)
         ax.set_title(f"figure {title}")

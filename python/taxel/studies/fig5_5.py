@@ -15,7 +15,7 @@ from taxel.simulate import fem
 from taxel.simulate.fem import SamplingGrid
 from taxel.studies import indented
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -287,7 +287,7 @@ def draw(p: Parameters, said: Said) -> list[Figure]:
         else:
             for line in lines:
                 ax.plot(*zip(*line["times"], strict=True), ".-", label=f"{line['period_ms']:g} ms")
-        ax.set_xscale("log")
+        logarithmic(ax, x=p["times_ms"] if title == "5.8" else periods)
         ax.set_xlabel("ms since contact" if title == "5.8" else "sampling period, ms")
         ax.set_ylabel(label)
         ax.set_title(f"figure {title}")

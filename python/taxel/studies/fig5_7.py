@@ -14,7 +14,7 @@ from taxel.simulate import fem
 from taxel.simulate.fem import SamplingGrid
 from taxel.studies import indented
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -137,7 +137,7 @@ def draw(p: Parameters, said: Said) -> Figure:
             said["periods_ms"], line["bits"], ".-", label=f"{line['event_bits']} bit{'s' * (line['event_bits'] > 1)}"
         )
     ax.axhline(np.log2(said["conditions"]), color="0.6", ls=":")
-    ax.set_xscale("log")
+    logarithmic(ax, x=said["periods_ms"])
     ax.set_xlabel("sampling period, ms")
     ax.set_ylabel("bits")
     ax.legend(title="an event", fontsize="small")

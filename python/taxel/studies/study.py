@@ -24,6 +24,7 @@ from taxel._files import write_whole
 from taxel.studies.runner import HERE, Results, Task, Workers, code_digest, run
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "Study",
     "Table",
     "drawn",
+    "logarithmic",
     "read_section",
     "refuse",
     "svg",
@@ -338,6 +340,18 @@ def svg(figure: Figure) -> bytes:
     with rc_context({"svg.hashsalt": "taxel", "svg.fonttype": "none"}):
         figure.savefig(buffer, format="svg", metadata={"Date": None}, bbox_inches="tight", facecolor="white")
     return buffer.getvalue()
+
+
+def logarithmic(axes: Axes, *, x: Sequence[float] = (), y: Sequence[float] = ()) -> None:
+    """Make the horizontal axis, the vertical one, or both logarithmic, marked in plain numbers at these places."""
+    if x:
+        axes.set_xscale("log")
+        axes.set_xticks(x, [f"{place:g}" for place in x])
+        axes.set_xticks([], minor=True)
+    if y:
+        axes.set_yscale("log")
+        axes.set_yticks(y, [f"{place:g}" for place in y])
+        axes.set_yticks([], minor=True)
 
 
 def drawn(study: Study, parameters: Parameters, said: Said) -> list[bytes]:
