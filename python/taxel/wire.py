@@ -35,6 +35,10 @@ PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
 
 _PAIRINGS = ("direct", "taxel")
 
+#: Rows from which on NumPy asks for large pages for the narrowest column too (from 4 MB on): the first write to each
+#: small page costs more than what is written there.
+_LARGE = 1 << 22
+
 
 def _bytes(data: object) -> NDArray[np.uint8]:
     """Return the bytes of anything with a contiguous buffer, without a copy."""
@@ -217,6 +221,38 @@ class Columns:
         p, present = self.p.view(np.uint8), self.present.view(np.uint8)
         return self.t, self.x, self.y, self.intensity, p, present
 
+    @classmethod
+    def _fresh(cls, rows: int) -> Columns:
+        """Return columns with room for `rows` events, to be filled once (`_given`)."""
+        return cls(max(rows, _LARGE) if rows >= _LARGE // 4 else rows)
+
+    def _first(
+        self,
+        array: Array,
+        rows: int,
+        paired: bool,
+        repaired: NDArray[np.bool_] | None,
+        markers: Sequence[tuple[int, bool]],
+    ) -> Events:
+        """Return the first rows as events that are views of the columns."""
+        ticks, present = (self.intensity[:rows], self.present[:rows]) if paired else (None, None)
+        t, x, y, p = self.t[:rows], self.x[:rows], self.y[:rows], self.p[:rows]
+        return Events._unchecked(t, x, y, p, array, ticks, present, repaired, tuple(markers))
+
+    def _given(
+        self,
+        array: Array,
+        rows: int,
+        paired: bool,
+        repaired: NDArray[np.bool_] | None,
+        markers: Sequence[tuple[int, bool]],
+    ) -> Events:
+        """Return the first rows as events that own the columns; memory that no event needs is given back."""
+        for filled in vars(self).values():
+            filled.resize(rows, refcheck=False)
+            frozen(filled)
+        return self._first(array, rows, paired, repaired, markers)
+
 
 class Decoder:
     """Turn bytes into events as they come: the same events wherever the bytes are cut.
@@ -294,17 +330,9 @@ class Decoder:
     def _take(self, data: Any, arrived: int | None, *, last: bool) -> Events:
         """Return the events of bytes, which may be the last ones, in memory of their own."""
         data = _bytes(data)
-        columns = Columns(len(data) // 5 + 2)
-        events = self._fill(columns, data, arrived, last=last)
-        n = len(events)
-        # Give back what no event needed: half of it where every change has an intensity.
-        for name in ("t", "x", "y", "p", "intensity", "present"):
-            column = getattr(columns, name)
-            if getattr(events, name) is not None:
-                setattr(events, name, None)
-                column.resize(n, refcheck=False)
-                setattr(events, name, column)
-        return events
+        columns = Columns._fresh(len(data) // 5 + 2)
+        rows, paired, markers = self._fill(columns, data, arrived, last=last)
+        return columns._given(self.array, rows, paired, None, markers)
 
     def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
         """Take the next bytes into memory that is used again; return the events as views of it.
@@ -327,28 +355,15 @@ class Decoder:
         ------
         ProblemError : too little room, or as `push`
         """
-        return self._fill(instance("columns", columns, Columns), _bytes(data), arrived, again=True)
+        rows, paired, markers = self._fill(instance("columns", columns, Columns), _bytes(data), arrived, last=False)
+        return columns._first(self.array, rows, paired, None, markers)
 
     def _fill(
-        self, columns: Columns, data: NDArray[np.uint8], arrived: int | None, *, last: bool = False, again: bool = False
-    ) -> Events:
-        """Fill columns, which the events own then unless they are filled again; may end the stream."""
+        self, columns: Columns, data: NDArray[np.uint8], arrived: int | None, *, last: bool
+    ) -> tuple[int, bool, list[tuple[int, bool]]]:
+        """Fill columns, and end the stream where it is the last; return rows, whether with intensities, markers."""
         when = None if arrived is None else whole("arrived", arrived)
-        rows, paired, markers = self._core.fill(data, when, columns._parts(), last)
-        if not again:
-            for column in vars(columns).values():
-                frozen(column)
-        return Events._unchecked(
-            columns.t[:rows],
-            columns.x[:rows],
-            columns.y[:rows],
-            columns.p[:rows],
-            self.array,
-            columns.intensity[:rows] if paired else None,
-            columns.present[:rows] if paired else None,
-            None,
-            tuple(markers),
-        )
+        return self._core.fill(data, when, columns._parts(), last)
 
     def end_of_datagram(self) -> Events:
         """Say that a datagram ends here; return the change that waited for its intensity, if there is one."""

@@ -13,7 +13,7 @@ from taxel import _core
 from taxel._arguments import whole
 from taxel.array import Array
 from taxel.events import Events
-from taxel.wire import _bytes
+from taxel.wire import Columns, _bytes
 
 __all__ = ["Counts", "Decoder", "Heard", "Status", "StreamReader", "decode"]
 
@@ -194,8 +194,11 @@ def decode(data: Any, *, array: Array | None = None) -> tuple[Events, Counts, in
     (4096, True, 0)
     """
     sensor = Array._of(array)
-    parts, counts, skipped = _core.decode_datagrams(_bytes(data), sensor._parts())
-    return Events._from_parts(parts, sensor), Counts(**json.loads(counts)), skipped
+    stream = _bytes(data)
+    columns = Columns._fresh(_core.datagram_rows(len(stream)))
+    told = _core.decode_datagrams(stream, sensor._parts(), columns._parts())
+    rows, paired, repaired, markers, counts, skipped = told
+    return columns._given(sensor, rows, paired, repaired, markers), Counts(**json.loads(counts)), skipped
 
 
 class StreamReader:

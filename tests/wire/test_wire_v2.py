@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 import taxel
 from taxel.simulate import Board
 from taxel.wire import Registers
-from taxel.wire_v2 import Decoder, StreamReader
+from taxel.wire_v2 import Decoder, StreamReader, decode
 
-from .oracle_v2 import Reader, datagram, words
+from .oracle_v2 import Reader, datagram, markers, words
 
 DATA = Path(__file__).parent.parent / "data" / "wire_v2"
 VECTORS = sorted(path.stem for path in DATA.glob("*.json"))
@@ -63,6 +63,38 @@ def test_any_words_of_the_slow_writer_are_read(seed, kind, stride):
     assert list(rows([decoder.push(data)])) == reader.events
     if kind < 6:
         assert [e[:4] for e in reader.events] == [(t, x, y, bool(p)) for t, x, y, p, _ in events]
+
+
+@given(seed=st.integers(0, 2**32 - 1), valued_from=st.integers(0, 12), states=st.booleans())
+def test_a_whole_stream_says_what_the_slow_reader_hears(seed, valued_from, states):
+    """Kinds with values begin somewhere or never, states give rows or none, and between datagrams lies what is none."""
+    draw, slow, stream, skipped = random.Random(seed), Reader(16, 16), b"", 0
+    for sequence in range(12):
+        kind = draw.choice([1, 2, 3, 6 if states else 1]) if sequence >= valued_from else 0
+        base = 1000 * sequence
+        if kind == 3:
+            body = markers((draw.randrange(900), draw.choice([1, 2, 3]), 0))
+        else:
+            places = sorted(draw.sample([(x, y) for x in range(16) for y in range(16)], draw.randrange(60)))
+            events = [(base, x, y, draw.random() < 0.5, draw.randrange(256) if kind else 0) for x, y in places]
+            body = words(kind, events, base=base, stride=4)
+        sent = datagram(kind, body, sequence=sequence, base=base, stride=4)
+        slow.push(sent)
+        noise = b"\xff" * draw.randrange(4)
+        stream, skipped = stream + noise + len(sent).to_bytes(2, "little") + sent, skipped + len(noise)
+    events, counts, none = decode(stream, array=taxel.Array(16, 16))
+    ticks = [-1] * len(events)
+    if events.intensity is not None:
+        ticks = [int(v) if there else -1 for v, there in zip(events.intensity, events.present, strict=True)]
+    marked = np.zeros(len(events), bool) if events.repaired is None else events.repaired
+    columns = (events.t, events.x, events.y, events.p)
+    heard = list(zip(*(c.tolist() for c in columns), ticks, marked.tolist(), strict=True))
+    assert heard == [(*e[:4], -1 if e[4] is None else e[4], e[5]) for e in slow.events]
+    assert (list(events.markers), none) == (slow.markers, skipped)
+    assert (counts.intact, counts.events, counts.repaired) == (12, len(events), int(marked.sum()))
+    assert (events.repaired is None) == (not marked.any())
+    with pytest.raises(ValueError, match="read-only"):
+        events.t[:] = 0
 
 
 @given(data=st.binary(max_size=80), sealed=st.booleans())

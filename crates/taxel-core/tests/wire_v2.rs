@@ -401,7 +401,7 @@ fn a_stream_is_cut_anywhere_and_found_again_after_damage() {
         let (mut reader, mut found, mut rest) = (taxel_core::wire::v2::StreamReader::default(), vec![], &stream[..]);
         while !rest.is_empty() {
             let (piece, later) = rest.split_at(random.random_range(1..=rest.len()));
-            reader.push(piece, |datagram, _, _| found.push(datagram.to_vec()));
+            reader.push(piece, |datagram| found.push(datagram.to_vec()));
             rest = later;
         }
         reader.finish();

@@ -3,11 +3,12 @@
 //! Contiguous arrays of the right type are read in place, under a borrow that is held for the whole call; the Python
 //! side makes them so (`numpy.ascontiguousarray`) before it calls.
 
-use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1};
+use numpy::{Element, IntoPyArray, PyArray1, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::prelude::*;
+use taxel_core::wire::Room;
 use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeTrains};
 
-use crate::errors::ProblemError;
+use crate::errors::{ProblemError, core};
 
 /// The entries of a one-dimensional array, in place.
 pub(crate) fn slice<'a, T: Element>(name: &str, array: &'a PyReadonlyArray1<'_, T>) -> PyResult<&'a [T]> {
@@ -23,7 +24,7 @@ pub(crate) fn array<T: Element>(py: Python<'_>, values: Vec<T>) -> Bound<'_, PyA
 pub(crate) type ArrayParts = (u16, u16, f64, String, Option<Vec<bool>>);
 
 pub(crate) fn to_array((rows, columns, pitch_mm, name, exists): ArrayParts) -> PyResult<Array> {
-    let mut array = Array::new(rows, columns, pitch_mm, &name).map_err(crate::errors::core)?;
+    let mut array = Array::new(rows, columns, pitch_mm, &name).map_err(core)?;
     if let Some(exists) = exists {
         if exists.len() != array.len() {
             let text = format!("exists has {} entries: must be {rows} x {columns}", exists.len());
@@ -88,6 +89,24 @@ impl EventsHeld<'_> {
     }
 }
 
+/// Columns for a decoder to fill, as Python lays them out: t, x, y, ticks, and p, present as bytes.
+pub(crate) type ColumnsIn<'py> = (
+    PyReadwriteArray1<'py, i64>,
+    PyReadwriteArray1<'py, u16>,
+    PyReadwriteArray1<'py, u16>,
+    PyReadwriteArray1<'py, u16>,
+    PyReadwriteArray1<'py, u8>,
+    PyReadwriteArray1<'py, u8>,
+);
+
+/// The columns in place, to be filled without the GIL.
+pub(crate) fn to_room<'a>((t, x, y, ticks, p, present): &'a mut ColumnsIn<'_>) -> PyResult<Room<'a>> {
+    fn open<'a, T: Element>(column: &'a mut PyReadwriteArray1<'_, T>) -> PyResult<&'a mut [T]> {
+        column.as_slice_mut().map_err(|_| ProblemError::new_err("columns must be contiguous"))
+    }
+    Room::new(open(t)?, [open(x)?, open(y)?, open(ticks)?], [open(p)?, open(present)?]).map_err(core)
+}
+
 /// Pictures as Python hands them over: array, t, and values one after the other.
 pub(crate) type FramesIn<'py> = (ArrayParts, PyReadonlyArray1<'py, i64>, PyReadonlyArray1<'py, f32>);
 
@@ -148,7 +167,7 @@ pub(crate) fn to_spikes((times, offsets, values, start, stop): SpikesIn<'_>) -> 
     let offsets = to_offsets(&offsets)?;
     let values = values.map(|v| slice("values", &v).map(<[f32]>::to_vec)).transpose()?;
     let trains = SpikeTrains { times: slice("times", &times)?.to_vec(), offsets, values, start, stop };
-    trains.check().map_err(crate::errors::core)?;
+    trains.check().map_err(core)?;
     Ok(trains)
 }
 

@@ -2,29 +2,19 @@
 
 use std::borrow::Cow;
 
-use numpy::{PyReadonlyArray1, PyReadwriteArray1};
+use numpy::PyReadonlyArray1;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::Deserialize;
 use taxel_core::board::{Board, Crossed, IntensityWord, Previous, Version2};
 use taxel_core::circuit::Chain;
-use taxel_core::wire::{self, Command, Counts, Decoder, Filled, Pairing, Registers, Room};
+use taxel_core::wire::{self, Command, Counts, Decoder, Filled, Pairing, Registers};
 use taxel_core::{Error, Events, problem};
 
-use crate::convert::{ArrayParts, EventsIn, EventsOut, from_events, slice, to_array, to_events};
+use crate::convert::{ArrayParts, ColumnsIn, EventsIn, EventsOut, from_events, slice, to_array, to_events, to_room};
 use crate::enter::{Shared, enter};
-use crate::errors::{ProblemError, core};
+use crate::errors::core;
 use crate::parameters::{parsed, to_json};
-
-/// Columns to fill: t, x, y, ticks, and p, present as bytes.
-type ColumnsIn<'py> = (
-    PyReadwriteArray1<'py, i64>,
-    PyReadwriteArray1<'py, u16>,
-    PyReadwriteArray1<'py, u16>,
-    PyReadwriteArray1<'py, u16>,
-    PyReadwriteArray1<'py, u8>,
-    PyReadwriteArray1<'py, u8>,
-);
 
 /// How many rows were filled, whether ticks were, and the markers on the way.
 type FilledOut = (usize, bool, Vec<(i64, bool)>);
@@ -48,19 +38,11 @@ impl WireDecoder {
         py: Python<'_>,
         data: PyReadonlyArray1<'_, u8>,
         arrived: Option<i64>,
-        columns: ColumnsIn<'_>,
+        mut columns: ColumnsIn<'_>,
         last: bool,
     ) -> PyResult<FilledOut> {
         let data = slice("data", &data)?;
-        let (mut t, mut x, mut y, mut ticks, mut p, mut present) = columns;
-        let contiguous = |_| ProblemError::new_err("columns must be contiguous");
-        let t = t.as_slice_mut().map_err(contiguous)?;
-        let x = x.as_slice_mut().map_err(contiguous)?;
-        let y = y.as_slice_mut().map_err(contiguous)?;
-        let ticks = ticks.as_slice_mut().map_err(contiguous)?;
-        let p = p.as_slice_mut().map_err(contiguous)?;
-        let present = present.as_slice_mut().map_err(contiguous)?;
-        let room = Room::new(t, [x, y, ticks], [p, present]).map_err(core)?;
+        let room = to_room(&mut columns)?;
         let (Filled { rows, paired }, markers) =
             self.0.enter(py, |decoder, stop| decoder.fill(data, arrived, room, last, stop))?;
         Ok((rows, paired, markers.iter().map(|m| (m.t, m.start)).collect()))

@@ -3,10 +3,11 @@
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use taxel_core::wire::v2::{Decoder, Heard, StreamReader};
+use taxel_core::wire::Filled;
+use taxel_core::wire::v2::{self, Decoded, Decoder, Heard, StreamReader};
 use taxel_core::{Error, Events};
 
-use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
+use crate::convert::{ArrayParts, ColumnsIn, EventsOut, array, from_events, slice, to_array, to_room};
 use crate::enter::{Shared, enter};
 use crate::parameters::to_json;
 
@@ -61,29 +62,29 @@ impl DatagramDecoder {
     }
 }
 
-/// Decodes a whole stream of datagrams, each behind its length; events, counts as JSON, bytes that belonged to none.
+/// How far columns were filled, whether ticks were, which rows states gave, the markers; counts as JSON, and how many bytes
+/// belonged to no datagram.
+type DecodedOut<'py> = (usize, bool, Option<Bound<'py, PyArray1<bool>>>, Vec<(i64, bool)>, String, u64);
+
+/// How many rows a stream of so many bytes may need.
+#[pyfunction]
+fn datagram_rows(length: usize) -> usize {
+    v2::stream_rows(length)
+}
+
+/// Decodes a whole stream of datagrams, each behind its length, into columns.
 #[pyfunction]
 fn decode_datagrams<'py>(
     py: Python<'py>,
     data: PyReadonlyArray1<'_, u8>,
     sensor: ArrayParts,
-) -> PyResult<(EventsOut<'py>, String, u64)> {
-    /// Bytes between two looks at Ctrl-C: some milliseconds of work.
-    const PIECE: usize = 1 << 20;
-    let (bytes, sensor) = (slice("data", &data)?, to_array(sensor)?);
-    let (events, counts, skipped) = enter(py, |stop| {
-        let (mut reader, mut decoder) = (StreamReader::default(), Decoder::new(sensor.clone()));
-        let mut events = Events::empty(sensor);
-        for piece in bytes.chunks(PIECE) {
-            stop.check()?;
-            reader.push(piece, |_, header, body| {
-                decoder.push_read(header, body, None, &mut events);
-            });
-        }
-        reader.finish();
-        Ok::<_, Error>((events, decoder.counts(), reader.skipped()))
-    })?;
-    Ok((from_events(py, events), to_json(&counts)?, skipped))
+    mut columns: ColumnsIn<'_>,
+) -> PyResult<DecodedOut<'py>> {
+    let (bytes, sensor, room) = (slice("data", &data)?, to_array(sensor)?, to_room(&mut columns)?);
+    let decoded = enter(py, |stop| v2::decode(bytes, sensor, room, stop))?;
+    let Decoded { filled: Filled { rows, paired }, repaired, markers, counts, skipped } = decoded;
+    let markers = markers.iter().map(|m| (m.t, m.start)).collect();
+    Ok((rows, paired, repaired.map(|column| array(py, column)), markers, to_json(&counts)?, skipped))
 }
 
 /// Cuts a stream into datagrams.
@@ -101,7 +102,7 @@ impl DatagramStream {
     fn push<'py>(&self, py: Python<'py>, data: PyReadonlyArray1<'_, u8>) -> PyResult<Vec<Bound<'py, PyBytes>>> {
         let (bytes, mut found) = (slice("data", &data)?, vec![]);
         let found = self.0.enter(py, |reader, _| {
-            reader.push(bytes, |datagram, _, _| found.push(datagram.to_vec()));
+            reader.push(bytes, |datagram| found.push(datagram.to_vec()));
             Ok::<_, Error>(found)
         })?;
         Ok(found.iter().map(|datagram| PyBytes::new(py, datagram)).collect())
@@ -116,5 +117,6 @@ impl DatagramStream {
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<DatagramDecoder>()?;
     module.add_class::<DatagramStream>()?;
+    module.add_function(wrap_pyfunction!(datagram_rows, module)?)?;
     module.add_function(wrap_pyfunction!(decode_datagrams, module)?)
 }

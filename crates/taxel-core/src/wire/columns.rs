@@ -1,6 +1,7 @@
 //! Columns that a decoder fills, in place.
 
 use std::mem::MaybeUninit;
+use std::ops::Range;
 
 use crate::{Events, Marker, Result, problem};
 
@@ -124,5 +125,80 @@ pub(in crate::wire) unsafe fn append(
             intensity.present.set_len(after);
         }
         out.intensity = Some(intensity);
+    }
+}
+
+/// Where version 2 puts what datagrams tell: columns that grow, or columns that were laid out.
+pub(in crate::wire) trait Table {
+    /// Takes a start or a stop.
+    fn mark(&mut self, marker: Marker);
+
+    /// Takes rows: `fill` gets room for `most` of them, and whether each has an intensity or the mark that it has none, as it
+    /// must where they are `valued`; it says how many it wrote. States gave them where they are `repaired`.
+    ///
+    /// # Safety
+    ///
+    /// `fill` must have written as many rows as it says, as [`append`] asks for.
+    unsafe fn rows(&mut self, most: usize, valued: bool, repaired: bool, fill: impl FnOnce(Room<'_>, bool) -> usize);
+}
+
+impl Table for Events {
+    fn mark(&mut self, marker: Marker) {
+        self.markers.push(marker);
+    }
+
+    unsafe fn rows(&mut self, most: usize, valued: bool, repaired: bool, fill: impl FnOnce(Room<'_>, bool) -> usize) {
+        if valued {
+            self.complete_intensities();
+        }
+        let before = self.len();
+        // SAFETY: the caller's promise.
+        unsafe { append(self, most, |room, paired, _| Filled { rows: fill(room, paired), paired }) };
+        self.mark_repaired(before, repaired);
+    }
+}
+
+/// Columns that were laid out, as they fill from their first row on.
+pub(in crate::wire) struct Laid<'a> {
+    room: Room<'a>,
+    filled: Filled,
+    repaired: Vec<Range<usize>>,
+    markers: Vec<Marker>,
+}
+
+impl<'a> Laid<'a> {
+    pub(in crate::wire) fn new(room: Room<'a>) -> Self {
+        Self { room, filled: Filled { rows: 0, paired: false }, repaired: vec![], markers: vec![] }
+    }
+
+    /// What was written, which rows states gave (none where no row is of that kind), and the markers.
+    pub(in crate::wire) fn end(self) -> (Filled, Option<Vec<bool>>, Vec<Marker>) {
+        let mask = (!self.repaired.is_empty()).then(|| {
+            let mut mask = vec![false; self.filled.rows];
+            self.repaired.into_iter().for_each(|rows| mask[rows].fill(true));
+            mask
+        });
+        (self.filled, mask, self.markers)
+    }
+}
+
+impl Table for Laid<'_> {
+    fn mark(&mut self, marker: Marker) {
+        self.markers.push(marker);
+    }
+
+    #[inline]
+    unsafe fn rows(&mut self, most: usize, valued: bool, repaired: bool, fill: impl FnOnce(Room<'_>, bool) -> usize) {
+        let before = self.filled.rows;
+        if valued && !self.filled.paired {
+            self.room.without_intensities(before);
+            self.filled.paired = true;
+        }
+        let rows = fill(self.room.behind(before), self.filled.paired);
+        assert!(rows <= most, "more rows than there was room for");
+        self.filled.rows += rows;
+        if repaired && rows > 0 {
+            self.repaired.push(before..before + rows);
+        }
     }
 }

@@ -26,7 +26,7 @@ mod stream;
 pub use counts::{Counts, Status};
 pub use decoder::{Decoder, Heard};
 pub use packer::{Packer, Settings};
-pub use stream::StreamReader;
+pub use stream::{Decoded, StreamReader, decode, stream_rows};
 
 /// The first byte of a datagram.
 pub const MAGIC: u8 = 0x54;

@@ -8,9 +8,10 @@ use std::collections::VecDeque;
 use super::counts::{Counts, Status};
 use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Layout, Refused, START, STOP};
 use crate::vectors::Instructions;
-use crate::wire::columns::{self, Filled};
+use crate::wire::columns::Table;
 use crate::{Array, Events, Marker, Result};
 use held::Held;
+pub(in crate::wire::v2) use words::most_rows;
 use words::{Body, Meaning};
 
 /// How far behind the highest sequence number a datagram may come and still be told from a repeated one.
@@ -220,7 +221,13 @@ impl Decoder {
     }
 
     /// As [`Self::push`], of a datagram that was read and found intact.
-    pub fn push_read(&mut self, header: &Header, body: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
+    pub(in crate::wire) fn push_read(
+        &mut self,
+        header: &Header,
+        body: &[u8],
+        arrived: Option<i64>,
+        out: &mut impl Table,
+    ) -> Heard {
         self.counts.datagrams += 1;
         if *self.board.get_or_insert(header.board) != header.board {
             self.counts.foreign += 1;
@@ -289,7 +296,7 @@ impl Decoder {
         (self.sessions.len() - 1, !began)
     }
 
-    fn body(&mut self, header: &Header, body: &[u8], base: i64, out: &mut Events) {
+    fn body(&mut self, header: &Header, body: &[u8], base: i64, out: &mut impl Table) {
         let Some(kind) = Kind::of(header.kind) else {
             self.counts.unknown_kind += 1;
             return;
@@ -306,7 +313,7 @@ impl Decoder {
                     let code = u16::from_le_bytes([marker[4], marker[5]]);
                     if code == START || code == STOP {
                         self.counts.markers += 1;
-                        out.markers.push(Marker { t: base + i64::from(offset), start: code == START });
+                        out.mark(Marker { t: base + i64::from(offset), start: code == START });
                     }
                 }
             }
@@ -321,27 +328,22 @@ impl Decoder {
         }
     }
 
-    fn words(&mut self, header: &Header, kind: Kind, layout: Layout, body: &[u8], base: i64, out: &mut Events) {
+    fn words(&mut self, header: &Header, kind: Kind, layout: Layout, body: &[u8], base: i64, out: &mut impl Table) {
         let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
         let meaning = match states {
             true => Meaning::States,
             false if header.flags & DIFFERENCES != 0 && layout.value > 0 => Meaning::Differences,
             false => Meaning::Changes,
         };
-        if layout.value > 0 {
-            out.complete_intensities();
-        }
-        let before = out.len();
         let body = Body::new(layout, meaning, header.stride, base, body);
         let Self { instructions, held, counts, latest, .. } = self;
         // SAFETY: `words::decode` writes each row that it counts, and with `paired` its ticks and present.
         unsafe {
-            columns::append(out, words::most_rows(&body), |room, paired, _| {
+            out.rows(words::most_rows(body.left()), layout.value > 0, states, |room, paired| {
                 let given = words::decode(body, *instructions, held, room, paired, counts);
                 *latest = given.latest.max(*latest);
-                Filled { rows: given.rows, paired }
+                given.rows
             });
         }
-        out.mark_repaired(before, states);
     }
 }

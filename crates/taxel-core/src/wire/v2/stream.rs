@@ -1,40 +1,32 @@
 //! Datagrams in files and on streams, each behind its length: cut anywhere, and found again after damage.
 
+use super::counts::Counts;
+use super::decoder::{Decoder, most_rows};
 use super::{DATAGRAM_BYTES, HEADER_BYTES, Header, MAGIC, TRAILER_BYTES};
+use crate::wire::columns::{Filled, Laid, Room};
+use crate::{Array, Marker, Result, Stop, problem};
 
 /// Bytes of a length.
 const LENGTH_BYTES: usize = 2;
+
+/// Bytes of the shortest word.
+const WORD_BYTES: usize = 2;
 
 /// Cuts a stream into datagrams. What is none is skipped byte by byte and counted, to the next place where length, magic and
 /// checksum agree.
 #[derive(Debug, Clone, Default)]
 pub struct StreamReader {
-    bytes: Vec<u8>,
+    /// What may still become a datagram.
+    rest: Vec<u8>,
     skipped: u64,
 }
 
 impl StreamReader {
-    /// Takes the next bytes; gives each whole datagram to `take`, with its header and body.
-    pub fn push(&mut self, bytes: &[u8], mut take: impl FnMut(&[u8], &Header, &[u8])) {
-        self.bytes.extend_from_slice(bytes);
-        let mut at = 0;
-        while let Some(rest) = self.bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) {
-            let length = usize::from(u16::from_le_bytes([rest[0], rest[1]]));
-            let likely = (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES).contains(&length)
-                && rest[LENGTH_BYTES] == MAGIC
-                && rest[LENGTH_BYTES + 1] >> 4 == 2;
-            if likely {
-                let Some(datagram) = rest.get(LENGTH_BYTES..LENGTH_BYTES + length) else { break };
-                if let Ok((header, body)) = Header::read(datagram) {
-                    take(datagram, &header, body);
-                    at += LENGTH_BYTES + length;
-                    continue;
-                }
-            }
-            at += 1;
-            self.skipped += 1;
-        }
-        self.bytes.drain(..at);
+    /// Takes the next bytes; gives each whole datagram to `take`.
+    pub fn push(&mut self, bytes: &[u8], mut take: impl FnMut(&[u8])) {
+        self.rest.extend_from_slice(bytes);
+        let done = cut(&self.rest, &mut self.skipped, |datagram, _, _| take(datagram));
+        self.rest.drain(..done);
     }
 
     /// Bytes that belonged to no datagram so far; those that may still become one are not counted.
@@ -45,7 +37,78 @@ impl StreamReader {
 
     /// Ends the stream: what is left counts as skipped too.
     pub fn finish(&mut self) {
-        self.skipped += self.bytes.len() as u64;
-        self.bytes.clear();
+        self.skipped += self.rest.len() as u64;
+        self.rest.clear();
     }
+}
+
+/// Gives each whole datagram that begins in `bytes` to `take`, with its header and body; gives how many bytes are done with.
+fn cut(bytes: &[u8], skipped: &mut u64, mut take: impl FnMut(&[u8], &Header, &[u8])) -> usize {
+    let mut at = 0;
+    while let Some(rest) = bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) {
+        let length = usize::from(u16::from_le_bytes([rest[0], rest[1]]));
+        let likely = (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES).contains(&length)
+            && rest[LENGTH_BYTES] == MAGIC
+            && rest[LENGTH_BYTES + 1] >> 4 == 2;
+        if likely {
+            let Some(datagram) = rest.get(LENGTH_BYTES..LENGTH_BYTES + length) else { break };
+            if let Ok((header, body)) = Header::read(datagram) {
+                take(datagram, &header, body);
+                at += LENGTH_BYTES + length;
+                continue;
+            }
+        }
+        at += 1;
+        *skipped += 1;
+    }
+    at
+}
+
+/// What a whole stream told, but for what stands in the columns.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Decoded {
+    /// How far the columns were filled.
+    pub filled: Filled,
+    /// Which rows states gave; none where no row is of that kind.
+    pub repaired: Option<Vec<bool>>,
+    /// Starts and stops, as they came.
+    pub markers: Vec<Marker>,
+    /// What was heard and missed.
+    pub counts: Counts,
+    /// Bytes that belonged to no datagram.
+    pub skipped: u64,
+}
+
+/// How many rows a stream of so many bytes may need, whatever it holds.
+#[must_use]
+pub fn stream_rows(bytes: usize) -> usize {
+    most_rows(bytes / WORD_BYTES)
+}
+
+/// Decodes a whole stream of one board's datagrams into columns that the caller laid out, from their first row on.
+///
+/// # Errors
+///
+/// `Problem` where a column has fewer entries than [`stream_rows`] asks for, and nothing was read; `Interrupted` where asked to
+/// stop.
+pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Result<Decoded> {
+    /// Bytes between two looks at `stop`: some milliseconds of work, and more than a datagram.
+    const PIECE: usize = 1 << 20;
+    let most = stream_rows(bytes.len());
+    if room.len() < most {
+        return Err(problem!("columns have room for {} rows: {} bytes may need {most}", room.len(), bytes.len()));
+    }
+    let (mut decoder, mut laid, mut skipped, mut rest) = (Decoder::new(array), Laid::new(room), 0, bytes);
+    loop {
+        stop.check()?;
+        let done = cut(&rest[..rest.len().min(PIECE)], &mut skipped, |_, header, body| {
+            decoder.push_read(header, body, None, &mut laid);
+        });
+        if done == 0 {
+            break;
+        }
+        rest = &rest[done..];
+    }
+    let (filled, repaired, markers) = laid.end();
+    Ok(Decoded { filled, repaired, markers, counts: decoder.counts(), skipped: skipped + rest.len() as u64 })
 }

@@ -30,9 +30,9 @@ pub(super) struct Given {
     pub(super) latest: i64,
 }
 
-/// How much room a body needs, rows.
-pub(super) fn most_rows(body: &Body<'_>) -> usize {
-    body.left() + MARGIN
+/// How much room so many words need, rows.
+pub(in crate::wire::v2) fn most_rows(words: usize) -> usize {
+    words + MARGIN
 }
 
 /// Decodes a body; with `paired` each row gets an intensity, or the mark that it has none. `room` has [`most_rows`] or more.
@@ -44,7 +44,7 @@ pub(super) fn decode(
     paired: bool,
     counts: &mut Counts,
 ) -> Given {
-    assert!(room.len() >= most_rows(&body), "columns too short");
+    assert!(room.len() >= most_rows(body.left()), "columns too short");
     while body.left() > 0 {
         blocks(&mut body, set, held, &mut room, paired);
         if body.left() == 0 {

@@ -46,7 +46,7 @@ impl<'a> Body<'a> {
 
     /// Whole words that are left.
     #[inline(always)]
-    pub(super) fn left(&self) -> usize {
+    pub(crate) fn left(&self) -> usize {
         (self.bytes.len() - self.at) / self.layout.bytes
     }
 }
