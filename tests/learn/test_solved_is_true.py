@@ -155,12 +155,15 @@ def lifted(seed):
     return cone, lists, wanted
 
 
+#: Draws that once showed a fault: here silence was asked for up to a target itself, where no margin is left.
+FOUND = {"far_from_0": [605]}
+
 KINDS = {"paused": paused, "beside": beside, "just_before": just_before, "far_from_0": far_from_0, "lifted": lifted}
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_says_solved_fires_at_its_targets_and_nowhere_else(kind):
-    said = [judged(*KINDS[kind](seed)) for seed in range(QUICK)]
+    said = [judged(*KINDS[kind](seed)) for seed in [*range(QUICK), *FOUND.get(kind, [])]]
     assert said.count("solved") > QUICK / 3
     assert said.count("stopped") < QUICK / 5 if kind == "just_before" else "stopped" not in said
 

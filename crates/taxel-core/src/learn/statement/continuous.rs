@@ -6,7 +6,7 @@
 //! begins. A bound that costs no exponential passes over nearly all of them.
 
 use super::peak::{Peak, exceeds};
-use super::rows::{AT_TARGET, Sheet, Statement, lost};
+use super::rows::{Sheet, Statement, lost, until};
 use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak};
 
 /// How long before a rise of the threshold silence is asked for at the lower one, ms: the simulator's edge has some width.
@@ -134,7 +134,7 @@ fn strip(statement: &Statement, sheet: &Sheet) -> Strip {
     let mut times = vec![sheet.start, sheet.end];
     times.extend(heard.iter().map(|i| i.0));
     for &target in &sheet.targets {
-        times.extend([target, target - taper.length, target - AT_TARGET, target + neuron.refractory]);
+        times.extend([target, target - taper.length, until(target), target + neuron.refractory]);
     }
     if neuron.first_threshold == FirstThreshold::Printed {
         let rise = sheet.start + neuron.refractory;
@@ -181,5 +181,5 @@ fn asks(statement: &Statement, sheet: &Sheet, t: f64, to: f64) -> bool {
         neuron.first_threshold == FirstThreshold::Printed && fired.is_none() && to == sheet.start + neuron.refractory;
     !rises
         && fired.is_none_or(|target| target + neuron.refractory <= t)
-        && sheet.next(to).is_none_or(|target| to <= target - AT_TARGET)
+        && sheet.next(to).is_none_or(|target| to <= until(target))
 }

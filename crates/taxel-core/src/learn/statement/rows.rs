@@ -71,6 +71,11 @@ impl Margin {
     }
 }
 
+/// When the silence before a target ends: far from time 0 two neighbouring times are farther apart than what counts as at it.
+pub(crate) fn until(target: f64) -> f64 {
+    (target - AT_TARGET).min(target.next_down())
+}
+
 /// The taper: in the kernel's own family, so that potential and margin together are one state.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Taper {
@@ -379,7 +384,7 @@ impl Statement {
             Time::Grid => t <= target + self.neuron.refractory + ROUNDING_MS,
             Time::Continuous => t < target + self.neuron.refractory,
         });
-        !free && next.is_none_or(|target| t <= target - AT_TARGET)
+        !free && next.is_none_or(|target| t <= until(target))
     }
 
     /// The threshold at `t`, the neuron having fired at the targets before, mV.
