@@ -252,14 +252,12 @@ def tables(p: Parameters, said: Said) -> list[Table]:
     """Tell the search over alpha."""
     del p
     alphas = sorted({a for line in said["lines"] for a, _ in line["searched"]})
-    rows = []
-    for line in said["lines"]:
-        known = dict(map(tuple, line["searched"]))
-        rows.append([f"{line['period_ms']:g} ms", *(f"{known[a]:.2f}" if a in known else "-" for a in alphas)])
+    known = [dict(map(tuple, line["searched"])) for line in said["lines"]]
+    rows = [[f"{a:g}", *(f"{bits[a]:.2f}" if a in bits else "-" for bits in known)] for a in alphas]
     return [
         Table(
             "bits by period and alpha",
-            ["period", *(f"{a:g}" for a in alphas)],
+            ["alpha", *(f"{line['period_ms']:g} ms" for line in said["lines"])],
             rows,
             "below 2 ms only the best of the longer periods, its neighbours, and the printed 0.7 were tried",
         )

@@ -383,7 +383,8 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
             "the neuron first (our goal)",
             ways,
             best == "neuron",
-            f"the rule looks at {said['rules'][at]}; rule and LDA are told when the touch began, the neuron is not",
+            f"the rule looks at {said['rules'][at]}; rule and LDA are told when the touch began, the neuron is not; "
+            "they look at one moment, and see less when the ball leaves (after 15 to 19 ms)",
         ),
     ]
     levels = ", ".join(str(level) for level in sorted(set(said["levels"])))
@@ -421,8 +422,8 @@ def tables(p: Parameters, said: Said) -> list[Table]:
             )
     return [
         Table(
-            "Which sphere fell: right, per cent, by time since contact",
-            ["way", *(f"{t:g} ms" for t in said["times_ms"])],
+            "Which sphere fell: said and right, per cent, by ms since contact",
+            ["way", *(f"{t:g}" for t in said["times_ms"])],
             kinds,
             "The neuron's share counts what was said by then and right; what the rule looks at at each time: "
             + ", ".join(said["rules"]),
