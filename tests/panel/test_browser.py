@@ -141,7 +141,8 @@ def story(page: Any, folder: Path, name: str, floor_ticks: int) -> None:
     shows(page, "label-count", "^1 label")
     start = still(page)
     press(page, "Space")
-    until(lambda: clock(page) > start + 1, "it plays")
+    # Something came in part of the two seconds only: what can be looked at may be as short.
+    until(lambda: clock(page) > start + 0.2, "it plays")
     file = taxel.open(folder / f"{name}7.mcap")
     assert len(file.events.t) > 0
     assert file.registers is not None
