@@ -51,6 +51,11 @@ def _bytes(data: object) -> NDArray[np.uint8]:
         raise ProblemError(f"data is {shown(data)}: must be bytes, or anything with a contiguous buffer") from None
 
 
+def _rows(data: NDArray[np.uint8]) -> int:
+    """Return how many events bytes may hold, with what waits from before."""
+    return len(data) // 5 + 2
+
+
 def encode(events: Events) -> bytes:
     """Write events as bytes: each change, its intensity next to it, markers before the first event not earlier.
 
@@ -118,13 +123,16 @@ def decode(
     decoder = Decoder(array=array, pairing=pairing, differences=differences)
     if lengths is not None:
         each = column("lengths", lengths, np.int64)
-        return Events._from_parts(decoder._core.datagrams(_bytes(data), each), decoder.array)
+        stream = _bytes(data)
+        columns = Columns._fresh(_rows(stream))
+        rows, paired, markers = decoder._core.fill_datagrams(stream, each, columns._parts())
+        events = columns._given(decoder.array, rows, paired, None, markers)
+    else:
+        events = decoder._take(data, None, last=pairing == "direct")
     if pairing == "taxel":
-        markers = decoder.push(data).markers
-        events = decoder.finish()
-        events.markers = markers
-        return events
-    return decoder._take(data, None, last=True)
+        heard, events = events.markers, decoder.finish()
+        events.markers = heard
+    return events
 
 
 @dataclass(frozen=True)
@@ -330,7 +338,7 @@ class Decoder:
     def _take(self, data: Any, arrived: int | None, *, last: bool) -> Events:
         """Return the events of bytes, which may be the last ones, in memory of their own."""
         data = _bytes(data)
-        columns = Columns._fresh(len(data) // 5 + 2)
+        columns = Columns._fresh(_rows(data))
         rows, paired, markers = self._fill(columns, data, arrived, last=last)
         return columns._given(self.array, rows, paired, None, markers)
 

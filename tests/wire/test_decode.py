@@ -216,6 +216,8 @@ def test_datagrams_one_behind_the_other_are_heard_each_by_itself(data, cuts):
     assert heard.markers == tuple(marker for part in parts for marker in part.markers)
     with pytest.raises(taxel.ProblemError, match="lengths: must be 0 or more each"):
         wire.decode(data, lengths=[len(data) + 1])
+    whole = wire.decode(data, pairing="taxel", lengths=[len(data)])
+    assert whole == wire.decode(data, pairing="taxel")
 
 
 def test_a_whole_recording_paired_by_taxel_keeps_its_markers():

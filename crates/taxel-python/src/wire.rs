@@ -9,7 +9,7 @@ use serde::Deserialize;
 use taxel_core::board::{Board, Crossed, IntensityWord, Previous, Version2};
 use taxel_core::circuit::Chain;
 use taxel_core::wire::{self, Command, Counts, Decoder, Filled, Pairing, Registers};
-use taxel_core::{Error, Events, problem};
+use taxel_core::{Error, Marker};
 
 use crate::convert::{ArrayParts, ColumnsIn, EventsIn, EventsOut, from_events, slice, to_array, to_events, to_room};
 use crate::enter::{Shared, enter};
@@ -18,6 +18,10 @@ use crate::parameters::{parsed, to_json};
 
 /// How many rows were filled, whether ticks were, and the markers on the way.
 type FilledOut = (usize, bool, Vec<(i64, bool)>);
+
+fn filled_out((Filled { rows, paired }, markers): (Filled, Vec<Marker>)) -> FilledOut {
+    (rows, paired, markers.iter().map(|m| (m.t, m.start)).collect())
+}
 
 /// Turns bytes into events as they come.
 #[pyclass(module = "taxel._core", frozen)]
@@ -43,41 +47,19 @@ impl WireDecoder {
     ) -> PyResult<FilledOut> {
         let data = slice("data", &data)?;
         let room = to_room(&mut columns)?;
-        let (Filled { rows, paired }, markers) =
-            self.0.enter(py, |decoder, stop| decoder.fill(data, arrived, room, last, stop))?;
-        Ok((rows, paired, markers.iter().map(|m| (m.t, m.start)).collect()))
+        Ok(filled_out(self.0.enter(py, |decoder, stop| decoder.fill(data, arrived, room, last, stop))?))
     }
 
-    /// Takes datagrams that lie one behind the other, each by itself, as a host hears them; ends the stream.
-    fn datagrams<'py>(
+    /// As `fill`, of datagrams that lie one behind the other, each by itself, as a host hears them; ends the stream.
+    fn fill_datagrams(
         &self,
-        py: Python<'py>,
+        py: Python<'_>,
         data: PyReadonlyArray1<'_, u8>,
         lengths: PyReadonlyArray1<'_, i64>,
-    ) -> PyResult<EventsOut<'py>> {
-        /// Datagrams between two looks at Ctrl-C: some milliseconds of work.
-        const PIECE: usize = 1 << 14;
-        let (mut data, lengths) = (slice("data", &data)?, slice("lengths", &lengths)?);
-        let wrong = || problem!("lengths: must be 0 or more each, and {} bytes together", data.len());
-        let cut = lengths.iter().try_fold(0, |sum: usize, &n| sum.checked_add(usize::try_from(n).ok()?));
-        if cut != Some(data.len()) {
-            return Err(core(wrong()));
-        }
-        let events = self.0.enter(py, |decoder, stop| {
-            let mut events = Events::empty(decoder.array().clone());
-            for piece in lengths.chunks(PIECE) {
-                stop.check()?;
-                for &length in piece {
-                    let (datagram, later) = data.split_at(length as usize);
-                    decoder.push_into(datagram, None, &mut events);
-                    decoder.end_of_datagram_into(&mut events);
-                    data = later;
-                }
-            }
-            decoder.finish_into(&mut events);
-            Ok::<_, Error>(events)
-        })?;
-        Ok(from_events(py, events))
+        mut columns: ColumnsIn<'_>,
+    ) -> PyResult<FilledOut> {
+        let (data, lengths, room) = (slice("data", &data)?, slice("lengths", &lengths)?, to_room(&mut columns)?);
+        Ok(filled_out(self.0.enter(py, |decoder, stop| decoder.fill_datagrams(data, lengths, room, stop))?))
     }
 
     /// Releases the change that waits for its intensity.
