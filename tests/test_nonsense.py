@@ -308,13 +308,15 @@ SOUND: dict[str, Sound] = {
     "taxel.Readout.from_json": plain(taxel.Readout.from_json, text=READOUT.to_json()),
     "taxel.Readout.save": method(READOUT, "save", path="readout.json", overwrite=True),
     "taxel.Readout.load": plain(taxel.Readout.load, path="here_readout.json"),
-    "taxel.Readout.stream": method(READOUT, "stream", array=ARRAY, frame_us=192.0, tare=TARE),
+    "taxel.Readout.stream": method(READOUT, "stream", array=ARRAY, frame_us=192.0, tare=TARE, wire_version=2),
     "taxel.detect.ReadoutStream": plain(
-        taxel.detect.ReadoutStream, readout=READOUT, array=ARRAY, frame_us=192.0, tare=TARE
+        taxel.detect.ReadoutStream, readout=READOUT, array=ARRAY, frame_us=192.0, tare=TARE, wire_version=2
     ),
     "taxel.detect.ReadoutStream.push": fresh(read_out, "push", x=FRAMES),
     "taxel.detect.ReadoutStream.advance": fresh(read_out, "advance", t_us=5),
-    "taxel.detect.run": plain(taxel.detect.run, readout=READOUT, source=FRAMES, frame_us=192.0, tare=TARE),
+    "taxel.detect.run": plain(
+        taxel.detect.run, readout=READOUT, source=FRAMES, frame_us=192.0, tare=TARE, wire_version=2
+    ),
     "taxel.detect.score": plain(taxel.detect.score, found=FOUND, truth={"a": [10], "b": [25]}, window_ms=50.0),
     "taxel.detect.Spread.of": plain(taxel.detect.Spread.of, values=[1.0, 2.0]),
     "taxel.detect.Recipe": plain(

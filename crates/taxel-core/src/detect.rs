@@ -6,7 +6,7 @@ mod score;
 mod stream;
 mod trained;
 
-pub use frame_clock::FrameClock;
+pub use frame_clock::{FrameClock, FrameTime};
 pub use readout::Readout;
 pub use score::{Spread, Tally, WIDEST_WINDOW_US, score};
 pub use stream::ReadoutStream;

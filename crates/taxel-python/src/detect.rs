@@ -2,7 +2,9 @@
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
-use taxel_core::detect::{Detection, Readout, ReadoutStream as CoreStream, Reference, Spread, score as score_core};
+use taxel_core::detect::{
+    Detection, FrameTime, Readout, ReadoutStream as CoreStream, Reference, Spread, score as score_core,
+};
 use taxel_core::encode::Tare;
 
 use crate::convert::{ArrayParts, EventsIn, FramesIn, array, slice, to_array, to_events, to_frames};
@@ -143,11 +145,13 @@ fn readout_run_events<'py>(
     readout: &str,
     events: EventsIn<'py>,
     frame_us: f64,
+    wire_version: u8,
     tare: Option<&str>,
 ) -> PyResult<DetectionsOut<'py>> {
     let ((readout, tare), events) = (parse(readout, tare)?, to_events(events)?);
     let events = events.view()?;
-    let found = enter(py, |stop| readout.run_events(events, frame_us, tare.as_ref(), stop))?;
+    let frames = FrameTime::on_wire(frame_us, wire_version);
+    let found = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), stop))?;
     Ok(from_detections(py, found))
 }
 
@@ -173,9 +177,10 @@ struct ReadoutStream(Shared<CoreStream>);
 #[pymethods]
 impl ReadoutStream {
     #[new]
-    fn new(readout: &str, array: ArrayParts, frame_us: f64, tare: Option<&str>) -> PyResult<Self> {
+    fn new(readout: &str, array: ArrayParts, frame_us: f64, wire_version: u8, tare: Option<&str>) -> PyResult<Self> {
         let ((readout, tare), array) = (parse(readout, tare)?, to_array(array)?);
-        Ok(Self(Shared::new(readout.stream(&array, frame_us, tare.as_ref()).map_err(core)?)))
+        let frames = FrameTime::on_wire(frame_us, wire_version);
+        Ok(Self(Shared::new(readout.stream(&array, frames, tare.as_ref()).map_err(core)?)))
     }
 
     fn push_events<'py>(&self, py: Python<'py>, events: EventsIn<'py>) -> PyResult<DetectionsOut<'py>> {

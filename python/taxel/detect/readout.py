@@ -280,7 +280,12 @@ class Readout:
         return read_nir(cls, path, encoder=encoder, neuron=neuron, spike_ms=spike_ms)
 
     def stream(
-        self, array: Array | None = None, *, frame_us: float = FRAME_US, tare: Tare | None = None
+        self,
+        array: Array | None = None,
+        *,
+        frame_us: float = FRAME_US,
+        tare: Tare | None = None,
+        wire_version: int = 1,
     ) -> ReadoutStream:
         """Begin to listen: the same detections as of the whole, wherever the input is cut.
 
@@ -292,12 +297,14 @@ class Readout:
             How long the board's frame (or a picture) lasts; 192 is the board at reset.
         tare : Tare, optional
             The taxels' rest, where the encoder needs one and has none.
+        wire_version : {1, 2}
+            Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
 
         Raises
         ------
         ProblemError : another array than it was trained on, or a tare that is missing
         """
-        return ReadoutStream(self, array, frame_us=frame_us, tare=tare)
+        return ReadoutStream(self, array, frame_us=frame_us, tare=tare, wire_version=wire_version)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Readout):
@@ -333,11 +340,18 @@ class ReadoutStream:
     """
 
     def __init__(
-        self, readout: Readout, array: Array | None = None, *, frame_us: float = FRAME_US, tare: Tare | None = None
+        self,
+        readout: Readout,
+        array: Array | None = None,
+        *,
+        frame_us: float = FRAME_US,
+        tare: Tare | None = None,
+        wire_version: int = 1,
     ) -> None:
         self._text = instance("readout", readout, Readout).to_json()
         self._frame_us = number("frame_us", frame_us, "us")
         self._tare = _tare(tare)
+        self._version = whole("wire_version", wire_version, 1, 2)
         self._core: _core.ReadoutStream | None = None
         array = readout.array if array is None else array
         if array is not None:
@@ -346,7 +360,7 @@ class ReadoutStream:
     def _begin(self, array: Array) -> _core.ReadoutStream:
         if self._core is None:
             parts = instance("array", array, Array)._parts()
-            self._core = _core.ReadoutStream(self._text, parts, self._frame_us, self._tare)
+            self._core = _core.ReadoutStream(self._text, parts, self._frame_us, self._version, self._tare)
         return self._core
 
     def push(self, x: Events | Frames) -> Detections:
@@ -392,6 +406,7 @@ def run(
     *,
     frame_us: float | None = None,
     tare: Tare | None = None,
+    wire_version: int | None = None,
 ) -> Detections:
     """Return what a readout says of a whole recording: the same as it would have said live.
 
@@ -406,6 +421,9 @@ def run(
         say; of frames, their median distance; else 192, the board at reset.
     tare : Tare, optional
         The taxels' rest, where the encoder needs one and has none.
+    wire_version : {1, 2}, optional
+        Of the wire that stamped the events: 1 counts 100 us, so that a stamp may lie before its frame; 2 counts us.
+        Left out: what the recording's registers say, else 1.
 
     Returns
     -------
@@ -428,14 +446,16 @@ def run(
     """
     text = instance("readout", readout, Readout).to_json()
     period = None if frame_us is None else number("frame_us", frame_us, "us")
+    version = None if wire_version is None else whole("wire_version", wire_version, 1, 2)
     rest = _tare(tare)
     if isinstance(source, Recording):
-        if period is None and source.registers is not None:
-            period = source.registers.frame_us
+        if source.registers is not None:
+            period = source.registers.frame_us if period is None else period
+            version = source.registers.wire_version if version is None else version
         source = source.events if source.has_events else source.frames()
     if isinstance(source, Events):
         period = FRAME_US if period is None else period
-        return Detections._from_parts(_core.readout_run_events(text, source._parts(), period, rest))
+        return Detections._from_parts(_core.readout_run_events(text, source._parts(), period, version or 1, rest))
     if not isinstance(source, Frames):
         raise ProblemError(f"source is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, rest))

@@ -1,33 +1,58 @@
 //! When the host could first know: the end of the board's frame in which something happens.
 
+use crate::wire::STAMP_US;
 use crate::{Result, problem};
 
-/// The board's stamps count units of 100 us (Table 5.4).
-const STAMP_NS: i128 = 100_000;
+/// How long frames last, and what their stamps count.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameTime {
+    /// us.
+    pub period_us: f64,
+    /// Unit of a stamp, us: 100 with version 1 of the wire (Table 5.4), 1 with version 2.
+    pub stamp_us: i64,
+}
+
+impl FrameTime {
+    /// Frames of `period_us`, stamped as this version of the wire does.
+    #[must_use]
+    pub fn on_wire(period_us: f64, version: u8) -> Self {
+        Self { period_us, stamp_us: if version == 2 { 1 } else { STAMP_US } }
+    }
+}
+
+impl From<f64> for FrameTime {
+    /// Frames of so many us, stamped as version 1 of the wire does.
+    fn from(period_us: f64) -> Self {
+        Self::on_wire(period_us, 1)
+    }
+}
 
 /// Which frame a time belongs to, and when that frame ends.
 ///
-/// With frame sync all events of a frame carry the stamp of its start, cut down to whole units of 100 us, which is up to
+/// With frame sync all events of a frame carry the stamp of its start, cut down to whole units, which is up to
 /// one unit *before* the frame starts. So a time belongs to the frame whose stamp is the last at or before it, and not to
-/// the one that fills that moment. Frame `k` of 192 us has the stamp `floor(1.92 k)`.
+/// the one that fills that moment. In version 1 frame `k` of 192 us has the stamp `floor(1.92 k)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameClock {
     period_ns: i128,
+    stamp_ns: i128,
     /// The last picture's time where pictures come; the board's frames start at time 0.
     picture_ns: Option<i128>,
 }
 
 impl FrameClock {
-    /// Frames of `period_us`.
+    /// A clock of such frames.
     ///
     /// # Errors
     ///
     /// `Problem` where the period is not between 1 us and one hour.
-    pub fn new(period_us: f64) -> Result<Self> {
+    pub fn new(frames: impl Into<FrameTime>) -> Result<Self> {
+        let FrameTime { period_us, stamp_us } = frames.into();
         if !(1.0..=3.6e9).contains(&period_us) {
             return Err(problem!("frame_us is {period_us}: must lie between 1 us and one hour, 3600000000"));
         }
-        Ok(Self { period_ns: (period_us * 1000.0).round() as i128, picture_ns: None })
+        let stamp_ns = i128::from(stamp_us) * 1000;
+        Ok(Self { period_ns: (period_us * 1000.0).round() as i128, stamp_ns, picture_ns: None })
     }
 
     /// From now on frames count from the picture at `t` us, which is the start of its frame.
@@ -43,7 +68,7 @@ impl FrameClock {
         let end = match self.picture_ns {
             Some(picture) => picture + ((t - picture).div_euclid(self.period_ns) + 1) * self.period_ns,
             None => {
-                let next_stamp = (t.div_euclid(STAMP_NS) + 1) * STAMP_NS;
+                let next_stamp = (t.div_euclid(self.stamp_ns) + 1) * self.stamp_ns;
                 // The last frame that starts before the next stamp; it ends where its successor starts.
                 next_stamp.div_euclid(self.period_ns) * self.period_ns
                     + if next_stamp.rem_euclid(self.period_ns) == 0 { 0 } else { self.period_ns }
@@ -67,6 +92,21 @@ mod tests {
             assert_eq!(clock.end_of(k as f64 * 0.192), 192 * (k + 1), "frame {k}");
             let next_us = 192 * (k + 1) / 100 * 100;
             assert_eq!(clock.end_of((next_us as f64 - 0.001) / 1000.0), 192 * (k + 1), "frame {k}");
+        }
+    }
+
+    #[test]
+    fn stamps_of_a_us_belong_to_the_frame_that_fills_that_moment() {
+        for period_ns in [48_000_i64, 192_000, 499_200, 999_680, 2_000_000] {
+            let clock = FrameClock::new(FrameTime::on_wire(period_ns as f64 / 1000.0, 2)).unwrap();
+            for k in 0..20_000 {
+                let (start, end) = (k * period_ns, (k + 1) * period_ns);
+                // The stamp of its start, as the board cuts it down, its middle, and the last moment before the next stamp.
+                for t in [start / 1000 * 1000, start + period_ns / 2, end / 1000 * 1000 - 1] {
+                    let known = clock.end_of(t as f64 / 1e6);
+                    assert_eq!(known, (end + 999) / 1000, "frame {k} of {period_ns} ns, {t} ns");
+                }
+            }
         }
     }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::allowed::above_0;
-use crate::detect::{Detection, FrameClock, ReadoutStream, TrainedNeuron};
+use crate::detect::{Detection, FrameClock, FrameTime, ReadoutStream, TrainedNeuron};
 use crate::encode::{Encoder, Tare};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
@@ -182,13 +182,13 @@ impl Readout {
         serde_json::to_string_pretty(&File { format: FORMAT, version: VERSION, readout: self }).unwrap_or_default()
     }
 
-    /// Starts to listen to an array whose frames last `frame_us`.
+    /// Starts to listen to an array with such frames.
     ///
     /// # Errors
     ///
     /// `Problem` where the array is not the one that the readout was trained on, a tare is needed and not there, or the
     /// period makes no sense.
-    pub fn stream(&self, array: &Array, frame_us: f64, tare: Option<&Tare>) -> Result<ReadoutStream> {
+    pub fn stream(&self, array: &Array, frames: impl Into<FrameTime>, tare: Option<&Tare>) -> Result<ReadoutStream> {
         self.check()?;
         if let Some(mine) = &self.array
             && (mine.rows, mine.columns, &mine.exists) != (array.rows, array.columns, &array.exists)
@@ -209,7 +209,7 @@ impl Readout {
         }
         let encoder = tare.map_or_else(|| self.encoder.clone(), |tare| self.encoder.with_tare(tare));
         let neurons = self.neurons.iter().map(|(label, one)| (label.clone(), one.clone()));
-        let (encoder, clock) = (encoder.stream(array)?, FrameClock::new(frame_us)?);
+        let (encoder, clock) = (encoder.stream(array)?, FrameClock::new(frames)?);
         let delays_ms = self.delays_ms.clone();
         Ok(ReadoutStream::new(encoder, array.clone(), clock, self.run_threshold, delays_ms, neurons))
     }
@@ -228,12 +228,12 @@ impl Readout {
     pub fn run_events(
         &self,
         events: EventsView<'_>,
-        frame_us: f64,
+        frames: impl Into<FrameTime>,
         tare: Option<&Tare>,
         stop: Stop<'_>,
     ) -> Result<Vec<Detection>> {
         let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
-        let mut stream = self.stream(events.array, frame_us, tare)?;
+        let mut stream = self.stream(events.array, frames, tare)?;
         events.check_order()?;
         let mut found = stream.push_recording(events, stop)?;
         stream.advance(last.saturating_add(self.silence_us()), &mut found)?;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use taxel_core::Array;
+use taxel_core::detect::FrameTime;
 use taxel_core::wire::Registers;
 
 use super::sending::Destination;
@@ -54,6 +55,12 @@ impl LiveOptions {
             name: "board".to_owned(),
             sources: vec![],
         }
+    }
+
+    /// How long the board's frames last, and what their stamps count, by its registers.
+    #[must_use]
+    pub fn frames(&self) -> FrameTime {
+        FrameTime::on_wire(self.registers.frame_us(), self.registers.wire_version)
     }
 }
 

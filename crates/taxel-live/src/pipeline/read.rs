@@ -4,7 +4,7 @@ use std::sync::atomic::Ordering;
 
 use crossbeam_channel::Sender;
 use taxel_core::Events;
-use taxel_core::detect::{Detection, Readout, ReadoutStream};
+use taxel_core::detect::{Detection, FrameTime, Readout, ReadoutStream};
 use taxel_core::encode::Tare;
 
 use super::ahead::Ahead;
@@ -44,9 +44,7 @@ impl Ear {
         Ok(match (readout, tare_us) {
             (None, _) => Self::Deaf,
             (Some(readout), Some(us)) => Self::Taring(us, Box::new(readout)),
-            (Some(readout), None) => {
-                Self::Reading(Box::new(readout.stream(&options.array, options.registers.frame_us(), tare)?))
-            }
+            (Some(readout), None) => Self::Reading(Box::new(readout.stream(&options.array, options.frames(), tare)?)),
         })
     }
 }
@@ -57,7 +55,7 @@ pub(super) struct Reader {
     say: Sender<Said>,
     found: Vec<Detection>,
     events: Events,
-    frame_us: f64,
+    frames: FrameTime,
 }
 
 enum Mode {
@@ -75,7 +73,7 @@ impl Reader {
             Ear::Reading(stream) => Mode::Reading(Ahead::new(stream)),
             Ear::Taring(stretch_us, readout) => Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array))),
         };
-        Self { mode, sinks, say, found: vec![], events, frame_us: options.registers.frame_us() }
+        Self { mode, sinks, say, found: vec![], events, frames: options.frames() }
     }
 
     pub(super) fn run(mut self, shared: &Shared) {
@@ -124,7 +122,7 @@ impl Reader {
     /// The rest is over: begins to read with the first event after it.
     fn begin(&mut self, shared: &Shared, stop: i64, inside: usize) -> crate::Result<()> {
         let Mode::Taring(rest) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
-        let (tare, stream) = rest.finish(stop, self.frame_us)?;
+        let (tare, stream) = rest.finish(stop, self.frames)?;
         let mut readout = Ahead::new(Box::new(stream));
         readout.push(self.events.view().piece(inside..self.events.len()), &mut self.found)?;
         self.mode = Mode::Reading(readout);

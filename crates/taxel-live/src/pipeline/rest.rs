@@ -1,6 +1,6 @@
 //! A sensor at rest: what a fresh tare is made of.
 
-use taxel_core::detect::{Readout, ReadoutStream};
+use taxel_core::detect::{FrameTime, Readout, ReadoutStream};
 use taxel_core::encode::{Tare, TareBuilder};
 use taxel_core::{Events, Intensities, Result};
 
@@ -52,9 +52,9 @@ impl Rest {
     }
 
     /// The tare, and the readout that uses it and knows what the taxels hold at `stop` us.
-    pub(super) fn finish(self, stop: i64, frame_us: f64) -> Result<(Tare, ReadoutStream)> {
+    pub(super) fn finish(self, stop: i64, frames: FrameTime) -> Result<(Tare, ReadoutStream)> {
         let tare = self.builder.finish(stop, "taken live")?;
-        let mut stream = self.readout.stream(&self.array, frame_us, Some(&tare))?;
+        let mut stream = self.readout.stream(&self.array, frames, Some(&tare))?;
         let mut held: Vec<(usize, Last)> =
             self.last.iter().enumerate().filter_map(|(taxel, last)| last.map(|last| (taxel, last))).collect();
         held.sort_by_key(|(_, last)| last.t);
