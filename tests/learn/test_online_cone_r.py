@@ -126,3 +126,12 @@ def test_control_c_keeps_the_best_so_far_and_the_pattern():
     assert online.patterns_ >= 1
     assert repr(online).startswith("OnlineConeR(neuron=Neuron(tau=40.0), ")
     assert "window=50" in repr(online)
+
+
+@pytest.mark.parametrize("learner", [ConeR(), OnlineConeR(window=2)])
+def test_more_trains_than_memory_holds_are_refused_in_one_line(learner):
+    many = SpikeTrains.from_lists([[1.0]] * 10_001, stop=20.0)
+    with pytest.raises(ProblemError, match=r"10001 trains.*, at most 10000 can be weighed"):
+        learner.fit([many], [[10.0]])
+    few = SpikeTrains.from_lists([[1.0], [4.0]], stop=20.0)
+    assert learner.fit([few], [[10.0]]).weights_.shape == (2,)

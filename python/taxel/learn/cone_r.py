@@ -235,13 +235,7 @@ class ConeRProblem:
         self._heard = _heard(instance("cone", cone, ConeR), trains)
         if self._heard is not None:
             trains = [(parts[0], np.append(parts[1][self._heard], parts[1][-1]), *parts[2:]) for parts in trains]
-        count = self._trains if self._heard is None else len(self._heard)
-        if count > _MOST_TRAINS:
-            raise ProblemError(
-                f"patterns: {count} trains have spikes, at most {_MOST_TRAINS} can be weighed, as memory goes with the "
-                "square and time with the cube of them; take an encoder that pools taxels, fewer levels, or a part of "
-                "the array"
-            )
+        _weighed("patterns", self._trains if self._heard is None else len(self._heard), "trains have spikes")
         self._problem = _core.ConeRProblem(self._handed(cone), trains, times)
         self.silent_rows: int = self._problem.silent_rows
 
@@ -321,6 +315,15 @@ class ConeRProblem:
         if weights.shape != (self._trains,):
             raise ProblemError(f"weights: {weights.size} for {self._trains} trains, must be one a train")
         return weights[self._heard]
+
+
+def _weighed(name: str, count: int, what: str) -> None:
+    """Refuse more trains than can be weighed."""
+    if count > _MOST_TRAINS:
+        raise ProblemError(
+            f"{name}: {count} {what}, at most {_MOST_TRAINS} can be weighed, as memory goes with the square and time "
+            "with the cube of them; take an encoder that pools taxels, fewer levels, or a part of the array"
+        )
 
 
 def _heard(cone: ConeR, trains: Sequence[tuple[Any, ...]]) -> NDArray[np.int64] | None:

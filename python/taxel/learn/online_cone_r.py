@@ -13,7 +13,7 @@ from taxel import _core
 from taxel._arguments import callback, floats, instance, several
 from taxel._core import ProblemError
 from taxel._parameters import defaults
-from taxel.learn.cone_r import ConeR, _keep, _warn
+from taxel.learn.cone_r import ConeR, _keep, _warn, _weighed
 from taxel.spikes import SpikeTrains
 
 __all__ = ["OnlineConeR"]
@@ -146,6 +146,8 @@ class OnlineConeR(ConeR):
 
     def _add(self, pattern: SpikeTrains, targets: ArrayLike, name: str, wanted: str) -> None:
         given = instance(name, pattern, SpikeTrains)._parts(), floats(wanted, targets, "ms")
+        # A train that is silent in this window may have spikes in the next.
+        _weighed(name, len(pattern), "trains")
         self._stream.add(*given)
         self._held.append(given)
 
