@@ -286,7 +286,7 @@ def parameters(values: Mapping[str, object]) -> str:
     def plain(name: str, value: object) -> object:
         value = bare(name, value)
         if isinstance(value, Mapping):
-            return {str(key): plain(str(key), entry) for key, entry in value.items()}
+            return {str(key): plain(f"{name}.{key}", entry) for key, entry in value.items()}
         if isinstance(value, list | tuple | np.ndarray):
             return [
                 plain(f"{name}[{k}]", entry)

@@ -115,6 +115,15 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
     (tmp_path / "sole.csv").write_text("0, 1, 0\n0, 2\n")
     with pytest.raises(SceneError, match=r"sole\.csv"):
         SceneFile.open(tmp_path / "scene.toml")
+    (tmp_path / "sole.csv").unlink()
+    with pytest.raises(SceneError, match=r"scene.toml: bodies\[0\].shape.height_map.file .*sole\.csv: no such file"):
+        SceneFile.open(tmp_path / "scene.toml")
+    write(tmp_path, text.replace('file = "sole.csv"', 'file = "sole.csv", heights_mm = [[0, 0], [0, 0]]'))
+    with pytest.raises(SceneError, match="has heights_mm and a file: must have one of both"):
+        SceneFile.open(tmp_path / "scene.toml")
+    write(tmp_path, text.replace('file = "sole.csv"', "file = 3"))
+    with pytest.raises(SceneError, match=r"height_map.file is 3: must be a text"):
+        SceneFile.open(tmp_path / "scene.toml")
 
 
 @pytest.mark.parametrize(
@@ -124,6 +133,20 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         (("mass_g = 30", "mass_g = -30"), r"mass_g is -30 g: must be above 0"),
         (("mass_g = 30", ""), "mass_g is missing: .* or a material"),
         (("mass_g = 30", 'material = "cheese"'), r'material is "cheese": must be "steel"'),
+        (
+            ("mass_g = 30", 'mass_g = 30\nmaterial = "steel"'),
+            r"bodies\[0\] has mass_g and material: must have one of both",
+        ),
+        (("mass_g = 30", "mass_g = inf"), r"bodies\[0\].mass_g is inf: must be finite"),
+        (("mass_g = 30", "mass_g = 1e6"), r"scene.toml: the ball bottoms out: 1000000 g"),
+        (
+            ("x_mm = 70", "x_mm = 70\nshape.edge.slope_deg = 30"),
+            r"bodies\[0\].shape is sphere and edge: must be one of",
+        ),
+        (
+            ("x_mm = 70", "x_mm = 70\nmotion.pressed.peak_n = 3"),
+            r"bodies\[0\].motion is pressed and dropped: must be one",
+        ),
         (("radius_mm", "radus_mm"), r"radus_mm is not known \(did you mean radius_mm\?\)"),
         (("mass_g", "mass"), r"bodies\[0\].mass is not known"),
         (("x_mm", "x_mn"), r"did you mean x_mm\?"),
@@ -131,10 +154,17 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         (("seed = 5", "seed = 1.5"), "seed is 1.5"),
         (("seed = 5", 'preset = "9 kHz"'), "preset"),
         (("seed = 5", "foam.modulus_kpa = -1"), "modulus_kpa is -1 kPa: must be above 0"),
+        (("seed = 5", "foam.modulus_kpa = 1e300"), "foam: the force on it is too large to be told"),
         (("seed = 5", "foam.modulus = 1"), r"foam.modulus is not known"),
         (("seed = 5", "taxels.exponent = 3"), "exponent is 3"),
         (("seed = 5", "taxels.noise = 3"), "taxels.noise is not known"),
         (("seed = 5", "array.rows = 0"), "rows"),
+        (
+            ("seed = 5", "array.rows = 300\narray.columns = 300"),
+            r"array is 300 x 300: .*5.2 kHz.* does not read so many: 19 x step_",
+        ),
+        (("seed = 5", "tare_ms = -50"), "tare_ms is -50 ms: must be from 0 to 60000"),
+        (("seed = 5", "tare_ms = 1e15"), r"tare_ms is 1e\+15 ms: must be from 0"),
         (("seed = 5", "array = 3"), "array is 3: must be a table"),
         (("[[bodies]]", "[bodies]"), r"bodies is .*\[\[bodies\]\]"),
         (("height_mm = 60", "height_mm = 1e9"), "height_mm is 1e9 mm"),

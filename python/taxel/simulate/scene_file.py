@@ -19,6 +19,7 @@ from taxel._arguments import path as checked_path
 from taxel._core import SceneError
 from taxel.array import Array
 from taxel.simulate.acts import Act, Scene, Silence
+from taxel.simulate.board import truth
 from taxel.wire import Registers
 
 __all__ = ["SceneFile"]
@@ -39,6 +40,8 @@ _TAXELS = (
 )
 #: Silence between the tare and the scene, and after it, ms.
 _BEFORE_MS, _AFTER_MS = 250.0, 100.0
+#: As long as a scene's silences may be.
+_LONGEST_MS = 60_000.0
 
 
 @dataclass(frozen=True)
@@ -120,13 +123,23 @@ class SceneFile:
         )
         # Says what makes no sense before anything is played.
         _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
+        if not np.isfinite(scene.motion(array=array).force_n).all():
+            raise SceneError("foam: the force on it is too large to be told; take a softer one")
         preset = text("preset", said.get("preset", cls.preset))
         Registers.preset(preset)
+        try:
+            truth([Silence(_AFTER_MS)], preset=preset, array=array)
+        except _core.DeviceError as error:
+            size = f"array is {array.rows} x {array.columns}"
+            raise SceneError(f'{size}: the preset "{preset}" does not read so many: {error}') from None
+        tare_ms = number("tare_ms", said.get("tare_ms", cls.tare_ms))
+        if not 0 <= tare_ms <= _LONGEST_MS:
+            raise SceneError(f"tare_ms is {tare_ms:g} ms: must be from 0 to {_LONGEST_MS:g}")
         return cls(
             scene,
             whole("seed", said.get("seed", cls.seed), 0),
             preset,
-            number("tare_ms", said.get("tare_ms", cls.tare_ms)),
+            tare_ms,
             array,
             sensor,
         )
@@ -158,15 +171,27 @@ def _bodies(said: Any, folder: Path) -> Any:
         raise SceneError(f"bodies is {json.dumps(said, default=str)}: must be written [[bodies]], once a body")
     bodies = []
     for n, body in enumerate(said):
+        if isinstance(body, Mapping):
+            for part in ("shape", "motion"):
+                kinds = body.get(part)
+                if isinstance(kinds, Mapping) and len(kinds) > 1:
+                    raise SceneError(f"bodies[{n}].{part} is {' and '.join(kinds)}: must be one of them")
+            if "mass_g" in body and "material" in body:
+                raise SceneError(f"bodies[{n}] has mass_g and material: must have one of both")
         shape: Any = body.get("shape") if isinstance(body, Mapping) else None
         relief = shape.get("height_map") if isinstance(shape, Mapping) else None
         if isinstance(relief, Mapping) and "file" in relief:
-            place = folder / str(relief["file"])
+            where = f"bodies[{n}].shape.height_map"
+            if "heights_mm" in relief:
+                raise SceneError(f"{where} has heights_mm and a file: must have one of both")
+            place = folder / text(f"{where}.file", relief["file"])
             try:
                 rows = place.read_text(encoding="utf-8").replace(",", " ").splitlines()
                 heights = np.loadtxt(rows, ndmin=2).tolist()
+            except FileNotFoundError:
+                raise SceneError(f"{where}.file {place}: no such file") from None
             except ValueError as error:
-                raise SceneError(f"bodies[{n}].shape.height_map.file {place}: {error}") from None
+                raise SceneError(f"{where}.file {place}: {error}") from None
             rest = {name: value for name, value in relief.items() if name != "file"}
             body = {**body, "shape": {**shape, "height_map": {"heights_mm": heights, **rest}}}  # noqa: PLW2901
         bodies.append(body)
