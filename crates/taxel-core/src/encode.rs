@@ -19,7 +19,7 @@ use serde_json::{Map, Value};
 pub use pieces::Pieces;
 pub use running_range::{FirstWindow, RunningRange};
 pub use stream::Stream;
-pub use tare::{Tare, TareBuilder};
+pub use tare::{Tare, TareBuilder, Zeroing};
 
 use law::Law;
 

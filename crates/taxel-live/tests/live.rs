@@ -202,7 +202,7 @@ fn what_is_said_live_is_what_the_recording_says() {
     let live_said: Vec<Detection> = heard.iter().map(|s| s.detection.clone()).collect();
     let (events, said) = recorded(&path);
     assert_eq!(said, live_said, "the recording keeps what was said");
-    let mut again = readout(2.0).run_events(events.view(), 192.0, None, Stop::never()).expect("a sound readout");
+    let mut again = readout(2.0).run_events(events.view(), 192.0, None, &[], Stop::never()).expect("a sound readout");
     // Nothing moved the time on after the last event, and what it would have led to was not said.
     again.retain(|d| Some(&d.t) < events.t.last());
     assert_eq!(again, live_said);
@@ -397,7 +397,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_w
     assert!(tare.rest.iter().all(|&rest| rest == Some(20.0)));
     assert_eq!(said.len(), 5, "a press each 208 frames of 1000");
     let again =
-        readout.run_events(recorded(&path).0.view(), 192.0, Some(&tare), Stop::never()).expect("a sound readout");
+        readout.run_events(recorded(&path).0.view(), 192.0, Some(&tare), &[], Stop::never()).expect("a sound readout");
     assert_eq!(again, said);
 }
 

@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use taxel_core::detect::{
     Detection, FrameTime, Readout, ReadoutStream as CoreStream, Reference, Spread, score as score_core,
 };
-use taxel_core::encode::Tare;
+use taxel_core::encode::{Tare, Zeroing};
 
 use crate::convert::{ArrayParts, EventsIn, FramesIn, array, slice, to_array, to_events, to_frames};
 use crate::enter::{Shared, enter};
@@ -138,7 +138,7 @@ fn parse(readout: &str, tare: Option<&str>) -> PyResult<(Readout, Option<Tare>)>
     Ok((Readout::from_json(readout).map_err(core)?, tare))
 }
 
-/// What a readout says of a whole recording of events.
+/// What a readout says of a whole recording of events, in which taxels were zeroed: t in us, column, row, rest.
 #[pyfunction]
 fn readout_run_events<'py>(
     py: Python<'py>,
@@ -147,11 +147,14 @@ fn readout_run_events<'py>(
     frame_us: f64,
     wire_version: u8,
     tare: Option<&str>,
+    zeroings: Vec<(i64, u16, u16, f64)>,
 ) -> PyResult<DetectionsOut<'py>> {
     let ((readout, tare), events) = (parse(readout, tare)?, to_events(events)?);
+    let zeroings: Vec<_> =
+        zeroings.into_iter().map(|(t, x, y, rest)| Zeroing { t, x, y, rest, before: None }).collect();
     let events = events.view()?;
     let frames = FrameTime::on_wire(frame_us, wire_version);
-    let found = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), stop))?;
+    let found = enter(py, |stop| readout.run_events(events, frames, tare.as_ref(), &zeroings, stop))?;
     Ok(from_detections(py, found))
 }
 

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::allowed::above_0;
 use crate::detect::{Detection, FrameClock, FrameTime, ReadoutStream, TrainedNeuron};
-use crate::encode::{Encoder, Tare};
+use crate::encode::{Encoder, Tare, Zeroing};
 use crate::neuron::{AfterSpike, Time};
 use crate::spikes::us;
 use crate::{Array, Error, EventsView, FramesView, Result, Stop, problem, reading};
@@ -219,21 +219,23 @@ impl Readout {
         SILENCE_US + us(self.delays_ms.last().copied().unwrap_or(0.0)).ceil() as i64
     }
 
-    /// What is said of a whole recording of events, and of a second of silence after it.
+    /// What is said of a whole recording of events in which a person zeroed some taxels, and of a second of silence after it.
     ///
     /// # Errors
     ///
-    /// As [`Readout::stream`], [`ReadoutStream::push_events`] and [`EventsView::check_order`]; `Interrupted` where asked to
-    /// stop.
+    /// As [`Readout::stream`], [`ReadoutStream::zero`], [`ReadoutStream::push_events`] and [`EventsView::check_order`];
+    /// `Interrupted` where asked to stop.
     pub fn run_events(
         &self,
         events: EventsView<'_>,
         frames: impl Into<FrameTime>,
         tare: Option<&Tare>,
+        zeroings: &[Zeroing],
         stop: Stop<'_>,
     ) -> Result<Vec<Detection>> {
         let last = events.t.iter().copied().chain(events.markers.iter().map(|m| m.t)).max().unwrap_or(0);
         let mut stream = self.stream(events.array, frames, tare)?;
+        zeroings.iter().try_for_each(|zeroing| stream.zero(zeroing))?;
         events.check_order()?;
         let mut found = stream.push_recording(events, stop)?;
         stream.advance(last.saturating_add(self.silence_us()), &mut found)?;
@@ -286,9 +288,13 @@ fn word(option: &impl Serialize) -> String {
 
 #[cfg(test)]
 mod tests {
+    use rand::rngs::StdRng;
+    use rand::{Rng, SeedableRng};
+
     use super::*;
     use crate::encode::ContactArea;
     use crate::neuron::Neuron;
+    use crate::{Events, Intensities};
 
     fn readout() -> Readout {
         let neuron = Neuron { tau: 0.5, time: Time::Grid, step_ms: 0.192, ..Neuron::default() };
@@ -389,5 +395,117 @@ mod tests {
         let tare =
             Tare { array: array.clone(), rest: vec![Some(0.0); 63 * 64], start_us: 0, stop_us: 1, note: String::new() };
         assert!(Readout { array: None, ..readout() }.stream(&array, 192.0, Some(&tare)).is_ok());
+    }
+
+    /// Presses on 6 x 6 taxels, at stamps of the wire, some of which are full of them.
+    fn presses(random: &mut StdRng, array: &Array) -> Events {
+        let (mut t, mut events, mut intensity) = (0, Events::empty(array.clone()), Intensities::default());
+        for _ in 0..600 {
+            t += [0, 0, 100, 100, 700, 40_000][random.random_range(0..6)];
+            events.t.push(t);
+            events.x.push(random.random_range(0..6));
+            events.y.push(random.random_range(0..6));
+            events.p.push(true);
+            intensity.ticks.push(random.random_range(130..170));
+            intensity.present.push(random.random_range(0..10) > 0);
+        }
+        Events { intensity: Some(intensity), ..events }
+    }
+
+    /// The same events as if, after `z.t`, the taxel's values were lower by `rise`, and it said so then.
+    fn lowered(mut events: Events, z: &Zeroing, rise: u16) -> Events {
+        let at = events.t.partition_point(|&t| t <= z.t);
+        let mut intensity = events.intensity.take().unwrap();
+        let its = |k: &usize| (events.x[*k], events.y[*k]) == (z.x, z.y) && intensity.present[*k];
+        let held = (0..at).rev().find(its).map(|k| intensity.ticks[k]);
+        for k in (at..events.len()).filter(its).collect::<Vec<_>>() {
+            intensity.ticks[k] -= rise;
+        }
+        if let Some(held) = held {
+            events.t.insert(at, z.t);
+            events.x.insert(at, z.x);
+            events.y.insert(at, z.y);
+            events.p.insert(at, false);
+            intensity.ticks.insert(at, held - rise);
+            intensity.present.insert(at, true);
+        }
+        Events { intensity: Some(intensity), ..events }
+    }
+
+    #[test]
+    fn a_zeroed_taxel_reads_as_one_whose_values_fell_by_what_its_rest_rose() {
+        let array = Array::new(6, 6, 2.0, "small").unwrap();
+        let rest = vec![Some(130.0); 36];
+        let tare = Tare { array: array.clone(), rest, start_us: -1, stop_us: 0, note: String::new() };
+        let mut heard = 0;
+        for (seed, name) in (0..40).zip(["contact_area", "moments"].into_iter().cycle()) {
+            let mut random = StdRng::seed_from_u64(seed);
+            let encoder = Encoder::from_json(&format!(r#"{{"name": "{name}"}}"#)).unwrap();
+            let weights = (0..encoder.trains(&array)).map(|_| random.random_range(-0.2..1.0)).collect();
+            let neuron = Neuron { tau: 0.5, refractory: 0.5, theta_0: 0.3, ..Neuron::default() };
+            let one = TrainedNeuron { neuron: neuron.clone(), delay_ms: 0.0, weights };
+            let neurons = [("touch".to_owned(), one)].into();
+            let readout = Readout {
+                encoder,
+                array: None,
+                time: neuron.time,
+                after_spike: neuron.after_spike,
+                neurons,
+                ..readout()
+            };
+            let events = presses(&mut random, &array);
+            let (mut zeroings, mut low): (Vec<Zeroing>, _) = (vec![], events.clone());
+            while zeroings.len() < 4 {
+                let (x, y) = (random.random_range(0..6), random.random_range(0..6));
+                if zeroings.iter().all(|z| (z.x, z.y) != (x, y)) {
+                    let (t, rise) = (
+                        events.t[random.random_range(0..500)] + random.random_range(0..2) * 50,
+                        random.random_range(1..30),
+                    );
+                    let z = Zeroing { t, x, y, rest: 130.0 + f64::from(rise), before: Some(130.0) };
+                    low = lowered(low, &z, rise);
+                    zeroings.push(z);
+                }
+            }
+            let run = |events: &Events, zeroings: &[Zeroing]| {
+                readout.run_events(events.view(), 192.0, Some(&tare), zeroings, Stop::never()).unwrap()
+            };
+            let said = run(&events, &zeroings);
+            assert_eq!(said, run(&low, &[]), "seed {seed}, {name}");
+            assert!(said.len() > 5, "{}", said.len());
+            heard += usize::from(said != run(&events, &[]));
+
+            // Live: in pieces, time moved on between them, each zeroing told before anything that is later than it.
+            let mut live = readout.stream(&array, 192.0, Some(&tare)).unwrap();
+            let (mut pieces, mut from) = (vec![], 0);
+            while from < events.len() {
+                let to = (from + random.random_range(1..40)).min(events.len());
+                let next = events.t.get(to).copied().unwrap_or(i64::MAX);
+                let (now, later): (Vec<_>, Vec<_>) = zeroings.iter().partition(|z| z.t < next);
+                now.iter().for_each(|z| live.zero(z).unwrap());
+                zeroings = later;
+                live.push_events(events.view().piece(from..to), &mut pieces).unwrap();
+                live.advance(random.random_range(events.t[to - 1]..=next.min(events.t[to - 1] + 5000)), &mut pieces)
+                    .unwrap();
+                from = to;
+            }
+            live.advance(events.t[599] + SILENCE_US, &mut pieces).unwrap();
+            assert_eq!(pieces, said, "seed {seed}, {name}");
+        }
+        assert!(heard > 30, "a zeroing changes what is said: {heard} of 40");
+    }
+
+    #[test]
+    fn only_a_taxel_that_exists_is_zeroed() {
+        let array = Array { exists: Some(vec![true, true, true, false]), ..Array::new(2, 2, 1.0, "three").unwrap() };
+        let z = Zeroing { t: 0, x: 0, y: 0, rest: 1.0, before: None };
+        assert!(z.check(&array).is_ok());
+        for (wrong, said) in [
+            (Zeroing { x: 1, y: 1, ..z }, "taxel at row 1, column 1: none there in 2 x 2"),
+            (Zeroing { x: 2, ..z }, "taxel at row 0, column 2: none there in 2 x 2"),
+            (Zeroing { rest: f64::NAN, ..z }, "taxel at row 0, column 0: a rest of NaN"),
+        ] {
+            assert_eq!(wrong.check(&array).unwrap_err().to_string(), said);
+        }
     }
 }

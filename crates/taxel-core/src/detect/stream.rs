@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use crate::detect::{Detection, FrameClock, TrainedNeuron};
-use crate::encode::Stream;
+use crate::encode::{Stream, Zeroing};
 use crate::neuron::{Neuron, NeuronStream, OutputSpike};
 use crate::spikes::{ms, us};
 use crate::{Array, EventsView, FramesView, Result, Spike, Stop, problem};
@@ -35,6 +35,8 @@ pub struct ReadoutStream {
     waiting: Vec<(Spike, bool)>,
     /// When taxels were repaired last, us, as far back as the encoder may still speak of it.
     repaired: VecDeque<i64>,
+    /// Taxels that are to be zeroed, by time, each after all events up to then.
+    zeroings: VecDeque<Zeroing>,
     late: u64,
 }
 
@@ -75,8 +77,8 @@ impl ReadoutStream {
             repaired: None,
         });
         let voices = voices.collect();
-        let (heard, waiting, repaired) = (vec![], vec![], VecDeque::new());
-        Self { voices, encoder, array, clock, now: None, delays_ms, heard, waiting, repaired, late: 0 }
+        let (heard, waiting, repaired, zeroings) = (vec![], vec![], VecDeque::new(), VecDeque::new());
+        Self { voices, encoder, array, clock, now: None, delays_ms, heard, waiting, repaired, zeroings, late: 0 }
     }
 
     /// Takes the next events; adds what is certain now to `out`.
@@ -96,8 +98,7 @@ impl ReadoutStream {
         let mut latest = self.now.map_or(first, |now| now.max(first));
         let in_order = latest == first && rest.iter().is_sorted() && rest.first().is_none_or(|&t| t >= first);
         if in_order {
-            self.note_repaired(events);
-            self.encoder.push_events(events, &mut self.heard)?;
+            self.hear(events)?;
         } else {
             let mut moved = events.t.to_vec();
             for t in &mut moved {
@@ -105,9 +106,7 @@ impl ReadoutStream {
                 latest = latest.max(*t);
                 *t = latest;
             }
-            let moved = EventsView { t: &moved, ..events };
-            self.note_repaired(moved);
-            self.encoder.push_events(moved, &mut self.heard)?;
+            self.hear(EventsView { t: &moved, ..events })?;
         }
         self.settle(events.t[events.len() - 1].max(latest), out)
     }
@@ -120,6 +119,7 @@ impl ReadoutStream {
     /// beyond 2^52 us.
     pub fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Detection>) -> Result<()> {
         check_time(t)?;
+        self.zero_before(t);
         self.encoder.push_frame(t, values, &mut self.heard)?;
         self.settle(t, out)?;
         self.clock.picture(t);
@@ -134,10 +134,30 @@ impl ReadoutStream {
     pub fn advance(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
         check_time(t)?;
         if self.now.is_none_or(|now| t > now) {
+            self.zero_before(t);
             self.encoder.advance(t, &mut self.heard);
             self.settle(t, out)?;
         }
         Ok(())
+    }
+
+    /// From a time on, after all events up to then, a taxel rests at another value; where that time is over, from now on.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where no such taxel exists, the rest is no number, or the time is beyond 2^52 us.
+    pub fn zero(&mut self, zeroing: &Zeroing) -> Result<()> {
+        check_time(zeroing.t)?;
+        zeroing.check(&self.array)?;
+        let place = self.zeroings.partition_point(|earlier| earlier.t <= zeroing.t);
+        self.zeroings.insert(place, *zeroing);
+        Ok(())
+    }
+
+    /// What each taxel rests at, row by row; `None` where that is not known, or the encoder reads no tare.
+    #[must_use]
+    pub fn rest(&self) -> Vec<Option<f64>> {
+        (0..self.array.len()).map(|place| self.encoder.rest(place)).collect()
     }
 
     /// How many events came later than others with a later time, or later than time was moved on.
@@ -188,6 +208,34 @@ impl ReadoutStream {
             self.push_frame(t, picture, &mut out)?;
         }
         Ok(out)
+    }
+
+    /// Hands events on in order of time, and between them what is to be zeroed.
+    fn hear(&mut self, events: EventsView<'_>) -> Result<()> {
+        self.note_repaired(events);
+        let mut from = 0;
+        while let Some(zeroing) = self.zeroings.front() {
+            let upto = events.t.partition_point(|&t| t <= zeroing.t);
+            if upto == events.len() {
+                break;
+            }
+            if upto > from {
+                self.encoder.push_events(events.piece(from..upto), &mut self.heard)?;
+                from = upto;
+            }
+            self.zero_before(events.t[upto]);
+        }
+        self.encoder.push_events(events.piece(from..events.len()), &mut self.heard)
+    }
+
+    /// Zeroes what is to be zeroed before `t` us.
+    fn zero_before(&mut self, t: i64) {
+        let over = self.zeroings.partition_point(|zeroing| zeroing.t < t);
+        for zeroing in self.zeroings.drain(..over) {
+            let at = self.now.map_or(zeroing.t, |now| now.max(zeroing.t));
+            let place = self.array.index(zeroing.x, zeroing.y);
+            self.encoder.set_rest(at, place, zeroing.rest, &mut self.heard);
+        }
     }
 
     /// Moves the neurons on to `until` us, before which every spike is known.

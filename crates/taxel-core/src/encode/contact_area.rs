@@ -161,10 +161,26 @@ impl Stream for Area {
             }
             if intensity.present[k] {
                 let place = events.array.index(events.x[k], events.y[k]);
-                self.loaded.take(place, f32::from(intensity.ticks[k]));
+                let value = f32::from(intensity.ticks[k]);
+                self.held[place / BLOCK][place % BLOCK] = value;
+                self.loaded.take(place, value);
             }
         }
         Ok(())
+    }
+
+    fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {
+        self.advance(t, out);
+        self.loaded.set_rest(place, rest);
+        match self.source {
+            // The next picture is looked at there anew.
+            Source::Frames { .. } => self.changed[place / BLOCK] = true,
+            _ => self.loaded.take(place, self.held[place / BLOCK][place % BLOCK]),
+        }
+    }
+
+    fn rest(&self, place: usize) -> Option<f64> {
+        Some(self.loaded.rest(place)).filter(|rest| rest.is_finite())
     }
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {

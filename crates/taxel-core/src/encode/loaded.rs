@@ -32,6 +32,9 @@ pub(super) struct Loaded {
     columns: usize,
     /// From which value on each place is loaded; infinite where it has no rest.
     from: Vec<Block>,
+    noise_floor: f64,
+    /// By place; infinite where none is known.
+    rest: Vec<f64>,
     /// 1 where a place is loaded.
     loaded: Vec<[u32; BLOCK]>,
     /// How many neighbours of each place are loaded.
@@ -56,21 +59,35 @@ impl Loaded {
                 to.columns
             ));
         }
-        let mut from = vec![[f32::INFINITY; BLOCK]; blocks(array.len())];
+        let n = blocks(array.len());
+        let mut fresh = Self {
+            rows: usize::from(array.rows),
+            columns: usize::from(array.columns),
+            loaded: vec![[0; BLOCK]; n],
+            from: vec![[f32::INFINITY; BLOCK]; n],
+            noise_floor,
+            rest: vec![f64::INFINITY; array.len()],
+            neighbours: vec![0; array.len()],
+            area: 0,
+        };
         let exists = |place: usize| array.exists.as_ref().is_none_or(|e| e[place]);
         for (place, rest) in tare.rest.iter().enumerate().filter(|&(place, _)| exists(place)) {
             if let Some(rest) = rest {
-                from[place / BLOCK][place % BLOCK] = round_up(rest + noise_floor + 0.5);
+                fresh.set_rest(place, *rest);
             }
         }
-        Ok(Self {
-            rows: usize::from(array.rows),
-            columns: usize::from(array.columns),
-            loaded: vec![[0; BLOCK]; from.len()],
-            from,
-            neighbours: vec![0; array.len()],
-            area: 0,
-        })
+        Ok(fresh)
+    }
+
+    /// Gives a place another rest; its value is to be taken again.
+    pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
+        self.rest[place] = rest;
+        self.from[place / BLOCK][place % BLOCK] = round_up(rest + self.noise_floor + 0.5);
+    }
+
+    /// What a place rests at; infinite where that is not known.
+    pub(super) fn rest(&self, place: usize) -> f64 {
+        self.rest[place]
     }
 
     /// How many taxels count.

@@ -157,12 +157,10 @@ impl Law for Moments {
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let loaded = Loaded::new("moments", array, self.tare.as_ref(), self.noise_floor)?;
-        // There is one, else `Loaded` would not be.
-        let rest = self.tare.iter().flat_map(|t| &t.rest).map(|rest| rest.unwrap_or(f64::INFINITY)).collect();
         let levels = self.all_levels();
         let passing = Passing {
             loaded,
-            rest,
+            places: array.len(),
             columns: usize::from(array.columns),
             pitch_mm: array.pitch_mm,
             origin: None,
@@ -215,7 +213,8 @@ impl Level {
 #[derive(Clone)]
 struct Passing {
     loaded: Loaded,
-    rest: Vec<f64>,
+    /// How many there are.
+    places: usize,
     columns: usize,
     pitch_mm: f64,
     /// The centre as the present touch began, in taxels.
@@ -238,9 +237,9 @@ impl Passing {
         }
         let (mut total, mut peak, mut x, mut y) = (0.0, 0.0_f64, 0.0, 0.0);
         for (block, values) in held.iter().enumerate().filter(|&(block, _)| self.loaded.any(block)) {
-            for (place, &value) in (block * BLOCK..self.rest.len()).zip(values) {
+            for (place, &value) in (block * BLOCK..self.places).zip(values) {
                 if self.loaded.counts(place) {
-                    let above = f64::from(value) - self.rest[place];
+                    let above = f64::from(value) - self.loaded.rest(place);
                     total += above;
                     peak = peak.max(above);
                     x += above * (place % self.columns) as f64;
@@ -326,6 +325,14 @@ impl Rule for Passing {
         let from = out.len();
         self.speak(t, false, out);
         sort_from(out, from);
+    }
+
+    fn set_rest(&mut self, channel: usize, rest: f64) {
+        self.loaded.set_rest(channel, rest);
+    }
+
+    fn rest(&self, channel: usize) -> Option<f64> {
+        Some(self.loaded.rest(channel)).filter(|rest| rest.is_finite())
     }
 
     fn idle(&self) -> bool {

@@ -43,6 +43,14 @@ pub(super) trait Rule: Send + Clone + 'static {
     /// A state says that a channel which read `from` reads `to`, and did so before: no change is to be told.
     fn repair(&mut self, _channel: usize, _from: f32, _to: f32) {}
 
+    /// A channel, whose block the next sample says to have changed, rests at `rest` from there on.
+    fn set_rest(&mut self, _channel: usize, _rest: f64) {}
+
+    /// What a channel rests at; `None` where that is not known, or the rule reads no tare.
+    fn rest(&self, _channel: usize) -> Option<f64> {
+        None
+    }
+
     /// Whether nothing would ever come while the last sample holds, so that samples without change may be left out.
     fn idle(&self) -> bool;
 }
@@ -120,7 +128,11 @@ impl Channels {
     }
 
     pub(super) fn of(&self, x: u16, y: u16) -> Option<usize> {
-        let place = usize::from(y) * usize::from(self.columns) + usize::from(x);
+        self.of_place(usize::from(y) * usize::from(self.columns) + usize::from(x))
+    }
+
+    /// The channel of a place; `None` where no taxel exists.
+    pub(super) fn of_place(&self, place: usize) -> Option<usize> {
         match &self.of_place {
             None => Some(place),
             Some(of) => (of[place] != NONE).then_some(of[place] as usize),
@@ -369,6 +381,24 @@ impl<R: Rule> Stream for Sampled<R> {
 
     fn hears_repaired_ms(&self) -> Option<f64> {
         R::HEARS_REPAIRED.then(|| ms(self.period) + self.latency_ms)
+    }
+
+    fn set_rest(&mut self, t: i64, place: usize, rest: f64, out: &mut Vec<Spike>) {
+        let Some(channel) = self.channels.of_place(place) else { return };
+        if let Source::Events { present, .. } = &mut self.source {
+            *present = t.max(*present);
+            self.sample_until(t, out);
+        }
+        if self.begun {
+            pass(&mut self.rule, t, out);
+        }
+        self.rule.set_rest(channel, rest);
+        self.changed[channel / BLOCK] = true;
+        self.quiet = false;
+    }
+
+    fn rest(&self, place: usize) -> Option<f64> {
+        self.channels.of_place(place).and_then(|channel| self.rule.rest(channel))
     }
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {

@@ -30,6 +30,15 @@ pub trait Stream: Send {
         Some(self.latency_ms())
     }
 
+    /// From `t` us on the taxel at `place` (row by row) rests at `rest`. Comes after the events up to `t` and before later
+    /// ones; an encoder that reads no tare hears nothing of it.
+    fn set_rest(&mut self, _t: i64, _place: usize, _rest: f64, _out: &mut Vec<Spike>) {}
+
+    /// What the taxel at `place` rests at; `None` where that is not known, or the encoder reads no tare.
+    fn rest(&self, _place: usize) -> Option<f64> {
+        None
+    }
+
     /// Takes the next picture, row by row, at `t` us.
     ///
     /// # Errors

@@ -96,6 +96,38 @@ impl Tare {
     }
 }
 
+/// A taxel that a person zeroed: from then on it rests at what it held. Never done but when asked for, as standing contact
+/// would be taken for rest.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Zeroing {
+    /// When, us: after all events up to then, before later ones.
+    pub t: i64,
+    /// The taxel's column.
+    pub x: u16,
+    /// Its row.
+    pub y: u16,
+    /// What it rests at from then on, in the sensor's unit.
+    pub rest: f64,
+    /// What it rested at before; `None` where that was not known.
+    pub before: Option<f64>,
+}
+
+impl Zeroing {
+    /// Checks that the taxel exists and that its rest is a number.
+    ///
+    /// # Errors
+    ///
+    /// `Problem`, naming the taxel.
+    pub fn check(&self, array: &Array) -> Result<()> {
+        let Self { x, y, rest, .. } = *self;
+        if x >= array.columns || y >= array.rows || array.exists.as_ref().is_some_and(|e| !e[array.index(x, y)]) {
+            let (rows, columns) = (array.rows, array.columns);
+            return Err(problem!("taxel at row {y}, column {x}: none there in {rows} x {columns}"));
+        }
+        if rest.is_finite() { Ok(()) } else { Err(problem!("taxel at row {y}, column {x}: a rest of {rest}")) }
+    }
+}
+
 /// Takes a tare from what comes.
 pub struct TareBuilder {
     array: Array,
