@@ -18,7 +18,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Label, Labels
 from taxel.neuron import Neuron
-from taxel.recording import BoardChange, Clock, Datagrams, Note, Recording
+from taxel.recording import BoardChange, Clock, Datagrams, Note, Recording, Zeroing
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
@@ -52,6 +52,7 @@ __all__ = [
     "SceneError",
     "SpikeTrains",
     "Tare",
+    "Zeroing",
     "convert",
     "cut",
     "detect",

@@ -155,6 +155,7 @@ def _remarks_of(recording: Recording | None) -> tuple[Remarks, list[str]]:
         detections=recording.detections,
         counts=recording.counts,
         verdict=recording.verdict,
+        zeroings=recording.zeroings,
     )
     lost = {"mcap": ["raw datagrams with their arrival times"], "lsa": ["raw bytes (words that are no events)"]}
     return remarks, lost.get(recording.kind, [])
@@ -199,7 +200,11 @@ def _not_in_lsa(table: Events, recording: Recording | None) -> list[str]:
 
 
 def _said(remarks: Remarks) -> list[str]:
-    counts = {"notes": len(remarks.notes), "detections": len(remarks.detections)}
+    counts = {
+        "notes": len(remarks.notes),
+        "detections": len(remarks.detections),
+        "zeroed taxels": len(remarks.zeroings),
+    }
     return [f"{n} {name}" for name, n in counts.items() if n] + ["the board's registers"] * bool(remarks.registers)
 
 
@@ -305,6 +310,8 @@ def _add_remarks(writer: Any, events: Events, recording: Recording | None) -> No
         return
     for note in recording.notes:
         writer.note(note.at_ns, note.t, note.text)
+    for zeroing in recording.zeroings:
+        writer.zeroing(max(0, at_ns(zeroing.t)), zeroing.t, zeroing.x, zeroing.y, zeroing.rest, zeroing.before)
     for at, values in recording._source.register_changes:
         writer.registers(at, json.dumps(values))
     for d in found:

@@ -10,7 +10,7 @@ import numpy as np
 
 from taxel._arguments import flag, instance, number, several, shown, text, window
 from taxel._core import ProblemError
-from taxel._remarks import Note, Remarks
+from taxel._remarks import Note, Remarks, Zeroing
 from taxel.array import Array
 from taxel.detections import Detections
 from taxel.events import Events, repaired_of
@@ -93,6 +93,7 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
     -------
     Recording
         In memory; `taxel.convert` writes it. A note at the beginning of each says which it was, so that `cut` finds it.
+        That taxels were zeroed is left out: it would hold in the others too.
 
     Raises
     ------
@@ -154,7 +155,18 @@ def _region(recording: Recording, columns: slice | None, rows: slice | None) -> 
         table = Events(inside.t, x, y, inside.p, array=small, markers=inside.markers, **more)
     else:
         table = recording.frames().region(across, down)
-    remarks = Remarks(array=small, source=recording.source, notes=recording.notes, detections=recording.detections)
+    zeroings = tuple(
+        Zeroing(z.t, z.x - left, z.y - top, z.rest, z.before)
+        for z in (recording.zeroings if recording.has_events else ())
+        if left <= z.x < right and top <= z.y < bottom
+    )
+    remarks = Remarks(
+        array=small,
+        source=recording.source,
+        notes=recording.notes,
+        detections=recording.detections,
+        zeroings=zeroings,
+    )
     return in_memory(recording.path, recording.kind, table, remarks, name=recording.name)
 
 

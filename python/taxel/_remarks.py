@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from taxel import _limits
-from taxel._arguments import text, whole
+from taxel._arguments import number, text, whole
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.detections import Detections
 from taxel.wire import Registers
 
-__all__ = ["Note", "Remarks", "array_of", "detections_of", "notes_of"]
+__all__ = ["Note", "Remarks", "Zeroing", "array_of", "detections_of", "notes_of", "zeroings_of"]
 
 
 @dataclass(frozen=True)
@@ -38,6 +38,29 @@ class Note:
 
 
 @dataclass(frozen=True)
+class Zeroing:
+    """Hold that a person zeroed a taxel: from then on it rests at what it held.
+
+    Parameters
+    ----------
+    t : int, us
+        When: after all events up to then, before later ones.
+    x, y : int
+        The taxel's column and row.
+    rest : float, ticks
+        What it rests at from then on.
+    before : float, ticks, optional
+        What it rested at before, where that was known.
+    """
+
+    t: int
+    x: int
+    y: int
+    rest: float
+    before: float | None
+
+
+@dataclass(frozen=True)
 class Remarks:
     """Hold what a table of events or pictures cannot: as JSON it stands in a .npz and a .h5.
 
@@ -55,6 +78,7 @@ class Remarks:
         What came and what was lost, by cause.
     verdict : str
         The same in one line.
+    zeroings : tuple of Zeroing
     """
 
     array: Array | None = None
@@ -64,6 +88,7 @@ class Remarks:
     detections: Detections = field(default_factory=lambda: Detections([], [], []))
     counts: Mapping[str, Any] = field(default_factory=dict)
     verdict: str = ""
+    zeroings: tuple[Zeroing, ...] = ()
 
     def to_json(self) -> str:
         """Return the remarks as files hold them."""
@@ -78,6 +103,7 @@ class Remarks:
             ],
             "counts": dict(self.counts),
             "verdict": self.verdict,
+            "zeroings": [{"t": z.t, "x": z.x, "y": z.y, "rest": z.rest, "before": z.before} for z in self.zeroings],
         }
         return json.dumps({name: value for name, value in said.items() if value})
 
@@ -110,6 +136,8 @@ class Remarks:
             source = text(entry, about.get(entry, ""))
             entry = "verdict"
             verdict = text(entry, about.get(entry, ""))
+            entry = "zeroings"
+            zeroings = zeroings_of(about.get(entry, ()))
         except FormatError:
             raise
         except RecursionError:
@@ -117,7 +145,7 @@ class Remarks:
         except (ValueError, KeyError, TypeError, AttributeError, IndexError, ProblemError) as error:
             said = str(error).split("\n", maxsplit=1)[0][:200]
             raise FormatError(f"{place}, {entry}: {said}; must be JSON as taxel writes it") from None
-        return cls(array, source, about.get("registers"), notes, detections, counts, verdict)
+        return cls(array, source, about.get("registers"), notes, detections, counts, verdict, zeroings)
 
 
 def array_of(said: Mapping[str, Any]) -> Array:
@@ -146,6 +174,21 @@ def detections_of(said: Any) -> Detections:
     repaired = [row[5] if len(row) > 5 else False for row in rows]
     label, t, known = ([row[k] for row in rows] for k in (1, 2, 3))
     return Detections(label, t, known, slopes, repaired=repaired)
+
+
+def zeroings_of(said: Any) -> tuple[Zeroing, ...]:
+    """Return zeroed taxels, in order of time, from records of t, x, y, rest and before."""
+    zeroings = (
+        Zeroing(
+            whole("t", one["t"], -_limits.TIME_US, _limits.TIME_US),
+            whole("x", one["x"], 0, 65_535),
+            whole("y", one["y"], 0, 65_535),
+            number("rest", one["rest"]),
+            None if one["before"] is None else number("before", one["before"]),
+        )
+        for one in said
+    )
+    return tuple(sorted(zeroings, key=lambda one: one.t))
 
 
 def _counts(said: Any, depth: int = 0) -> dict[str, Any]:

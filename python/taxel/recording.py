@@ -19,7 +19,7 @@ from taxel._arguments import flag, instance, number, several, shown, text, windo
 from taxel._clock import Clock
 from taxel._core import FormatError, ProblemError
 from taxel._h5 import read_h5
-from taxel._remarks import Note, Remarks, array_of, detections_of, notes_of
+from taxel._remarks import Note, Remarks, Zeroing, array_of, detections_of, notes_of, zeroings_of
 from taxel._tables import read_csv, read_npz
 from taxel.array import Array
 from taxel.calibration import Calibration
@@ -40,6 +40,7 @@ __all__ = [
     "Datagrams",
     "Note",
     "Recording",
+    "Zeroing",
     "in_memory",
     "kind_of_file",
     "open_recording",
@@ -381,6 +382,12 @@ class Recording:
         return tuple(n for n in notes if n.t is not None and start <= n.t < stop)
 
     @cached_property
+    def zeroings(self) -> tuple[Zeroing, ...]:
+        """Taxels that people zeroed while recording, in order; of a slice those before it too, which hold in it."""
+        zeroings = self._source.zeroings
+        return zeroings if self._window is None else tuple(z for z in zeroings if z.t < self._window[1])
+
+    @cached_property
     def detections(self) -> Detections:
         """What a readout said while recording."""
         found = self._source.detections
@@ -506,6 +513,7 @@ class Recording:
         time = f"{int(what.t.min())} to {int(what.t.max())} us" if len(what) else "no time"
         more = [f"{len(self.notes)} notes"] * bool(self.notes)
         more += [f"{len(self.detections)} detections"] * bool(len(self.detections))
+        more += [f"{len(self.zeroings)} zeroed taxels"] * bool(self.zeroings)
         more += ["truncated"] * self.truncated
         others = [name for name in self._family if name != self._source.label]
         more += [f"beside {', '.join(others)}"] * bool(others)
@@ -703,6 +711,11 @@ class _Source:
         return ()
 
     @property
+    def zeroings(self) -> tuple[Zeroing, ...]:
+        """Taxels that were zeroed, in order of time."""
+        return ()
+
+    @property
     def detections(self) -> Detections:
         return Detections([], [], [])
 
@@ -770,6 +783,10 @@ class _Table(_Source):
     @property
     def notes(self) -> tuple[Note, ...]:
         return self._remarks.notes
+
+    @property
+    def zeroings(self) -> tuple[Zeroing, ...]:
+        return self._remarks.zeroings
 
     @property
     def detections(self) -> Detections:
@@ -914,6 +931,10 @@ class _Mcap(_Reader):
     @property
     def notes(self) -> tuple[Note, ...]:
         return notes_of(self._remarks["notes"])
+
+    @property
+    def zeroings(self) -> tuple[Zeroing, ...]:
+        return zeroings_of([one for _, one in self._remarks["zeroings"]])
 
     @property
     def detections(self) -> Detections:
@@ -1062,6 +1083,10 @@ class _Several(_Source):
         return next(iter(self._family.values())).notes
 
     @property
+    def zeroings(self) -> tuple[Zeroing, ...]:
+        raise self._refusal()
+
+    @property
     def detections(self) -> Detections:
         return next(iter(self._family.values())).detections
 
@@ -1131,6 +1156,10 @@ class _OnClock(_Source):
     @property
     def notes(self) -> tuple[Note, ...]:
         return self.moved(self.of.notes)
+
+    @property
+    def zeroings(self) -> tuple[Zeroing, ...]:
+        return tuple(replace(one, t=self._time(one.t)) for one in self.of.zeroings)
 
     @property
     def detections(self) -> Detections:

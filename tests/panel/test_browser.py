@@ -327,6 +327,18 @@ def test_the_crosshair_goes_by_keys_and_names_its_taxel(page: Any) -> None:
     page.locator("#flip-x").uncheck()
 
 
+def test_a_taxel_is_zeroed_by_a_button_and_marked(page: Any) -> None:
+    shows(page, "state-word", "^Live$")
+    button = page.get_by_role("button", name="Zero", exact=True)
+    until(lambda: "ticks" in page.locator("#taxel-value").inner_text(), "the taxel was heard of")
+    button.click()
+    shows(page, "taxel-value", "zeroed")
+    until(lambda: page.locator("#pressure-marks .unwell.zeroed").count() == 1, "it is marked")
+    press(page, "Space")
+    shows(page, "state-word", "^Held$")
+    assert button.is_hidden(), "what it holds now is not what is shown"
+
+
 def test_the_page_fits_a_phone_and_its_foot_hides_nothing(chromium: Any, live: SimpleNamespace) -> None:
     page = opened(chromium, live.url, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
     shows(page, "state-word", "^Live$")

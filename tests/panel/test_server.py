@@ -596,3 +596,35 @@ def test_the_command_shows_a_recording_and_says_where(tmp_path, capsys):
         main(["view", str(tmp_path / "two.mcap"), "--no-open", "--seconds", "0.2", "--json"])
     assert ended.value.code in (0, None)
     assert json.loads(capsys.readouterr().out)["url"].startswith("http://127.0.0.1:")
+
+
+def test_a_taxel_is_zeroed_for_all_and_the_next_recording_begins_with_it(live, tmp_path):
+    with Panel(live, folder=tmp_path) as panel, Client(panel) as page, Client(panel) as other:
+        assert page.until("zeroed")["taxels"] == []
+        page.send(type="credit", n=1)
+        assert page.ask("zero", taxels=[[3, 5]])["type"] == "refused"
+        say(live, word(4000, 3, 5, 48), word(5000, 3, 5, 90))
+        heard(live, 2)
+        for wrong in ([], [[3]], [[3, -1]], "all", [[3, 5], [4, 5]], [[64, 5]]):
+            assert page.ask("zero", taxels=wrong)["type"] == "refused"
+        assert page.ask("zero", taxels=[[3, 5]])["type"] == "done"
+        for one in (page, other):
+            (told,) = one.until("zeroed")["taxels"] or one.until("zeroed")["taxels"]
+            assert (told["taxel"], told["rest"], told["before"]) == ([3, 5], 90.0, None)
+        # The picture's rest is the new one, and a lower value does not move it.
+        say(live, word(6000, 3, 5, 80), word(7000, 3, 5, 95))
+        heard(live, 4)
+        page.send(type="credit", n=8)
+        while not (rest := section(page.until("picture"), 5, "<u2")).size or rest[5 * 64 + 3] != 90:
+            page.send(type="credit", n=1)
+        assert page.ask("record", name="after")["type"] == "done"
+        page.until("recorder", state="recording")
+        say(live, word(8000, 3, 5, 99))
+        heard(live, 5)
+        assert page.ask("stop")["type"] == "done"
+        page.until("recorder", state="idle")
+        (kept,) = taxel.open(tmp_path / "after.mcap").zeroings
+        assert (kept.x, kept.y, kept.rest) == (3, 5, 90.0)
+        assert page.ask("open", name="after.mcap")["type"] == "done"
+        opened = next(m for m in reversed(page.said) if not isinstance(m, bytes) and m["type"] == "opened")
+        assert [z["taxel"] for z in opened["zeroed"]] == [[3, 5]]

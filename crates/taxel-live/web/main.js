@@ -61,6 +61,8 @@ let opened = null;
 let counters = null;
 /** @type {import("./protocol.js").RegistersTold | null} */
 let registers = null;
+/** Taxels of the board that a person zeroed. @type {import("./protocol.js").Zeroing[]} */
+let zeroed = [];
 /** @type {Heard[]} */
 let detections = [];
 /** @type {Heard[]} kept while a recording is looked at */
@@ -224,6 +226,9 @@ function hear(message) {
       maps.health = message;
       maps.mark();
       return view.takeHealth(message);
+    case "zeroed":
+      zeroed = message.taxels;
+      return showZeroed();
     case "board_line":
       return board.connection.hear(message.text);
     case "places":
@@ -235,6 +240,19 @@ function hear(message) {
     case "refused":
       return say(message.reason, true);
   }
+}
+
+/** Marks the taxels that were zeroed: of the board, or of the recording that is looked at. */
+function showZeroed() {
+  maps.zeroed = opened ? opened.zeroed : zeroed;
+  maps.mark();
+}
+
+/** Takes what the taxel under the crosshair holds for its rest, for the readout too. */
+function zero() {
+  const { taxel } = maps;
+  if (!taxel) return say("point at a taxel first: click a map, or use its arrow keys", true);
+  server.ask({ type: "zero", taxels: [taxel] }).then(() => say(`zeroed row ${taxel[1]}, column ${taxel[0]}`), failed);
 }
 
 /** @param {import("./protocol.js").Spikes} spikes @returns {string} */
@@ -292,7 +310,7 @@ function open(told) {
   if (!maps.taxel) maps.point([told.array.columns >> 1, told.array.rows >> 1]);
   board.array = told.array;
   maps.health = null;
-  maps.mark();
+  showZeroed();
   part("files", HTMLSelectElement).value = told.name;
   labels.choose(told.name);
   view.choose(told.name);
@@ -332,7 +350,7 @@ function move(told) {
     strip.overview = null;
     if (hello?.array) size(hello.array);
     maps.health = null;
-    maps.mark();
+    showZeroed();
     part("files", HTMLSelectElement).value = "";
     part("notes-block", HTMLElement).hidden = true;
     player.reach = counters?.reach_us ?? null;
@@ -395,6 +413,7 @@ function showState() {
       : state === "following"
         ? ["live", "Live"]
         : ["held", state === "playing" ? "Earlier" : "Held"];
+  part("zero", HTMLButtonElement).hidden = kind !== "live";
   pill.dataset.kind = recording && kind !== "lost" ? "rec" : kind;
   write(part("state-word", HTMLElement), recording && kind !== "lost" ? `${word === "Live" ? "" : `${word}, `}Recording ${recording.file ?? ""}` : word);
   const array = opened?.array ?? hello?.array;
@@ -729,6 +748,7 @@ part("help-button", HTMLButtonElement).onclick = () => help.showModal();
 part("help-close", HTMLButtonElement).onclick = () => help.close();
 part("picture", HTMLButtonElement).onclick = picture;
 part("health", HTMLButtonElement).onclick = health;
+part("zero", HTMLButtonElement).onclick = zero;
 part("zoom-in", HTMLButtonElement).onclick = () => zoom(1);
 part("zoom-out", HTMLButtonElement).onclick = () => zoom(-1);
 part("said-close", HTMLButtonElement).onclick = () => {

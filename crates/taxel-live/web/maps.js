@@ -7,6 +7,7 @@ import { counted } from "./words.js";
 
 /** @typedef {import("./protocol.js").Picture} Picture */
 /** @typedef {import("./protocol.js").Health} Health */
+/** @typedef {import("./protocol.js").Zeroing} Zeroing */
 /** @typedef {import("./settings.js").Settings} Settings */
 
 /** How long the largest value holds the scale, ms. */
@@ -88,6 +89,8 @@ export class Maps {
     this.taxel = null;
     /** @type {Health | null} */
     this.health = null;
+    /** Taxels whose rest a person set. @type {Zeroing[]} */
+    this.zeroed = [];
     /** @type {Picture | null} */
     this.picture = null;
     /** @type {Uint16Array} */
@@ -205,7 +208,8 @@ export class Maps {
     write(part("taxel-name", HTMLElement), this.named());
     const { value, rest } = this.told;
     const above = value === null || rest === null ? "" : `, ${Math.max(0, value - rest)} above rest`;
-    write(part("taxel-value", HTMLElement), !this.taxel ? "" : value === null ? "not heard of" : `${value} ticks${above}`);
+    const zeroed = this.zeroed.some(({ taxel: [x, y] }) => x === this.taxel?.[0] && y === this.taxel?.[1]) ? ", zeroed" : "";
+    write(part("taxel-value", HTMLElement), !this.taxel ? "" : value === null ? "not heard of" : `${value} ticks${above}${zeroed}`);
   }
 
   /** @returns {string} row, column and traces of the taxel under the crosshair */
@@ -273,15 +277,15 @@ export class Maps {
         map.lines.style.setProperty("--y", `${100 * top}%`);
       }
       map.marks.replaceChildren();
-      for (const kind of /** @type {const} */ (["dead", "stuck", "noisy"])) {
-        for (const taxel of this.health?.[kind] ?? []) {
-          const mark = make("span", { class: `unwell ${kind}`, title: `${kind}: row ${taxel[1]}, column ${taxel[0]}` });
-          const [left, top] = place(taxel);
-          mark.style.left = `${100 * left}%`;
-          mark.style.top = `${100 * top}%`;
-          map.marks.append(mark);
-        }
-      }
+      const put = (/** @type {[number, number]} */ taxel, /** @type {string} */ kind, more = "") => {
+        const mark = make("span", { class: `unwell ${kind}`, title: `${kind}: row ${taxel[1]}, column ${taxel[0]}${more}` });
+        const [left, top] = place(taxel);
+        mark.style.left = `${100 * left}%`;
+        mark.style.top = `${100 * top}%`;
+        map.marks.append(mark);
+      };
+      for (const kind of /** @type {const} */ (["dead", "stuck", "noisy"])) for (const taxel of this.health?.[kind] ?? []) put(taxel, kind);
+      for (const { taxel, rest } of this.zeroed) put(taxel, "zeroed", `, rests at ${rest} ticks`);
     }
   }
 }

@@ -27,13 +27,15 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "recordings", folder: string, files: FileTold[] }} Recordings
  * @typedef {{ type: "opened", name: string, array: ArrayTold, start_us: number | null, stop_us: number | null, events: number, bytes: number,
  *   verdict: string, unfinished: boolean, registers: Record<string, number | boolean> | null, markers: { t_us: number, start: boolean }[],
- *   notes: { t_us: number | null, text: string }[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
+ *   notes: { t_us: number | null, text: string }[], zeroed: Zeroing[], detections: { label: string, t_us: number, known_us: number }[] }} Opened
  * @typedef {{ type: "overview", source: string | null, start_us: number, step_us: number, events: number[] }} Overview
  * @typedef {{ type: "transport", source: string | null, state: "following" | "playing" | "paused", speed: number, t_us: number | null }} Transport
  * @typedef {{ label_id: number, label: string, t_us: number }} Label
  * @typedef {{ type: "labels", name: string, path: string, labels: Label[] }} Labels
  * @typedef {[number, number]} Taxel column and row
  * @typedef {{ type: "health", source: string | null, taxels: number, heard: number, dead: Taxel[], stuck: Taxel[], noisy: Taxel[] }} Health
+ * @typedef {{ taxel: Taxel, t_us: number, rest: number, before: number | null }} Zeroing
+ * @typedef {{ type: "zeroed", taxels: Zeroing[] }} Zeroed
  * @typedef {{ type: "board_line", at_ns: number, text: string }} BoardLine
  * @typedef {{ type: "cut", name: string, lost: string[] }} Cut
  * @typedef {{ place: string, kind: string, product: string | null, maker: string | null, serial: string | null }} Port
@@ -42,7 +44,7 @@ export const UNKNOWN_VALUE = 65535;
  * @typedef {{ type: "refused", id?: number, what: string | null, reason: string, field: string | null }} Refused
  * @typedef {{ type: "warning", text: string }} Warning
  * @typedef {Hello | RegistersTold | Presets | Counters | Detection | Spikes | Recorder | Recordings | Opened | Overview | Transport | Labels |
- *   Health | BoardLine | Cut | Places | Done | Refused | Warning} Message
+ *   Health | Zeroed | BoardLine | Cut | Places | Done | Refused | Warning} Message
  */
 
 /**

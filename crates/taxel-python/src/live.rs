@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use taxel_core::detect::Readout;
-use taxel_core::encode::Tare;
+use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
@@ -54,6 +54,13 @@ impl Chosen {
 
 /// Label, t, known, slope, said (us of the board's clock), said (ns of the host's clock), repaired.
 type SaidParts = (String, i64, i64, f64, i64, i64, bool);
+
+/// t (us), column, row, rest after, rest before.
+type ZeroingOut = (i64, u16, u16, f64, Option<f64>);
+
+fn zeroing_out(one: Zeroing) -> ZeroingOut {
+    (one.t, one.x, one.y, one.rest, one.before)
+}
 
 fn said_parts(said: Said) -> SaidParts {
     let d = said.detection;
@@ -228,6 +235,16 @@ impl Live {
     fn sample(&self, py: Python<'_>, name: &str, values: Vec<f64>, arrived_ns: Option<i64>) -> PyResult<()> {
         let arrived_ns = arrived_ns.unwrap_or_else(taxel_live::recording::now_ns);
         self.with(py, |pipeline| pipeline.sample(name, arrived_ns, &values))
+    }
+
+    /// Takes what taxels (column, row) hold for their rest from now on: t in us, column, row, rest after and before.
+    fn zero(&self, py: Python<'_>, taxels: Vec<(u16, u16)>) -> PyResult<Vec<ZeroingOut>> {
+        self.with(py, |pipeline| pipeline.handle().zero(&taxels)).map(|all| all.into_iter().map(zeroing_out).collect())
+    }
+
+    /// What was zeroed last at each taxel that was.
+    fn zeroed(&self, py: Python<'_>) -> PyResult<Vec<ZeroingOut>> {
+        self.with(py, |pipeline| Ok(pipeline.handle().zeroed().0)).map(|all| all.into_iter().map(zeroing_out).collect())
     }
 
     /// Writes something down in the recording.

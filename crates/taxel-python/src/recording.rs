@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde_json::json;
 use taxel_core::detect::Detection;
+use taxel_core::encode::Zeroing;
 use taxel_core::{Marker, problem, wire};
 use taxel_live::clock::BoardClock;
 use taxel_live::recording::{
@@ -92,7 +93,7 @@ impl RecordingReader {
             "board": all.board.iter().map(|c| (c.at_ns, c)).collect::<Vec<_>>(),
             "counts": all.counts, "datagrams": all.datagrams, "datagram_bytes": all.datagram_bytes,
             "arrivals": all.arrivals, "pictures": all.pictures, "bad_chunks": bad_chunks,
-            "samples": all.samples, "held": all.held,
+            "samples": all.samples, "held": all.held, "zeroings": all.zeroings,
         });
         Ok(said.to_string())
     }
@@ -167,6 +168,21 @@ impl RecordingWriter {
     /// Keeps a note.
     fn note(&self, py: Python<'_>, at_ns: i64, t_us: Option<i64>, text: &str) -> PyResult<()> {
         self.with(py, |writer| writer.note(at_ns, t_us, text))
+    }
+
+    /// Keeps that a taxel was zeroed.
+    #[expect(clippy::too_many_arguments, reason = "Python names them")]
+    fn zeroing(
+        &self,
+        py: Python<'_>,
+        at_ns: i64,
+        t_us: i64,
+        x: u16,
+        y: u16,
+        rest: f64,
+        before: Option<f64>,
+    ) -> PyResult<()> {
+        self.with(py, |writer| writer.zeroing(at_ns, &Zeroing { t: t_us, x, y, rest, before }))
     }
 
     /// Keeps a start or stop of the board.

@@ -410,7 +410,8 @@ def run(
 ) -> Detections:
     """Return what a readout says of a whole recording: the same as it would have said live.
 
-    Time moves on for a second of silence after the end, so that what was heard last is said too.
+    Time moves on for a second of silence after the end, so that what was heard last is said too. Taxels that were
+    zeroed while a recording was made (`Recording.zeroings`) are zeroed here as well; its events alone are not.
 
     Parameters
     ----------
@@ -447,15 +448,17 @@ def run(
     text = instance("readout", readout, Readout).to_json()
     period = None if frame_us is None else number("frame_us", frame_us, "us")
     version = None if wire_version is None else whole("wire_version", wire_version, 1, 2)
-    rest = _tare(tare)
+    rest, zeroings = _tare(tare), []
     if isinstance(source, Recording):
         if source.registers is not None:
             period = source.registers.frame_us if period is None else period
             version = source.registers.wire_version if version is None else version
+        zeroings = [(one.t, one.x, one.y, one.rest) for one in source.zeroings] if source.has_events else []
         source = source.events if source.has_events else source.frames()
     if isinstance(source, Events):
-        period = FRAME_US if period is None else period
-        return Detections._from_parts(_core.readout_run_events(text, source._parts(), period, version or 1, rest))
+        period, version = FRAME_US if period is None else period, version or 1
+        said = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
+        return Detections._from_parts(said)
     if not isinstance(source, Frames):
         raise ProblemError(f"source is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
     return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, rest))

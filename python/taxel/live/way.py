@@ -19,6 +19,7 @@ from taxel import _core
 from taxel._arguments import flag, instance, number, numbers, parameters, several, shown, text, whole
 from taxel._arguments import path as checked_path
 from taxel._core import ProblemError
+from taxel._remarks import Zeroing
 from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
@@ -410,6 +411,39 @@ class Live:
         """
         came = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
         self._core.sample(text("name", name), numbers("values", values, np.float64).reshape(-1).tolist(), came)
+
+    def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
+        """Take what taxels hold now for their rest from now on: for taxels that drift.
+
+        The readout's encoder hears them above that rest, where it reads a tare; the recording keeps the command, with
+        the rests before and after, and `taxel.detect.run` applies it. Never done but when asked for: what stands on
+        a taxel then would be taken for rest.
+
+        Parameters
+        ----------
+        x, y : int, or shape (n,)
+            Columns and rows.
+
+        Raises
+        ------
+        ProblemError : a taxel that does not exist or was not heard of yet (names it; then none is zeroed), a tare that
+            is being taken, or a `.lsa` that is recorded, which could not keep it
+        OSError : the disk is full
+        """
+        columns, rows = (numbers(name, given, np.int64).reshape(-1) for name, given in (("x", x), ("y", y)))
+        if len(columns) != len(rows):
+            raise ProblemError(f"x has {len(columns)} columns, y {len(rows)} rows: must be as many")
+        for name, given in (("x", columns), ("y", rows)):
+            if len(given) and (given.min() < 0 or given.max() > _MOST):
+                raise ProblemError(
+                    f"{name}: holds {given.min() if given.min() < 0 else given.max()}, must be a taxel's"
+                )
+        return tuple(Zeroing(*one) for one in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True))))
+
+    @property
+    def zeroed(self) -> tuple[Zeroing, ...]:
+        """What was zeroed last at each taxel that was, by `zero` or a panel."""
+        return tuple(Zeroing(*one) for one in self._core.zeroed())
 
     def note(self, said: str) -> None:
         """Write something down in the recording, with the time of now.

@@ -437,7 +437,7 @@ mod tests {
         let array = Array::new(6, 6, 2.0, "small").unwrap();
         let rest = vec![Some(130.0); 36];
         let tare = Tare { array: array.clone(), rest, start_us: -1, stop_us: 0, note: String::new() };
-        let mut heard = 0;
+        let (mut count, mut heard) = (0, 0);
         for (seed, name) in (0..40).zip(["contact_area", "moments"].into_iter().cycle()) {
             let mut random = StdRng::seed_from_u64(seed);
             let encoder = Encoder::from_json(&format!(r#"{{"name": "{name}"}}"#)).unwrap();
@@ -472,8 +472,7 @@ mod tests {
             };
             let said = run(&events, &zeroings);
             assert_eq!(said, run(&low, &[]), "seed {seed}, {name}");
-            assert!(said.len() > 5, "{}", said.len());
-            heard += usize::from(said != run(&events, &[]));
+            (count, heard) = (count + said.len(), heard + usize::from(said != run(&events, &[])));
 
             // Live: in pieces, time moved on between them, each zeroing told before anything that is later than it.
             let mut live = readout.stream(&array, 192.0, Some(&tare)).unwrap();
@@ -492,7 +491,8 @@ mod tests {
             live.advance(events.t[599] + SILENCE_US, &mut pieces).unwrap();
             assert_eq!(pieces, said, "seed {seed}, {name}");
         }
-        assert!(heard > 30, "a zeroing changes what is said: {heard} of 40");
+        assert!(count > 400, "something must be said to compare: {count}");
+        assert!(heard > 20, "a zeroing changes what is said: {heard} of 40");
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant, UNIX_EPOCH};
 
 use crossbeam_channel as channel;
 use serde_json::{Map, Value, json};
+use taxel_core::encode::Zeroing;
 use taxel_core::wire::Registers;
 use taxel_core::wire::registers::PRESETS;
 use taxel_core::{encode, problem};
@@ -71,6 +72,8 @@ pub(super) struct LiveSide {
     pub(super) film: RingFilm,
     pub(super) activity: Mutex<Activity>,
     missing: AtomicU64,
+    /// How much of what was zeroed has been shown.
+    zeroed: AtomicU64,
 }
 
 /// A label of a recording.
@@ -167,9 +170,11 @@ impl Hub {
             handle,
             said,
             missing: AtomicU64::new(0),
+            zeroed: AtomicU64::new(0),
         };
         *lock(&self.live) = Some(Arc::new(side));
         self.tell(Told::Hello);
+        self.tell_all(&self.zeroed());
         Ok(())
     }
 
@@ -255,6 +260,19 @@ impl Hub {
             drop(outlet);
             while let Ok(said) = live.said.try_recv() {
                 self.tell_all(&detection(&said));
+            }
+            let zeroings = live.handle.zeroings();
+            if live.zeroed.swap(zeroings, Ordering::Relaxed) != zeroings {
+                let columns = usize::from(live.film.array().columns);
+                let mut lens = lock(&live.lens);
+                for one in live.handle.zeroed().0 {
+                    // A held value, so it has 16 bits.
+                    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                    lens.zero(usize::from(one.y) * columns + usize::from(one.x), one.rest as u16);
+                }
+                drop(lens);
+                self.tell_all(&self.zeroed());
+                new = true;
             }
             if new {
                 self.moved.send_modify(|n| *n += 1);
@@ -359,6 +377,12 @@ impl Hub {
             "most_message_bytes": MOST_BYTES,
             "most_credits": MOST_CREDITS,
         })
+    }
+
+    /// The taxels that were zeroed, of the live source.
+    pub(super) fn zeroed(&self) -> Value {
+        let zeroed = self.live().map(|live| live.handle.zeroed().0).unwrap_or_default();
+        json!({ "type": "zeroed", "taxels": zeroed.iter().map(said_of_zeroing).collect::<Vec<_>>() })
     }
 
     pub(super) fn registers(&self) -> Value {
@@ -524,6 +548,12 @@ pub(super) fn said_of(array: &taxel_core::Array) -> Value {
     let exists = array.exists.as_ref();
     let exists = exists.map(|all| all.iter().map(|&there| if there { '1' } else { '0' }).collect::<String>());
     json!({ "rows": array.rows, "columns": array.columns, "pitch_mm": array.pitch_mm, "name": array.name, "exists": exists })
+}
+
+/// A taxel that was zeroed.
+pub(super) fn said_of_zeroing(zeroing: &Zeroing) -> Value {
+    let Zeroing { t, x, y, rest, before } = zeroing;
+    json!({ "taxel": [x, y], "t_us": t, "rest": rest, "before": before })
 }
 
 fn detection(said: &Said) -> Value {

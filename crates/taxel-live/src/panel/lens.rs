@@ -3,7 +3,7 @@
 //! The same for live events and for recordings: a lens that was begun earlier and one that was begun from a keyframe show
 //! the same, as soon as [`FORGET`] columns of time have passed.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use crate::pipeline::{Change, UNKNOWN};
@@ -244,6 +244,8 @@ pub struct Lens {
     rest: Vec<u16>,
     /// Whether the rest is the lowest so far; else it was set.
     lowest: bool,
+    /// Taxels whose rest was set one by one: no lower value moves it.
+    zeroed: BTreeSet<usize>,
     /// How often the rest has changed.
     rests: u64,
     change: Vec<i8>,
@@ -279,6 +281,7 @@ impl Lens {
             held: from.held.clone(),
             rest: from.rest.clone(),
             lowest: true,
+            zeroed: BTreeSet::new(),
             rests: 1,
             change: vec![0; from.held.len()],
             strip: Strip::new(from.held.len() / columns, strip_bytes),
@@ -369,7 +372,9 @@ impl Lens {
             }
             self.weigh(taxel, false);
             self.held[taxel] = change.ticks;
-            if self.rest[taxel] == UNKNOWN || self.lowest && change.ticks < self.rest[taxel] {
+            if (self.rest[taxel] == UNKNOWN || self.lowest && change.ticks < self.rest[taxel])
+                && !self.zeroed.contains(&taxel)
+            {
                 self.rest[taxel] = change.ticks;
                 self.rests += 1;
             }
@@ -445,8 +450,9 @@ impl Lens {
     pub fn hold(&mut self, held: &[u16], events: u64) {
         self.held.copy_from_slice(held);
         self.events = events;
-        for (rest, &held) in self.rest.iter_mut().zip(held) {
-            if held != UNKNOWN && (*rest == UNKNOWN || self.lowest && held < *rest) {
+        for (taxel, (rest, &held)) in self.rest.iter_mut().zip(held).enumerate() {
+            let lower = *rest == UNKNOWN || self.lowest && held < *rest;
+            if held != UNKNOWN && lower && !self.zeroed.contains(&taxel) {
                 *rest = held;
                 self.rests += 1;
             }
@@ -454,8 +460,18 @@ impl Lens {
         self.reckon();
     }
 
+    /// A taxel rests at `rest` from here on, until the rest of all is set.
+    pub fn zero(&mut self, taxel: usize, rest: u16) {
+        self.weigh(taxel, false);
+        self.rest[taxel] = rest;
+        self.zeroed.insert(taxel);
+        self.rests += 1;
+        self.weigh(taxel, true);
+    }
+
     /// What is held now is the rest from here on.
     pub fn rest_now(&mut self) {
+        self.zeroed.clear();
         self.rest.copy_from_slice(&self.held);
         (self.lowest, self.rests) = (false, self.rests + 1);
         self.reckon();
@@ -463,6 +479,7 @@ impl Lens {
 
     /// The rest is the lowest from here on.
     pub fn rest_lowest(&mut self) {
+        self.zeroed.clear();
         self.rest.copy_from_slice(&self.held);
         (self.lowest, self.rests) = (true, self.rests + 1);
         self.reckon();
@@ -476,6 +493,7 @@ impl Lens {
             self.reckon();
         }
         self.lowest = other.lowest;
+        self.zeroed.clone_from(&other.zeroed);
     }
 
     /// Changes up to the noise floor are none.
@@ -687,6 +705,26 @@ mod tests {
         assert_eq!(lens.strip().curve(0).sum, 0);
         lens.advance(FORGET * COLUMN_US);
         assert_eq!(lens.change(), [0; 4]);
+    }
+
+    #[test]
+    fn a_zeroed_taxel_keeps_its_rest_until_the_rest_of_all_is_set() {
+        let mut lens = Lens::new(2, 3, &blank(4), COLUMN_US, 1 << 20);
+        for (t, ticks) in [(0, 40), (100, 60)] {
+            (0..4).for_each(|taxel| lens.take(&change(t, taxel, ticks)));
+        }
+        lens.zero(1, 60);
+        lens.settle();
+        assert_eq!((lens.strip().curve(0).sum, lens.strip().curve(0).area), (60, 3));
+        lens.take(&change(200, 1, 30));
+        lens.take(&change(200, 0, 30));
+        assert_eq!(lens.rest(), [30, 60, 40, 40]);
+        lens.take(&change(300, 1, 80));
+        lens.settle();
+        assert_eq!(lens.strip().curve(0).sum, 60);
+        lens.rest_lowest();
+        lens.take(&change(400, 1, 20));
+        assert_eq!(lens.rest()[1], 20);
     }
 
     #[test]

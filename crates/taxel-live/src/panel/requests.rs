@@ -395,6 +395,13 @@ pub(super) async fn carry_out(
                 _ => return Err(Refused::of("how", "must be now or lowest")),
             }
         }
+        "zero" => {
+            let live = hub.live().ok_or("no board is listened to")?;
+            let taxels = taxels(&asked)?;
+            // A disk may hold the answer up.
+            let zeroed = tokio::task::spawn_blocking(move || live.handle.zero(&taxels)).await;
+            zeroed.map_err(|_| Refused::from("zero: failed within taxel; please report it"))??;
+        }
         "places" => {
             let mut said = hub.ask("places", json!({})).await?;
             if let Some(said) = said.as_object_mut() {
@@ -429,6 +436,18 @@ pub(super) async fn carry_out(
         _ => return Err(format!("type {what:?} is none of the protocol's").into()),
     }
     Ok(None)
+}
+
+/// Which taxels a request names.
+fn taxels(asked: &Asked<'_>) -> Answer<Vec<(u16, u16)>> {
+    let one = |taxel: &Value| {
+        let two = taxel.as_array().filter(|two| two.len() == 2)?;
+        let number = |k: usize| two[k].as_u64().and_then(|n| u16::try_from(n).ok());
+        number(0).zip(number(1))
+    };
+    let all = asked.0.get("taxels").and_then(Value::as_array).filter(|all| !all.is_empty());
+    let taxels = all.and_then(|all| all.iter().map(one).collect());
+    taxels.ok_or_else(|| Refused::of("taxels", "must be one taxel or more, each [column, row]"))
 }
 
 /// Whether the source may begin anew: on another address, or read in another way.

@@ -9,7 +9,7 @@ use taxel_core::encode::Encoder;
 use tokio::sync::{broadcast, mpsc, watch};
 
 use super::film::{FileFilm, Film, Gaze, Player};
-use super::hub::{Hub, LiveSide, Seat, Told, said_of};
+use super::hub::{Hub, LiveSide, Seat, Told, said_of, said_of_zeroing};
 use super::lens::{COLUMN_US, COLUMNS_US, History, LATE_US, column_of, is_column};
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::picture::{self, About, FOLLOWS, LIVE, MOVES, RECORDS, RESTART};
@@ -149,7 +149,7 @@ impl Session {
         let (mut told, mut moved) = self.hub.hear();
         let hub = Arc::clone(&self.hub);
         prepare(&hub).await;
-        for said in [hub.hello(), hub.registers(), hub.presets(), hub.recorder.said(), hub.recordings()] {
+        for said in [hub.hello(), hub.registers(), hub.presets(), hub.recorder.said(), hub.recordings(), hub.zeroed()] {
             self.say(&said).await?;
         }
         let (mut heard, mut pinged) = (Instant::now(), Instant::now());
@@ -689,6 +689,7 @@ impl Session {
             "registers": header.registers,
             "markers": marked.collect::<Vec<_>>(),
             "notes": noted.collect::<Vec<_>>(),
+            "zeroed": film.remarks.zeroings.iter().map(|(_, one)| said_of_zeroing(one)).collect::<Vec<_>>(),
             "detections": said.collect::<Vec<_>>(),
             "index_ms": begun.elapsed().as_secs_f64() * 1e3,
         });

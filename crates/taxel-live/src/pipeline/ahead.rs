@@ -1,6 +1,7 @@
 //! A readout that looks ahead in silence, and takes nothing back that the board's own time would say.
 
 use taxel_core::detect::{Detection, ReadoutStream};
+use taxel_core::encode::Zeroing;
 use taxel_core::events::FARTHEST_BACK_US;
 use taxel_core::{EventsView, Result};
 
@@ -50,6 +51,17 @@ impl Ahead {
         self.heard.advance(t, &mut self.found)?;
         self.settle(out);
         Ok(())
+    }
+
+    /// Zeroes a taxel; what was said ahead of that time stays said.
+    pub(super) fn zero(&mut self, zeroing: &Zeroing) -> Result<()> {
+        self.ahead = None;
+        self.heard.zero(zeroing)
+    }
+
+    /// What each taxel rests at, as [`ReadoutStream::rest`].
+    pub(super) fn rest(&self) -> Vec<Option<f64>> {
+        self.heard.rest()
     }
 
     /// How many events came later than a silence that was settled, or out of order.

@@ -3,8 +3,9 @@
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use taxel_core::Events;
+use taxel_core::encode::Zeroing;
 use taxel_core::wire::{Decoder, Receiver, Took};
+use taxel_core::{Events, problem};
 
 use super::copies::{Copier, GATHER, copier};
 use super::options::LiveOptions;
@@ -218,7 +219,10 @@ impl Work<'_> {
                     if begun.is_ok() {
                         let decoder = Decoder::new(self.options.array.clone()).differences(self.options.differences);
                         self.fresh = Some(Box::new(Receiver::new(decoder, 1)));
+                        // What was zeroed before holds in this recording too.
+                        let zeroed: Vec<Zeroing> = self.shared.shown().zeroed.values().copied().collect();
                         *lock(&self.shared.recorder) = Some(*recorder);
+                        self.record(|recorder| zeroed.iter().try_for_each(|one| recorder.zeroing(one)))?;
                     }
                     // Who asked may have gone.
                     let _ = give.send(begun);
@@ -244,6 +248,10 @@ impl Work<'_> {
                         self.copiers.push(copier);
                     }
                 }
+                Wish::Zero(taxels, give) => {
+                    // Who asked may have gone.
+                    let _ = give.send(self.zero(&taxels));
+                }
                 Wish::Registers(registers) => {
                     self.frame_us = registers.frame_us();
                     self.speaks(registers.wire_version)?;
@@ -252,6 +260,48 @@ impl Work<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Takes what these taxels hold for their rest, from now on: where one cannot be zeroed none is.
+    fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
+        let array = &self.options.array;
+        let shown = self.shared.shown();
+        if shown.counters.taring {
+            return Err(problem!("a tare is being taken: zero taxels when that is done").into());
+        }
+        let now = shown.counters.offset.map(|offset| offset.board_us(now_ns()));
+        let Some(t) = shown.counters.board_us.max(self.believed).max(now) else {
+            return Err(problem!("nothing came yet: no taxel can be zeroed").into());
+        };
+        let mut zeroings = vec![];
+        for &(x, y) in taxels {
+            let mut zeroing = Zeroing { t, x, y, rest: 0.0, before: None };
+            zeroing.check(array)?;
+            let place = array.index(x, y);
+            if self.held[place] == UNKNOWN {
+                return Err(
+                    problem!("taxel at row {y}, column {x}: not heard of yet, so what it holds is unknown").into()
+                );
+            }
+            zeroing.rest = self.held[place].into();
+            let tared = shown.rest.get(place).copied().flatten();
+            zeroing.before = shown.zeroed.get(&place).map(|earlier| earlier.rest).or(tared);
+            zeroings.push(zeroing);
+        }
+        drop(shown);
+        if let Some(recorder) = &*lock(&self.shared.recorder) {
+            // First what is kept: nothing is zeroed that a recording does not know of.
+            zeroings.iter().try_for_each(|zeroing| recorder.zeroing(zeroing))?;
+        }
+        let mut shown = self.shared.shown();
+        shown.zeroed.extend(zeroings.iter().map(|one| (array.index(one.x, one.y), *one)));
+        shown.zeroings += 1;
+        drop(shown);
+        self.shared.happened([t]);
+        if self.listens {
+            self.shared.handover.zero(&zeroings);
+        }
+        Ok(zeroings)
     }
 
     /// The recording's own decoder has come to its first stamp, an event's or a marker's: from then on it is known what its

@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use crossbeam_channel as channel;
+use taxel_core::encode::Zeroing;
 use taxel_core::wire::Registers;
 
 use super::copies::Copies;
@@ -166,6 +167,32 @@ impl Handle {
     /// As [`Live::note`](super::Live::note).
     pub fn entitle(&self, text: &str) -> Result<()> {
         self.shared.note(text, false)
+    }
+
+    /// Takes what these taxels (column, row) hold now for their rest from now on, in the readout and in the recording's
+    /// pictures; the recording keeps when it was done, and the rests before and after. Never done but when asked for.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where a taxel does not exist or was not heard of yet, a tare is being taken, or a `.lsa` is recorded, which
+    /// could not keep it: then none is zeroed. `File` where the disk is full.
+    pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
+        let (give, zeroed) = channel::bounded(1);
+        self.shared.wish(Wish::Zero(taxels.to_vec(), give));
+        self.wait(&zeroed).and_then(std::convert::identity)
+    }
+
+    /// What was zeroed last at each taxel that was, by taxel index; and how often something was.
+    #[must_use]
+    pub fn zeroed(&self) -> (Vec<Zeroing>, u64) {
+        let shown = self.shared.shown();
+        (shown.zeroed.values().copied().collect(), shown.zeroings)
+    }
+
+    /// How often something was zeroed.
+    #[must_use]
+    pub fn zeroings(&self) -> u64 {
+        self.shared.shown().zeroings
     }
 
     fn wait<T>(&self, from: &channel::Receiver<T>) -> Result<T> {

@@ -2,6 +2,7 @@
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
+use taxel_core::encode::Zeroing;
 use taxel_core::{Array, Events};
 
 /// Events that wait for the readout, and how far the board's time has come without any.
@@ -16,6 +17,7 @@ pub(super) struct Handover {
 struct Waiting {
     events: Events,
     quiet: Option<Quiet>,
+    zeroings: Vec<Zeroing>,
     dropped: u64,
     closed: bool,
 }
@@ -49,7 +51,8 @@ pub(super) struct Taken {
 
 impl Handover {
     pub(super) fn new(array: &Array, limit: usize) -> Self {
-        let state = Waiting { events: Events::empty(array.clone()), quiet: None, dropped: 0, closed: false };
+        let events = Events::empty(array.clone());
+        let state = Waiting { events, quiet: None, zeroings: vec![], dropped: 0, closed: false };
         Self { state: Mutex::new(state), came: Condvar::new(), limit }
     }
 
@@ -79,18 +82,27 @@ impl Handover {
         self.came.notify_one();
     }
 
+    /// Hands on what is to be zeroed: it has its own time.
+    pub(super) fn zero(&self, zeroings: &[Zeroing]) {
+        self.state().zeroings.extend_from_slice(zeroings);
+        self.came.notify_one();
+    }
+
     pub(super) fn close(&self) {
         self.state().closed = true;
         self.came.notify_one();
     }
 
-    /// Waits for something and takes all of it.
-    pub(super) fn take(&self, events: &mut Events) -> Taken {
+    /// Waits for something and takes all of it; what is to be zeroed is added to `zeroings`.
+    pub(super) fn take(&self, events: &mut Events, zeroings: &mut Vec<Zeroing>) -> Taken {
         events.clear();
-        let nothing =
-            |s: &mut Waiting| s.events.is_empty() && s.events.markers.is_empty() && s.quiet.is_none() && !s.closed;
+        let nothing = |s: &mut Waiting| {
+            let silent = s.events.is_empty() && s.events.markers.is_empty() && s.zeroings.is_empty();
+            silent && s.quiet.is_none() && !s.closed
+        };
         let mut state = self.came.wait_while(self.state(), nothing).unwrap_or_else(PoisonError::into_inner);
         std::mem::swap(&mut state.events, events);
+        zeroings.append(&mut state.zeroings);
         Taken { quiet: state.quiet.take(), last: state.closed }
     }
 
@@ -122,7 +134,7 @@ mod tests {
             assert!(piece.is_empty());
         }
         let mut taken = Events::empty(Array::thesis());
-        assert_eq!(handover.take(&mut taken), Taken { quiet: None, last: false });
+        assert_eq!(handover.take(&mut taken, &mut vec![]), Taken { quiet: None, last: false });
         assert_eq!(taken.t, [1, 2, 3, 4]);
         let intensity = taken.intensity.as_ref().expect("one had an intensity");
         assert_eq!(intensity.ticks, [0, 0, 7, 0]);
@@ -136,7 +148,7 @@ mod tests {
         assert_eq!(handover.put(&mut events(&[1, 2], None), None), 0);
         assert_eq!(handover.put(&mut events(&[3, 4, 5], None), None), 2);
         let mut taken = Events::empty(Array::thesis());
-        handover.take(&mut taken);
+        handover.take(&mut taken, &mut vec![]);
         assert_eq!(taken.t, [1, 2, 3]);
     }
 
@@ -145,13 +157,13 @@ mod tests {
         let handover = Handover::new(&Array::thesis(), 10);
         let mut taken = Events::empty(Array::thesis());
         handover.quiet(100);
-        assert_eq!(handover.take(&mut taken).quiet, Some(Quiet::Believed(100)));
+        assert_eq!(handover.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Believed(100)));
         handover.quiet(200);
         handover.put(&mut events(&[150], None), None);
-        assert_eq!(handover.take(&mut taken).quiet, None);
+        assert_eq!(handover.take(&mut taken, &mut vec![]).quiet, None);
         handover.put(&mut events(&[], None), Some(300));
-        assert_eq!(handover.take(&mut taken).quiet, Some(Quiet::Promised(300)));
+        assert_eq!(handover.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Promised(300)));
         handover.close();
-        assert!(handover.take(&mut taken).last);
+        assert!(handover.take(&mut taken, &mut vec![]).last);
     }
 }

@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering;
 use crossbeam_channel::Sender;
 use taxel_core::Events;
 use taxel_core::detect::{Detection, FrameTime, Readout, ReadoutStream};
-use taxel_core::encode::Tare;
+use taxel_core::encode::{Tare, Zeroing};
 
 use super::ahead::Ahead;
 use super::handover::{Quiet, Taken};
@@ -55,6 +55,7 @@ pub(super) struct Reader {
     say: Sender<Said>,
     found: Vec<Detection>,
     events: Events,
+    zeroings: Vec<Zeroing>,
     frames: FrameTime,
 }
 
@@ -73,13 +74,14 @@ impl Reader {
             Ear::Reading(stream) => Mode::Reading(Ahead::new(stream)),
             Ear::Taring(stretch_us, readout) => Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array))),
         };
-        Self { mode, sinks, say, found: vec![], events, frames: options.frames() }
+        Self { mode, sinks, say, found: vec![], events, zeroings: vec![], frames: options.frames() }
     }
 
     pub(super) fn run(mut self, shared: &Shared) {
         shared.shown().counters.taring = matches!(self.mode, Mode::Taring(_));
+        self.show_rest(shared);
         loop {
-            let taken = shared.handover.take(&mut self.events);
+            let taken = shared.handover.take(&mut self.events, &mut self.zeroings);
             if let Err(error) = self.hear(shared, taken) {
                 shared.fail(error);
                 self.mode = Mode::Idle;
@@ -94,6 +96,7 @@ impl Reader {
     fn hear(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
         match &mut self.mode {
             Mode::Reading(readout) => {
+                self.zeroings.drain(..).try_for_each(|zeroing| readout.zero(&zeroing))?;
                 readout.push(self.events.view(), &mut self.found)?;
                 match taken.quiet {
                     Some(Quiet::Promised(t)) => readout.advance(t, &mut self.found)?,
@@ -107,7 +110,7 @@ impl Reader {
                     self.begin(shared, stop, inside)?;
                 }
             }
-            Mode::Idle => {}
+            Mode::Idle => self.zeroings.clear(),
         }
         if !self.events.is_empty() || taken.last {
             let counters = &mut shared.shown().counters;
@@ -126,10 +129,19 @@ impl Reader {
         let mut readout = Ahead::new(Box::new(stream));
         readout.push(self.events.view().piece(inside..self.events.len()), &mut self.found)?;
         self.mode = Mode::Reading(readout);
+        self.show_rest(shared);
         let mut shown = shared.shown();
         shown.counters.taring = false;
         shown.tare = Some(tare);
         Ok(())
+    }
+
+    /// Says what the readout takes for rest, where it reads any.
+    fn show_rest(&self, shared: &Shared) {
+        if let Mode::Reading(readout) = &self.mode {
+            let rest = readout.rest();
+            shared.shown().rest = if rest.iter().all(Option::is_none) { vec![] } else { rest };
+        }
     }
 
     /// From the thread that made them: to the sinks first, then into the recording and to who asks.

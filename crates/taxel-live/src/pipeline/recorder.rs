@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError, Weak};
 
 use taxel_core::detect::Detection;
-use taxel_core::encode::Tare;
+use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
@@ -57,6 +57,7 @@ enum Entry {
     Board(BoardChange),
     Held(i64, Option<i64>, Vec<u16>),
     Note(i64, Option<i64>, String),
+    Zeroing(i64, Zeroing),
     Marker(i64, Marker),
     Detection(i64, Detection),
     Tare(Box<Tare>),
@@ -227,6 +228,7 @@ impl Recorder {
             (_, Some(track), Entry::Board(change)) => track.board_change(&change),
             (_, Some(track), Entry::Held(at, t_us, held)) => track.held(at, t_us, &held),
             (_, Some(track), Entry::Note(at, t_us, text)) => track.note(at, t_us, &text),
+            (_, Some(track), Entry::Zeroing(at, zeroing)) => track.zeroing(at, &zeroing),
             (_, Some(track), Entry::Marker(at, marker)) => track.marker(at, marker),
             (_, Some(track), Entry::Detection(at, detection)) => track.detection(at, &detection),
             (_, Some(track), Entry::Tare(tare)) => {
@@ -343,6 +345,14 @@ impl Recorder {
         }
         self.noted.store(true, Ordering::Relaxed);
         self.push(Entry::Note(now_ns(), board_us, text.to_owned()))
+    }
+
+    /// A taxel that a person zeroed.
+    pub(super) fn zeroing(&self, zeroing: &Zeroing) -> Result<()> {
+        if named(&self.record.path)? == "lsa" {
+            return Err(problem!("a .lsa cannot keep that a taxel was zeroed: record to a .mcap file").into());
+        }
+        self.push(Entry::Zeroing(now_ns(), *zeroing))
     }
 
     /// What was lost, as the file keeps it.

@@ -1,12 +1,13 @@
 //! What the threads of a pipeline share, and what they show to those who look on.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Instant;
 
 use crossbeam_channel as channel;
 use taxel_core::Marker;
-use taxel_core::encode::Tare;
+use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 
 use super::counters::Counters;
@@ -31,6 +32,12 @@ pub(super) struct Shown {
     pub(super) markers: Vec<Marker>,
     pub(super) picture: Vec<u16>,
     pub(super) tare: Option<Tare>,
+    /// What the readout takes each taxel to read at rest, by taxel index; empty where it reads no tare, or has none yet.
+    pub(super) rest: Vec<Option<f64>>,
+    /// What was zeroed last at each taxel, by its index.
+    pub(super) zeroed: BTreeMap<usize, Zeroing>,
+    /// How often something was.
+    pub(super) zeroings: u64,
     pub(super) failed: Option<Error>,
 }
 
@@ -74,6 +81,8 @@ pub(super) enum Wish {
     Copy(channel::Sender<channel::Receiver<Vec<u8>>>),
     /// The registers were written.
     Registers(Registers),
+    /// Zero these taxels, and say what that was.
+    Zero(Vec<(u16, u16)>, channel::Sender<Result<Vec<Zeroing>>>),
 }
 
 impl Shared {

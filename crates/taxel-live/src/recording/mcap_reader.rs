@@ -16,6 +16,7 @@ use mcap::{MAGIC, parse_record};
 use serde::Serialize;
 use serde_json::Value;
 use taxel_core::detect::Detection;
+use taxel_core::encode::Zeroing;
 use taxel_core::wire::{self, Decoder, Pairing, Registers};
 use taxel_core::{Events, Marker, Stop, problem};
 
@@ -159,6 +160,8 @@ pub struct Remarks {
     pub markers: Vec<Marker>,
     /// Notes of people.
     pub notes: Vec<Note>,
+    /// Taxels that people zeroed, and when by the host's clock, ns.
+    pub zeroings: Vec<(i64, Zeroing)>,
     /// What readouts said, and when by the host's clock, ns.
     pub detections: Vec<(i64, Detection)>,
     /// The last counts, from before the end.
@@ -208,6 +211,10 @@ impl Remarks {
                     && let Some(text) = said["message"].as_str()
                 {
                     let t_us = said["t_us"].as_i64();
+                    if let Some(zeroing) = zeroing(t_us, &said["zeroed"]) {
+                        self.zeroings.push((message.at_ns, zeroing));
+                        return;
+                    }
                     self.notes.push(Note { at_ns: message.at_ns, t_us, text: text.to_owned() });
                 }
             }
@@ -238,6 +245,13 @@ impl Remarks {
             Topic::Counts => self.counts = serde_json::from_slice(message.data).ok().or(self.counts.take()),
         }
     }
+}
+
+/// The taxel that a note says to have been zeroed; `None` of any other note.
+fn zeroing(t_us: Option<i64>, said: &Value) -> Option<Zeroing> {
+    let whole = |key: &str| said[key].as_u64().and_then(|n| u16::try_from(n).ok());
+    let (t, x, y) = (t_us?, whole("x")?, whole("y")?);
+    Some(Zeroing { t, x, y, rest: said["rest"].as_f64()?, before: said["before"].as_f64() })
 }
 
 /// A chunk, or a run of records outside chunks (as other tools may write them).

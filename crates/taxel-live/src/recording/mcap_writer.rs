@@ -22,7 +22,7 @@ use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions};
 use serde_json::json;
 use taxel_core::detect::Detection;
-use taxel_core::encode::Tare;
+use taxel_core::encode::{Tare, Zeroing};
 use taxel_core::wire::Registers;
 use taxel_core::{Marker, problem};
 
@@ -61,6 +61,8 @@ pub struct Track {
     /// Which of the file's sources.
     source: usize,
     stream: Option<Stream>,
+    /// Columns of the array.
+    columns: usize,
     pictures: Mutex<Pictures>,
 }
 
@@ -164,6 +166,7 @@ impl Writer {
             shared,
             source: 0,
             stream: header.stream.clone(),
+            columns: header.array.columns.into(),
             pictures: Mutex::default(),
         };
         Ok(Self { track, header: header.clone(), thread: None })
@@ -184,6 +187,7 @@ impl Writer {
             shared: Arc::clone(&self.track.shared),
             source: k + 1,
             stream: self.header.sources[k].stream.clone(),
+            columns: self.header.sources[k].array.columns.into(),
             pictures: Mutex::default(),
         })
     }
@@ -311,9 +315,21 @@ impl Track {
     ///
     /// As [`Track::datagram`].
     pub fn note(&self, at_ns: i64, t_us: Option<i64>, text: &str) -> Result<()> {
-        let note = json!({
-            "timestamp": time(at_ns), "level": 2, "message": text, "name": "taxel", "file": "", "line": 0, "t_us": t_us,
-        });
+        self.push_json(Topic::Notes, at_ns, &log(at_ns, t_us, text))
+    }
+
+    /// Keeps that a person zeroed a taxel, as a note that says so.
+    ///
+    /// # Errors
+    ///
+    /// As [`Track::datagram`].
+    pub fn zeroing(&self, at_ns: i64, zeroing: &Zeroing) -> Result<()> {
+        let Zeroing { t, x, y, rest, before } = *zeroing;
+        let before_said = before.map_or_else(|| "unknown".to_owned(), |before| format!("{before:.1}"));
+        let text = format!("zeroed row {y}, column {x}: rest {before_said} to {rest:.1} ticks");
+        let mut note = log(at_ns, Some(t), &text);
+        note["zeroed"] = json!({ "x": x, "y": y, "rest": rest, "before": before });
+        self.pictures().zero(usize::from(y) * self.columns + usize::from(x), rest);
         self.push_json(Topic::Notes, at_ns, &note)
     }
 
@@ -707,6 +723,13 @@ fn stopped(why: &str) -> Vec<u8> {
     let pair = [text("stopped"), text(why)].concat();
     let body = [text(END), u32::try_from(pair.len()).unwrap_or(0).to_le_bytes().to_vec(), pair].concat();
     [vec![op::METADATA], (body.len() as u64).to_le_bytes().to_vec(), body].concat()
+}
+
+/// What a viewer shows as a line of text.
+fn log(at_ns: i64, t_us: Option<i64>, text: &str) -> serde_json::Value {
+    json!({
+        "timestamp": time(at_ns), "level": 2, "message": text, "name": "taxel", "file": "", "line": 0, "t_us": t_us,
+    })
 }
 
 fn time(at_ns: i64) -> serde_json::Value {

@@ -1,6 +1,6 @@
 //! The low-rate picture: held values as grey, so that a viewer shows a touch and not the rest of the sensor.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 
 use taxel_core::encode::Tare;
 
@@ -14,6 +14,8 @@ const LATE_US: i64 = 1_000_000;
 #[derive(Debug, Default)]
 pub(super) struct Pictures {
     tare: Option<Vec<f64>>,
+    /// What taxels rest at that were zeroed since, by index.
+    zeroed: BTreeMap<usize, f64>,
     /// The lowest that each taxel held so far; `None` before it was heard of.
     lowest: Vec<Option<u16>>,
     /// Largest values above rest with their times, us: falling values, so that the first is the largest of all.
@@ -36,7 +38,13 @@ impl Pictures {
     pub(super) fn tare(&mut self, tare: &Tare) {
         // A taxel that was never heard of reads 0 and rests there.
         self.tare = Some(tare.rest.iter().map(|rest| rest.unwrap_or(0.0)).collect());
+        self.zeroed.clear();
         self.peaks.clear();
+    }
+
+    /// Takes this off a taxel from here on.
+    pub(super) fn zero(&mut self, taxel: usize, rest: f64) {
+        self.zeroed.insert(taxel, rest);
     }
 
     /// The grey picture of what the taxels hold at `t_us`; a taxel that holds 0 was not heard of yet.
@@ -53,7 +61,9 @@ impl Pictures {
             .iter()
             .enumerate()
             .map(|(k, &value)| {
-                let rest = tare.map_or_else(|| f64::from(self.lowest[k].unwrap_or(0)), |rest| rest[k]);
+                let zeroed = if self.zeroed.is_empty() { None } else { self.zeroed.get(&k) };
+                let rest = zeroed.copied().or(tare.map(|rest| rest[k]));
+                let rest = rest.unwrap_or_else(|| f64::from(self.lowest[k].unwrap_or(0)));
                 if value > 0 { (f64::from(value) - rest).max(0.0) } else { 0.0 }
             })
             .collect();
@@ -108,6 +118,16 @@ mod tests {
         assert_eq!(pictures.take(1_600_000, &[140]).bytes, [128]);
         // A clock that begins anew.
         assert_eq!(pictures.take(0, &[140]).bytes, [255]);
+    }
+
+    #[test]
+    fn a_zeroed_taxel_is_black_until_it_is_pressed() {
+        let mut pictures = Pictures::default();
+        pictures.take(0, &[100, 100]);
+        assert_eq!(pictures.take(1, &[130, 140]).bytes, [191, 255]);
+        pictures.zero(0, 130.0);
+        assert_eq!(pictures.take(2, &[130, 140]).bytes, [0, 255]);
+        assert_eq!(pictures.take(3, &[150, 140]).bytes, [128, 255]);
     }
 
     #[test]
