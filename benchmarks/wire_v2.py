@@ -9,7 +9,7 @@ Decoding: checksums included, beside version 1's pairs of change and intensity; 
 decoded a datagram at a time; version 1 as one stream without datagrams, and a datagram at a time as a host hears it.
 In scenes a datagram has few events, so the second is what compares. All fill columns of their own in place. Heartbeats,
 which version 1 does not know, are left out of what is decoded (in the drop 94 of 100 datagrams are empty): their
-numbers are then missing, which costs version 2 a little. What they cost themselves is said beside.
+numbers are then missing, which costs version 2 something, most in the drop. What they cost is said beside.
 """
 
 from __future__ import annotations
