@@ -93,6 +93,14 @@ def test_without_labels_a_recording_is_a_trial_and_its_folder_the_label(tmp_path
     assert said["full"]["bits"] > 0.8
 
 
+def test_recordings_of_one_folder_without_labels_are_told_of_the_table(tmp_path):
+    events, _ = ordered(4)
+    taxel.convert(events, tmp_path / "touches.npz")
+    done = run(tmp_path / "touches.npz", "--window-ms", "20", "--report", tmp_path / "page.html")
+    assert isinstance(done.exception, taxel.Error), done.output
+    assert f"here '{tmp_path.name}' alone; give a table of trials (--labels)" in str(done.exception)
+
+
 GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
     f"touches.npz,{100_000 + 400_000 * k},{'ab'[k % 2]},{200_000 + 400_000 * k},{'uvwxyz'[k % 6]}\n" for k in range(24)
 )
