@@ -112,6 +112,23 @@ def test_verdicts_are_of_the_same_trials():
     assert by_group.error != open_.error
 
 
+def test_of_responses_that_tell_nothing_there_is_nothing_to_keep():
+    said = []
+    for seed in range(40):
+        random = np.random.default_rng([11, seed])
+        labels = np.repeat(np.arange(4), 20)
+        a, b = (estimate(labels, random.integers(0, 4, len(labels)), redraws=2) for _ in range(2))
+        groups = np.arange(len(labels)) // 4 if seed % 2 else None
+        said.append(keeps(b, a, groups=groups).says)
+    # Bits are held against 0 one-sided at 90 %.
+    assert said.count("nothing") >= 32
+    assert str(keeps(a, a)) == "nothing to keep"
+    # One group alone says nothing of how sure anything is.
+    labels, dear = answers(channel(4, 0.9)[0], 50, np.random.default_rng(5))
+    told = estimate(labels, dear, redraws=2)
+    assert keeps(told, told, groups=np.zeros(len(labels), int)).says == "open"
+
+
 def test_the_rule_rarely_takes_a_setting_that_is_too_cheap():
     """Just below the edge the paired bound says keeps in at most one of ten, as simulated beforehand."""
     random = np.random.default_rng(9)

@@ -138,7 +138,7 @@ def lines(found: Answer) -> list[str]:
 
 def _told(name: str, point: Point, found: Answer) -> str:
     verdict = "the full one" if point.verdict is None else str(point.verdict)
-    if point is found.cheapest:
+    if point is found.cheapest and not found.empty:
         verdict += " <- cheapest"
     return _row(
         name,

@@ -173,6 +173,11 @@ class Answer:
         return tuple(point for point in self.points if point.window_ms == self.full.window_ms)
 
     @property
+    def empty(self) -> bool:
+        """Whether the full setting's bits are not above 0, so that no other has anything to keep."""
+        return any(p.verdict is not None and p.verdict.says == "nothing" for p in (*self.by_period, *self.taxels))
+
+    @property
     def cheapest(self) -> Point:
         """The setting of the lowest rate among those that keep 95 % of the full one's bits, or the full one."""
         kept = [p for p in (*self.by_period, *self.taxels) if p.verdict is not None and p.verdict.says == "keeps"]

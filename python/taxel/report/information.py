@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["write_information"]
 
 #: Of verdicts.
-_COLOURS = {"keeps": "#2f6690", "open": "#e8b04b", "loses": "#b5423c", "full": "#2b2b2b"}
+_COLOURS = {"keeps": "#2f6690", "open": "#e8b04b", "loses": "#b5423c", "full": "#2b2b2b", "nothing": "#9a9a9a"}
 #: Labels whose names still fit a confusion matrix.
 _NAMED = 40
 
@@ -86,7 +86,8 @@ def _curves(found: Answer) -> Figure:
         says = "full" if point.verdict is None else point.verdict.says
         axes[1, 1].plot(point.kbps, point.found.bits, "o" if point.kind == "all" else "s", color=_COLOURS[says], ms=5)
     for says, colour in _COLOURS.items():
-        axes[1, 1].plot([], [], "o", color=colour, label=says)
+        if says != "nothing" or found.empty:
+            axes[1, 1].plot([], [], "o", color=colour, label="nothing to keep" if says == "nothing" else says)
     axes[1, 1].set(xscale="log", xlabel="kbit/s while touched", title="cost (squares: fewer or larger taxels)")
     axes[1, 1].axhline(0.95 * found.full.found.bits, color="0.7", lw=1, ls=":")
     axes[1, 1].legend(frameon=False)
