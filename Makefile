@@ -52,6 +52,7 @@ test: build
 
 slow: build dist bridge
 	cargo test --release --workspace --quiet -- --ignored
+	cargo check --manifest-path fuzz/Cargo.toml --quiet
 	$(BIN)/python -m pytest -q -m slow
 
 lint: build

@@ -25,7 +25,7 @@ fuzz_target!(|input: &[u8]| {
             }
         }
         decoder.finish_into(&mut events);
-        events.check().unwrap();
+        events.view().check().unwrap();
         let c = *decoder.counts();
         assert_eq!(c.bytes, bytes.len() as u64);
         assert_eq!(c.bytes, 5 * c.words + c.skipped);

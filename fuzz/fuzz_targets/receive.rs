@@ -35,7 +35,7 @@ fuzz_target!(|input: &[u8]| {
         first.push(datagram);
     }
     receiver.finish_into(&mut events);
-    events.check().unwrap();
+    events.view().check().unwrap();
     let (one, two) = (*receiver.counts(), receiver.two().counts());
     assert_eq!(two.datagrams, two.intact + two.repeated + two.old + two.short + two.foreign + two.checksum);
     assert_eq!(one.bytes, 5 * one.words + one.skipped);

@@ -32,7 +32,7 @@ fuzz_target!(|input: &[u8]| {
         for datagram in &datagrams {
             assert!(matches!(decoder.push(datagram, None, &mut events), Heard::Intact { .. }));
         }
-        events.check().unwrap();
+        events.view().check().unwrap();
         assert_eq!(decoder.counts().events, events.len() as u64);
         let heard = (events, decoder.counts(), decoder.held());
         let first = first.get_or_insert_with(|| heard.clone());
