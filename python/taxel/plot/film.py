@@ -93,6 +93,9 @@ def film(
         below.plot(to_ms(np.arange(len(force_n)) * frame_us - begin), force_n)
         below.set(ylabel="force (N)")
     cursor = below.axvline(0.0, color="0.5")
+    # Laid out once: nothing that moves changes its room.
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")
 
     def write(file: io.BufferedIOBase) -> None:
         nonlocal rest
