@@ -66,6 +66,11 @@ def information(
             if labels is None
             else read_trials(labels, opened, window_ms=window_ms)
         )
+        if labels is None and len({trial.label for trial in trials}) == 1:
+            raise ProblemError(
+                f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, here "
+                f"{trials[0].label!r} alone; give a table of trials (--labels), or each label's recordings a folder"
+            )
         found = answer(
             trials,
             encoder=chosen,

@@ -160,7 +160,7 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
 
     Raises
     ------
-    ProblemError : a recording without anything in it, or all of them in folders of one name
+    ProblemError : a recording without anything in it
     """
     found = []
     for k, given in enumerate(several("recordings", recordings)):
@@ -171,11 +171,6 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
         start, stop = int(source.t.min()), int(source.t.max()) + 1
         label = one.path.resolve().parent.name
         found.append(LabelledTrial(source, label, start, None if window_ms is not None else stop, name=str(one.path)))
-    if len({trial.label for trial in found}) == 1:
-        raise ProblemError(
-            f"{found[0].name}: without a table each recording is a trial and its folder's name the label, here "
-            f"{found[0].label!r} alone; give a table of trials (--labels), or each label's recordings a folder"
-        )
     return found
 
 
