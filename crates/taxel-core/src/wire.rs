@@ -8,6 +8,7 @@ pub mod command;
 pub mod decoder;
 pub mod receiver;
 pub mod registers;
+mod silence;
 pub mod v1;
 pub mod v2;
 

@@ -1,6 +1,7 @@
 //! One sender's datagrams to events, whichever version of the wire it speaks.
 
 use crate::wire::decoder::{Counts, Decoder};
+use crate::wire::silence::silence;
 use crate::wire::v1::{FIRST, WORD_BYTES};
 use crate::wire::v2::{self, Header, Heard};
 use crate::{Array, Events};
@@ -150,7 +151,7 @@ impl Receiver {
             return false;
         };
         let since = *self.whole_since.get_or_insert(now);
-        now - since >= CHANGED_AFTER_US
+        silence(since, now) >= CHANGED_AFTER_US
     }
 
     fn change(&mut self, version: u8, out: &mut Events) {
@@ -170,7 +171,7 @@ impl Receiver {
         let Some(first) = first else { return };
         let offset = *self.offset.get_or_insert_with(|| match self.latest {
             Some((latest, heard)) => {
-                let passed = arrived.zip(heard).map_or(0, |(now, then)| now.saturating_sub(then).max(0));
+                let passed = arrived.zip(heard).map_or(0, |(now, then)| silence(then, now));
                 latest + passed - first
             }
             None => 0,
@@ -209,6 +210,31 @@ mod tests {
     fn speak(board: &mut Board, version: u8) {
         let registers = Registers { wire_version: version, ..*board.registers() };
         board.command(&Command { register: 0, value: registers.word(0) }.to_bytes());
+    }
+
+    #[test]
+    fn arrivals_out_of_all_reason_carry_no_clock_away() {
+        let mut receiver = Receiver::new(Decoder::new(Array::thesis()), 2);
+        let mut events = Events::empty(Array::thesis());
+        let mut before = 0;
+        for (session, arrived) in [0, i64::MAX, i64::MIN, i64::MAX, 0, i64::MAX].into_iter().enumerate() {
+            // Nothing but a promise, of a board that was reset each time.
+            let header = Header {
+                kind: 0,
+                board: 1,
+                sequence: 0,
+                base: 0,
+                session: session as u16,
+                stride: v2::stride(64),
+                flags: 0,
+                span: 1,
+            };
+            let mut datagram = vec![];
+            header.write(&[], &mut datagram);
+            let until = receiver.push(&datagram, Some(arrived), &mut events).until.unwrap();
+            assert!((before..=before + 400 * 86_400_000_000).contains(&until), "{until} us after {before} us");
+            before = until;
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Stamps to time: which turn of the 16-bit counter a stamp belongs to.
 
 use crate::events::FARTHEST_BACK_US;
+use crate::wire::silence::silence;
 use crate::wire::v1::STAMP_US;
 
 /// How far a stamp may lie behind the latest time and still be a step back (reordered datagrams), in stamps: 0.1 s.
@@ -32,7 +33,7 @@ impl Clock {
         let mut time = if ahead >= TURN - FARTHEST_BACK { latest + ahead - TURN } else { latest + ahead };
         if let (Some(now), Some(before)) = (arrived, self.heard) {
             // The silence as the host heard it says how many whole turns the stamps do not show.
-            let expected = latest + now.saturating_sub(before).clamp(0, LONGEST_SILENCE) / STAMP_US;
+            let expected = latest + silence(before, now) / STAMP_US;
             time += ((expected - time + TURN / 2).div_euclid(TURN)).max(0) * TURN;
         }
         self.heard = arrived;
@@ -41,6 +42,3 @@ impl Clock {
         (time, time < latest)
     }
 }
-
-/// A year, us: no arrival time can carry the clock out of its 64 bits.
-const LONGEST_SILENCE: i64 = 365 * 86_400 * 1_000_000;

@@ -9,6 +9,7 @@ use super::counts::{Counts, Status};
 use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Layout, Refused, START, STOP};
 use crate::vectors::Instructions;
 use crate::wire::columns::Table;
+use crate::wire::silence::silence;
 use crate::{Array, Events, Marker, Result};
 use held::Held;
 pub(in crate::wire::v2) use words::most_rows;
@@ -277,7 +278,7 @@ impl Decoder {
             0
         } else {
             let passed = match (arrived, self.heard) {
-                (Some(now), Some((before, time))) => time + now.saturating_sub(before).max(0) - self.latest,
+                (Some(now), Some((before, time))) => time + silence(before, now) - self.latest,
                 _ => 0,
             };
             self.latest + passed.max(0) - header.base as i64
