@@ -229,7 +229,11 @@ class StreamReader:
         """
         return self._core.push(_bytes(data))
 
+    def finish(self) -> list[bytes]:
+        """End the stream; return the datagrams within bytes that seemed to begin a longer one."""
+        return self._core.finish()
+
     @property
     def skipped(self) -> int:
-        """Bytes that belonged to no datagram so far."""
+        """Bytes that belonged to no datagram; those that may still become one count once the stream has ended."""
         return self._core.skipped()

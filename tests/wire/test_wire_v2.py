@@ -80,8 +80,12 @@ def test_a_whole_stream_says_what_the_slow_reader_hears(seed, valued_from, state
             body = words(kind, events, base=base, stride=4)
         sent = datagram(kind, body, sequence=sequence, base=base, stride=4)
         slow.push(sent)
-        noise = b"\xff" * draw.randrange(4)
+        # What is none may promise more than there is, to the end of the stream.
+        noise = draw.choice([b"\xff" * draw.randrange(4), draw.randrange(30, 1400).to_bytes(2, "little") + b"\x54\x21"])
         stream, skipped = stream + noise + len(sent).to_bytes(2, "little") + sent, skipped + len(noise)
+    reader = StreamReader()
+    pieces = len(reader.push(stream)) + len(reader.finish())
+    assert (pieces, reader.skipped) == (12, skipped)
     events, counts, none = decode(stream, array=taxel.Array(16, 16))
     ticks = [-1] * len(events)
     if events.intensity is not None:

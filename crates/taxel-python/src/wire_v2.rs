@@ -108,6 +108,16 @@ impl DatagramStream {
         Ok(found.iter().map(|datagram| PyBytes::new(py, datagram)).collect())
     }
 
+    /// Ends the stream; returns the datagrams within what waited for more.
+    fn finish<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyBytes>>> {
+        let mut found = vec![];
+        let found = self.0.enter(py, |reader, _| {
+            reader.finish(|datagram| found.push(datagram.to_vec()));
+            Ok::<_, Error>(found)
+        })?;
+        Ok(found.iter().map(|datagram| PyBytes::new(py, datagram)).collect())
+    }
+
     /// Bytes that belonged to no datagram.
     fn skipped(&self, py: Python<'_>) -> u64 {
         self.0.look(py, |reader| reader.skipped())

@@ -25,7 +25,7 @@ impl StreamReader {
     /// Takes the next bytes; gives each whole datagram to `take`.
     pub fn push(&mut self, bytes: &[u8], mut take: impl FnMut(&[u8])) {
         self.rest.extend_from_slice(bytes);
-        let done = cut(&self.rest, &mut self.skipped, |datagram, _, _| take(datagram));
+        let done = cut(&self.rest, false, &mut self.skipped, |datagram, _, _| take(datagram));
         self.rest.drain(..done);
     }
 
@@ -35,15 +35,16 @@ impl StreamReader {
         self.skipped
     }
 
-    /// Ends the stream: what is left counts as skipped too.
-    pub fn finish(&mut self) {
-        self.skipped += self.rest.len() as u64;
+    /// Ends the stream: what waited for more is no datagram, but one that lies within it is given to `take`.
+    pub fn finish(&mut self, mut take: impl FnMut(&[u8])) {
+        cut(&self.rest, true, &mut self.skipped, |datagram, _, _| take(datagram));
         self.rest.clear();
     }
 }
 
-/// Gives each whole datagram that begins in `bytes` to `take`, with its header and body; gives how many bytes are done with.
-fn cut(bytes: &[u8], skipped: &mut u64, mut take: impl FnMut(&[u8], &Header, &[u8])) -> usize {
+/// Gives each whole datagram that begins in `bytes` to `take`, with its header and body; gives how many bytes are done with:
+/// all of them where the stream ends there.
+fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, mut take: impl FnMut(&[u8], &Header, &[u8])) -> usize {
     let mut at = 0;
     while let Some(rest) = bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) {
         let length = usize::from(u16::from_le_bytes([rest[0], rest[1]]));
@@ -51,8 +52,11 @@ fn cut(bytes: &[u8], skipped: &mut u64, mut take: impl FnMut(&[u8], &Header, &[u
             && rest[LENGTH_BYTES] == MAGIC
             && rest[LENGTH_BYTES + 1] >> 4 == 2;
         if likely {
-            let Some(datagram) = rest.get(LENGTH_BYTES..LENGTH_BYTES + length) else { break };
-            if let Ok((header, body)) = Header::read(datagram) {
+            let whole = rest.get(LENGTH_BYTES..LENGTH_BYTES + length);
+            if whole.is_none() && !ends {
+                return at;
+            }
+            if let Some((datagram, (header, body))) = whole.and_then(|bytes| Some((bytes, Header::read(bytes).ok()?))) {
                 take(datagram, &header, body);
                 at += LENGTH_BYTES + length;
                 continue;
@@ -60,6 +64,10 @@ fn cut(bytes: &[u8], skipped: &mut u64, mut take: impl FnMut(&[u8], &Header, &[u
         }
         at += 1;
         *skipped += 1;
+    }
+    if ends {
+        *skipped += (bytes.len() - at) as u64;
+        at = bytes.len();
     }
     at
 }
@@ -99,16 +107,14 @@ pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Res
         return Err(problem!("columns have room for {} rows: {} bytes may need {most}", room.len(), bytes.len()));
     }
     let (mut decoder, mut laid, mut skipped, mut rest) = (Decoder::new(array), Laid::new(room), 0, bytes);
-    loop {
+    while !rest.is_empty() {
         stop.check()?;
-        let done = cut(&rest[..rest.len().min(PIECE)], &mut skipped, |_, header, body| {
+        let piece = &rest[..rest.len().min(PIECE)];
+        let done = cut(piece, piece.len() == rest.len(), &mut skipped, |_, header, body| {
             decoder.push_read(header, body, None, &mut laid);
         });
-        if done == 0 {
-            break;
-        }
         rest = &rest[done..];
     }
     let (filled, repaired, markers) = laid.end();
-    Ok(Decoded { filled, repaired, markers, counts: decoder.counts(), skipped: skipped + rest.len() as u64 })
+    Ok(Decoded { filled, repaired, markers, counts: decoder.counts(), skipped })
 }
