@@ -116,13 +116,11 @@ def heading(text: str) -> list[str]:
 def paragraphs(text: str) -> list[str]:
     """Return a help text; its examples as code."""
     lines: list[str] = []
-    for part in text.replace("\b", "").split("\n\n"):
-        said = " ".join(part.split())
-        lines += (
-            ["::", "", f"   {said.removeprefix('Example: ')}", ""]
-            if said.startswith("Example: ")
-            else [literal(said), ""]
-        )
+    for part in text.replace("\b\n", "").split("\n\n"):
+        if part.startswith("Example: "):
+            lines += ["::", "", *(f"   {line.removeprefix('Example: ')}" for line in part.splitlines()), ""]
+        else:
+            lines += [literal(" ".join(part.split())), ""]
     return lines
 
 

@@ -19,7 +19,17 @@ WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
 
 
 class _Command(TyperCommand):
-    """A command whose errors speak of what was typed, not of Python's arguments."""
+    """A command whose errors speak of what was typed, not of Python's arguments; an example is one line to copy."""
+
+    def __init__(self, *args: Any, help: str | None = None, **options: Any) -> None:  # noqa: A002  typer's name
+        paragraphs = [
+            # click keeps the lines of a paragraph that begins with \b.
+            "\n".join(["\b", *(" ".join(line.split()) for line in re.split(r"\n(?=Example: )", part))])
+            if part.startswith("Example: ")
+            else part
+            for part in (help or "").split("\n\n")
+        ]
+        super().__init__(*args, help="\n\n".join(paragraphs) or None, **options)
 
     def invoke(self, ctx: Any) -> Any:
         """Run it."""

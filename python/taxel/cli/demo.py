@@ -40,7 +40,8 @@ def demo(
     real packets over UDP; this one records, encodes and says contact and lift. A new folder gets report.html and
     report.json.
 
-    Examples: taxel demo --seed 1; taxel demo --scenes 100 --no-clock -o benchmarks/results/demo.json
+    Example: taxel demo --seed 1
+    Example: taxel demo --scenes 100 --no-clock -o benchmarks/results/demo.json
     """
     console = Console(quiet=as_json)
     for place, replaced in ((train_to, False), (drops_to, False), (result, True)):

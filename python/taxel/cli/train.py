@@ -75,9 +75,7 @@ def train(
     training data.
 
     Example: taxel train trials/ -o gait.json
-
     Example: taxel train walk.npz --labels events.csv --set neurons.contact.kappa=1.5 -o gait.json
-
     Example: taxel train a.mcap b.mcap --labels events.csv --encoder contact_area --tare 0.05
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
