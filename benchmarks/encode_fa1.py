@@ -41,5 +41,5 @@ def run(*, quick: bool) -> dict[str, Any]:
         "FA-1, ticks": lambda: numpy_fa1(ticks, theta_0),
         "FA-1, pressure": lambda: numpy_fa1(pressure, theta_0),
     }
-    goals = {"FA-1, ticks": 20, "FA-1, pressure": 5}
+    goals = {"FA-1, ticks": 60, "FA-1, pressure": 60}
     return compare(__doc__, seconds, ours, numpy, quick=quick, goals=goals)

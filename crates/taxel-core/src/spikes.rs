@@ -62,25 +62,29 @@ impl SpikeTrains {
             offsets[n + 1] += offsets[n];
         }
         let mut next = offsets.clone();
-        let mut sorted: Vec<(f64, f32)> = vec![(0.0, 0.0); spikes.len()];
+        let mut times = vec![0.0; spikes.len()];
+        let mut values = vec![0.0; if signed { spikes.len() } else { 0 }];
         for s in spikes {
             let place = &mut next[s.train as usize];
-            sorted[*place] = (s.t, s.value);
+            times[*place] = s.t;
+            if signed {
+                values[*place] = s.value;
+            }
             *place += 1;
         }
-        for n in 0..trains {
-            let train = &mut sorted[offsets[n]..offsets[n + 1]];
-            if !train.is_sorted_by(|a, b| a.0 <= b.0) {
-                train.sort_by(|a, b| a.0.total_cmp(&b.0));
+        for train in offsets.windows(2).map(|ends| ends[0]..ends[1]) {
+            if !times[train.clone()].is_sorted() {
+                let mut order: Vec<usize> = train.clone().collect();
+                order.sort_by(|&a, &b| times[a].total_cmp(&times[b]));
+                let in_order: Vec<f64> = order.iter().map(|&k| times[k]).collect();
+                times[train.clone()].copy_from_slice(&in_order);
+                if signed {
+                    let in_order: Vec<f32> = order.iter().map(|&k| values[k]).collect();
+                    values[train].copy_from_slice(&in_order);
+                }
             }
         }
-        Ok(Self {
-            times: sorted.iter().map(|s| s.0).collect(),
-            values: signed.then(|| sorted.iter().map(|s| s.1).collect()),
-            offsets,
-            start,
-            stop,
-        })
+        Ok(Self { times, values: signed.then_some(values), offsets, start, stop })
     }
 
     /// How many trains.

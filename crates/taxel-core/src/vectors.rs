@@ -6,6 +6,7 @@
 
 mod aligned;
 mod eight;
+mod fetch;
 mod instructions;
 mod products;
 
@@ -13,6 +14,7 @@ pub(crate) use aligned::Aligned;
 pub(crate) use eight::{LANES, Vector, lines, lines_mut};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use eight::{Ymm, Zmm};
+pub(crate) use fetch::fetch;
 pub use instructions::Instructions;
 pub(crate) use instructions::{by_width, kernel, wide};
 pub(crate) use products::{add, add_lines, dot, times};

@@ -5,8 +5,14 @@
 //! last sample's spike, the change is added, both are compared, a spike resets the integral. (The threshold's move is
 //! reckoned at the end of a sample instead of at the start of the next: the same numbers, one array less.)
 //!
+//! Few afferents fire at a sample, and a power is dear. So each keeps how far its pressure may go from the one at its last
+//! spike without firing, in proportion to the threshold ([`Afferents::reach`]); only those beyond are reckoned by 5.1 and
+//! 5.4. That bound is safe, so spikes are the same to the bit as if all were.
+//!
 //! Reading: as printed, equation 5.5 lets the threshold sink below `theta_0` for one sample, by less than `B theta_0`,
 //! before its third case restores it. Kept, so that spikes equal the thesis'.
+
+use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
@@ -149,8 +155,20 @@ struct Afferent {
     base: [f64; BLOCK],
     /// theta (5.5) of the next sample.
     theta: [f64; BLOCK],
+    /// The pressure whose rho is `base`; NaN where there is none such.
+    heard: Block,
+    /// No pressure within `reach * theta` of `heard` fires.
+    reach: Block,
     /// Whether a sample without change would leave all this as it is.
     still: bool,
+}
+
+/// An afferent that may fire.
+#[derive(Clone, Copy, Default)]
+struct Near {
+    channel: u32,
+    /// theta of this sample.
+    theta: f64,
 }
 
 #[derive(Clone)]
@@ -159,13 +177,24 @@ pub(super) struct Afferents {
     jump: f64,
     decay: f64,
     theta_0: f64,
+    /// What no theta lies below; 0 where that is nothing or beyond f32.
+    least: f64,
+    /// The pressure whose rho is the least theta; 0 where alpha is above 1.
+    unheard: f64,
+    /// One over the least theta.
+    per_least: f64,
     /// The largest value of a spike.
     most: f64,
     blocks: Vec<Afferent>,
     channels: usize,
-    /// 5.1 of every tick.
-    table: Box<[f64; TICKS]>,
+    /// Room for those that may fire at a sample.
+    near: Vec<Near>,
+    /// 5.1 of every tick up to the largest so far.
+    table: Vec<[f64; BLOCK]>,
 }
+
+/// What f32 holds to seven digits, and products of two.
+const SOUND: RangeInclusive<f64> = 1e-18..=1e18;
 
 /// How many different ticks a word of the wire can hold.
 const TICKS: usize = 65_536;
@@ -173,76 +202,135 @@ const TICKS: usize = 65_536;
 impl Afferents {
     pub(super) fn new(parameters: &Fa1, channels: usize) -> Self {
         let (theta_0, t) = (parameters.baseline(), parameters.period_ms);
-        let mut table = Box::new([0.0; TICKS]);
-        for (k, rho) in table.as_chunks_mut::<BLOCK>().0.iter_mut().enumerate() {
-            let ticks = std::array::from_fn(|lane| (k * BLOCK + lane) as f32);
-            power(&ticks, parameters.alpha, rho);
-        }
+        let decay = match parameters.decay {
+            Decay::Sample => parameters.b * theta_0,
+            Decay::Ms => parameters.b * t * theta_0,
+        };
+        let least = if SOUND.contains(&(theta_0 - decay)) { theta_0 - decay } else { 0.0 };
         Self {
             alpha: parameters.alpha,
             jump: t * parameters.a * theta_0,
-            decay: match parameters.decay {
-                Decay::Sample => parameters.b * theta_0,
-                Decay::Ms => parameters.b * t * theta_0,
-            },
+            decay,
             theta_0,
+            least,
+            unheard: if parameters.alpha > 1.0 { 0.0 } else { least.powf(1.0 / parameters.alpha) },
+            per_least: 1.0 / least,
             most: f64::from((1_u32 << parameters.bits) - 1),
             blocks: vec![],
             channels,
-            table,
+            near: vec![],
+            table: vec![],
         }
     }
 
     /// 5.1, from the table where all values are ticks.
     #[inline(always)]
-    fn compress(alpha: f64, table: &[f64; TICKS], values: &Block, rho: &mut [f64; BLOCK]) {
+    fn compress(alpha: f64, table: &mut Vec<[f64; BLOCK]>, values: &Block, rho: &mut [f64; BLOCK]) {
         /// Added to a whole number below 2^23, it shows that number in the lowest bits.
         const SHIFT: f32 = 8_388_608.0; // 2^23
-        let mut odd = 0;
+        let (mut odd, mut all) = (0, 0);
         for &v in values {
+            all |= (v + SHIFT).to_bits();
             odd |= ((v + SHIFT) - SHIFT).to_bits() ^ v.to_bits();
             odd |= (v + SHIFT).to_bits() & !(SHIFT.to_bits() | (TICKS as u32 - 1));
         }
         if odd == 0 {
+            let last = all as usize % TICKS;
+            while table.len() <= last / BLOCK {
+                let (from, mut rho) = (table.len() * BLOCK, [0.0; BLOCK]);
+                power(&std::array::from_fn(|lane| (from + lane) as f32), alpha, &mut rho);
+                table.push(rho);
+            }
+            let table = &table.as_flattened()[..=last];
             for (rho, &v) in rho.iter_mut().zip(values) {
-                *rho = table[(v + SHIFT).to_bits() as usize % TICKS];
+                *rho = table[(v + SHIFT).to_bits() as usize & last];
             }
         } else {
             power(values, alpha, rho);
         }
     }
+
+    /// How far a pressure may go from `heard`, whose rho is `base`, in proportion to theta, without a spike.
+    ///
+    /// theta is at most `most` until the next one. With `m = theta / base` the pressure may go by `r` of `heard`, where
+    /// `(1 + r)^alpha <= 1 + m` and `(1 - r)^alpha >= 1 - m`. Both hold for `r = m / (alpha + |1 - alpha| m)`: with alpha
+    /// below 1 by `(1 - m)^(1 / alpha - 1) <= 1 / (1 + (1 / alpha - 1) m)`, above 1 by Bernoulli's inequality; and for less, so
+    /// that m may be the largest in the divisor. Where alpha is at most 1 and neither pressure is above
+    /// `theta unheard / least <= theta^(1 / alpha)`, neither rho is above theta. A ten-thousandth is left for rounding: values
+    /// of f32 that differ do so by 6e-8 of `heard`, so theta is at least 6e-8 alpha base where this is of use, and 5.1 errs
+    /// by less than 1e-13 of base.
+    fn reach(&self, heard: f32, base: f64, theta: f64) -> f32 {
+        let (heard, most) = (f64::from(heard), theta.max(self.theta_0));
+        let near = heard / (self.alpha * base + (1.0 - self.alpha).abs() * most);
+        let low = (self.unheard - heard) * self.per_least;
+        let reach = 0.9999 * near.max(low);
+        let sound = [reach, reach * self.least, most].iter().all(|x| SOUND.contains(x));
+        // With 0 whatever changes is reckoned.
+        if sound && self.alpha > 0.01 { reach as f32 } else { 0.0 }
+    }
+
+    /// Has an afferent begin again at a pressure whose rho is `base`.
+    fn reset(&mut self, channel: usize, pressure: f32, base: f64, theta: f64) {
+        let heard = pressure.max(0.0);
+        let reach = self.reach(heard, base, theta);
+        let (afferent, lane) = (&mut self.blocks[channel / BLOCK], channel % BLOCK);
+        (afferent.base[lane], afferent.theta[lane]) = (base, theta);
+        (afferent.heard[lane], afferent.reach[lane]) = (heard, reach);
+    }
+
+    /// Reckons those that may fire.
+    #[inline(always)]
+    fn reckon(&mut self, t: i64, held: &[Block], near: &[Near], out: &mut Vec<Spike>) {
+        let (mut values, mut rho) = ([0.0; BLOCK], [0.0; BLOCK]);
+        for some in near.chunks(BLOCK) {
+            for (value, near) in values.iter_mut().zip(some) {
+                *value = held[near.channel as usize / BLOCK][near.channel as usize % BLOCK];
+            }
+            Self::compress(self.alpha, &mut self.table, &values, &mut rho);
+            for ((&Near { channel, theta }, &rho), &value) in some.iter().zip(&rho).zip(&values) {
+                let place = channel as usize;
+                let u = rho - self.blocks[place / BLOCK].base[place % BLOCK];
+                // Below 0, theta has both said of a small U, which is neither.
+                let said = f64::from(i8::from(u > theta) - i8::from(u < -theta));
+                if said != 0.0 {
+                    // A baseline of 0 makes every change as large as can be said.
+                    let size = if self.most > 1.0 { (u.abs() / self.theta_0).trunc().clamp(1.0, self.most) } else { 1.0 };
+                    out.push(Spike { t: ms(t), train: channel, value: (said * size) as f32 });
+                    self.reset(place, value, rho, theta + self.jump);
+                    self.blocks[place / BLOCK].still = false;
+                }
+            }
+        }
+    }
 }
 
 impl Afferent {
-    /// One sample; fills `s` (5.4) and says whether any afferent fired. Where `GRADED`, `s` holds sizes (5.7).
+    /// Which of a block may fire, a bit each.
     #[inline(always)]
-    fn sample<const GRADED: bool>(
-        &mut self,
-        rho: &[f64; BLOCK],
-        s: &mut [f64; BLOCK],
-        jump: f64,
-        decay: f64,
-        theta_0: f64,
-        most: f64,
-    ) -> bool {
-        let (mut fired, mut moved) = (0, 0);
-        for (lane, &rho) in rho.iter().enumerate() {
-            let (base, theta) = (self.base[lane], self.theta[lane]);
-            let u = rho - base;
-            let rise = if u > theta { 1.0 } else { 0.0 };
-            let fall = if u < -theta { -1.0 } else { 0.0 };
-            let said: f64 = rise + fall;
-            let quiet = if theta > theta_0 { theta - decay } else { theta_0 };
-            let next = if said == 0.0 { quiet } else { theta + jump };
-            // A baseline of 0 makes every change as large as can be said.
-            s[lane] = if GRADED && said != 0.0 { said * (u.abs() / theta_0).trunc().clamp(1.0, most) } else { said };
-            self.base[lane] = if said == 0.0 { base } else { rho };
-            self.theta[lane] = next;
-            fired |= said.to_bits();
-            moved |= (next.to_bits() ^ theta_0.to_bits()) | (theta.to_bits() ^ theta_0.to_bits());
+    fn near(&self, held: &Block) -> u64 {
+        let theta = self.theta.map(|theta| theta as f32);
+        let mut halves = [0_u32; 2];
+        for (half, bits) in halves.iter_mut().enumerate() {
+            for k in 0..32 {
+                let lane = half * 32 + k;
+                let pressure = if held[lane] > 0.0 { held[lane] } else { 0.0 };
+                let within = (pressure - self.heard[lane]).abs() <= self.reach[lane] * theta[lane];
+                *bits |= if within { 0 } else { 1 << k };
+            }
         }
-        self.still = fired | moved == 0;
-        fired != 0
+        u64::from(halves[1]) << 32 | u64::from(halves[0])
+    }
+
+    /// Lowers the thresholds as 5.5 does where none fires.
+    #[inline(always)]
+    fn quieten(&mut self, decay: f64, theta_0: f64) {
+        let mut moved = 0;
+        for theta in &mut self.theta {
+            let next = if *theta > theta_0 { *theta - decay } else { theta_0 };
+            moved |= next.to_bits() ^ theta.to_bits();
+            *theta = next;
+        }
+        self.still = moved == 0;
     }
 }
 
@@ -252,38 +340,49 @@ impl Rule for Afferents {
     }
 
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
-        let blank = Afferent { base: [0.0; BLOCK], theta: [self.theta_0; BLOCK], still: true };
+        let blank = Afferent {
+            base: [0.0; BLOCK],
+            theta: [0.0; BLOCK],
+            heard: [0.0; BLOCK],
+            reach: [0.0; BLOCK],
+            still: true,
+        };
         self.blocks = vec![blank; held.len()];
-        for (afferent, values) in self.blocks.iter_mut().zip(held) {
-            Self::compress(self.alpha, &self.table, values, &mut afferent.base);
+        self.near = vec![Near::default(); (held.len() + 1) * BLOCK];
+        for (block, values) in held.iter().enumerate() {
+            let mut rho = [0.0; BLOCK];
+            Self::compress(self.alpha, &mut self.table, values, &mut rho);
+            for (lane, (&value, &rho)) in values.iter().zip(&rho).enumerate() {
+                self.reset(block * BLOCK + lane, value, rho, self.theta_0);
+            }
         }
     }
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
-        let (jump, decay, theta_0, most) = (self.jump, self.decay, self.theta_0, self.most);
-        let (mut rho, mut s) = ([0.0; BLOCK], [0.0; BLOCK]);
+        /// Written at once, needed or not, as a guess of how many there are costs more.
+        const AT_ONCE: usize = 4;
+        let (mut near, mut n) = (std::mem::take(&mut self.near), 0);
         for (block, afferent) in self.blocks.iter_mut().enumerate() {
             if afferent.still && !changed[block] {
                 continue;
             }
-            Self::compress(self.alpha, &self.table, &held[block], &mut rho);
-            let fired = if most > 1.0 {
-                afferent.sample::<true>(&rho, &mut s, jump, decay, theta_0, most)
-            } else {
-                afferent.sample::<false>(&rho, &mut s, jump, decay, theta_0, most)
-            };
-            if fired {
-                for (part, eight) in s.as_chunks::<8>().0.iter().enumerate() {
-                    if eight.iter().fold(0, |any, s| any | s.to_bits()) != 0 {
-                        for (lane, &s) in eight.iter().enumerate().filter(|&(_, &s)| s != 0.0) {
-                            let train = (block * BLOCK + part * 8 + lane) as u32;
-                            out.push(Spike { t: ms(t), train, value: s as f32 });
-                        }
-                    }
+            let mut left = afferent.near(&held[block]);
+            let end = n + left.count_ones() as usize;
+            while {
+                for near in &mut near[n..n + AT_ONCE] {
+                    let lane = left.trailing_zeros() as usize % BLOCK;
+                    *near = Near { channel: (block * BLOCK + lane) as u32, theta: afferent.theta[lane] };
+                    left &= left.wrapping_sub(1);
                 }
-            }
+                n += AT_ONCE;
+                n < end
+            } {}
+            n = end;
+            afferent.quieten(self.decay, self.theta_0);
         }
+        self.reckon(t, held, &near[..n], out);
+        self.near = near;
     }
 
     const HEARS_REPAIRED: bool = false;
@@ -291,13 +390,92 @@ impl Rule for Afferents {
     fn repair(&mut self, channel: usize, from: f32, to: f32) {
         let (mut values, mut rho) = ([0.0; BLOCK], [0.0; BLOCK]);
         (values[0], values[1]) = (from, to);
-        Self::compress(self.alpha, &self.table, &values, &mut rho);
-        let base = &mut self.blocks[channel / BLOCK].base[channel % BLOCK];
+        Self::compress(self.alpha, &mut self.table, &values, &mut rho);
+        let (afferent, lane) = (&mut self.blocks[channel / BLOCK], channel % BLOCK);
         // Exactly where nothing was summed up: with a threshold of 0 a rounding would fire.
-        *base = if *base == rho[0] { rho[1] } else { *base + (rho[1] - rho[0]) };
+        if afferent.base[lane] == rho[0] {
+            let theta = afferent.theta[lane];
+            self.reset(channel, to, rho[1], theta);
+        } else {
+            afferent.base[lane] += rho[1] - rho[0];
+            afferent.heard[lane] = f32::NAN;
+        }
     }
 
     fn idle(&self) -> bool {
         self.blocks.iter().all(|b| b.still)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::rngs::StdRng;
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+
+    /// Equations 5.1 to 5.5 for every afferent at every sample, whatever it may do.
+    fn plainly(parameters: &Fa1, pictures: &[Block]) -> Vec<Spike> {
+        let afferents = Afferents::new(parameters, BLOCK);
+        let Afferents { alpha, jump, decay, theta_0, .. } = afferents;
+        let (mut base, mut rho, mut theta) = ([0.0; BLOCK], [0.0; BLOCK], [theta_0; BLOCK]);
+        power(&pictures[0], alpha, &mut base);
+        let mut out = vec![];
+        for (t, picture) in (1..).zip(&pictures[1..]) {
+            power(picture, alpha, &mut rho);
+            for lane in 0..BLOCK {
+                let u = rho[lane] - base[lane];
+                let said = f32::from(i8::from(u > theta[lane]) - i8::from(u < -theta[lane]));
+                if said == 0.0 {
+                    theta[lane] = if theta[lane] > theta_0 { theta[lane] - decay } else { theta_0 };
+                } else {
+                    out.push(Spike { t: ms(t), train: lane as u32, value: said });
+                    (base[lane], theta[lane]) = (rho[lane], theta[lane] + jump);
+                }
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn afferents_that_are_not_reckoned_are_those_that_say_nothing() {
+        let mut rng = StdRng::seed_from_u64(5);
+        for round in 0..400 {
+            // From what f32 hardly holds to far beyond any sensor; noise from a last place to all there is.
+            let exponent = |rng: &mut StdRng, most: f64| 10_f64.powf(rng.random_range(-most..most));
+            let most = if round % 4 == 0 { 36.0 } else { 4.0 };
+            let (size, noise) = (exponent(&mut rng, most), 10_f64.powf(rng.random_range(-7.5..0.5)));
+            let alpha = [0.7, 1.0, 1.4, 4.0, 0.2, 0.02, 0.005][round % 7];
+            let parameters = Fa1 {
+                alpha,
+                a: [0.0, 0.2, 20.0, 1e3][rng.random_range(0..4)],
+                b: [0.0, 0.05, 0.999, 1.0, 3.0][rng.random_range(0..5)],
+                theta_0: Some(match rng.random_range(0..8) {
+                    0 => 0.0,
+                    1 => exponent(&mut rng, most),
+                    _ => size.powf(alpha) * noise * exponent(&mut rng, 1.0),
+                }),
+                ..Fa1::default()
+            };
+            let offset = rng.random_range(-1.0..2.0);
+            let mut held: [f64; BLOCK] = std::array::from_fn(|_| offset);
+            let pictures: Vec<Block> = (0..300)
+                .map(|_| {
+                    for held in &mut held {
+                        if rng.random_bool(0.3) {
+                            *held += noise * rng.random_range(-1.0..1.0);
+                        }
+                    }
+                    held.map(|held| (held * size) as f32)
+                })
+                .collect();
+            let mut afferents = Afferents::new(&parameters, BLOCK);
+            let mut out = vec![];
+            afferents.begin(0, &pictures[..1], &mut out);
+            for (t, picture) in (1..).zip(pictures[1..].chunks(1)) {
+                afferents.sample(t, picture, &[picture != &pictures[t as usize - 1..t as usize]], &mut out);
+            }
+            assert!(out == plainly(&parameters, &pictures), "round {round}: {parameters:?}");
+        }
     }
 }

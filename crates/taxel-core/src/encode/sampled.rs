@@ -7,7 +7,7 @@ use super::periods::micros;
 use super::stream::Stream;
 use crate::events::FARTHEST_BACK_US;
 use crate::spikes::{ms, us};
-use crate::vectors::wide;
+use crate::vectors::{fetch, wide};
 use crate::{Array, EventsView, Result, Spike, problem};
 
 /// Channels that are looked at together; the compiler turns loops over a block into vector instructions.
@@ -69,22 +69,27 @@ wide! {
 }
 
 wide! {
-    /// Takes a block of a picture where it differs from the one held.
-    fn take(t: i64, new: &Block, held: &mut Block, changed: &mut bool) -> Result<()> {
+    /// Takes blocks of a picture where they differ from those held.
+    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool]) -> Result<()> {
         /// All exponent bits: infinite or not a number.
         const NOT_FINITE: u32 = 0x7f80_0000;
-        let (mut other, mut bad) = (0, 0);
-        for (new, held) in new.iter().zip(held.iter()) {
-            other |= new.to_bits() ^ held.to_bits();
-            bad |= u32::from(new.to_bits() & NOT_FINITE == NOT_FINITE);
-        }
-        if bad != 0 {
-            let bad = new.iter().find(|v| !v.is_finite()).unwrap_or(&f32::NAN);
-            return Err(problem!("frame at {t} us holds {bad}: values must be finite"));
-        }
-        if other != 0 {
-            *held = *new;
-            *changed = true;
+        let picture = new.len();
+        for ((new, held), changed) in new.iter().zip(held).zip(changed) {
+            // Where the next picture follows in memory, it comes while this one is encoded.
+            fetch(std::ptr::from_ref(new).wrapping_add(picture));
+            let (mut other, mut bad) = (0, 0);
+            for (new, held) in new.iter().zip(held.iter()) {
+                other |= new.to_bits() ^ held.to_bits();
+                bad |= u32::from(new.to_bits() & NOT_FINITE == NOT_FINITE);
+            }
+            if bad != 0 {
+                let bad = new.iter().find(|v| !v.is_finite()).unwrap_or(&f32::NAN);
+                return Err(problem!("frame at {t} us holds {bad}: values must be finite"));
+            }
+            if other != 0 {
+                *held = *new;
+                *changed = true;
+            }
         }
         Ok(())
     }
@@ -147,24 +152,20 @@ impl Channels {
         }
         let Some(places) = &self.places else {
             let (whole, rest) = values.as_chunks::<BLOCK>();
-            for ((new, block), changed) in whole.iter().zip(held.iter_mut()).zip(changed.iter_mut()) {
-                take(t, new, block, changed)?;
-            }
-            if let Some((block, changed)) = held.last_mut().zip(changed.last_mut())
-                && !rest.is_empty()
-            {
+            take(t, whole, held, changed)?;
+            if !rest.is_empty() {
                 let mut new = [0.0; BLOCK];
                 new[..rest.len()].copy_from_slice(rest);
-                take(t, &new, block, changed)?;
+                take(t, &[new], &mut held[whole.len()..], &mut changed[whole.len()..])?;
             }
             return Ok(());
         };
-        for ((places, block), changed) in places.chunks(BLOCK).zip(held.iter_mut()).zip(changed.iter_mut()) {
+        for (block, places) in places.chunks(BLOCK).enumerate() {
             let mut new = [0.0; BLOCK];
             for (value, &place) in new.iter_mut().zip(places) {
                 *value = values[place as usize];
             }
-            take(t, &new, block, changed)?;
+            take(t, &[new], &mut held[block..], &mut changed[block..])?;
         }
         Ok(())
     }

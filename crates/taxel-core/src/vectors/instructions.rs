@@ -9,11 +9,11 @@ use crate::{Result, problem};
 pub enum Instructions {
     /// None: on any machine.
     Plain,
-    /// AVX2 with fused multiply-add.
+    /// AVX2 with fused multiply-add (and BMI1, POPCNT).
     Avx2,
     /// AVX-512 F, BW, DQ and VL.
     Avx512,
-    /// AVX-512 that moves single bytes as well: VBMI and VBMI2 (and BMI2, LZCNT, POPCNT).
+    /// AVX-512 that moves single bytes as well: VBMI and VBMI2 (and BMI2, LZCNT).
     Avx512Bytes,
 }
 
@@ -50,7 +50,12 @@ impl Instructions {
         match self {
             Self::Plain => true,
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma"),
+            Self::Avx2 => {
+                is_x86_feature_detected!("avx2")
+                    && is_x86_feature_detected!("fma")
+                    && is_x86_feature_detected!("bmi1")
+                    && is_x86_feature_detected!("popcnt")
+            }
             #[cfg(target_arch = "x86_64")]
             Self::Avx512 => {
                 is_x86_feature_detected!("avx512f")
@@ -64,7 +69,6 @@ impl Instructions {
                     && is_x86_feature_detected!("avx512vbmi2")
                     && is_x86_feature_detected!("bmi2")
                     && is_x86_feature_detected!("lzcnt")
-                    && is_x86_feature_detected!("popcnt")
             }
             #[cfg(not(target_arch = "x86_64"))]
             _ => false,
@@ -77,11 +81,11 @@ macro_rules! by_width {
     ($set:expr, ($($argument:ident: $kind:ty),*) -> $out:ty, [$($generic:tt)*], $avx512:expr, $avx2:expr, $plain:expr) => {{
         #[cfg(target_arch = "x86_64")]
         {
-            #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")]
+            #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl,avx2,fma,bmi1,popcnt")]
             fn avx512 $($generic)* ($($argument: $kind),*) -> $out {
                 $avx512($($argument),*)
             }
-            #[target_feature(enable = "avx2,fma")]
+            #[target_feature(enable = "avx2,fma,bmi1,popcnt")]
             fn avx2 $($generic)* ($($argument: $kind),*) -> $out {
                 $avx2($($argument),*)
             }
