@@ -133,13 +133,19 @@ pub(in crate::wire) trait Table {
     /// Takes a start or a stop.
     fn mark(&mut self, marker: Marker);
 
-    /// Takes rows: `fill` gets room for `most` of them, and whether each has an intensity or the mark that it has none, as it
+    /// Takes rows: `fill` gets room, the row from which on there is some for `most` of them, and whether each has an intensity or the mark that it has none, as it
     /// must where they are `valued`; it says how many it wrote. States gave them where they are `repaired`.
     ///
     /// # Safety
     ///
     /// `fill` must have written as many rows as it says, as [`append`] asks for.
-    unsafe fn rows(&mut self, most: usize, valued: bool, repaired: bool, fill: impl FnOnce(Room<'_>, bool) -> usize);
+    unsafe fn rows(
+        &mut self,
+        most: usize,
+        valued: bool,
+        repaired: bool,
+        fill: impl FnOnce(&mut Room<'_>, usize, bool) -> usize,
+    );
 }
 
 impl Table for Events {
@@ -147,13 +153,19 @@ impl Table for Events {
         self.markers.push(marker);
     }
 
-    unsafe fn rows(&mut self, most: usize, valued: bool, repaired: bool, fill: impl FnOnce(Room<'_>, bool) -> usize) {
+    unsafe fn rows(
+        &mut self,
+        most: usize,
+        valued: bool,
+        repaired: bool,
+        fill: impl FnOnce(&mut Room<'_>, usize, bool) -> usize,
+    ) {
         if valued {
             self.complete_intensities();
         }
         let before = self.len();
         // SAFETY: the caller's promise.
-        unsafe { append(self, most, |room, paired, _| Filled { rows: fill(room, paired), paired }) };
+        unsafe { append(self, most, |mut room, paired, _| Filled { rows: fill(&mut room, 0, paired), paired }) };
         self.mark_repaired(before, repaired);
     }
 }
@@ -188,13 +200,19 @@ impl Table for Laid<'_> {
     }
 
     #[inline]
-    unsafe fn rows(&mut self, most: usize, valued: bool, repaired: bool, fill: impl FnOnce(Room<'_>, bool) -> usize) {
+    unsafe fn rows(
+        &mut self,
+        most: usize,
+        valued: bool,
+        repaired: bool,
+        fill: impl FnOnce(&mut Room<'_>, usize, bool) -> usize,
+    ) {
         let before = self.filled.rows;
         if valued && !self.filled.paired {
             self.room.without_intensities(before);
             self.filled.paired = true;
         }
-        let rows = fill(self.room.behind(before), self.filled.paired);
+        let rows = fill(&mut self.room, before, self.filled.paired);
         assert!(rows <= most, "more rows than there was room for");
         self.filled.rows += rows;
         if repaired && rows > 0 {

@@ -194,16 +194,18 @@ impl Header {
         }
         let (header, rest) = rest.split_at(HEADER_BYTES);
         let (body, span) = rest.split_at(rest.len() - 2);
-        let u16_at = |at: usize| u16::from_le_bytes([header[at], header[at + 1]]);
-        let byte = |at: usize| u64::from(header[at]);
-        let base = (8..14).rev().fold(0, |base, at| base << 8 | byte(at));
-        let sequence = u32::from_le_bytes([header[4], header[5], header[6], header[7]]);
+        let eight = |at: usize| {
+            let mut word = [0; 8];
+            word.copy_from_slice(&header[at..at + 8]);
+            u64::from_le_bytes(word)
+        };
+        let (which, when) = (eight(0), eight(8));
         let header = Self {
             kind: header[1] & 0xf,
-            board: u16_at(2),
-            sequence,
-            base,
-            session: u16_at(14),
+            board: (which >> 16) as u16,
+            sequence: (which >> 32) as u32,
+            base: when & ((1 << BASE_BITS) - 1),
+            session: (when >> BASE_BITS) as u16,
             stride: header[16],
             flags: header[17],
             span: u16::from_le_bytes([span[0], span[1]]),

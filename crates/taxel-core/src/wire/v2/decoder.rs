@@ -3,8 +3,6 @@
 mod held;
 mod words;
 
-use std::collections::VecDeque;
-
 use super::counts::{Counts, Status};
 use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Layout, Refused, START, STOP};
 use crate::vectors::Instructions;
@@ -71,11 +69,19 @@ impl Session {
         self.highest + i64::from(sequence.wrapping_sub(self.highest as u32) as i32)
     }
 
+    /// Whether a datagram is the one that comes next.
+    #[inline]
+    fn is_next(&self, header: &Header) -> bool {
+        self.number == header.session && header.sequence == (self.highest as u32).wrapping_add(1)
+    }
+
+    #[inline]
     fn missing(&self) -> u64 {
         (self.highest - self.lowest + 1) as u64 - self.received
     }
 
     /// Notes a number; none where it is too old, else whether it is new.
+    #[inline]
     fn note(&mut self, number: i64) -> Option<bool> {
         if number == self.highest + 1 {
             // As nearly all come: the place is free for it, whatever came a window ago.
@@ -84,14 +90,15 @@ impl Session {
             (self.highest, self.received) = (number, self.received + 1);
             return Some(true);
         }
+        self.note_out_of_turn(number)
+    }
+
+    fn note_out_of_turn(&mut self, number: i64) -> Option<bool> {
         if number <= self.highest - WINDOW as i64 {
             return None;
         }
         if number > self.highest {
-            let ahead = (number - self.highest).min(WINDOW as i64);
-            for k in number - ahead + 1..=number {
-                self.clear(k);
-            }
+            self.clear((self.highest + 1).max(number + 1 - WINDOW as i64), number);
             self.highest = number;
         }
         self.lowest = self.lowest.min(number);
@@ -102,9 +109,14 @@ impl Session {
         Some(new)
     }
 
-    fn clear(&mut self, number: i64) {
-        let (word, bit) = place(number);
-        self.seen[word] &= !bit;
+    /// From `first` to `last`, at most a window of them, none has come; by words, as many may be missing.
+    fn clear(&mut self, mut first: i64, last: i64) {
+        while first <= last {
+            let (word, bit) = place(first);
+            let numbers = (64 - i64::from(bit.trailing_zeros())).min(last + 1 - first);
+            self.seen[word] &= !(bit.wrapping_mul(u64::MAX >> (64 - numbers)));
+            first += numbers;
+        }
     }
 }
 
@@ -122,7 +134,7 @@ pub struct Decoder {
     array: Array,
     instructions: Instructions,
     board: Option<u16>,
-    sessions: VecDeque<Session>,
+    sessions: Vec<Session>,
     /// Missing numbers of sessions that are remembered no more.
     missed_before: u64,
     /// When, by the host's clock, and what time, us, was heard last.
@@ -144,7 +156,7 @@ impl Decoder {
             array,
             instructions: Instructions::best(),
             board: None,
-            sessions: VecDeque::new(),
+            sessions: vec![],
             missed_before: 0,
             heard: None,
             latest: 0,
@@ -234,7 +246,11 @@ impl Decoder {
             self.counts.foreign += 1;
             return Heard::Refused(Refused::Foreign);
         }
-        let (which, reset) = self.session(header, arrived);
+        let (which, reset) = match self.sessions.last() {
+            // As nearly all come.
+            Some(last) if last.is_next(header) => (self.sessions.len() - 1, false),
+            _ => self.session(header, arrived),
+        };
         let session = &mut self.sessions[which];
         match session.note(session.number_of(header.sequence)) {
             None => {
@@ -254,7 +270,9 @@ impl Decoder {
         self.counts.unknown_flags += u64::from(header.flags & !(FRAME_SYNC | DIFFERENCES | DROPPED) != 0);
         self.latest = self.latest.max(base);
         self.body(header, body, base, out);
-        self.heard = arrived.map(|now| (now, self.latest)).or(self.heard);
+        if let Some(now) = arrived {
+            self.heard = Some((now, self.latest));
+        }
         let until = (header.span > 0).then(|| base + i64::from(header.span));
         self.latest = self.latest.max(until.unwrap_or(i64::MIN));
         Heard::Intact { until, missing, reset }
@@ -288,12 +306,10 @@ impl Decoder {
             // After its reset the board compares with 0, and tells every taxel that differs from it.
             self.held.forget();
         }
-        if self.sessions.len() == SESSIONS
-            && let Some(gone) = self.sessions.pop_front()
-        {
-            self.missed_before += gone.missing();
+        if self.sessions.len() == SESSIONS {
+            self.missed_before += self.sessions.remove(0).missing();
         }
-        self.sessions.push_back(Session::new(header, offset));
+        self.sessions.push(Session::new(header, offset));
         (self.sessions.len() - 1, !began)
     }
 
@@ -336,15 +352,47 @@ impl Decoder {
             false if header.flags & DIFFERENCES != 0 && layout.value > 0 => Meaning::Differences,
             false => Meaning::Changes,
         };
-        let body = Body::new(layout, meaning, header.stride, base, body);
+        let mut body = Body::new(layout, meaning, header.stride, base, body);
         let Self { instructions, held, counts, latest, .. } = self;
         // SAFETY: `words::decode` writes each row that it counts, and with `paired` its ticks and present.
         unsafe {
-            out.rows(words::most_rows(body.left()), layout.value > 0, states, |room, paired| {
-                let given = words::decode(body, *instructions, held, room, paired, counts);
-                *latest = given.latest.max(*latest);
-                given.rows
+            out.rows(words::most_rows(body.left()), layout.value > 0, states, |room, first, paired| {
+                body.rows = first;
+                words::decode(&mut body, *instructions, held, room, paired, counts);
+                *latest = body.latest.max(*latest);
+                body.rows - first
             });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use rand::{Rng, SeedableRng, rngs::StdRng};
+
+    use super::*;
+
+    #[test]
+    fn a_number_is_new_once_however_far_apart_they_come() {
+        let mut random = StdRng::seed_from_u64(1);
+        for begin in [0, 7, u32::MAX - 40_000] {
+            let mut bytes = vec![];
+            let header =
+                Header { kind: 1, board: 0, sequence: begin, base: 0, session: 1, stride: 6, flags: 0, span: 0 };
+            header.write(&[], &mut bytes);
+            let mut session = Session::new(&header, 0);
+            let (mut seen, mut highest) = (BTreeSet::from([i64::from(begin)]), i64::from(begin));
+            assert_eq!(session.note(highest), Some(true));
+            for _ in 0..20_000 {
+                let far = [1, 3, 63, 64, 65, 700, 65_535, 65_536, 65_537, 200_000][random.random_range(0..10)];
+                let number = highest + if random.random() { 1 } else { random.random_range(-far..=far) };
+                let expected = (number > highest - WINDOW as i64).then(|| seen.insert(number));
+                assert_eq!(session.note(number), expected, "{number} of {highest}");
+                highest = highest.max(number);
+            }
+            assert_eq!(session.missing(), (highest + 1 - seen.first().unwrap()) as u64 - seen.len() as u64);
         }
     }
 }

@@ -22,44 +22,38 @@ const MARGIN: usize = 32;
 /// Words that are taken one by one before blocks are tried again.
 const STRETCH: usize = 32;
 
-/// What a body gave.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Given {
-    pub(super) rows: usize,
-    /// The latest time of a row, us; `i64::MIN` where there is none.
-    pub(super) latest: i64,
-}
-
 /// How much room so many words need, rows.
 pub(in crate::wire::v2) fn most_rows(words: usize) -> usize {
     words + MARGIN
 }
 
-/// Decodes a body; with `paired` each row gets an intensity, or the mark that it has none. `room` has [`most_rows`] or more.
+/// Decodes a body, from its `rows` on; with `paired` each row gets an intensity, or the mark that it has none. `room` has
+/// [`most_rows`] or more from there on.
+#[inline]
 pub(super) fn decode(
-    mut body: Body<'_>,
+    body: &mut Body<'_>,
     set: Instructions,
     held: &mut Held,
-    mut room: Room<'_>,
+    room: &mut Room<'_>,
     paired: bool,
     counts: &mut Counts,
-) -> Given {
-    assert!(room.len() >= most_rows(body.left()), "columns too short");
+) {
+    let first = body.rows;
+    assert!(room.len() >= first + most_rows(body.left()), "columns too short");
     while body.left() > 0 {
-        blocks(&mut body, set, held, &mut room, paired);
+        blocks(body, set, held, room, paired);
         if body.left() == 0 {
             break;
         }
         let most = if set == Instructions::Avx512Bytes { STRETCH } else { usize::MAX };
         match body.layout.value {
-            0 => single::words::<2, 15, 0>(&mut body, held, &mut room, paired, counts, most),
-            8 => single::words::<2, 7, 8>(&mut body, held, &mut room, paired, counts, most),
-            _ => single::words::<4, 15, 16>(&mut body, held, &mut room, paired, counts, most),
+            0 => single::words::<2, 15, 0>(body, held, room, paired, counts, most),
+            8 => single::words::<2, 7, 8>(body, held, room, paired, counts, most),
+            _ => single::words::<4, 15, 16>(body, held, room, paired, counts, most),
         }
     }
-    counts.events += body.rows as u64;
+    counts.events += (body.rows - first) as u64;
     counts.malformed += u64::from(body.cut || body.at < body.bytes.len());
-    Given { rows: body.rows, latest: body.latest }
 }
 
 /// Takes plain words, as far as they go, where the machine has the instructions.
@@ -72,8 +66,8 @@ fn blocks(body: &mut Body<'_>, set: Instructions, held: &mut Held, room: &mut Ro
         && held.values.len() <= 1 << 16
     {
         // SAFETY: the machine has this set, as `Decoder::instructions` and `best` see to. `decode` has asserted that the room
-        // holds a row for each word and 32 more, and no word gives more than one row. The last two conditions are the
-        // block's own.
+        // holds, behind the rows so far, a row for each word and 32 more, and no word gives more than one row. The last two
+        // conditions are the block's own.
         unsafe {
             match body.layout.value {
                 0 => avx512::blocks::<0>(body, held, room, paired),

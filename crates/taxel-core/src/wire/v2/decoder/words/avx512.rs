@@ -45,6 +45,10 @@ const fn every(step: u16, first: u16) -> [u16; WORDS] {
     out
 }
 
+/// A block's lanes in memory.
+#[repr(align(64))]
+struct Lanes([u16; WORDS]);
+
 /// Takes plain words of so many bits of value.
 ///
 /// # Safety
@@ -101,14 +105,15 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
             body.at = after + bytes;
             continue;
         }
-        // Up to the next word of time, behind which the position begins anew.
-        let taken = lanes & (times & times.wrapping_neg()).wrapping_sub(1);
+        // Up to the next word of time, behind which the position begins anew; where there is none, as mostly, nothing waits for it.
+        let taken = if times == 0 { lanes } else { lanes & (times & times.wrapping_neg()).wrapping_sub(1) };
         let advances = controls & taken;
         let events = taken & !controls;
 
         // Steps of the position, added up; a sum that is too large stays too large.
         let mut steps = _mm512_maskz_add_epi16(taken, skip, one);
-        if advances != 0 {
+        // Of small words without a branch: in a scene nobody guesses which block has one.
+        if VALUE == 8 || advances != 0 {
             let advance = if VALUE == 8 {
                 _mm512_slli_epi16::<6>(_mm512_add_epi16(value, one))
             } else {
@@ -121,13 +126,16 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
         steps = _mm512_adds_epu16(steps, _mm512_bslli_epi128::<2>(steps));
         steps = _mm512_adds_epu16(steps, _mm512_bslli_epi128::<4>(steps));
         steps = _mm512_adds_epu16(steps, _mm512_bslli_epi128::<8>(steps));
-        let carried = _mm512_maskz_permutexvar_epi16(0xff00_ff00, last_before, steps);
-        steps = _mm512_adds_epu16(steps, carried);
-        let carried = _mm512_maskz_permutexvar_epi16(0xffff_0000, sixteenth, steps);
-        steps = _mm512_adds_epu16(steps, carried);
+        if count > 8 {
+            let carried = _mm512_maskz_permutexvar_epi16(0xff00_ff00, last_before, steps);
+            steps = _mm512_adds_epu16(steps, carried);
+            let carried = _mm512_maskz_permutexvar_epi16(0xffff_0000, sixteenth, steps);
+            steps = _mm512_adds_epu16(steps, carried);
+        }
         let from_1 = _mm512_adds_epu16(steps, _mm512_set1_epi16((body.position + 1) as i16));
         // No step is below 0, and lanes that are not taken add none: the last one has the sum.
-        let last = (_mm_extract_epi16::<7>(_mm512_extracti32x4_epi32::<3>(from_1)) & 0xffff) as u16;
+        let end = if count > 8 { _mm512_extracti32x4_epi32::<3>(from_1) } else { _mm512_castsi512_si128(from_1) };
+        let last = (_mm_extract_epi16::<7>(end) & 0xffff) as u16;
         if last == FULL {
             return;
         }
@@ -177,18 +185,33 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
                     _mm512_mask_storeu_epi64(since.wrapping_add(24), (given >> 24) as u8, t);
                 }
             } else {
-                let (mut places, mut values) = ([0_u16; WORDS], [0_u16; WORDS]);
                 // Lanes without an event repeat the last one, so that the loop has one of two lengths: a processor guesses these.
                 let repeated = _mm512_min_epu16(_mm512_set1_epi16(n as i16 - 1), lane);
-                // SAFETY: both are 64 bytes long, and the places of the first `n` events are on the array, as was seen above,
-                // and so in `held`.
-                unsafe {
-                    _mm512_storeu_si512(places.as_mut_ptr().cast(), _mm512_permutexvar_epi16(repeated, position));
-                    _mm512_storeu_si512(values.as_mut_ptr().cast(), _mm512_permutexvar_epi16(repeated, ticks));
-                    let lanes = if n > FEW { WORDS } else { FEW };
-                    for (&place, &value) in places[..lanes].iter().zip(&values[..lanes]) {
-                        *held.values.get_unchecked_mut(usize::from(place)) = value;
-                        *held.since.get_unchecked_mut(usize::from(place)) = body.t;
+                let places = _mm512_permutexvar_epi16(repeated, position);
+                let values = _mm512_permutexvar_epi16(repeated, ticks);
+                // SAFETY: the places of the first `n` events are on the array, as was seen above, and so in `held`.
+                let mut hold = |place: u16, value: u16| unsafe {
+                    *held.values.get_unchecked_mut(usize::from(place)) = value;
+                    *held.since.get_unchecked_mut(usize::from(place)) = body.t;
+                };
+                if n > FEW {
+                    let (mut at, mut told) = (Lanes([0; WORDS]), Lanes([0; WORDS]));
+                    // SAFETY: both are 64 bytes long, and begin where a line of the cache does.
+                    unsafe {
+                        _mm512_store_si512(at.0.as_mut_ptr().cast(), places);
+                        _mm512_store_si512(told.0.as_mut_ptr().cast(), values);
+                    }
+                    at.0.iter().zip(&told.0).for_each(|(&place, &value)| hold(place, value));
+                } else {
+                    // Not by way of memory, for which the loads would wait.
+                    let halves = |lanes| {
+                        let eight = _mm512_castsi512_si128(lanes);
+                        [_mm_cvtsi128_si64(eight) as u64, _mm_extract_epi64::<1>(eight) as u64]
+                    };
+                    for (places, values) in halves(places).into_iter().zip(halves(values)) {
+                        for shift in [0, 16, 32, 48] {
+                            hold((places >> shift) as u16, (values >> shift) as u16);
+                        }
                     }
                 }
             }

@@ -32,9 +32,9 @@ pub(crate) struct Body<'a> {
     /// Whether an offset was missing.
     pub(super) cut: bool,
     /// The latest time of a row, us; `i64::MIN` before the first.
-    pub(super) latest: i64,
-    /// Rows written so far.
-    pub(super) rows: usize,
+    pub(crate) latest: i64,
+    /// The row that is written next.
+    pub(crate) rows: usize,
 }
 
 impl<'a> Body<'a> {
@@ -47,7 +47,8 @@ impl<'a> Body<'a> {
     /// Whole words that are left.
     #[inline(always)]
     pub(crate) fn left(&self) -> usize {
-        (self.bytes.len() - self.at) / self.layout.bytes
+        // Of 2 or 4 bytes each: no division.
+        (self.bytes.len() - self.at) >> self.layout.bytes.trailing_zeros()
     }
 }
 
