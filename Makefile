@@ -24,7 +24,7 @@ check:
 $(VENV)/.installed: pyproject.toml | check
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.16,<2"
-	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]; print("\n".join(p["dependencies"] + sum((e[x] for x in ("test", "lint", "docs", "bench", "neo", "nir", "nwb", "cluster")), [])))' > $(VENV)/wanted.txt
+	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]; print("\n".join(p["dependencies"] + sum((e[x] for x in ("test", "lint", "docs", "bench", "foxglove", "neo", "nir", "nwb", "cluster")), [])))' > $(VENV)/wanted.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/wanted.txt
 	@touch $@
 

@@ -109,6 +109,7 @@ THOUSANDS = {
     "taxel.information.wire_rate": "kbit/s",
     "taxel.report.listening": "seconds",
     "taxel.simulate.fem": "N/m, kPa",
+    "taxel.live._to_foxglove": "ns",
     "taxel.studies": "seconds, Hz, seeds, frames of whole ms",
 }
 

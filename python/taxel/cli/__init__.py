@@ -52,6 +52,10 @@ def main(arguments: list[str] | None = None) -> NoReturn:
         _end(_said(error), WRONG_INPUT)
     except OSError as error:
         _end(_said(error), OUTSIDE)
+    except ImportError as error:
+        if "pip install taxel[" not in str(error):
+            raise
+        _end(str(error), WRONG_INPUT)
     except MemoryError as error:
         _end(f"this needs more memory than there is ({error})", OUTSIDE)
     sys.exit(code if isinstance(code, int) else 0)

@@ -31,9 +31,10 @@ from taxel.cli._board import (
 )
 from taxel.cli._listening import new_report
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
+from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, how_it_goes, say_shown, spikes_of, viewers
 from taxel.detect import Readout
 from taxel.device import Cable
-from taxel.live import Live, Panel, Said, Summary, delays
+from taxel.live import Live, Panel, Said, Summary, Viewer, delays
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -87,23 +88,31 @@ def live(
     panel_port: PanelPortOption = 0,
     folder: Annotated[Path | None, typer.Option(help="With --panel: where recordings are, and go; else here.")] = None,
     opens: OpenOption = False,
+    to: ToOption = None,
+    encoder: SpikesOption = None,
+    values: SpikesSetOption = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a line of JSON a detection, and nothing else.")
     ] = False,
 ) -> None:
-    """Listen to a board and say what a readout detects, while it happens; with --panel, show it in a browser.
+    """Listen to a board and say what a readout detects, while it happens; with --panel or --to, show it.
 
     Shows rates, losses and latency. With --json each detection is one line, written by the thread that made it: label;
     t_us, known_us and said_us of the board's clock; slope_mv_per_ms; said_ns by this computer's. --send sends the same
-    lines elsewhere; who reads them too slowly loses some, and is told how many. Exit code 3 where nothing came or
-    something was lost after it had arrived, 2 where the board has more taxels than the array.
+    lines elsewhere; who reads them too slowly loses some, and is told how many. --panel shows the board in a browser,
+    --to in a viewer of others, which loses pictures where it is too slow. Exit code 3 where nothing came or something
+    was lost after it had arrived, 2 where the board has more taxels than the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
     Example: taxel live --panel --control 127.0.0.1:5209
+    Example: taxel live --to rerun --to foxglove --encoder fa1
     Example: taxel live --from zenoh:192.168.1.5:7447/left --panel
     """
-    _together(readout, panel=panel, of_a_readout=bool(tare or report or send), of_a_panel=folder is not None)
+    spikes = spikes_of(to, encoder, values)
+    _together(
+        readout, panel=panel, viewers=bool(to), of_a_readout=bool(tare or report or send), of_a_panel=folder is not None
+    )
     heard = None if readout is None else Readout.load(readout)
     rest = rest_of(tare)
     _fresh(rest, save_tare, None if panel else control)
@@ -131,6 +140,7 @@ def live(
         ) as pipeline:
             # Whoever reads our lines and has enough is as good an end as Ctrl-C.
             shows: Panel | None = None
+            looks: list[Viewer] = []
             with contextlib.ExitStack() as shown, contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
                 if panel:
                     if isinstance(rest, float):
@@ -141,7 +151,10 @@ def live(
                     )
                     announce(shows, opens, console)
                 fresh = isinstance(rest, float) and not panel
-                _watch(pipeline, shows, seconds, console, at_rest, fresh=fresh)
+                if spikes is not None and isinstance(rest, Tare):
+                    spikes = spikes.with_tare(rest)
+                looks = viewers(shown, pipeline if shows is None else shows, to or (), spikes)
+                _watch(pipeline, shows, looks, seconds, console, at_rest, fresh=fresh)
             last = pipeline if shows is None or shows.live is None else shows.live
             summary = last.stop()
             taken = summary.tare
@@ -152,6 +165,7 @@ def live(
         _report(report, heard, summary.path, taken if taken is not None else rest)
         console.print(f"report: {report / 'report.html'}", soft_wrap=True)
     _unsent(summary)
+    say_shown(looks, quiet=as_json)
     if not as_json:
         _say(summary, guard_frames)
     elif summary.nothing_came or summary.lost:
@@ -200,10 +214,10 @@ def _unsent(summary: Summary) -> None:
             )
 
 
-def _together(readout: Path | None, *, panel: bool, of_a_readout: bool, of_a_panel: bool) -> None:
+def _together(readout: Path | None, *, panel: bool, viewers: bool, of_a_readout: bool, of_a_panel: bool) -> None:
     """Refuse options that nothing would use."""
-    if readout is None and not panel:
-        raise ProblemError("nothing to do: give --readout FILE to detect, or --panel to look")
+    if readout is None and not panel and not viewers:
+        raise ProblemError("nothing to do: give --readout FILE to detect, or --panel or --to VIEWER to look")
     if readout is None and of_a_readout:
         raise ProblemError("--tare, --report and --send belong to a readout: give --readout FILE")
     if of_a_panel and not panel:
@@ -246,6 +260,7 @@ def _unheard(tare: Tare) -> None:
 def _watch(
     pipeline: Live,
     panel: Panel | None,
+    looks: list[Viewer],
     seconds: float | None,
     console: Console,
     at_rest: contextlib.ExitStack,
@@ -283,7 +298,8 @@ def _watch(
                 typer.echo(f"taxel: {wrong}", err=True)
                 told = True
             if now["seconds"] - before["seconds"] >= _REDRAW:
-                display.update(Group(counters_table(before, now), _state(now, shown)))
+                lines = [Text(how_it_goes(viewer)) for viewer in looks]
+                display.update(Group(counters_table(before, now), _state(now, shown), *lines))
                 before = now
 
 

@@ -11,8 +11,10 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
+from taxel.cli._paneling import PanelHostOption, PanelPortOption, announce
+from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, how_it_goes, say_shown, spikes_of, viewers
 from taxel.live import Panel
 
 __all__ = ["view"]
@@ -28,25 +30,50 @@ def view(
     ],
     panel_host: PanelHostOption = "127.0.0.1",
     panel_port: PanelPortOption = 0,
-    opens: OpenOption = True,
+    opens: Annotated[
+        bool | None, typer.Option("--open/--no-open", help="Open the panel in a browser; not by itself with --to.")
+    ] = None,
+    to: ToOption = None,
+    speed: Annotated[
+        float | None, typer.Option(min=0.001, max=100.0, help="With --to: board time over real time.")
+    ] = None,
+    encoder: SpikesOption = None,
+    values: SpikesSetOption = None,
     seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the panel's address as JSON, and nothing else.")
     ] = False,
 ) -> None:
-    """Show a recording in a browser: play, scrub, label, cut.
+    """Show a recording in a browser: play, scrub, label, cut. With --to, play it once in viewers of others.
 
     Labels are kept beside it, in NAME.notes.csv; the recording itself is never changed.
 
     Example: taxel view walk.mcap
+    Example: taxel view walk.mcap --to rerun --speed 0.1 --encoder fa1
     """
+    spikes = spikes_of(to, encoder, values)
+    if speed is not None and not to:
+        raise ProblemError("--speed belongs to a viewer: give --to VIEWER; the panel has its own")
     console = Console(stderr=True, quiet=as_json)
-    with Panel(recording, host=panel_host, port=panel_port) as panel:
+    with contextlib.ExitStack() as shown:
+        panel = shown.enter_context(Panel(recording, host=panel_host, port=panel_port))
+        looks = viewers(shown, panel, to or (), spikes, 1.0 if speed is None else speed)
         if as_json:
-            typer.echo(json.dumps({"url": panel.url, "token": panel.token}))
-        announce(panel, opens, console)
+            where = {"to": [viewer.place for viewer in looks]} if looks else {}
+            typer.echo(json.dumps({"url": panel.url, "token": panel.token, **where}))
+        announce(panel, not to if opens is None else opens, console)
         console.print("Ctrl-C ends")
+        waited = dict.fromkeys(looks, "")
         until = None if seconds is None else time.monotonic() + seconds
         with contextlib.suppress(KeyboardInterrupt):
             while until is None or time.monotonic() < until:
                 time.sleep(_LOOK_EVERY)
+                for viewer, told in list(waited.items()):
+                    state = viewer.state
+                    if state.trouble and state.trouble != told:
+                        waited[viewer] = state.trouble
+                        console.print(f"{viewer.place}: {state.trouble}", soft_wrap=True)
+                    if state.over:
+                        del waited[viewer]
+                        console.print(f"shown to its end in {how_it_goes(viewer)}", soft_wrap=True)
+    say_shown(looks, quiet=as_json)

@@ -3,7 +3,21 @@
 from taxel.live.bridge import Bridge
 from taxel.live.panel import Panel
 from taxel.live.remote import Remote
+from taxel.live.viewer import Viewer, Viewing
 from taxel.live.way import PORT, Live, Said, Source, Summary, heard, send
 from taxel.live.way import delays as delays
 
-__all__ = ["PORT", "Bridge", "Live", "Panel", "Remote", "Said", "Source", "Summary", "heard", "send"]
+__all__ = [
+    "PORT",
+    "Bridge",
+    "Live",
+    "Panel",
+    "Remote",
+    "Said",
+    "Source",
+    "Summary",
+    "Viewer",
+    "Viewing",
+    "heard",
+    "send",
+]

@@ -94,6 +94,7 @@ class Panel:
             self._office.close()
             raise
         self._first, self._stopped = self._live, False
+        self._opened = opened
         self._url = self._core.url()
 
     @property

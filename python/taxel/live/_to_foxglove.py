@@ -1,0 +1,209 @@
+"""Show a sensor in Foxglove: a server of its own, on loopback, that Foxglove opens."""
+
+from __future__ import annotations
+
+import importlib
+import threading
+import time
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.live._page import Curves, Detection, Item, Note, Picture, Spikes, Subject
+
+__all__ = ["ToFoxglove"]
+
+#: Messages that wait for each who looks, the oldest of which the server drops.
+_BACKLOG = 512
+
+#: Who looks asks for one topic after the other, all within so long, s.
+_ALL_WITHIN_S = 0.25
+
+#: Whoever has not been heard of looks like this.
+_UNKNOWN = (96, 96, 96)
+
+_NUMBER, _WHOLE, _TEXT = {"type": "number"}, {"type": "integer"}, {"type": "string"}
+_SOME = {"type": ["number", "null"]}
+_SCHEMAS = {
+    "/contact": {"t_us": _WHOLE, "force_ticks": _WHOLE, "area_taxels": _WHOLE, "x": _SOME, "y": _SOME},
+    "/spikes": {
+        "t_us": _WHOLE,
+        "encoder": _TEXT,
+        "train": {"type": "array", "items": _WHOLE},
+        "value": {"type": "array", "items": _NUMBER},
+    },
+    "/detections": {
+        "label": _TEXT,
+        "t_us": _WHOLE,
+        "known_us": _WHOLE,
+        "said_us": _SOME,
+        "latency_us": _SOME,
+        "slope": _SOME,
+    },
+}
+
+
+class ToFoxglove:
+    """Show what a page shows to whoever opens ``ws://127.0.0.1:PORT`` in Foxglove.
+
+    Parameters
+    ----------
+    port : int
+        TCP; 0 finds a free one.
+
+    Raises
+    ------
+    OSError : the port is taken
+    """
+
+    def __init__(self, port: int) -> None:
+        self._foxglove: Any = importlib.import_module("foxglove")
+        channels: Any = importlib.import_module("foxglove.channels")
+        self._messages: Any = importlib.import_module("foxglove.messages")
+        self._context = self._foxglove.Context()
+        self._begun = False
+        self._looks: set[tuple[int, int]] = set()
+        self._since, self._lock = 0.0, threading.Lock()
+        self._images = {name: channels.RawImageChannel(name, context=self._context) for name in _IMAGES}
+        self._notes = channels.LogChannel("/notes", context=self._context)
+        self._tables = {name: self._table(name, fields) for name, fields in _SCHEMAS.items()}
+        try:
+            self._server = self._foxglove.start_server(
+                name="taxel",
+                host="127.0.0.1",
+                port=port,
+                context=self._context,
+                message_backlog_size=_BACKLOG,
+                server_listener=self,
+            )
+        except RuntimeError as error:
+            raise OSError(
+                f"127.0.0.1:{port}: Foxglove's server cannot listen there: {str(error).removeprefix('FoxgloveError: ')}"
+            ) from None
+        self.place = f"Foxglove at ws://127.0.0.1:{self._server.port}"
+
+    def _table(self, name: str, fields: dict[str, Any]) -> Any:
+        schema = {"title": f"taxel.{_TITLES[name]}", "type": "object", "properties": fields}
+        return self._foxglove.Channel(name, schema=schema, message_encoding="json", context=self._context)
+
+    def on_subscribe(self, client: Any, channel: Any) -> None:
+        """Note who looks."""
+        with self._lock:
+            if not self._looks:
+                self._since = time.monotonic()
+            self._looks.add((client.id, channel.id))
+
+    def on_unsubscribe(self, client: Any, channel: Any) -> None:
+        """Note who looks no more."""
+        with self._lock:
+            self._looks.discard((client.id, channel.id))
+
+    def meet(self) -> bool:
+        """Tell whether somebody looks."""
+        with self._lock:
+            return bool(self._looks) and time.monotonic() > self._since + _ALL_WITHIN_S
+
+    @property
+    def trouble(self) -> str:
+        """Why nobody is met."""
+        return "nobody looks"
+
+    def begin(self, subject: Subject) -> None:  # noqa: ARG002  pictures bring its name
+        """Show something else from here on."""
+        if self._begun:
+            # Time may begin anew: who looks forgets what was.
+            self._server.clear_session()
+        self._begun = True
+
+    def show(self, subject: Subject, item: Item) -> None:
+        """Show the next."""
+        match item:
+            case Picture():
+                for name, (encoding, draw) in _IMAGES.items():
+                    self._image(name, subject, item.t, encoding, draw(item))
+            case Curves():
+                for t, force, area, x, y in zip(item.t, item.force, item.area, item.x, item.y, strict=True):
+                    self._row("/contact", t, force_ticks=int(force), area_taxels=int(area), x=_some(x), y=_some(y))
+            case Spikes():
+                cuts = np.flatnonzero(np.diff(item.t)) + 1
+                parts = (np.split(column, cuts) for column in (item.t, item.train, item.value))
+                for t, train, value in zip(*parts, strict=True):
+                    if len(t):
+                        self._row("/spikes", t[0], encoder=item.encoder, train=train.tolist(), value=value.tolist())
+            case Detection():
+                when = {"known_us": item.known, "said_us": item.said, "latency_us": item.latency}
+                self._row("/detections", item.t, label=item.label, **when, slope=item.slope)
+            case Note():
+                level = self._messages.LogLevel.Info
+                note = self._messages.Log(timestamp=self._stamp(item.t), level=level, message=item.text, name="note")
+                self._notes.log(note, log_time=_ns(item.t))
+
+    def settle(self) -> None:
+        """Return at once: its server never waits for who reads slowly."""
+
+    def _stamp(self, t_us: int) -> Any:
+        return self._messages.Timestamp(*divmod(_ns(t_us), 10**9))
+
+    def _row(self, name: str, t: Any, **values: Any) -> None:
+        self._tables[name].log({"t_us": int(t), **values}, log_time=_ns(int(t)))
+
+    def _image(self, name: str, subject: Subject, t: int, encoding: str, values: NDArray[Any]) -> None:
+        rows, columns = values.shape[:2]
+        image = self._messages.RawImage(
+            timestamp=self._stamp(t),
+            frame_id=subject.name,
+            width=columns,
+            height=rows,
+            encoding=encoding,
+            step=values[0].nbytes,
+            data=values.tobytes(),
+        )
+        self._images[name].log(image, log_time=_ns(t))
+
+
+def _pressure(picture: Picture) -> NDArray[np.uint8]:
+    scaled = np.minimum(picture.above.astype(np.int64) * 255 // picture.full, 255)
+    drawn: NDArray[np.uint8] = _colours()[scaled]
+    drawn[~picture.known] = _UNKNOWN
+    return drawn
+
+
+def _ticks(picture: Picture) -> NDArray[np.uint16]:
+    return picture.above.astype("<u2")
+
+
+def _change(picture: Picture) -> NDArray[np.uint8]:
+    strength = np.abs(picture.change.astype(np.int16))[:, :, None] / 127
+    colour = np.where(picture.change[:, :, None] > 0, (255, 150, 50), (70, 150, 255))
+    drawn: NDArray[np.uint8] = (strength * colour).astype(np.uint8)
+    return drawn
+
+
+@cache
+def _colours() -> NDArray[np.uint8]:
+    """Return 256 colours, safe for colour-blind eyes."""
+    from matplotlib import colormaps  # noqa: PLC0415  loads slowly
+
+    table: NDArray[np.uint8] = (np.asarray(colormaps["viridis"](np.arange(256)))[:, :3] * 255).astype(np.uint8)
+    return table
+
+
+#: Pictures by topic: as a colour is safe to look at, and as numbers.
+_IMAGES: dict[str, tuple[str, Callable[[Picture], NDArray[Any]]]] = {
+    "/pressure": ("rgb8", _pressure),
+    "/pressure/ticks": ("16UC1", _ticks),
+    "/change": ("rgb8", _change),
+}
+_TITLES = {"/contact": "Contact", "/spikes": "Spikes", "/detections": "Detection"}
+
+
+def _some(value: Any) -> float | None:
+    """Return a number, or none where it is none."""
+    return None if np.isnan(value) else float(value)
+
+
+def _ns(t_us: int) -> int:
+    return max(0, 1000 * t_us)

@@ -1,0 +1,158 @@
+"""Show a sensor in a Rerun viewer that the user has started, as its client: nothing listens here."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import socket
+import time
+from typing import Any
+
+import numpy as np
+
+from taxel.live._page import Curves, Detection, Item, Note, Picture, Spikes, Subject
+from taxel.live._sink import Gone
+from taxel.spikes import to_ms
+
+__all__ = ["ToRerun"]
+
+#: The time line: the board's.
+_TIME = "board"
+
+#: How long a viewer is looked for, and how often; how long is waited at a time for one that reads slowly, s.
+_LOOK_S, _LOOK_EVERY_S, _WAIT_S = 0.5, 0.5, 1.0
+
+
+class ToRerun:
+    """Show what a page shows in a Rerun viewer.
+
+    Parameters
+    ----------
+    host : str
+    port : int
+        Where the viewer listens.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        self._rerun: Any = importlib.import_module("rerun")
+        self.place = f"Rerun at {host}:{port}"
+        self._address, self._name = (host.strip("[]"), port), f"{host}:{port}"
+        self._stream: Any = None
+        self._looked = -_LOOK_EVERY_S
+        self._there = False
+        self._known: Any = None
+
+    def meet(self) -> bool:
+        """Tell whether there is a viewer."""
+        if self._stream is None and time.monotonic() >= self._looked + _LOOK_EVERY_S:
+            self._looked = time.monotonic()
+            self._there = self._answers()
+        return self._there
+
+    @property
+    def trouble(self) -> str:
+        """Why nobody is met."""
+        return f"no viewer at {self._name}; start one with: rerun"
+
+    def begin(self, subject: Subject) -> None:
+        """Show something else from here on, as a recording of its own: its time may begin anew."""
+        self._known = None
+        self._stream = self._rerun.RecordingStream("taxel")
+        self._stream.set_log_tick_enabled(False)
+        self._stream.set_log_time_enabled(False)
+        # Where nobody listens this would wait for five seconds.
+        self._stream.connect_grpc(f"rerun+http://{self._name}/proxy")
+        self._stream.send_recording_name(subject.name)
+        self._stream.send_blueprint(_layout())
+        unknown = self._rerun.AnnotationContext([(1, "not heard of yet", (96, 96, 96))])
+        self._stream.log("pressure/unknown", unknown, static=True)
+        for name, colour in (("more", (230, 140, 40)), ("less", (70, 150, 240))):
+            look = self._rerun.SeriesPoints(colors=colour, names=name, markers="circle", marker_sizes=1.5)
+            self._stream.log(f"spikes/{name}", look, static=True)
+
+    def show(self, subject: Subject, item: Item) -> None:  # noqa: ARG002  where it is shown was said
+        """Show the next."""
+        match item:
+            case Picture():
+                self._picture(item)
+            case Curves():
+                values = {"force_ticks": item.force, "area_taxels": item.area, "centre/x": item.x, "centre/y": item.y}
+                for name, column in values.items():
+                    self._column(f"contact/{name}", item.t, column)
+            case Spikes():
+                more = item.value >= 0
+                for name, chosen in (("more", more), ("less", ~more)):
+                    if chosen.any():
+                        self._column(f"spikes/{name}", item.t[chosen], item.train[chosen])
+            case Detection():
+                self._at(item.t)
+                self._stream.log("detections", self._rerun.TextLog(_said(item), level="INFO"))
+                if item.latency is not None:
+                    self._stream.log("latency_ms", self._rerun.Scalars(to_ms(item.latency)))
+            case Note():
+                self._at(item.t)
+                self._stream.log("notes", self._rerun.TextLog(item.text, level="INFO"))
+
+    def settle(self) -> None:
+        """Wait until the viewer has taken it all.
+
+        Raises
+        ------
+        Gone : it is not there any more
+        """
+        while True:
+            try:
+                self._stream.flush(timeout_sec=_WAIT_S)
+            except (RuntimeError, ValueError) as error:
+                # One that only reads slowly still takes connections.
+                if "timed out" in str(error) and self._answers():
+                    continue
+                self._stream, self._there = None, False
+                raise Gone(str(error)) from None
+            return
+
+    def _answers(self) -> bool:
+        with contextlib.suppress(OSError), socket.create_connection(self._address, _LOOK_S):
+            return True
+        return False
+
+    def _at(self, t_us: int) -> None:
+        self._stream.set_time(_TIME, duration=np.timedelta64(t_us, "us"))
+
+    def _column(self, name: str, t_us: Any, values: Any) -> None:
+        times = self._rerun.TimeColumn(_TIME, duration=t_us.astype("timedelta64[us]"))
+        self._stream.send_columns(name, [times], self._rerun.Scalars.columns(scalars=values.astype(np.float64)))
+
+    def _picture(self, picture: Picture) -> None:
+        self._at(picture.t)
+        colours = {"meter": 1.0, "colormap": "viridis", "depth_range": [0.0, float(picture.full)]}
+        self._stream.log("pressure", self._rerun.DepthImage(picture.above, **colours))
+        colours = {"meter": 1.0, "colormap": "cyantoyellow", "depth_range": [-127.0, 127.0]}
+        self._stream.log("change", self._rerun.DepthImage(picture.change.astype(np.int16), **colours))
+        if self._known is None or not np.array_equal(self._known, picture.known):
+            self._known = picture.known
+            self._stream.log("pressure/unknown", self._rerun.SegmentationImage((~picture.known).astype(np.uint8)))
+
+
+def _layout() -> Any:
+    """Return where what is shown, until the user moves it."""
+    layout: Any = importlib.import_module("rerun.blueprint")
+    pictures = layout.Vertical(
+        layout.Spatial2DView(origin="pressure", name="Pressure above rest, ticks"),
+        layout.Spatial2DView(origin="change", name="Change, ticks"),
+    )
+    curves = layout.Vertical(
+        layout.TimeSeriesView(origin="spikes", name="Spikes, trains"),
+        layout.TimeSeriesView(origin="contact/force_ticks", name="Force, ticks"),
+        layout.TimeSeriesView(origin="contact/area_taxels", name="Area, taxels"),
+        layout.TimeSeriesView(origin="contact/centre", name="Centre, taxels"),
+        layout.TextLogView(origin="/", name="Detections and notes"),
+    )
+    return layout.Blueprint(layout.Horizontal(pictures, curves), collapse_panels=True)
+
+
+def _said(detection: Detection) -> str:
+    known = f"known {to_ms(detection.known - detection.t):.2f} ms after the event"
+    if detection.latency is None:
+        return f"{detection.label}: {known}"
+    return f"{detection.label}: {known}, said {to_ms(detection.latency):.2f} ms later, slope {detection.slope:g} mV/ms"

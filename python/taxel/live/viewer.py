@@ -1,0 +1,246 @@
+"""Views in programs of somebody else's: Rerun and Foxglove."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass, field, replace
+from types import TracebackType
+from typing import Any
+from urllib.parse import urlsplit
+
+from taxel._arguments import instance, number, shown, text
+from taxel._core import ProblemError
+from taxel.encode import Encoder
+from taxel.live.panel import Panel
+from taxel.live.way import Live
+
+__all__ = ["Viewer", "Viewing"]
+
+#: Where a Rerun viewer listens, and where Foxglove looks for a server, by their own defaults.
+_PORTS = {"rerun": 9876, "foxglove": 8765}
+
+#: The modules of the extras.
+_MODULES = {"rerun": ("rerun", "websockets"), "foxglove": ("foxglove", "websockets")}
+
+_MOST_PORT = 65_535
+
+#: How long the process may take to end, s.
+_END_WITHIN_S = 4.0
+
+
+@dataclass(frozen=True)
+class Viewing:
+    """Say how a `Viewer` goes.
+
+    Attributes
+    ----------
+    sent, lost : dict
+        How many pictures, times of the curves ("curves"), spikes, detections and notes the viewer took, and how many
+        found no room because it was missing, slow or gone.
+    there : bool
+        Whether somebody looks.
+    trouble : str or None
+        Why nobody does, or what the panel's server refused.
+    over : bool
+        Whether all of a recording has been shown.
+    """
+
+    sent: dict[str, int] = field(default_factory=dict)
+    lost: dict[str, int] = field(default_factory=dict)
+    there: bool = False
+    trouble: str | None = None
+    over: bool = False
+
+
+class Viewer:
+    """Show a board, or a recording, in a Rerun viewer or in Foxglove. A context manager.
+
+    What goes, on the board's time line: the picture above rest and the change, both with colours; force, area and
+    centre of the contact as curves; an encoder's spikes, detections with their latency, a recording's notes. A process
+    of its own hands it on, as one more page of the panel (whose server, on loopback, is begun where none is given): a
+    viewer that is missing, slow, stuck or gone holds nobody up. 32 pictures and 1024 other messages wait for it; of
+    what finds no room the oldest goes, and is counted.
+
+    Parameters
+    ----------
+    shows : Live, Panel or path
+        A board that is listened to, a panel that shows one, or a recording (`.mcap`, `.lsa`), which is played once,
+        from when somebody looks.
+    to : str
+        "rerun", "rerun:HOST:PORT" or "rerun+http://HOST:PORT/proxy": a viewer that the user has started; taxel is its
+        client, and looks for it until it is there. "foxglove" or "foxglove:PORT": a server on 127.0.0.1 that Foxglove
+        opens (any program of this machine may); port 0 finds a free one.
+    encoder : Encoder, optional
+        Whose spikes go too. One that reads the taxels' rest must have it.
+    speed : float, 0.001 to 100
+        Of a recording: board time over real time.
+    rate_hz : float, 1 to 60
+        Pictures a second at most.
+
+    Raises
+    ------
+    ImportError : the viewer's library is not installed (``pip install taxel[rerun]`` or ``taxel[foxglove]``)
+    OSError : Foxglove's port is taken, the recording is not there
+    ProblemError : arguments that make no sense
+
+    Examples
+    --------
+    ``with Live() as live, Viewer(live, "rerun"): ...`` shows the board in the viewer that ``rerun`` started;
+    ``Viewer("walk.mcap", "foxglove", speed=0.1).wait()`` plays a recording ten times slower.
+    """
+
+    def __init__(
+        self,
+        shows: Live | Panel | str | os.PathLike[str],
+        to: str,
+        *,
+        encoder: Encoder | None = None,
+        speed: float = 1.0,
+        rate_hz: float = 30.0,
+    ) -> None:
+        where = _where(to)
+        pace, rate = number("speed", speed), number("rate_hz", rate_hz)
+        for name, value, least, most in (("speed", pace, 0.001, 100.0), ("rate_hz", rate, 1.0, 60.0)):
+            if not least <= value <= most:
+                raise ProblemError(f"{name} is {value:g}: must lie in {least:g} to {most:g}")
+        spikes = None if encoder is None else instance("encoder", encoder, Encoder).to_json()
+        if encoder is not None and isinstance(shows, Live):
+            encoder.stream(shows.array)
+        _wanted(where["what"])
+        self._panel = None if isinstance(shows, Panel) else Panel(shows)
+        panel = shows if isinstance(shows, Panel) else self._panel
+        assert panel is not None  # one of the two
+        asked = {
+            "to": where,
+            "address": urlsplit(panel.url).netloc,
+            "token": panel.token,
+            "encoder": spikes,
+            "opens": panel._opened,
+            "speed": pace,
+            "rate_hz": rate,
+        }
+        self._state, self._changed = Viewing(), threading.Condition()
+        self._ended = self._stopping = False
+        self._listener: threading.Thread | None = None
+        # Ctrl-C is ours to hear; no file of the current folder is taken for a library; what the libraries say to
+        # themselves is not for the user.
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "taxel.live._viewing"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "RUST_LOG": "off"},
+            start_new_session=True,
+        )
+        try:
+            self._place = self._begun(asked)
+        except BaseException:
+            self.stop()
+            raise
+        self._listener = threading.Thread(target=self._listen, name="taxel-viewer", daemon=True)
+        self._listener.start()
+
+    def _begun(self, asked: dict[str, Any]) -> str:
+        """Say what is to be done; return where the viewer is."""
+        assert self._process.stdin is not None  # asked for
+        assert self._process.stdout is not None
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.write(json.dumps(asked) + "\n")
+            self._process.stdin.flush()
+        line = self._process.stdout.readline()
+        if not line:
+            raise OSError(f"{asked['to']['what']}: the process for it ended as it began")
+        said = json.loads(line)
+        if "error" in said:
+            raise OSError(said["error"])
+        return str(said["place"])
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None  # asked for
+        for line in self._process.stdout:
+            with self._changed:
+                self._state = Viewing(**json.loads(line))
+                self._changed.notify_all()
+        with self._changed:
+            self._ended = True
+            if not self._stopping:
+                self._state = replace(self._state, there=False, trouble="the process for it has ended")
+            self._changed.notify_all()
+
+    @property
+    def place(self) -> str:
+        """Where the viewer is, in words: "Rerun at 127.0.0.1:9876", "Foxglove at ws://127.0.0.1:8765"."""
+        return self._place
+
+    @property
+    def state(self) -> Viewing:
+        """How it goes, four times a second."""
+        return self._state
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait until all of a recording has been shown, or the board's server has ended; return whether that is so.
+
+        Parameters
+        ----------
+        timeout : float, s, optional
+            How long at most; for ever where it is left out.
+        """
+        limit = None if timeout is None else number("timeout", timeout)
+        with self._changed:
+            self._changed.wait_for(lambda: self._state.over or self._ended, limit)
+            return self._state.over
+
+    def stop(self) -> Viewing:
+        """End, and say how it went: what waits still goes, for 2 s at most. Once ended, say it again."""
+        self._stopping = True
+        assert self._process.stdin is not None  # asked for
+        with contextlib.suppress(BrokenPipeError):
+            self._process.stdin.close()
+        try:
+            self._process.wait(_END_WITHIN_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        if self._listener is not None:
+            self._listener.join()
+        if self._process.stdout is not None:
+            self._process.stdout.close()
+        if self._panel is not None:
+            self._panel.stop()
+        return self._state
+
+    def __enter__(self) -> Viewer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.stop()
+
+    def __repr__(self) -> str:
+        return f"Viewer({self._place}{', ended' if self._stopping else ''})"
+
+
+def _where(to: object) -> dict[str, Any]:
+    """Return what `to` names: the viewer's kind, host and port."""
+    said = text("to", to)
+    url = re.fullmatch(r"rerun\+http://([^/]+)/proxy", said)
+    plain = re.fullmatch(r"(rerun)(?::(.+):(\d{1,5}))?|(foxglove)(?::(\d{1,5}))?", f"rerun:{url[1]}" if url else said)
+    if plain is None or int(plain[3] or plain[5] or 0) > _MOST_PORT:
+        raise ProblemError(f"to is {shown(to)}: must be rerun, rerun:HOST:PORT, foxglove or foxglove:PORT")
+    what = plain[1] or plain[4]
+    return {"what": what, "host": plain[2] or "127.0.0.1", "port": int(plain[3] or plain[5] or _PORTS[what])}
+
+
+def _wanted(what: str) -> None:
+    """Refuse where an extra is not installed."""
+    missing = [module for module in _MODULES[what] if importlib.util.find_spec(module) is None]
+    if missing:
+        raise ImportError(f"{missing[0]} is not installed: pip install taxel[{what}]")
