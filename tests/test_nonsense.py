@@ -982,6 +982,7 @@ LEFT_OUT = {
     "taxel.live.Remote": "needs a wheel of its own; tried in tests/bridge",
     "taxel.live.Viewer": "needs an extra and begins a process; tried in tests/live",
     "taxel.live.Viewing": "a result",
+    "taxel.live.Viewer.wait": "waits",
     "taxel.live.Panel.delta_intensity": "begins a Live; its flag is checked, and tests/panel tries it",
     "taxel.live.Live.next": "waits",
     "taxel.live.Live.note": "tried with Live's own tests",
