@@ -160,7 +160,8 @@ def whole(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1
         value = _one(bare(name, value, unit))
     real = isinstance(value, float | np.floating) and float(value).is_integer()
     if isinstance(value, bool) or not (real or isinstance(value, int | np.integer)) or not least <= value <= most:  # type: ignore[operator]
-        raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {least} to {most}")
+        low, high = ("-2^63" if least == -(2**63) else least), ("2^63 - 1" if most == 2**63 - 1 else most)
+        raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {low} to {high}")
     return int(value)  # type: ignore[call-overload, no-any-return]
 
 

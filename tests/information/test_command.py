@@ -117,26 +117,38 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
         (GOOD.replace("100000,a", "noon,a"), [], "line 2: t_us is 'noon', must be whole us"),
         (GOOD.replace("100000,a,200000", "99000000,a,99100000"), [], "line 2: t_us 99000000 lies outside touches.npz"),
         (GOOD.replace("100000,a,200000", "100000,a,90000"), [], "stop 90000 us does not lie after start"),
-        (GOOD.replace(",b,", ",a,"), [], "labels are all 'a'"),
+        (GOOD.replace(",b,", ",a,"), [], "labels.csv: labels are all 'a'"),
         (GOOD.replace("touches.npz,100000,a,200000,u", "touches.npz,100000,a,200000,"), [], "group is empty"),
         (GOOD, ["--folds", "30"], None),
         (
             "recording,t_us,label,stop_us\ntouches.npz,100000,a,200000\ntouches.npz,500000,b,600000\n"
             "touches.npz,900000,a,1000000\ntouches.npz,1300000,b,1400000\n",
             [],
-            "4 trials for 10 folds",
+            "labels.csv: 4 trials for 10 folds",
         ),
-        (GOOD.replace(",b,", ",c,", 1), [], "label 'c': all its trials lie in group 'v'"),
+        (GOOD.replace(",b,", ",c,", 1), [], "labels.csv: label 'c': all its trials lie in group 'v'"),
         ("recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n", [], "has no stop_us"),
         (
             "recording,t_us,label\ntouches.npz,100000,a\ntouches.npz,500000,b\n",
             ["--window-ms", "450"],
             "inside its window of 450 ms",
         ),
+        (GOOD.replace("100000,a,200000", "1e30,a,200000"), [], "line 2: t_us is '1e30', must be whole us"),
+        (GOOD.replace("100000,a,200000", "100000,a,500001"), [], "line 3: begins before line 2 ends at 500001 us"),
+        (GOOD + GOOD.splitlines()[1], [], "line 26: begins where line 2 does"),
+        (GOOD.replace(",", ";"), [], "labels.csv, line 1: its cells are parted by semicolons; must be commas"),
+        (GOOD.replace(",", "\t"), [], "labels.csv, line 1: its cells are parted by tabs; must be commas"),
+        (GOOD.replace(",a,", ',"a,', 1), [], "labels.csv, line 2: a quote opens and does not close"),
+        (GOOD.replace("group\n", "group,\n").replace("u\n", "u,9\n"), [], "line 2: '9' stands in a column without a name"),
+        ("\n\n", [], "labels.csv: holds nothing; must be recording,t_us,label"),
         (GOOD, ["--periods", "fast"], "must be numbers, as 1,2,5"),
-        (GOOD, ["--taxels", "1.5"], "must be whole numbers"),
+        (GOOD, ["--periods", "0"], "--periods is [0.0]: must be whole us"),
+        (GOOD, ["--windows", "1000"], "--windows is [1000.0]: must lie in"),
+        (GOOD, ["--pools", "40"], "--pools is [40]: the array is"),
+        (GOOD, ["--folds", "1"], "--folds is 1: must be a whole number from 2"),
+        (GOOD, ["--taxels", "1.5"], "--taxels 1.5: must be whole numbers"),
         (GOOD, ["--encoder", "level_crossing"], "must be change_events or fa1"),
-        (GOOD, ["--also", "forest"], "must be one of"),
+        (GOOD, ["--also", "forest"], "--also is 'forest': must be one of"),
     ],
 )
 def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
@@ -155,6 +167,48 @@ def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
     assert text in str(done.exception)
     assert "\n" not in str(done.exception)
     assert not page.exists()
+
+
+def test_recordings_that_make_no_sense_together_are_one_clear_error(tmp_path):
+    events, rows = ordered(24)
+    (tmp_path / "empty").mkdir()
+    for folder in ("a", "b"):
+        (tmp_path / folder).mkdir()
+        taxel.convert(events, tmp_path / folder / "touches.npz")
+    wide = taxel.Events(events.t, events.x, events.y, events.p, array=taxel.Array(2, 3), intensity=events.intensity)
+    taxel.convert(wide, tmp_path / "wide.npz")
+    (tmp_path / "labels.csv").write_text(GOOD)
+    both = GOOD + GOOD.split("\n", 1)[1].replace("touches.npz", "wide.npz")
+    (tmp_path / "both.csv").write_text(both)
+    first, second = tmp_path / "a" / "touches.npz", tmp_path / "b" / "touches.npz"
+    for given, labels, text in (
+        ([first, first], "labels.csv", f"{first}: is named twice"),
+        ([first, tmp_path / "a" / ".." / "a" / "touches.npz"], "labels.csv", "is named twice"),
+        ([first, second], "labels.csv", f"labels.csv, line 2: recording 'touches.npz' may be {first} or {second}"),
+        ([tmp_path / "empty"], "labels.csv", f"{tmp_path / 'empty'}: holds no recording"),
+        ([first], "empty", f"{tmp_path / 'empty'}: is a directory; must be a .csv recording,t_us,label"),
+        ([first, tmp_path / "wide.npz"], "both.csv", "line 26: is of an array of 2 x 3"),
+    ):
+        done = run(*given, "--labels", tmp_path / labels, "--window-ms", "50", "--report", tmp_path / "page.html")
+        assert isinstance(done.exception, taxel.Error), done.output
+        assert text in str(done.exception)
+    done = run(first, first, "--window-ms", "50", "--report", tmp_path / "page.html")
+    assert "is named twice" in str(done.exception)
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_a_folder_stands_for_its_recordings(tmp_path):
+    events, rows = ordered(24)
+    (tmp_path / "monday").mkdir()
+    for k, (start, label) in enumerate(rows):
+        taxel.convert(events.between(start, start + 200_000), tmp_path / "monday" / f"{k}.npz")
+    table = [f"{k},{start},{label}" for k, (start, label) in enumerate(rows)]
+    (tmp_path / "trials.csv").write_text("\n".join(["recording,t_us,label", *table]))
+    done = run(
+        tmp_path / "monday", "--labels", tmp_path / "trials.csv", *QUICK, "--report", tmp_path / "page.html", "--json"
+    )
+    assert done.exit_code == 0, done.exception
+    assert sum(json.loads(done.stdout)["labels"].values()) == 24
 
 
 def test_parameters_and_groups_are_read(tmp_path):

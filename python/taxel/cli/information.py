@@ -8,19 +8,22 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from taxel._arguments import whole
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import SET_HELP, open_recording, told
+from taxel.cli._listening import SET_HELP, open_all, told
 
 if TYPE_CHECKING:
-    from taxel.information import Answer, Estimate, Point
+    from taxel.information import Answer, Estimate, LabelledTrial, Point
 
 __all__ = ["information"]
 
 
 @app.command()
 def information(
-    recordings: Annotated[list[Path], typer.Argument(help="Recordings: .mcap, .lsa, .npz or .csv.")],
+    recordings: Annotated[
+        list[Path], typer.Argument(help="Recordings, or folders of them: .mcap, .lsa, .npz, .csv, other makers' files.")
+    ],
     labels: Annotated[
         Path | None,
         typer.Option(
@@ -31,13 +34,15 @@ def information(
     window_ms: Annotated[
         float | None, typer.Option(help="How long after contact to look; needed where trials have no stop_us.")
     ] = None,
-    windows: Annotated[str | None, typer.Option(help="Times after contact, ms, as 10,20,50.")] = None,
-    periods: Annotated[str | None, typer.Option(help="Sampling periods, ms, as 1,2,5.")] = None,
+    windows_ms: Annotated[str | None, typer.Option("--windows", help="Times after contact, ms, as 10,20,50.")] = None,
+    periods_ms: Annotated[str | None, typer.Option("--periods", help="Sampling periods, ms, as 1,2,5.")] = None,
     taxels: Annotated[str | None, typer.Option(help="Numbers of taxels drawn at random, as 10,30,100.")] = None,
     pools: Annotated[str | None, typer.Option(help="Taxels of so many by so many taken for one, as 2,4.")] = None,
     encoder: Annotated[str, typer.Option(help="change_events or fa1.")] = "change_events",
     values: Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)] = None,
-    also: Annotated[str, typer.Option(help="Further classifiers: neighbours, cone_r, tempotron.")] = "neighbours",
+    classifiers: Annotated[
+        str, typer.Option("--also", help="Further classifiers: neighbours, cone_r, tempotron.")
+    ] = "neighbours",
     draws: Annotated[int, typer.Option(help="Draws of the sampling's phase, averaged.")] = 5,
     folds: Annotated[int, typer.Option(help="Folds; groups are never split.")] = 10,
     shuffles: Annotated[int, typer.Option(help="Of the labels, for the test against zero.")] = 20,
@@ -60,7 +65,7 @@ def information(
         opened = []
         for path in recordings:
             tell(f"reading {path}")
-            opened.append(open_recording(path))
+            opened += open_all([path])
         trials = (
             recordings_as_trials(opened, window_ms=window_ms)
             if labels is None
@@ -71,18 +76,19 @@ def information(
                 f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, here "
                 f"{trials[0].label!r} alone; give a table of trials (--labels), or each label's recordings a folder"
             )
+        _dealt(trials, labels or recordings[0], count=folds, seed=seed)
         found = answer(
             trials,
             encoder=chosen,
             window_ms=window_ms,
-            windows_ms=_numbers("--windows", windows),
-            periods_ms=_numbers("--periods", periods),
+            windows_ms=_numbers("--windows", windows_ms),
+            periods_ms=_numbers("--periods", periods_ms),
             taxels=_whole("--taxels", taxels),
             pools=_whole("--pools", pools),
             draws=draws,
             folds=folds,
             shuffles=shuffles,
-            classifiers=[name for name in also.split(",") if name],
+            classifiers=[name for name in classifiers.split(",") if name],
             seed=seed,
             progress=lambda what, done, of: tell(f"{what} ({done} of {of})"),
         )
@@ -94,6 +100,18 @@ def information(
     for line in lines(found):
         typer.echo(line)
     typer.echo(f"written to {report}")
+
+
+def _dealt(trials: list[LabelledTrial], place: Path, *, count: int, seed: int) -> None:
+    """Refuse labels and groups that cannot be dealt out to folds, and say in which table they stand."""
+    from taxel.information import folds  # noqa: PLC0415  starts quickly
+
+    whole("folds", count, 2), whole("seed", seed, 0)
+    groups = [trial.group for trial in trials]
+    try:
+        folds([trial.label for trial in trials], count=count, groups=groups if any(groups) else None, seed=seed)
+    except ProblemError as error:
+        raise ProblemError(f"{place}: {error}") from None
 
 
 def lines(found: Answer) -> list[str]:
@@ -188,9 +206,9 @@ def _numbers(option: str, said: str | None) -> list[float] | None:
 
 
 def _whole(option: str, said: str | None) -> list[int] | None:
-    found = _numbers(option, said)
-    if found is None:
+    if said is None:
         return None
-    if any(not one.is_integer() for one in found):
-        raise ProblemError(f"{option} {said}: must be whole numbers, as 10,30")
-    return [int(one) for one in found]
+    try:
+        return [int(cell) for cell in said.split(",")]
+    except ValueError:
+        raise ProblemError(f"{option} {said}: must be whole numbers, as 10,30") from None

@@ -320,9 +320,13 @@ class _Asked:
 
         if not self.trials:
             raise ProblemError("trials is []: must hold one at least")
-        arrays = {one.array.shape for one in self.trials}
-        if len(arrays) > 1:
-            raise ProblemError(f"trials are of arrays of {sorted(arrays)}: must all be of one")
+        shape = self.trials[0].array.shape
+        other = next((one for one in self.trials if one.array.shape != shape), None)
+        if other is not None:
+            sizes = " x ".join(map(str, other.array.shape)), " x ".join(map(str, shape))
+            raise ProblemError(
+                f"{other.name}: is of an array of {sizes[0]}, {self.trials[0].name} of {sizes[1]}: must all be of one"
+            )
         self.labels = np.array([one.label for one in self.trials])
         groups = [one.group for one in self.trials]
         self.groups = np.array(groups) if any(groups) else None
@@ -402,7 +406,10 @@ class _Asked:
             raise ProblemError(f"taxels is {shown(taxels)}: {there} of the array's ever send an event")
         self.random_taxels = [n for n in numbers if n < there]
         sides = [whole("pools", n, 2) for n in several("pools", (2, 4, 7) if pools is None else pools)]
-        self.pools = [n for n in sides if n <= max(self.trials[0].array.shape)]
+        rows, columns = self.trials[0].array.shape
+        if pools is not None and any(n > max(rows, columns) for n in sides):
+            raise ProblemError(f"pools is {shown(pools)}: the array is {rows} x {columns}")
+        self.pools = [n for n in sides if n <= max(rows, columns)]
         self.columns = self._parameters()
         settings = len(self.random_taxels) + len(self.pools)
         self.steps = self.draws * (len(self.periods) * (2 + len(self.columns)) + settings) + shuffles + classifiers + 8
@@ -644,7 +651,11 @@ class _Asked:
         found = {}
         for name in self.trials[0].parameters:
             column = np.array([one.parameters.get(name, "") for one in self.trials])
-            if len(np.unique(column)) < 2 or (column == self.labels).all():
+            if (column == self.labels).all():
+                self.notes.append(f"parameter {name} is left out: it says what the label says")
+                continue
+            if (column == "").any():
+                self.notes.append(f"parameter {name} is left out: some trials have none")
                 continue
             try:
                 folds(column, count=self.folds, groups=self.groups, seed=self.seed)

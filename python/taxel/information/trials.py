@@ -87,7 +87,7 @@ def read_trials(
     Parameters
     ----------
     table : path
-        A .csv with a header line. A recording is named by its path, file name or stem; ``t_us`` is where to begin to
+        A .csv with a header line. A recording is named by its path, name or stem; ``t_us`` is where to begin to
         look for the touch.
     recordings : sequence of Recording
         All of them must be named, and no other.
@@ -101,10 +101,11 @@ def read_trials(
     Raises
     ------
     FormatError : a column is missing, or a cell that is no number (names file and line)
-    ProblemError : recordings and table do not match, a start outside its recording, or trials without an end
+    ProblemError : recordings and table do not match, a recording is there twice, a start outside its recording, trials
+        without an end, or trials that overlap
     """
     place = Path(path("table", table))
-    opened = [instance(f"recordings[{k}]", one, Recording) for k, one in enumerate(several("recordings", recordings))]
+    opened = _once(recordings)
     if window_ms is not None and not 0 < number("window_ms", window_ms) < 1e9:
         raise ProblemError(f"window_ms is {shown(window_ms)}: must be above 0")
     by_name = _named(opened)
@@ -113,12 +114,19 @@ def read_trials(
     strange = sorted(named - set(by_name))
     if strange:
         line = next(line for line, row in rows if row["recording"] == strange[0])
-        there = ", ".join(sorted({one.path.name for one in opened})[:5])
-        raise ProblemError(f"{place}, line {line}: recording {strange[0]!r} is not among those given: {there} ...")
-    unsaid = [one.path for one in opened if not {str(one.path), one.path.name, one.path.stem} & named]
+        alike = [str(one.path) for one in opened if strange[0] in (one.name, _stem(one))]
+        if len(alike) > 1:
+            raise ProblemError(
+                f"{place}, line {line}: recording {strange[0]!r} may be {' or '.join(alike[:3])}; write the path"
+            )
+        there = sorted({one.name for one in opened})
+        listed = ", ".join(there[:5]) + (" ..." if len(there) > 5 else "")
+        raise ProblemError(f"{place}, line {line}: recording {strange[0]!r} is not among those given: {listed}")
+    unsaid = [one.path for one in opened if not {str(one.path), one.name, _stem(one)} & named]
     if unsaid:
         raise ProblemError(f"{place}: says nothing of {unsaid[0]}; name it, or leave the recording out")
     sources = {id(one): one.events if one.has_events else one.frames() for one in opened}
+    spans = {key: (int(s.t.min()), int(s.t.max())) if len(s) else None for key, s in sources.items()}
     found = []
     for line, row in rows:
         one = by_name[row["recording"]]
@@ -134,14 +142,14 @@ def read_trials(
         found.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
         end = start + round(to_us(window_ms or 0.0)) if stop is None else stop
         # Silence before the first event is not recorded, and a touch may be waited for in it.
-        if not len(source) or start > source.t.max() or end < source.t.min():
-            there = f"{source.t.min()} to {source.t.max()} us" if len(source) else "nothing"
-            raise ProblemError(f"{where}: t_us {start} lies outside {one.path.name}, which holds {there}")
+        span = spans[id(one)]
+        if span is None or start > span[1] or end < span[0]:
+            held = "nothing" if span is None else f"{span[0]} to {span[1]} us"
+            raise ProblemError(f"{where}: t_us {start} lies outside {one.name}, which holds {held}")
     if any(trial.group for trial in found) and not all(trial.group for trial in found):
         nameless = next(trial for trial in found if not trial.group)
         raise ProblemError(f"{nameless.name}: group is empty; give every trial one, or none")
-    if window_ms is not None:
-        _apart(found, round(to_us(window_ms)))
+    _apart(found, round(to_us(window_ms or 0.0)))
     return found
 
 
@@ -160,11 +168,10 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
 
     Raises
     ------
-    ProblemError : a recording without anything in it
+    ProblemError : a recording without anything in it, or one that is there twice
     """
     found = []
-    for k, given in enumerate(several("recordings", recordings)):
-        one = instance(f"recordings[{k}]", given, Recording)
+    for one in _once(recordings):
         source = one.events if one.has_events else one.frames()
         if not len(source):
             raise ProblemError(f"{one.path}: holds nothing; leave it out")
@@ -174,61 +181,119 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
     return found
 
 
+def _once(recordings: Sequence[Recording]) -> list[Recording]:
+    """Return recordings, none of them twice: it would be trained on and tested."""
+    opened = [instance(f"recordings[{k}]", one, Recording) for k, one in enumerate(several("recordings", recordings))]
+    seen: set[tuple[Path, str]] = set()
+    for one in opened:
+        key = one.path.resolve(), one.name
+        if key in seen:
+            raise ProblemError(f"{one.path}: is named twice; name it once")
+        seen.add(key)
+    return opened
+
+
 def _apart(trials: list[LabelledTrial], window_us: int) -> None:
-    """Refuse a trial without an end whose window holds the start of another."""
-    for source in {id(trial.source) for trial in trials}:
-        mine = sorted((trial for trial in trials if id(trial.source) == source), key=lambda trial: trial.start_us)
-        for trial, after in pairwise(mine):
-            if trial.stop_us is None and after.start_us < trial.start_us + window_us:
-                apart = to_ms(after.start_us - trial.start_us)
+    """Refuse a trial that holds the start of another: what both hold would be trained on and tested."""
+    of: dict[int, list[LabelledTrial]] = {}
+    for trial in trials:
+        of.setdefault(id(trial.source), []).append(trial)
+    for mine in of.values():
+        for trial, after in pairwise(sorted(mine, key=lambda trial: trial.start_us)):
+            before, apart = trial.name.split(", ")[-1], after.start_us - trial.start_us
+            if apart == 0:
+                raise ProblemError(f"{after.name}: begins where {before} does; a touch must stand there once")
+            if trial.stop_us is None and apart < window_us:
                 raise ProblemError(
-                    f"{after.name}: begins {apart:g} ms after {trial.name.split(', ')[-1]}, inside its window of "
+                    f"{after.name}: begins {to_ms(apart):g} ms after {before}, inside its window of "
                     f"{to_ms(window_us):g} ms; give stop_us, or a shorter --window-ms"
+                )
+            if trial.stop_us is not None and after.start_us < trial.stop_us:
+                raise ProblemError(
+                    f"{after.name}: begins before {before} ends at {trial.stop_us} us; trials must not overlap"
                 )
 
 
 def _named(recordings: Sequence[Recording]) -> dict[str, Recording]:
-    """Return recordings by path, and by file name and stem where only one has it."""
+    """Return recordings by path, and by name and stem where only one has it."""
     found: dict[str, Recording] = {}
-    for names in ([one.path.stem for one in recordings], [one.path.name for one in recordings]):
+    for names in ([_stem(one) for one in recordings], [one.name for one in recordings]):
         count = Counter(names)
         found |= {name: one for name, one in zip(names, recordings, strict=True) if count[name] == 1}
     return found | {str(one.path): one for one in recordings}
 
 
+def _stem(recording: Recording) -> str:
+    return Path(recording.name).stem
+
+
+#: What parts cells where it is not the comma, in words.
+_PARTED = {";": "semicolons", "\t": "tabs"}
+
+
 def _rows(place: Path) -> list[tuple[int, dict[str, str]]]:
+    wanted = f"must be {','.join(_COLUMNS)} ..."
     try:
         lines = place.read_bytes().decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
-        raise FormatError(f"{place}: is no UTF-8 text; must be a .csv recording,t_us,label") from None
-    table = list(csv.reader(lines))
-    header = [name.strip() for name in table[0]] if table else []
+        raise FormatError(f"{place}: is no UTF-8 text; must be a .csv {','.join(_COLUMNS)}") from None
+    except IsADirectoryError:
+        raise FormatError(f"{place}: is a directory; must be a .csv {','.join(_COLUMNS)}") from None
+    table = _cells(place, lines)
+    if not table:
+        raise FormatError(f"{place}: holds nothing; {wanted}")
+    first, header = table[0]
+    header = [name.strip() for name in header]
     missing = [name for name in _COLUMNS if name not in header]
     if missing:
-        said = ", ".join(header) or "nothing"
+        parted = next((said for mark, said in _PARTED.items() if len(header) == 1 and mark in header[0]), None)
+        if parted:
+            raise FormatError(f"{place}, line {first}: its cells are parted by {parted}; must be commas")
         raise FormatError(
-            f"{place}, line 1: no column {missing[0]}; there are {said}; must be {','.join(_COLUMNS)} ..."
+            f"{place}, line {first}: no column {missing[0]}; there are {shown(', '.join(header))[1:-1]}; {wanted}"
         )
-    repeated = [name for name in header if header.count(name) > 1]
+    repeated = [name for name in header if name and header.count(name) > 1]
     if repeated:
-        raise FormatError(f"{place}, line 1: column {repeated[0]} stands there twice")
+        raise FormatError(f"{place}, line {first}: column {repeated[0]} stands there twice")
     rows = []
-    for line, cells in enumerate(table[1:], start=2):
-        if not cells:
-            continue
+    for line, cells in table[1:]:
         if len(cells) != len(header):
             raise FormatError(f"{place}, line {line}: {len(cells)} cells, must have {len(header)}")
-        rows.append((line, dict(zip(header, (cell.strip() for cell in cells), strict=True))))
+        stray = next((cell for name, cell in zip(header, cells, strict=True) if cell.strip() and not name), None)
+        if stray is not None:
+            raise FormatError(f"{place}, line {line}: {shown(stray)} stands in a column without a name; give it one")
+        rows.append((line, {name: cell.strip() for name, cell in zip(header, cells, strict=True) if name}))
     if not rows:
         raise FormatError(f"{place}: names no trial")
     return rows
 
 
-def _us(place: Path, line: int, column: str, cell: str) -> int:
+def _cells(place: Path, lines: list[str]) -> list[tuple[int, list[str]]]:
+    """Return the cells of each line that has any, and its number."""
+    reader = csv.reader(lines, strict=True)
+    found = []
+    line = 1
     try:
-        value = float(cell)
+        for cells in reader:
+            if any(cell.strip() for cell in cells):
+                found.append((line, cells))
+            line = reader.line_num + 1
+    except csv.Error as error:
+        said = "a quote opens and does not close" if reader.line_num >= len(lines) else error
+        raise FormatError(f"{place}, line {line}: {said}") from None
+    return found
+
+
+def _us(place: Path, line: int, column: str, cell: str) -> int:
+    value: int | None
+    try:
+        value = int(cell)
     except ValueError:
-        value = np.nan
-    if not (np.isfinite(value) and value.is_integer()):
-        raise FormatError(f"{place}, line {line}: {column} is {cell!r}, must be whole us")
-    return int(value)
+        try:
+            real = float(cell)
+        except ValueError:
+            real = np.nan
+        value = int(real) if np.isfinite(real) and real.is_integer() else None
+    if value is None or not abs(value) < 2**62:
+        raise FormatError(f"{place}, line {line}: {column} is {shown(cell)}, must be whole us")
+    return value
