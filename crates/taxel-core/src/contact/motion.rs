@@ -99,10 +99,11 @@ impl Motion {
     ///
     /// # Errors
     ///
-    /// `Scene` where its parameters make no sense, a body bottoms out, or comes to rest before it can be caught.
+    /// `Scene` where its parameters make no sense, a body bottoms out, rolls or slides off the array, is lifted before
+    /// it lands, or comes to rest before it can be caught.
     pub fn of(scene: &Scene, array: &Array, step_us: f64) -> Result<Self> {
         scene.check(array)?;
-        Self::on(scene, Self::layer(scene, array)?.as_mut(), step_us)
+        Self::on(scene, array, Self::layer(scene, array)?.as_mut(), step_us)
     }
 
     /// The scene's foam, bonded, where it is reckoned so.
@@ -122,7 +123,7 @@ impl Motion {
     /// # Errors
     ///
     /// As [`Motion::of`].
-    pub fn on(scene: &Scene, mut layer: Option<&mut Bonded>, step_us: f64) -> Result<Self> {
+    pub fn on(scene: &Scene, array: &Array, mut layer: Option<&mut Bonded>, step_us: f64) -> Result<Self> {
         if !(step_us.is_finite() && step_us > 0.0 && step_us <= 1000.0) {
             return Err(Error::Scene(format!("step is {step_us} us: must be above 0, at most 1000")));
         }
@@ -130,7 +131,7 @@ impl Motion {
         for (n, body) in scene.bodies.iter().enumerate() {
             let push = Push::of(&scene.foam, body, layer.as_deref_mut())?;
             let mut player = Player::new(scene, body, push, step_us * 1e-3);
-            player.play().map_err(|error| match error {
+            player.play().and_then(|()| player.stays_on(array, step_us)).map_err(|error| match error {
                 Error::Scene(text) if scene.bodies.len() > 1 => Error::Scene(format!("bodies[{n}]: {text}")),
                 other => other,
             })?;
@@ -229,6 +230,12 @@ impl<'a> Player<'a> {
                     }
                     Ending::LeftToRest { rest_ms, lift_mm_s } => {
                         self.fall_for(*rest_ms)?;
+                        if self.contacts.is_empty() {
+                            let fall_ms = (2.0 * height_mm / GRAVITY).sqrt();
+                            return Err(Error::Scene(format!(
+                                "the body is lifted {rest_ms} ms after it was let go, before it lands: it falls for {fall_ms:.0} ms; rest_ms must be more"
+                            )));
+                        }
                         // The touch that a hand is about to end, if the body lies still by then.
                         if self.touching
                             && let Some(last) = self.contacts.last_mut()
@@ -284,6 +291,30 @@ impl<'a> Player<'a> {
         self.along = [0.0; 2];
         self.hand(self.depth, -CLEAR_MM, SET_DOWN, kind);
         Ok(())
+    }
+
+    /// Refuses a course that leads off the array; what falls may glance off a tilted one.
+    fn stays_on(&self, array: &Array, step_us: f64) -> Result<()> {
+        let does = match self.body.motion {
+            Move::Rolled(_) => "rolls",
+            Move::Slid(_) => "slides",
+            _ => return Ok(()),
+        };
+        let on = |at: f32, count: u16| (-0.01..=f64::from(count - 1) * array.pitch_mm + 0.01).contains(&f64::from(at));
+        let track = &self.track;
+        let touches = |k: &usize| track.force_n[*k] > 0.0;
+        let off = (0..track.force_n.len())
+            .filter(touches)
+            .find(|&k| !(on(track.x_mm[k], array.columns) && on(track.y_mm[k], array.rows)));
+        match (off, self.contacts.first()) {
+            (Some(k), Some(first)) => Err(Error::Scene(format!(
+                "the body {does} off the array {:.0} ms after it was set down, at x {:.0} mm, y {:.0} mm; begin further in, or stop earlier (for_ms)",
+                1e-3 * (k as f64 * step_us - first.start_us),
+                track.x_mm[k],
+                track.y_mm[k]
+            ))),
+            _ => Ok(()),
+        }
     }
 
     fn reachable(&self, deep: f64) -> Result<()> {
@@ -342,7 +373,7 @@ impl<'a> Player<'a> {
             }
             if f64::from(self.now - began) * self.inner_ms > PATIENCE_MS {
                 return Err(Error::Scene(format!(
-                    "the ball comes to rest after {} impacts: it cannot be caught after {after}; drop it from higher or catch it earlier",
+                    "the body comes to rest after {} impacts: it cannot be caught after {after}; drop it from higher or catch it earlier",
                     self.contacts.len()
                 )));
             }
@@ -370,8 +401,11 @@ impl<'a> Player<'a> {
         let depth = self.depth + dt * speed;
         if depth >= self.push.floor_mm() {
             return Err(Error::Scene(format!(
-                "the ball bottoms out: {:.0} g at {:.2} m/s crush {} mm of foam at {} kPa; drop it from lower, or take stiffer foam",
-                mass, speed, self.scene.foam.thickness_mm, self.scene.foam.modulus_kpa
+                "the body bottoms out: {:?} g at {:.2} m/s crush {} mm of foam at {} kPa; drop it from lower, or take stiffer foam",
+                (10.0 * mass).round() / 10.0,
+                speed,
+                self.scene.foam.thickness_mm,
+                self.scene.foam.modulus_kpa
             )));
         }
         let kind = if self.contacts.is_empty() { Kind::First } else { Kind::Bounce };
@@ -602,6 +636,27 @@ mod tests {
         let text = play(&dropped(tired, 30.0, 100.0, 9), QUARTER_US).unwrap_err().to_string();
         assert!(text.contains("comes to rest"), "{text}");
         assert!(play(&dropped(Foam::default(), 30.0, 100.0, 2), f64::NAN).is_err());
+    }
+
+    #[test]
+    fn a_course_that_leads_off_the_array_and_a_lift_before_the_landing_are_said() {
+        for (motion, word) in [
+            (Move::Rolled(Along { speed_mm_s: 300.0, ..along(2_000.0) }), "rolls off the array 3"),
+            (Move::Slid(Along { speed_mm_s: 300.0, press_n: Some(1.0), ..along(2_000.0) }), "slides off the array 3"),
+        ] {
+            let mut scene = alone(Surface::Layer, Foam::default(), ball(motion));
+            scene.bodies[0].rolling_friction = 0.0;
+            let text = play(&scene, QUARTER_US).unwrap_err().to_string();
+            assert!(text.contains(word), "{text}");
+        }
+        let early = Ending::LeftToRest { rest_ms: 150.0, lift_mm_s: 50.0 };
+        let scene =
+            alone(Surface::Layer, Foam::default(), ball(Move::Dropped { height_mm: 120.0, ending: early.clone() }));
+        let text = play(&scene, QUARTER_US).unwrap_err().to_string();
+        assert!(text.contains("lifted 150 ms after") && text.contains("falls for 156 ms"), "{text}");
+        let heavy = body(Shape::Sphere { radius_mm: 20.0 }, 1e300, Move::Dropped { height_mm: 50.0, ending: early });
+        let text = play(&alone(Surface::Columns, Foam::default(), heavy), QUARTER_US).unwrap_err().to_string();
+        assert!(text.contains("the body bottoms out: 1e300 g"), "{text}");
     }
 
     fn ball(motion: Move) -> Body {

@@ -390,7 +390,7 @@ fn part(array: &Array, frame_us: f64, act: &Act) -> Result<(Part, Vec<Contact>)>
         Act::Scene(scene) => {
             scene.check(array)?;
             let mut layer = Motion::layer(scene, array)?;
-            let mut motion = Motion::on(scene, layer.as_mut(), frame_us / GROUPS as f64)?;
+            let mut motion = Motion::on(scene, array, layer.as_mut(), frame_us / GROUPS as f64)?;
             if motion.len() < 2 {
                 return Err(Error::Scene(format!("scene: shorter than a quarter of a frame, {frame_us} us")));
             }
