@@ -139,7 +139,11 @@ GOOD = "recording,t_us,label,stop_us,group\n" + "".join(
         (GOOD.replace(",", ";"), [], "labels.csv, line 1: its cells are parted by semicolons; must be commas"),
         (GOOD.replace(",", "\t"), [], "labels.csv, line 1: its cells are parted by tabs; must be commas"),
         (GOOD.replace(",a,", ',"a,', 1), [], "labels.csv, line 2: a quote opens and does not close"),
-        (GOOD.replace("group\n", "group,\n").replace("u\n", "u,9\n"), [], "line 2: '9' stands in a column without a name"),
+        (
+            GOOD.replace("group\n", "group,\n").replace("u\n", "u,9\n"),
+            [],
+            "line 2: '9' stands in a column without a name",
+        ),
         ("\n\n", [], "labels.csv: holds nothing; must be recording,t_us,label"),
         (GOOD, ["--periods", "fast"], "must be numbers, as 1,2,5"),
         (GOOD, ["--periods", "0"], "--periods is [0.0]: must be whole us"),
@@ -170,11 +174,11 @@ def test_what_is_wrong_is_one_clear_error(tmp_path, table, arguments, text):
 
 
 def test_recordings_that_make_no_sense_together_are_one_clear_error(tmp_path):
-    events, rows = ordered(24)
+    events, _ = ordered(24)
     (tmp_path / "empty").mkdir()
-    for folder in ("a", "b"):
-        (tmp_path / folder).mkdir()
-        taxel.convert(events, tmp_path / folder / "touches.npz")
+    for day in ("a", "b"):
+        (tmp_path / day).mkdir()
+        taxel.convert(events, tmp_path / day / "touches.npz")
     wide = taxel.Events(events.t, events.x, events.y, events.p, array=taxel.Array(2, 3), intensity=events.intensity)
     taxel.convert(wide, tmp_path / "wide.npz")
     (tmp_path / "labels.csv").write_text(GOOD)
@@ -200,7 +204,7 @@ def test_recordings_that_make_no_sense_together_are_one_clear_error(tmp_path):
 def test_a_folder_stands_for_its_recordings(tmp_path):
     events, rows = ordered(24)
     (tmp_path / "monday").mkdir()
-    for k, (start, label) in enumerate(rows):
+    for k, (start, _) in enumerate(rows):
         taxel.convert(events.between(start, start + 200_000), tmp_path / "monday" / f"{k}.npz")
     table = [f"{k},{start},{label}" for k, (start, label) in enumerate(rows)]
     (tmp_path / "trials.csv").write_text("\n".join(["recording,t_us,label", *table]))

@@ -95,4 +95,7 @@ def test_two_spheres_give_trials_of_both_and_errors_by_epoch(tmp_path):
     (line,) = said["forces"]
     assert min(line["counts"]) > 2
     assert all(0 <= e <= 1 for e in line["error"])
-    assert [s["holds"] for s in statements.values()] == [None, None]
+    (other,) = said["others"]
+    assert (other["reading"], other["force_n"]) == ("foam of 30 kPa", 1.0)
+    assert other["spikes"] > 1.5 * line["spikes"]  # softer foam: more taxels under the same force
+    assert [s["holds"] for s in statements.values()] == [None, None, None]
