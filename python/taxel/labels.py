@@ -16,7 +16,7 @@ from taxel._arguments import shown
 from taxel._core import FormatError, ProblemError
 from taxel._files import whole_file
 
-__all__ = ["Label", "Labels", "beside", "write_labels"]
+__all__ = ["Label", "Labels", "ahead_us", "beside", "write_labels"]
 
 #: A whole turn of the board's 16-bit clock of 100 us, us.
 TURN_US = 6_553_600
@@ -130,27 +130,34 @@ class Labels:
         if not isinstance(recording, _Recorded):
             raise ProblemError(f"recording is {shown(recording)}: must be a taxel.Recording")
         name = self.named(recording.path)
+        rows = [row for row in self.rows if row.recording == name]
+        clock = recording.clock if any(row.host_ns is not None for row in rows) else None
         found: dict[str, list[int]] = {}
-        for row in self.rows if name is not None else ():
-            if row.recording == name:
-                found.setdefault(row.label, []).append(row.t_us - self._turns(row, recording) * TURN_US)
+        for row in rows:
+            ahead = ahead_us(row, recording.path, clock, self.path)
+            found.setdefault(row.label, []).append(row.t_us - ahead)
         return {label: np.sort(np.array(times, np.int64)) for label, times in found.items()}
-
-    def _turns(self, row: Label, recording: _Recorded) -> int:
-        """Return by how many turns of its clock the board is ahead of a recording's own time."""
-        clock = recording.clock
-        if row.host_ns is None or clock is None or not len(clock.board_us):
-            return 0
-        turns = (row.t_us - clock.board_us_at(row.host_ns)) / TURN_US
-        if abs(turns - round(turns)) > 0.25:
-            raise ProblemError(
-                f"{self.path}: {row.label} at {row.t_us} us and {row.host_ns} ns is of another run than "
-                f"{recording.path}: board's and host's time do not fit together"
-            )
-        return round(turns)
 
     def __repr__(self) -> str:
         return f"Labels({len(self.rows)} events of {', '.join(self.recordings) or 'one recording'}, {self.path})"
+
+
+def ahead_us(row: Label, recording: Path, clock: _Clock | None, table: Path) -> int:
+    """Return by how many us (whole turns of its clock) a board is ahead of a recording's time; 0 where none can tell.
+
+    Raises
+    ------
+    ProblemError : the host's time and the board's do not fit this recording
+    """
+    if row.host_ns is None or clock is None or not len(clock.board_us):
+        return 0
+    turns = (row.t_us - clock.board_us_at(row.host_ns)) / TURN_US
+    if abs(turns - round(turns)) > 0.25:
+        raise ProblemError(
+            f"{table}: {row.label} at {row.t_us} us and {row.host_ns} ns is of another run than "
+            f"{recording}: board's and host's time do not fit together"
+        )
+    return round(turns) * TURN_US
 
 
 def beside(recording: str | os.PathLike[str]) -> Path:

@@ -40,6 +40,9 @@ def test_host_time_settles_how_many_turns_a_recording_is_behind_the_board(tmp_pa
     assert set(found.tolist()) <= set(recording.events.t.tolist())
     assert found[0] == recording.events.t[0] == begins_us % TURN_US
     np.testing.assert_array_equal(np.diff(found), np.diff(happened))
+    # A table of trials is read by the same rule, and needs no name where there is one recording.
+    trials = taxel.information.read_trials(tmp_path / "labels.csv", [recording], window_ms=5.0)
+    assert [trial.start_us for trial in trials] == found.tolist()
 
 
 def test_without_host_time_times_are_taken_as_they_are(tmp_path: Path) -> None:
@@ -52,6 +55,8 @@ def test_labels_of_another_run_are_refused(tmp_path: Path) -> None:
     (tmp_path / "labels.csv").write_text(f"label,t_us,host_ns\ntick,100000,{BEGAN_NS + 3_000_000_000}\n")
     with pytest.raises(taxel.ProblemError, match="is of another run than"):
         taxel.Labels(tmp_path / "labels.csv").of(recording)
+    with pytest.raises(taxel.ProblemError, match="is of another run than"):
+        taxel.information.read_trials(tmp_path / "labels.csv", [recording], window_ms=5.0)
 
 
 def test_a_table_names_recordings_by_path_name_or_stem(tmp_path: Path) -> None:

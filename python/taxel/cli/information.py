@@ -27,8 +27,8 @@ def information(
     labels: Annotated[
         Path | None,
         typer.Option(
-            help="A CSV recording,t_us,label[,stop_us][,group] and columns of parameters: a row is a trial. "
-            "Without it each recording is one, and its folder's name the label."
+            help="A CSV recording,t_us,label[,stop_us][,group] and columns of parameters: a row is a trial; of one "
+            "recording the first may be absent. Without a table each recording is one, and its folder's name the label."
         ),
     ] = None,
     window_ms: Annotated[

@@ -17,6 +17,7 @@ from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.labels import Label, ahead_us
 from taxel.recording import Recording
 from taxel.spikes import to_ms, to_us
 
@@ -82,13 +83,14 @@ class LabelledTrial:
 def read_trials(
     table: str | os.PathLike[str], recordings: Sequence[Recording], *, window_ms: float | None = None
 ) -> list[LabelledTrial]:
-    """Read a table of trials: ``recording,t_us,label[,stop_us][,group]`` and columns of parameters, in any order.
+    """Read a table of trials: ``recording,t_us,label[,stop_us][,group][,host_ns]`` and columns of parameters.
 
     Parameters
     ----------
     table : path
-        A .csv with a header line. A recording is named by its path, name or stem; ``t_us`` is where to begin to
-        look for the touch.
+        A .csv with a header line, its columns in any order. A recording is named by its path, name or stem; where
+        one is given the column may be absent. ``t_us`` is where to begin to look for the touch; ``host_ns`` settles it
+        where the recording began in mid-stream, as for `Labels`.
     recordings : sequence of Recording
         All of them must be named, and no other.
     window_ms : float, ms, above 0, optional
@@ -102,14 +104,14 @@ def read_trials(
     ------
     FormatError : a column is missing, or a cell that is no number (names file and line)
     ProblemError : recordings and table do not match, a recording is there twice, a start outside its recording, trials
-        without an end, or trials that overlap
+        without an end, trials that overlap, or the host's time of another run
     """
     place = Path(path("table", table))
     opened = _once(recordings)
     if window_ms is not None and not 0 < number("window_ms", window_ms) < 1e9:
         raise ProblemError(f"window_ms is {shown(window_ms)}: must be above 0")
     by_name = _named(opened)
-    rows = _rows(place)
+    rows = _rows(place, opened)
     named = {row["recording"] for _, row in rows}
     strange = sorted(named - set(by_name))
     if strange:
@@ -126,14 +128,17 @@ def read_trials(
     if unsaid:
         raise ProblemError(f"{place}: says nothing of {unsaid[0]}; name it, or leave the recording out")
     sources = {id(one): one.events if one.has_events else one.frames() for one in opened}
+    clocks = {id(one): one.clock for one in opened} if any(row.get("host_ns") for _, row in rows) else {}
     spans = {key: (int(s.t.min()), int(s.t.max())) if len(s) else None for key, s in sources.items()}
     found = []
     for line, row in rows:
         one = by_name[row["recording"]]
         source = sources[id(one)]
-        start = _us(place, line, "t_us", row["t_us"])
-        stop = _us(place, line, "stop_us", row["stop_us"]) if row.get("stop_us") else None
         where = f"{place}, line {line}"
+        told, host_ns = (_whole(where, name, row[name]) if row.get(name) else None for name in ("stop_us", "host_ns"))
+        start = _whole(where, "t_us", row["t_us"])
+        ahead = ahead_us(Label("", row["label"], start, host_ns), one.path, clocks.get(id(one)), place)
+        start, stop = start - ahead, None if told is None else told - ahead
         if stop is None and window_ms is None:
             raise ProblemError(f"{where}: has no stop_us; give it, or the trials' length by --window-ms")
         if not row["label"]:
@@ -231,7 +236,7 @@ def _stem(recording: Recording) -> str:
 _PARTED = {";": "semicolons", "\t": "tabs"}
 
 
-def _rows(place: Path) -> list[tuple[int, dict[str, str]]]:
+def _rows(place: Path, recordings: Sequence[Recording]) -> list[tuple[int, dict[str, str]]]:
     wanted = f"must be {','.join(_COLUMNS)} ..."
     try:
         lines = place.read_bytes().decode("utf-8-sig").splitlines()
@@ -244,7 +249,8 @@ def _rows(place: Path) -> list[tuple[int, dict[str, str]]]:
         raise FormatError(f"{place}: holds nothing; {wanted}")
     first, header = table[0]
     header = [name.strip() for name in header]
-    missing = [name for name in _COLUMNS if name not in header]
+    only = {"recording": str(recordings[0].path)} if len(recordings) == 1 and "recording" not in header else {}
+    missing = [name for name in _COLUMNS if name not in {*header, *only}]
     if missing:
         parted = next((said for mark, said in _PARTED.items() if len(header) == 1 and mark in header[0]), None)
         if parted:
@@ -262,7 +268,7 @@ def _rows(place: Path) -> list[tuple[int, dict[str, str]]]:
         stray = next((cell for name, cell in zip(header, cells, strict=True) if cell.strip() and not name), None)
         if stray is not None:
             raise FormatError(f"{place}, line {line}: {shown(stray)} stands in a column without a name; give it one")
-        rows.append((line, {name: cell.strip() for name, cell in zip(header, cells, strict=True) if name}))
+        rows.append((line, only | {name: cell.strip() for name, cell in zip(header, cells, strict=True) if name}))
     if not rows:
         raise FormatError(f"{place}: names no trial")
     return rows
@@ -284,7 +290,7 @@ def _cells(place: Path, lines: list[str]) -> list[tuple[int, list[str]]]:
     return found
 
 
-def _us(place: Path, line: int, column: str, cell: str) -> int:
+def _whole(where: str, column: str, cell: str) -> int:
     value: int | None
     try:
         value = int(cell)
@@ -295,5 +301,5 @@ def _us(place: Path, line: int, column: str, cell: str) -> int:
             real = np.nan
         value = int(real) if np.isfinite(real) and real.is_integer() else None
     if value is None or not abs(value) < 2**62:
-        raise FormatError(f"{place}, line {line}: {column} is {shown(cell)}, must be whole us")
+        raise FormatError(f"{where}: {column} is {shown(cell)}, must be whole {column[-2:]}")
     return value
