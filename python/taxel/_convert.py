@@ -253,8 +253,9 @@ def _write_mcap(
         writer.board_change(max(0, change.at_ns), change._json())
         done = max(done, upto)
     _add_datagrams(writer, datagrams, arrived, done, len(arrived))
-    if origin is not None and origin.held is not None:
-        writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(origin.held).reshape(-1))
+    held = None if recording is None else recording._began_with()
+    if held is not None:
+        writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(held).reshape(-1))
     _add_remarks(writer, events, recording)
     writer.finish(json.dumps(_counts(recording, len(datagrams))))
     again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
-from taxel.events import Events
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.events import Events, repaired_of
 from taxel.frames import Frames
 
 __all__ = ["Recorded", "recorded"]
@@ -25,13 +28,38 @@ class Recorded(Protocol):
         """The changes at taxels."""
         ...
 
+    @property
+    def held(self) -> NDArray[np.float32] | None:
+        """What the taxels held when it began, ticks, NaN where one was not heard of; None where it is not known."""
+        ...
+
     def frames(self) -> Frames:
         """Return the pictures."""
         ...
 
 
 def recorded(x: Events | Frames | Recorded | T) -> Events | Frames | T:
-    """Return what a recording holds; anything else as it is."""
+    """Return what a recording holds, begun with what its taxels held then; anything else as it is."""
     if isinstance(x, type) or not all(hasattr(x, name) for name in ("has_events", "frames")):
         return x  # type: ignore[return-value]
-    return x.events if x.has_events else x.frames()  # type: ignore[union-attr]
+    if not x.has_events:  # type: ignore[union-attr]
+        return x.frames()  # type: ignore[union-attr]
+    return _begun(x.events, getattr(x, "held", None))  # type: ignore[union-attr]
+
+
+def _begun(events: Events, held: NDArray[np.float32] | None) -> Events:
+    """Return events that begin with what the taxels held then: values told again, which are no changes."""
+    if held is None or events.intensity is None or events.present is None or not len(events):
+        return events
+    y, x = np.nonzero(~np.isnan(held))
+    if not len(x):
+        return events
+    now = np.full(len(x), events.t.min())
+    told = Events(
+        now, x, y, np.ones(len(x), bool), array=events.array, intensity=held[y, x], repaired=np.ones(len(x), bool)
+    )
+    both = (told, events)
+    names = ("t", "x", "y", "p", "intensity", "present")
+    columns: list[Any] = [np.concatenate([getattr(e, name) for e in both]) for name in names]
+    t, x, y, p, ticks, present = columns
+    return Events._unchecked(t, x, y, p, events.array, ticks, present, repaired_of(both), events.markers)

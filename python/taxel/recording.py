@@ -307,11 +307,26 @@ class Recording:
     def held(self) -> NDArray[np.float32] | None:
         """What the taxels held when it began, ticks, shape (rows, columns), NaN of one that was not heard of.
 
-        None where the file does not say. A recording that begins in mid-stream says it, as a taxel that does not change
-        would else be unknown until it does; `frames` begins with it.
+        None where nothing is known of it. A recording that begins in mid-stream says it, as a taxel that does not
+        change would else be unknown until it does; a slice knows what came before it. `frames` begins with it, and so
+        do encoders and readouts that are given the recording (not its events alone).
         """
-        held = self._source.held
+        held = self._began_with()
         return None if held is None else np.where(held == _UNHEARD, np.nan, held).astype(np.float32)
+
+    def _began_with(self) -> NDArray[np.uint16] | None:
+        """Return what the taxels held when it began, as files keep it; of a slice with what came before it."""
+        held, events = self._source.held, self._source.events
+        if self._window is None or events is None or events.intensity is None or events.present is None:
+            return held
+        before = np.flatnonzero(events.present & (events.t < self._window[0]))
+        if not len(before):
+            return held
+        now = np.full(self.array.shape, _UNHEARD, np.uint16) if held is None else held.copy()
+        last = before[np.argsort(events.t[before], kind="stable")]
+        # Of values at one place the last one stays.
+        now[events.y[last], events.x[last]] = events.intensity[last]
+        return now
 
     @cached_property
     def calibration(self) -> Calibration | None:

@@ -64,7 +64,8 @@ def tare_of(said: str | None, recording: Recording) -> Tare | None:
     The stretch ends early where the board marked the start of the recording, as a board that was tared does. One
     longer than half of the recording is refused: hardly all of that was rest.
     """
-    from taxel.events import Events  # noqa: PLC0415  the command line starts quickly
+    from taxel._recorded import recorded  # noqa: PLC0415  the command line starts quickly
+    from taxel.events import Events  # noqa: PLC0415
     from taxel.tare import Tare  # noqa: PLC0415
 
     if said is None:
@@ -75,7 +76,7 @@ def tare_of(said: str | None, recording: Recording) -> Tare | None:
         return Tare.load(said)
     if not 0 < seconds < 1e6:
         raise ProblemError(f"--tare {said}: must be seconds above 0, or a file")
-    source = recording.events if recording.has_events else recording.frames()
+    source = recorded(recording)
     if not len(source):
         raise ProblemError(f"{recording.path}: holds nothing to take a tare from")
     first, last = int(source.t[0]), int(source.t[-1])
@@ -95,9 +96,10 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
 
     A label that a person set may come late, so the rest ends a little earlier.
     """
-    from taxel.events import Events  # noqa: PLC0415  the command line starts quickly
+    from taxel._recorded import recorded  # noqa: PLC0415  the command line starts quickly
+    from taxel.events import Events  # noqa: PLC0415
 
-    source = recording.events if recording.has_events else recording.frames()
+    source = recorded(recording)
     ends = [int(times[0]) - _BEFORE_US for times in labels.values() if len(times)]
     first = int(source.t[0]) if len(source) else 0
     if isinstance(source, Events):

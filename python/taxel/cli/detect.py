@@ -98,12 +98,10 @@ def detect(
     if csv is not None:
         write_whole(csv, lambda file: file.write(_table(heard).encode()), overwrite=overwrite)
     if report is not None:
+        from taxel._recorded import recorded  # noqa: PLC0415  the command line starts quickly
         from taxel.report import Listened, write_listening  # noqa: PLC0415  pictures load slowly
 
-        shown = [
-            Listened(said.name, one.events if one.has_events else one.frames(), *said[1:])
-            for one, said in zip(opened, heard, strict=True)
-        ]
+        shown = [Listened(said.name, recorded(one), *said[1:]) for one, said in zip(opened, heard, strict=True)]
         write_listening(report, loaded, shown, title=f"What {readout} says of {recording}")
     written = {"written": csv, "report": None if report is None else report / "report.html"}
     places = {name: str(place) for name, place in written.items() if place is not None}

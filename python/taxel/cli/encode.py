@@ -43,7 +43,7 @@ def encode(
         if rest is not None:
             chosen = chosen.with_tare(rest)
         tell(f"encoding {len(source)} {'events' if opened.has_events else 'pictures'}")
-        trains = chosen.encode(source)
+        trains = chosen.encode(opened)
     trains.save(out, overwrite=overwrite)
     counts = trains.counts
     result = {

@@ -128,7 +128,9 @@ def train(
 
 
 def _source(recording: Recording) -> Events | Frames:
-    return recording.events if recording.has_events else recording.frames()
+    from taxel._recorded import recorded  # noqa: PLC0415  the command line starts quickly
+
+    return recorded(recording)
 
 
 def _examples(

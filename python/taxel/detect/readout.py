@@ -16,6 +16,7 @@ from taxel._arguments import floats, instance, number, parameters, shown, text, 
 from taxel._arguments import path as checked_path
 from taxel._core import FormatError, NotFittedError, ProblemError
 from taxel._files import write_whole
+from taxel._recorded import recorded
 from taxel.array import Array
 from taxel.detect.exchange import read_nir, write_nir
 from taxel.detect.trained import TrainedNeuron
@@ -454,7 +455,7 @@ def run(
             period = source.registers.frame_us if period is None else period
             version = source.registers.wire_version if version is None else version
         zeroings = [(one.t, one.x, one.y, one.rest) for one in source.zeroings] if source.has_events else []
-        source = source.events if source.has_events else source.frames()
+        source = recorded(source)
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
         said = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
