@@ -138,7 +138,15 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
             r"bodies\[0\] has mass_g and material: must have one of both",
         ),
         (("mass_g = 30", "mass_g = inf"), r"bodies\[0\].mass_g is inf: must be finite"),
-        (("mass_g = 30", "mass_g = 1e6"), r"scene.toml: the ball bottoms out: 1000000 g"),
+        (("mass_g = 30", "mass_g = 1e6"), r"scene.toml: the body bottoms out: 1000000.0 g"),
+        (
+            ("rest_ms = 180", "rest_ms = 90"),
+            r"scene.toml: the body is lifted 90 ms after it was let go, before it lands",
+        ),
+        (
+            (BALL.splitlines()[-1], "motion.rolled = { speed_mm_s = 300, for_ms = 900 }"),
+            r"scene.toml: the body rolls off the array \d+ ms after it was set down, at x 16\d mm, y 90 mm; begin",
+        ),
         (
             ("x_mm = 70", "x_mm = 70\nshape.edge.slope_deg = 30"),
             r"bodies\[0\].shape is sphere and edge: must be one of",
