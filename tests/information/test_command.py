@@ -201,6 +201,16 @@ def test_recordings_that_make_no_sense_together_are_one_clear_error(tmp_path):
     assert not (tmp_path / "page.html").exists()
 
 
+def test_pictures_without_times_are_told_so(tmp_path):
+    for label in ("a", "b"):
+        (tmp_path / label).mkdir()
+        values = np.arange(12.0).reshape(12, 1, 1) * np.ones((1, 2, 2))
+        for k in range(12):
+            taxel.convert(taxel.Frames(values, np.arange(12)), tmp_path / label / f"{k}.npz")
+    done = run(tmp_path / "a", tmp_path / "b", "--report", tmp_path / "page.html")
+    assert "its pictures all lie within 11 us, so they have no times" in str(done.exception)
+
+
 def test_a_folder_stands_for_its_recordings(tmp_path):
     events, rows = ordered(24)
     (tmp_path / "monday").mkdir()

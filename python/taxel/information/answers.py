@@ -20,6 +20,7 @@ from taxel.information.keeping import Verdict, keeps
 from taxel.information.nested import Nested, nested_predictions, training_curve
 from taxel.information.rasters import event_grams, features, frame_grams
 from taxel.information.sampling import (
+    STEP_US,
     HeldValues,
     Spikes,
     checked_periods,
@@ -350,7 +351,13 @@ class _Asked:
                 raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least")
         self.contact = contacts(self.trials, self.held, self.encoder, self.finest, reach)
         if np.isnan(self.contact).all():
-            raise ProblemError(f"trials: no event in any of them by {self.encoder!r}; a lower floor may help")
+            lasts = max(int(np.ptp(one.source.t)) for one in self.trials if len(one.source))
+            if lasts < STEP_US:
+                raise ProblemError(
+                    f"{self.trials[0].name}: its pictures all lie within {lasts} us, so they have no times; "
+                    "give them some (taxel.Frames)"
+                )
+            raise ProblemError(f"trials: no event in any of them by {self.encoder!r}; a lower noise_floor may help")
         ends = np.array([np.inf if one.stop_us is None else one.stop_us for one in self.trials])
         self.ended = bool(np.isfinite(ends).all())
         lengths = (ends - self.contact)[~np.isnan(self.contact)]

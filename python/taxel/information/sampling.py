@@ -18,12 +18,12 @@ from taxel.frames import Frames
 from taxel.information.trials import LabelledTrial
 from taxel.spikes import to_ms, to_us
 
-__all__ = ["HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "pictures_of", "spikes_of"]
+__all__ = ["STEP_US", "HeldValues", "Spikes", "checked_periods", "contacts", "finest_us", "pictures_of", "spikes_of"]
 
 #: Events between two kept states of the array.
 _STRIDE = 4096
 #: No touch's beginning is looked for more finely on a grid, us.
-_STEP_US = 100
+STEP_US = 100
 
 
 class HeldValues:
@@ -181,7 +181,7 @@ def contacts(
     found = np.full(len(trials), np.nan)
     for k, (trial, values) in enumerate(zip(trials, held, strict=True)):
         stop = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
-        t, step = trial.source.t, max(period_us, _STEP_US)
+        t, step = trial.source.t, max(period_us, STEP_US)
         if isinstance(trial.source, Events) and isinstance(encoder, ChangeEvents):
             grid = np.unique(np.append(t[(t >= trial.start_us) & (t < stop)], trial.start_us - 1))
         else:
