@@ -245,6 +245,10 @@ def _write_mcap(
         "started_ns": int(arrived[0]) if len(arrived) else 0,
     }
     writer = _core.RecordingWriter(part, json.dumps(header), compression, True)
+    # Before all datagrams, as the recorder does it: who plays the file looks for it there.
+    held = None if recording is None else recording._began_with()
+    if held is not None:
+        writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(held).reshape(-1))
     done = 0
     # What the host told the board stands between the datagrams before and after it, as decoding asks for it.
     for change in () if origin is None else origin.board_changes:
@@ -253,9 +257,6 @@ def _write_mcap(
         writer.board_change(max(0, change.at_ns), change._json())
         done = max(done, upto)
     _add_datagrams(writer, datagrams, arrived, done, len(arrived))
-    held = None if recording is None else recording._began_with()
-    if held is not None:
-        writer.held(int(arrived[0]) if len(arrived) else 0, None, np.ascontiguousarray(held).reshape(-1))
     _add_remarks(writer, events, recording)
     writer.finish(json.dumps(_counts(recording, len(datagrams))))
     again = Events._from_parts(_core.RecordingReader(part).decode("direct")[0], events.array)

@@ -373,7 +373,7 @@ def test_what_waits_is_bounded_and_what_goes_is_counted() -> None:
     waiting, one = Waiting(), Subject("board", 1, 1)
     zero = np.zeros((1, 1), np.uint16)
     for t in range(3000):
-        waiting.put(one, Picture(t, zero, zero == 0, zero.astype(np.int8), 1))
+        waiting.put(one, Picture(t, zero, zero == 0, zero.astype(np.int8), 1, 1))
         waiting.put(one, Note("here", t))
     assert len(waiting) == MOST_PICTURES + MOST_OTHERS
     assert waiting.lost == {"pictures": 3000 - MOST_PICTURES, "notes": 3000 - MOST_OTHERS}

@@ -59,8 +59,8 @@ class Picture:
         False where a taxel was never heard of.
     change : int8, shape (rows, columns), ticks
         The largest change lately, decaying.
-    full : int, ticks
-        The largest value above rest of the last 10 s, 1 at least.
+    full, full_change : int, ticks
+        The largest value above rest, and the largest change either way, of the last 10 s, 1 at least.
     """
 
     kind: ClassVar[str] = "pictures"
@@ -70,6 +70,7 @@ class Picture:
     known: NDArray[np.bool_]
     change: NDArray[np.int8]
     full: int
+    full_change: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +171,7 @@ class Page:
         self._rest: NDArray[np.uint16] | None = None
         self._shown = self._told = _NOTHING_CAME
         self._columns: tuple[NDArray[np.int64], NDArray[Any]] | None = None
-        self._peaks: deque[tuple[int, int]] = deque()
+        self._full, self._full_change = _Scale(), _Scale()
         #: Of a recording, what is told when its time has come.
         self._later: deque[Detection | Note] = deque()
         self._plays = self._ends = False
@@ -262,7 +263,7 @@ class Page:
     def _anew(self) -> None:
         """Time begins anew."""
         self._shown = self._told = _NOTHING_CAME
-        self._peaks.clear()
+        self._full, self._full_change = _Scale(), _Scale()
 
     def _wait_for(self, marks: Sequence[Detection | Note]) -> None:
         self._later = deque(sorted([*self._later, *marks], key=_when))
@@ -288,24 +289,14 @@ class Page:
             above = np.zeros(len(pressure), np.int32)
         above[above <= self._floor] = 0
         shape = rows, columns
-        full = self._full(t, int(above.max(initial=0)))
-        yield (
-            subject,
-            Picture(t, above.astype(np.uint16).reshape(shape), known.reshape(shape), change.reshape(shape), full),
-        )
+        full = self._full.of(t, int(above.max(initial=0)))
+        full_change = self._full_change.of(t, int(np.abs(change.astype(np.int16)).max(initial=0)))
+        drawn = above.astype(np.uint16).reshape(shape)
+        yield subject, Picture(t, drawn, known.reshape(shape), change.reshape(shape), full, full_change)
         self._columns = (np.arange(first + 1, first + count + 1, dtype=np.int64) * column_us, curves)
         yield from self._settled(over=False)
         while self._later and _when(self._later[0]) <= t:
             yield subject, self._later.popleft()
-
-    def _full(self, t: int, peak: int) -> int:
-        """Return the largest of the last values, with this one."""
-        while self._peaks and self._peaks[0][0] < t - _SCALE_US:
-            self._peaks.popleft()
-        while self._peaks and self._peaks[-1][1] <= peak:
-            self._peaks.pop()
-        self._peaks.append((t, peak))
-        return max(1, self._peaks[0][1])
 
     def _settled(self, *, over: bool) -> Iterator[tuple[Subject, Item]]:
         """Yield the curves that nothing changes any more."""
@@ -334,6 +325,23 @@ class Page:
                         break
             except ConnectionClosed:
                 return
+
+
+class _Scale:
+    """Know the largest value lately, 1 at least."""
+
+    def __init__(self) -> None:
+        # Falling values, so that the first is the largest of all.
+        self._peaks: deque[tuple[int, int]] = deque()
+
+    def of(self, t: int, value: int) -> int:
+        """Return it, with the value of this time."""
+        while self._peaks and self._peaks[0][0] < t - _SCALE_US:
+            self._peaks.popleft()
+        while self._peaks and self._peaks[-1][1] <= value:
+            self._peaks.pop()
+        self._peaks.append((t, value))
+        return max(1, self._peaks[0][1])
 
 
 #: Number and type of the sections of a picture that are read.

@@ -176,7 +176,7 @@ def _ticks(picture: Picture) -> NDArray[np.uint16]:
 
 
 def _change(picture: Picture) -> NDArray[np.uint8]:
-    strength = np.abs(picture.change.astype(np.int16))[:, :, None] / 127
+    strength = np.abs(picture.change.astype(np.int16))[:, :, None] / picture.full_change
     colour = np.where(picture.change[:, :, None] > 0, (255, 150, 50), (70, 150, 255))
     drawn: NDArray[np.uint8] = (strength * colour).astype(np.uint8)
     return drawn

@@ -64,11 +64,13 @@ class ToRerun:
         self._stream.connect_grpc(f"rerun+http://{self._name}/proxy")
         self._stream.send_recording_name(subject.name)
         self._stream.send_blueprint(_layout())
-        unknown = self._rerun.AnnotationContext([(1, "not heard of yet", (96, 96, 96))])
+        unknown = self._rerun.AnnotationContext([(0, "heard of", (0, 0, 0, 0)), (1, "not heard of yet", (96, 96, 96))])
         self._stream.log("pressure/unknown", unknown, static=True)
         for name, colour in (("more", (230, 140, 40)), ("less", (70, 150, 240))):
             look = self._rerun.SeriesPoints(colors=colour, names=name, markers="circle", marker_sizes=1.5)
             self._stream.log(f"spikes/{name}", look, static=True)
+        for name, colour in (("x", (230, 140, 40)), ("y", (70, 150, 240))):
+            self._stream.log(f"contact/centre/{name}", self._rerun.SeriesLines(colors=colour, names=name), static=True)
 
     def show(self, subject: Subject, item: Item) -> None:  # noqa: ARG002  where it is shown was said
         """Show the next."""
@@ -127,7 +129,8 @@ class ToRerun:
         self._at(picture.t)
         colours = {"meter": 1.0, "colormap": "viridis", "depth_range": [0.0, float(picture.full)]}
         self._stream.log("pressure", self._rerun.DepthImage(picture.above, **colours))
-        colours = {"meter": 1.0, "colormap": "cyantoyellow", "depth_range": [-127.0, 127.0]}
+        most = float(picture.full_change)
+        colours = {"meter": 1.0, "colormap": "cyantoyellow", "depth_range": [-most, most]}
         self._stream.log("change", self._rerun.DepthImage(picture.change.astype(np.int16), **colours))
         if self._known is None or not np.array_equal(self._known, picture.known):
             self._known = picture.known
