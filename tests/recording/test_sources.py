@@ -334,6 +334,24 @@ def test_two_boards_that_drift_are_put_on_one_clock(tmp_path: Path) -> None:
     assert abs(moved - truth) < 5000
 
 
+def test_differences_begun_in_mid_stream_add_up_from_what_the_taxels_held(tmp_path: Path) -> None:
+    array = {"rows": 4, "columns": 4, "pitch_mm": 2.0, "name": "small", "exists": None}
+    writer = _core.RecordingWriter(
+        tmp_path / "mid.mcap", json.dumps({"array": array, "difference": True}), "none", True
+    )
+    held = np.full(16, 65_535, np.uint16)
+    held[9] = 41
+    writer.held(1_700_000_000_000_000_000, None, held)
+    told = taxel.Events(
+        [1000, 1000, 2000], [1, 2, 1], [2, 2, 2], [True, True, False], array=SMALL, intensity=[50, 7, 90]
+    )
+    writer.datagram(1_700_000_000_000_001_000, 0, taxel.wire.encode(told))
+    writer.finish("{}")
+    events = taxel.open(tmp_path / "mid.mcap").events
+    np.testing.assert_array_equal(events.intensity, [91, 0, 1])
+    np.testing.assert_array_equal(events.present, [True, False, True])
+
+
 def test_a_recording_begun_in_mid_stream_begins_with_what_the_taxels_held(tmp_path: Path) -> None:
     header = {"array": {"rows": 4, "columns": 4, "pitch_mm": 2.0, "name": "small", "exists": None}}
     writer = _core.RecordingWriter(tmp_path / "mid.mcap", json.dumps(header), "none", True)

@@ -82,8 +82,8 @@ pub struct Decoder {
     clock: Clock,
     waiting: Option<Change>,
     by_taxel: Option<ByTaxel>,
-    /// What each taxel held last, where intensities are differences.
-    held: Option<Vec<u16>>,
+    /// What each taxel held last, where intensities are differences; none where that is not known.
+    held: Option<Vec<Option<u16>>>,
     counts: Counts,
 }
 
@@ -116,8 +116,16 @@ impl Decoder {
     /// the board's reset on, where it compares with the last value sent, and until an intensity is lost.
     #[must_use]
     pub fn differences(mut self, differences: bool) -> Self {
-        self.held = differences.then(|| vec![0; self.array.len()]);
+        self.held = differences.then(|| vec![Some(0); self.array.len()]);
         self
+    }
+
+    /// Says what the taxels hold, by index, none where that is not known: differences add up from there. One that is added to
+    /// what is not known gives no event an intensity, and counts as unpaired. Of no account where intensities are values.
+    pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
+        if let Some(own) = &mut self.held {
+            own.iter_mut().zip(held).for_each(|(own, held)| *own = held);
+        }
     }
 
     /// Uses other vector instructions than the machine's best, for tests and measurements: the events are the same.
@@ -207,7 +215,7 @@ impl Decoder {
         self.give_up_partial();
         self.clock = Clock::default();
         if let Some(held) = &mut self.held {
-            held.fill(0);
+            held.fill(Some(0));
         }
     }
 
@@ -426,16 +434,17 @@ impl Decoder {
                 let (x, y) = (u16::from(x), u16::from(y));
                 let taxel = self.array.index(x, y);
                 let ticks = match &mut self.held {
-                    None => ticks,
+                    None => Some(ticks),
                     Some(held) => {
-                        let before = held[taxel];
-                        held[taxel] = if p { before.saturating_add(ticks) } else { before.saturating_sub(ticks) };
+                        let add = |before: u16| if p { before.saturating_add(ticks) } else { before.saturating_sub(ticks) };
+                        held[taxel] = held[taxel].map(add);
                         held[taxel]
                     }
                 };
-                let paired = match &mut self.by_taxel {
-                    Some(by_taxel) => by_taxel.intensity(taxel, ticks),
-                    None => open && filling.pair(ticks, x, y),
+                let paired = match (ticks, &mut self.by_taxel) {
+                    (None, _) => false,
+                    (Some(ticks), Some(by_taxel)) => by_taxel.intensity(taxel, ticks),
+                    (Some(ticks), None) => open && filling.pair(ticks, x, y),
                 };
                 *(if paired { &mut self.counts.intensities } else { &mut self.counts.unpaired }) += 1;
             }
@@ -684,6 +693,20 @@ mod tests {
         let mut events = decoder.push(&bytes(&words), None);
         decoder.finish_into(&mut events);
         assert_eq!(intensities(&events), [Some(50), Some(30), Some(0)]);
+    }
+
+    #[test]
+    fn differences_add_up_from_what_was_held_and_to_nothing_from_what_is_unknown() {
+        let words = [change(0, 1, 1), intensity(50, 1, 1), change(1, 2, 1), intensity(7, 2, 1)];
+        for pairing in [Pairing::Direct, Pairing::Taxel] {
+            let mut decoder = Decoder::new(Array::thesis()).pairing(pairing).differences(true);
+            let index = Array::thesis().index(1, 1);
+            decoder.begin_with((0..4096).map(|taxel| (taxel == index).then_some(300)));
+            let mut events = decoder.push(&bytes(&words), None);
+            decoder.finish_into(&mut events);
+            assert_eq!((events.len(), intensities(&events)), (2, vec![Some(350), None]));
+            assert_eq!((decoder.counts().intensities, decoder.counts().unpaired), (1, 1));
+        }
     }
 
     #[test]

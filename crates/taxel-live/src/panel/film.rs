@@ -17,7 +17,7 @@ use taxel_core::{Array, Events, problem};
 use super::lens::{COLUMN_US, FORGET, History, Keyframe, LATE_US, Lens, SPAN, Strip, column_of};
 use super::spikes::Spikes;
 use crate::pipeline::{Change, Piece, UNKNOWN};
-use crate::recording::{Ending, Header, NOTHING_LOST, Place, Reader, Remarks, Topic};
+use crate::recording::{Ending, Header, NOTHING_LOST, Place, Reader, Remarks, Topic, begin_with};
 use crate::{Error, Result};
 
 /// How far back a live view may look, us ...
@@ -516,6 +516,8 @@ impl FileFilm {
                     if message.topic == Topic::Datagrams {
                         receiver.push(message.data, Some(message.at_ns / 1000), events);
                         bytes += message.data.len() as u64;
+                    } else if message.topic == Topic::Held {
+                        begin_with(receiver, message.data);
                     } else if message.topic == Topic::Pressure {
                         return Ok(());
                     }

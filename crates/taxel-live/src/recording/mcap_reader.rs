@@ -230,11 +230,7 @@ impl Remarks {
                 }
             }
             Topic::Held => {
-                if let Ok(said) = serde_json::from_slice::<Value>(message.data)
-                    && let Some(ticks) = said["ticks"].as_str().and_then(unbase64)
-                {
-                    self.held = Some(ticks.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect());
-                }
+                self.held = held(message.data).or(self.held.take());
             }
             Topic::Board => {
                 if let Ok(said) = serde_json::from_slice::<BoardChange>(message.data) {
@@ -244,6 +240,20 @@ impl Remarks {
             Topic::Samples => self.samples += 1,
             Topic::Counts => self.counts = serde_json::from_slice(message.data).ok().or(self.counts.take()),
         }
+    }
+}
+
+/// What a message says that the taxels held, ticks by taxel index; 65 535 of one that was never heard of.
+fn held(data: &[u8]) -> Option<Vec<u16>> {
+    let said: Value = serde_json::from_slice(data).ok()?;
+    let ticks = unbase64(said["ticks"].as_str()?)?;
+    Some(ticks.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect())
+}
+
+/// Tells a decoder of differences what the taxels held before the recording's first datagram.
+pub(crate) fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
+    if let Some(held) = held(data) {
+        receiver.begin_with(held.into_iter().map(|ticks| (ticks != u16::MAX).then_some(ticks)));
     }
 }
 
@@ -478,6 +488,9 @@ impl Reader {
                 decoded.arrived_ns.push(message.at_ns);
                 decoded.number.push(message.number);
                 decoded.first.push(before as u64);
+            }
+            if message.topic == Topic::Held {
+                begin_with(&mut sender, message.data);
             }
             // What the host told the board cannot be seen from its datagrams.
             if message.topic == Topic::Board
