@@ -1,9 +1,10 @@
 //! Datagrams to detections, as they come.
 //!
-//! Threads with fixed jobs: *receive, decode and record*, *encode and read out*; while something is recorded, which a disk may hold
-//! up, *receive* has a thread of its own ([`crate::capture`]). What waits between two of them is bounded, and what finds no room is
-//! counted where it was lost. A detection leaves from the thread that
-//! made it. Who looks on gets copies ([`Live::counters`], [`Live::picture`]) and slows nothing.
+//! One thread receives, decodes and reads out; who has something to say leaves that to another one first. While something is
+//! recorded, which a disk may hold up, *receive*, *decode and record*, *encode and read out* have a thread each
+//! ([`crate::capture`]), and the last one has also where it is slower than what comes. What waits between two of them is bounded,
+//! and what finds no room is counted where it was lost. Who looks on gets copies ([`Live::counters`], [`Live::picture`]) and slows
+//! nothing.
 
 mod ahead;
 mod copies;
@@ -11,11 +12,13 @@ mod counters;
 mod decode;
 mod handle;
 mod handover;
+mod lead;
 mod options;
 mod read;
 mod recorder;
 mod rest;
 mod said;
+mod saying;
 mod sending;
 mod shared;
 mod source;
@@ -40,12 +43,16 @@ use crate::locked::lock;
 use crate::{Error, Result};
 pub use copies::{Copied, Copies};
 pub use counters::{Counters, SourceCounts, Summary};
+use decode::Work;
 pub use handle::Handle;
 use handover::Handover;
+use lead::Lead;
 pub use options::{LiveOptions, Record};
 pub use read::Ear;
+use read::Reader;
 use recorder::{Part, Recorder};
 pub use said::{Lines, Said, Sink};
+use saying::Saying;
 use sending::Sending;
 pub use sending::{Destination, Sent};
 use shared::{Shared, Shown};
@@ -171,14 +178,16 @@ impl Live {
         })?;
         let others = Mutex::new(others);
         let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![], others };
-        let theirs = Arc::clone(&shared);
-        let decode_options = options.clone();
-        live.spawn("taxel-decode", move || decode::run(&theirs, sender, &decode_options, listens))?;
-        if listens {
-            // Who drives something is not to wait for a callback.
-            let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
-            let reader = read::Reader::new(ear, sending.chain(sinks).collect(), say, &options);
-            live.spawn("taxel-readout", move || reader.run(&shared))?;
+        // Who drives something is not to wait for a callback.
+        let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
+        let saying = Saying::new(sending.chain(sinks).collect(), say);
+        let reader = listens.then(|| Reader::new(ear, &options));
+        let work = Work::new(Arc::clone(&shared), sender, reader);
+        let names: &[&str] = if listens { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
+        let lead = Arc::new(Lead::new(work, saying, names.len()));
+        for name in names {
+            let (lead, shared) = (Arc::clone(&lead), Arc::clone(&shared));
+            live.spawn(name, move || lead.serve(&shared))?;
         }
         Ok(live)
     }

@@ -325,6 +325,32 @@ fn a_slow_readout_loses_events_where_they_are_counted_and_the_recording_loses_no
 }
 
 #[test]
+fn who_is_slow_to_listen_holds_up_neither_what_comes_nor_what_is_read_out() {
+    let (free, held) = std::sync::mpsc::channel::<()>();
+    let heard = Arc::new(Mutex::new(Vec::<Detection>::new()));
+    let sink = Arc::clone(&heard);
+    let slow: Box<dyn Sink> = Box::new(move |said: &Said| {
+        sink.lock().expect("sound").push(said.detection.clone());
+        // Until it is let go; then at once.
+        let _ = held.recv();
+        Ok(())
+    });
+    let live = Live::start(ANY, options(None), reading(&readout(2.0)), vec![slow]).expect("a port");
+    let report = emulate(live.address(), true, presses(1500, 1500));
+    let expected = sent(1500, 1500);
+    wait_for(&live, |live| live.counters().read_out == expected.len() as u64);
+    assert_eq!((heard.lock().expect("sound").len(), live.counters().detections), (1, 0));
+    drop(free);
+    let summary = live.stop().expect("a sound way");
+    assert_closed(&summary, &report);
+    let mut again = readout(2.0).run_events(expected.view(), 192.0, None, &[], Stop::never()).expect("a sound readout");
+    again.retain(|d| Some(&d.t) < expected.t.last());
+    assert!(again.len() > 3, "the presses are heard: {}", again.len());
+    assert_eq!(*heard.lock().expect("sound"), again, "each once, in their order");
+    assert_eq!(summary.counters.detections, again.len() as u64);
+}
+
+#[test]
 fn a_file_that_exists_is_kept_and_its_port_is_let_go() {
     let path = Scratch::new("kept.mcap");
     std::fs::write(&path.0, "mine").expect("written");

@@ -436,7 +436,8 @@ impl Decoder {
                 let ticks = match &mut self.held {
                     None => Some(ticks),
                     Some(held) => {
-                        let add = |before: u16| if p { before.saturating_add(ticks) } else { before.saturating_sub(ticks) };
+                        let add =
+                            |before: u16| if p { before.saturating_add(ticks) } else { before.saturating_sub(ticks) };
                         held[taxel] = held[taxel].map(add);
                         held[taxel]
                     }

@@ -90,6 +90,13 @@ impl Batch {
         self.datagrams.last().is_none_or(|last| last.arrived_ns >= ns)
     }
 
+    /// Numbers what it holds.
+    fn number_from(&mut self, first: u64) {
+        for (number, datagram) in (first..).zip(&mut self.datagrams) {
+            datagram.number = number;
+        }
+    }
+
     /// Forgets what it holds and makes room for so many bytes.
     pub(super) fn begin(&mut self, bytes: usize) {
         self.clear();
@@ -97,8 +104,8 @@ impl Batch {
     }
 }
 
-/// Two batches take turns: one fills while the other is worked on. A copy of each byte buys that any number of small
-/// datagrams packs tightly while the taker is behind, so that the bound in bytes is also a bound in time.
+/// Batches take turns: one fills while another is worked on. While the taker is behind, a copy of each byte buys that any number
+/// of small datagrams packs tightly, so that the bound in bytes is also a bound in time.
 #[derive(Debug)]
 pub(super) struct Queue {
     state: Mutex<Received>,
@@ -129,12 +136,17 @@ impl Queue {
         let mut state = self.state();
         let Received { waiting, counts, .. } = &mut *state;
         let first = counts.add(received.datagrams.len(), received.bytes.len(), messages, dropped_by_kernel);
-        for (number, (datagram, bytes)) in (first..).zip(received.iter()) {
-            if waiting.bytes.len() + bytes.len() <= self.limit {
-                waiting.push(Datagram { number, ..*datagram }, bytes);
-            } else {
-                counts.dropped_by_queue += 1;
-                counts.bytes_dropped_by_queue += bytes.len() as u64;
+        if waiting.is_empty() && received.bytes.len() <= self.limit {
+            received.number_from(first);
+            std::mem::swap(waiting, received);
+        } else {
+            for (number, (datagram, bytes)) in (first..).zip(received.iter()) {
+                if waiting.bytes.len() + bytes.len() <= self.limit {
+                    waiting.push(Datagram { number, ..*datagram }, bytes);
+                } else {
+                    counts.dropped_by_queue += 1;
+                    counts.bytes_dropped_by_queue += bytes.len() as u64;
+                }
             }
         }
         let some = !waiting.is_empty();
@@ -149,9 +161,7 @@ impl Queue {
     pub(super) fn count(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
         let (datagrams, bytes) = (received.datagrams.len(), received.bytes.len());
         let first = self.state().counts.add(datagrams, bytes, messages, dropped_by_kernel);
-        for (number, datagram) in (first..).zip(&mut received.datagrams) {
-            datagram.number = number;
-        }
+        received.number_from(first);
     }
 
     pub(super) fn take(&self, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {

@@ -1,14 +1,17 @@
-//! The first thread: receives and decodes, hands the events on, and records. While it records, another one receives.
+//! Receives and decodes, reads out or hands the events on, and records. While it records, another thread receives.
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
 use taxel_core::wire::{Decoder, Receiver, Took};
 use taxel_core::{Events, problem};
 
 use super::copies::{Copier, GATHER, copier};
-use super::options::LiveOptions;
+use super::handover::{Quiet, Taken};
+use super::read::Reader;
 use super::recorder::Recorder;
 use super::shared::{Shared, Wish};
 use super::stills::Stills;
@@ -35,50 +38,32 @@ const IDLE: Duration = Duration::from_millis(20);
 /// Events are handed on when so many are there, also in the middle of a large batch.
 const HAND_ON: usize = 1 << 14;
 
-pub(super) fn run(shared: &Shared, sender: Receiver, options: &LiveOptions, listens: bool) {
-    let mut work = Work {
-        shared,
-        sender,
-        promise: Promise::default(),
-        believed: None,
-        heard: None,
-        options,
-        listens,
-        clock: BoardClock::default(),
-        events: Events::empty(options.array.clone()),
-        held: vec![UNKNOWN; options.array.len()],
-        taps: vec![],
-        copiers: vec![],
-        received: 0,
-        frame_us: options.registers.frame_us(),
-        fresh: None,
-        has_intensities: false,
-        decoded: 0,
-        late: 0,
-        counted: 0,
-        tared: false,
-        pictured: Instant::now(),
-        stills: Stills::new(),
-        told: Instant::now(),
-    };
-    if let Err(error) = work.all() {
-        shared.fail(error);
-    }
-    shared.handover.close();
-    if !listens {
-        shared.ended.store(true, std::sync::atomic::Ordering::Release);
-    }
+/// What is to be done when the thread that leads comes back.
+pub(super) enum Next {
+    /// Something was found ([`Work::found`]).
+    Say,
+    /// The readout wants a thread of its own from here on.
+    Apart(Box<Reader>),
+    /// Nothing will come any more.
+    Over,
 }
 
-struct Work<'a> {
-    shared: &'a Shared,
+pub(super) struct Work {
+    shared: Arc<Shared>,
+    /// The readout, as long as it works in this thread.
+    reader: Option<Reader>,
+    /// One that is to have a thread of its own.
+    leaves: Option<Box<Reader>>,
+    /// Without a readout there is nothing to say.
+    nothing: Vec<Detection>,
+    begun: bool,
+    batch: Batch,
     sender: Receiver,
     promise: Promise,
     /// What the readout was told last of how far time has come, by promises of version 2.
     believed: Option<i64>,
     /// The latest time that was heard, us.
     heard: Option<i64>,
-    options: &'a LiveOptions,
     listens: bool,
     clock: BoardClock,
     events: Events,
@@ -133,43 +118,138 @@ impl Promise {
     }
 }
 
-impl Work<'_> {
-    fn all(&mut self) -> Result<()> {
-        let mut batch = Batch::new();
-        if lock(&self.shared.recorder).is_some() {
-            self.shared.receiver.apart()?;
+impl Work {
+    pub(super) fn new(shared: Arc<Shared>, sender: Receiver, reader: Option<Reader>) -> Self {
+        let (array, frame_us) = (shared.options.array.clone(), shared.options.registers.frame_us());
+        Self {
+            shared,
+            listens: reader.is_some(),
+            reader,
+            leaves: None,
+            nothing: vec![],
+            begun: false,
+            batch: Batch::new(),
+            sender,
+            promise: Promise::default(),
+            believed: None,
+            heard: None,
+            clock: BoardClock::default(),
+            held: vec![UNKNOWN; array.len()],
+            events: Events::empty(array),
+            taps: vec![],
+            copiers: vec![],
+            received: 0,
+            frame_us,
+            fresh: None,
+            has_intensities: false,
+            decoded: 0,
+            late: 0,
+            counted: 0,
+            tared: false,
+            pictured: Instant::now(),
+            stills: Stills::new(),
+            told: Instant::now(),
         }
-        while !self.shared.receiver.is_done() {
-            self.expect()?;
-            // Only where a board makes no promises does silence say anything.
-            let guesses = self.listens && self.sender.version() == 1;
-            let tick = if guesses { TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)) } else { IDLE };
-            let wait = if self.copiers.is_empty() { tick } else { tick.min(GATHER) };
-            let silent_until = if self.shared.receiver.take(&mut batch, wait)? {
-                self.decode(&batch)?;
-                self.record(|recorder| recorder.datagrams(&batch))?;
-                None
-            } else {
-                let until = self.shared.receiver.silent_until();
-                self.silence(until);
-                until
-            };
-            self.copy(&batch, silent_until);
-            self.taps.retain_mut(Tap::tick);
-            self.still(false)?;
-            self.look()?;
-            if self.shared.wished.swap(false, Ordering::Acquire) {
-                self.fulfil()?;
+    }
+
+    /// What the readout has found and nobody has said yet.
+    pub(super) fn found(&mut self) -> &mut Vec<Detection> {
+        self.reader.as_mut().map_or(&mut self.nothing, |reader| &mut reader.found)
+    }
+
+    /// Goes on until something is to be done about it; an error ends it.
+    pub(super) fn go_on(&mut self) -> Next {
+        self.rounds().unwrap_or_else(|error| {
+            self.shared.fail(error);
+            self.close(None);
+            Next::Over
+        })
+    }
+
+    fn rounds(&mut self) -> Result<Next> {
+        if !self.begun {
+            self.begun = true;
+            if let Some(reader) = &self.reader {
+                reader.begin_with(&self.shared);
+            }
+            if lock(&self.shared.recorder).is_some() {
+                self.apart()?;
             }
         }
+        loop {
+            if let Some(reader) = self.leaves.take() {
+                return Ok(Next::Apart(reader));
+            }
+            if !self.found().is_empty() {
+                return Ok(Next::Say);
+            }
+            if self.shared.receiver.is_done() {
+                self.finish()?;
+                return Ok(Next::Over);
+            }
+            self.round()?;
+        }
+    }
+
+    /// From now on a thread of its own receives, and another one reads out: a disk may hold this one up.
+    fn apart(&mut self) -> Result<()> {
+        self.shared.receiver.apart()?;
+        self.leave();
+        Ok(())
+    }
+
+    /// From now on another thread reads out.
+    fn leave(&mut self) {
+        if let Some(reader) = self.reader.take() {
+            self.leaves = Some(Box::new(reader));
+        }
+    }
+
+    fn round(&mut self) -> Result<()> {
+        self.expect()?;
+        // Only where a board makes no promises does silence say anything.
+        let guesses = self.listens && self.sender.version() == 1;
+        let tick = if guesses { TICK.max(Duration::from_secs_f64(self.frame_us * 1e-6)) } else { IDLE };
+        let wait = if self.copiers.is_empty() { tick } else { tick.min(GATHER) };
+        let mut batch = std::mem::take(&mut self.batch);
+        let silent_until = if self.shared.receiver.take(&mut batch, wait)? {
+            self.decode(&batch)?;
+            self.record(|recorder| recorder.datagrams(&batch))?;
+            None
+        } else {
+            let until = self.shared.receiver.silent_until();
+            self.silence(until);
+            until
+        };
+        self.copy(&batch, silent_until);
+        self.batch = batch;
+        self.taps.retain_mut(Tap::tick);
+        self.still(false)?;
+        self.look()?;
+        if self.shared.wished.swap(false, Ordering::Acquire) {
+            self.fulfil()?;
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<()> {
         self.sender.finish_into(&mut self.events);
         self.hand_on()?;
         self.still(true)?;
-        self.silence(self.shared.receiver.silent_until());
+        let believed = self.believes(self.shared.receiver.silent_until());
         self.taps.retain_mut(Tap::tick);
         let dropped = self.dropped_by_kernel();
         self.copiers.iter_mut().for_each(|copier| copier.finish(dropped));
+        self.close(believed);
         self.fulfil()
+    }
+
+    /// The last that the readout hears.
+    fn close(&mut self, believed: Option<Quiet>) {
+        match &mut self.reader {
+            Some(reader) => reader.wait(&self.shared, Taken { quiet: believed, last: true }),
+            None => self.shared.handover.close(believed),
+        }
     }
 
     /// What came goes to other computers.
@@ -213,11 +293,11 @@ impl Work<'_> {
         for wish in wishes {
             match wish {
                 Wish::Begin(mut recorder, give) => {
-                    // A disk may hold this thread up.
-                    self.shared.receiver.apart()?;
+                    self.apart()?;
                     let begun = recorder.begin(&self.shared.counters(), &self.held);
                     if begun.is_ok() {
-                        let decoder = Decoder::new(self.options.array.clone()).differences(self.options.differences);
+                        let decoder = Decoder::new(self.shared.options.array.clone())
+                            .differences(self.shared.options.differences);
                         self.fresh = Some(Box::new(Receiver::new(decoder, 1)));
                         // What was zeroed before holds in this recording too.
                         let zeroed: Vec<Zeroing> = self.shared.shown().zeroed.values().copied().collect();
@@ -237,7 +317,8 @@ impl Work<'_> {
                 }
                 Wish::Look(give) => {
                     let counters = &self.shared.shown().counters;
-                    let (tap, outlet) = tap(&self.options.array, self.held.clone(), counters.board_us, counters.events);
+                    let (tap, outlet) =
+                        tap(&self.shared.options.array, self.held.clone(), counters.board_us, counters.events);
                     if give.send(outlet).is_ok() {
                         self.taps.push(tap);
                     }
@@ -263,8 +344,8 @@ impl Work<'_> {
     }
 
     /// Takes what these taxels hold for their rest, from now on: where one cannot be zeroed none is.
-    fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
-        let array = &self.options.array;
+    fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
+        let array = &self.shared.options.array;
         let shown = self.shared.shown();
         if shown.counters.taring {
             return Err(problem!("a tare is being taken: zero taxels when that is done").into());
@@ -298,8 +379,10 @@ impl Work<'_> {
         shown.zeroings += 1;
         drop(shown);
         self.shared.happened([t]);
-        if self.listens {
-            self.shared.handover.zero(&zeroings);
+        match &mut self.reader {
+            Some(reader) => reader.zero(&zeroings),
+            None if self.listens => self.shared.handover.zero(&zeroings),
+            None => {}
         }
         Ok(zeroings)
     }
@@ -308,7 +391,7 @@ impl Work<'_> {
     /// clock lacks. `heard` and `marked` are how many of each were there before the datagram.
     fn compare(&mut self, bytes: &[u8], arrived_us: i64, heard: usize, marked: usize) -> Result<()> {
         let Some(fresh) = &mut self.fresh else { return Ok(()) };
-        let mut events = Events::empty(self.options.array.clone());
+        let mut events = Events::empty(self.shared.options.array.clone());
         fresh.push(bytes, Some(arrived_us), &mut events);
         let by_event = self.events.t.get(heard).zip(events.t.first()).map(|(ours, theirs)| ours - theirs);
         let by_marker =
@@ -369,7 +452,7 @@ impl Work<'_> {
                 }
                 let late = self.events.t[before..].iter().filter(|&&t| self.believed.is_some_and(|until| t < until));
                 self.late += late.count() as u64;
-                let gap_us = (self.options.gap_frames * self.frame_us) as i64;
+                let gap_us = (self.shared.options.gap_frames * self.frame_us) as i64;
                 self.promise.note(&took, arrived_us, gap_us);
             }
             let last = self.events.t[before..].last().copied();
@@ -378,6 +461,8 @@ impl Work<'_> {
             }
             self.shared.shown().decode_latency.note(now - datagram.arrived_ns);
             if self.events.len() >= HAND_ON {
+                // So much waits only where reading out takes longer than what comes leaves it.
+                self.leave();
                 self.hand_on()?;
             }
         }
@@ -427,8 +512,15 @@ impl Work<'_> {
         }
         let promised = self.promise.take();
         if self.listens && (promised.is_some() || !events.is_empty() || !events.markers.is_empty()) {
-            let dropped = self.shared.handover.put(events, promised);
-            self.shared.shown().counters.events_dropped = dropped;
+            match &mut self.reader {
+                Some(reader) => {
+                    reader.take(&self.shared, events, Taken { quiet: promised.map(Quiet::Promised), last: false });
+                }
+                None => {
+                    let dropped = self.shared.handover.put(events, promised);
+                    self.shared.shown().counters.events_dropped = dropped;
+                }
+            }
             self.believed = self.believed.max(promised);
         }
         events.clear();
@@ -439,16 +531,22 @@ impl Work<'_> {
     }
 
     /// Nothing waits: of a board that makes no promises the readout's time may move on by the host's clock.
-    #[allow(clippy::cast_possible_truncation)]
-    fn silence(&self, until_ns: Option<i64>) {
-        if self.listens
-            && self.sender.version() == 1
-            && let (Some(offset), Some(until_ns)) = (self.clock.offset(), until_ns)
-        {
-            let guard = (self.options.guard_frames * self.frame_us) as i64;
-            // What a frame sees leaves at its end: before the start of the frame that ends now all has come.
-            self.shared.handover.quiet(offset.board_us(until_ns) - self.frame_us() - guard);
+    fn silence(&mut self, until_ns: Option<i64>) {
+        let Some(quiet) = self.believes(until_ns) else { return };
+        match &mut self.reader {
+            Some(reader) => reader.wait(&self.shared, Taken { quiet: Some(quiet), last: false }),
+            None => self.shared.handover.quiet(quiet),
         }
+    }
+
+    #[allow(clippy::cast_possible_truncation)]
+    fn believes(&self, until_ns: Option<i64>) -> Option<Quiet> {
+        if !self.listens || self.sender.version() != 1 {
+            return None;
+        }
+        let guard = (self.shared.options.guard_frames * self.frame_us) as i64;
+        // What a frame sees leaves at its end: before the start of the frame that ends now all has come.
+        Some(Quiet::Believed(self.clock.offset()?.board_us(until_ns?) - self.frame_us() - guard))
     }
 
     /// The pictures of the recording; the last one at its end.
@@ -470,7 +568,7 @@ impl Work<'_> {
             self.stills.take(now, now_ns(), t_us, held);
         }
         happened.into_iter().for_each(|t| self.stills.around(t));
-        let columns = self.options.array.columns;
+        let columns = self.shared.options.array.columns;
         let mut stills = std::mem::replace(&mut self.stills, Stills::new());
         let kept = self.record(|recorder| {
             stills.give().try_for_each(|still| recorder.picture(still.at_ns, still.t_us, columns, &still.held))

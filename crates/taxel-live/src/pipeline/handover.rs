@@ -76,9 +76,9 @@ impl Handover {
         dropped
     }
 
-    /// Believes that after all that was handed over nothing comes before `t` us.
-    pub(super) fn quiet(&self, t: i64) {
-        self.state().quiet = Some(Quiet::Believed(t));
+    /// Says how far time has come after all that was handed over.
+    pub(super) fn quiet(&self, quiet: Quiet) {
+        self.state().quiet = Some(quiet);
         self.came.notify_one();
     }
 
@@ -88,8 +88,12 @@ impl Handover {
         self.came.notify_one();
     }
 
-    pub(super) fn close(&self) {
-        self.state().closed = true;
+    /// Ends it; `quiet` is how far time has come.
+    pub(super) fn close(&self, quiet: Option<Quiet>) {
+        let mut state = self.state();
+        state.quiet = quiet.or(state.quiet);
+        state.closed = true;
+        drop(state);
         self.came.notify_one();
     }
 
@@ -156,14 +160,14 @@ mod tests {
     fn silence_is_taken_once_and_only_where_nothing_came_after_it() {
         let handover = Handover::new(&Array::thesis(), 10);
         let mut taken = Events::empty(Array::thesis());
-        handover.quiet(100);
+        handover.quiet(Quiet::Believed(100));
         assert_eq!(handover.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Believed(100)));
-        handover.quiet(200);
+        handover.quiet(Quiet::Believed(200));
         handover.put(&mut events(&[150], None), None);
         assert_eq!(handover.take(&mut taken, &mut vec![]).quiet, None);
         handover.put(&mut events(&[], None), Some(300));
         assert_eq!(handover.take(&mut taken, &mut vec![]).quiet, Some(Quiet::Promised(300)));
-        handover.close();
+        handover.close(None);
         assert!(handover.take(&mut taken, &mut vec![]).last);
     }
 }

@@ -1,8 +1,5 @@
-//! The thread behind decoding: encodes, reads out, and says.
+//! Encodes and reads out: in the thread that decodes, or in one behind it.
 
-use std::sync::atomic::Ordering;
-
-use crossbeam_channel::Sender;
 use taxel_core::Events;
 use taxel_core::detect::{Detection, FrameTime, Readout, ReadoutStream};
 use taxel_core::encode::{Tare, Zeroing};
@@ -11,11 +8,8 @@ use super::ahead::Ahead;
 use super::handover::{Quiet, Taken};
 use super::options::LiveOptions;
 use super::rest::Rest;
-use super::said::{Said, Sink};
+use super::saying::Saying;
 use super::shared::Shared;
-use crate::Error;
-use crate::locked::lock;
-use crate::recording::now_ns;
 
 /// Who listens to the events.
 pub enum Ear {
@@ -51,9 +45,8 @@ impl Ear {
 
 pub(super) struct Reader {
     mode: Mode,
-    sinks: Vec<Box<dyn Sink>>,
-    say: Sender<Said>,
-    found: Vec<Detection>,
+    /// What is to be said.
+    pub(super) found: Vec<Detection>,
     events: Events,
     zeroings: Vec<Zeroing>,
     frames: FrameTime,
@@ -67,33 +60,65 @@ enum Mode {
 }
 
 impl Reader {
-    pub(super) fn new(ear: Ear, sinks: Vec<Box<dyn Sink>>, say: Sender<Said>, options: &LiveOptions) -> Self {
+    pub(super) fn new(ear: Ear, options: &LiveOptions) -> Self {
         let events = Events::empty(options.array.clone());
         let mode = match ear {
             Ear::Deaf => Mode::Idle,
             Ear::Reading(stream) => Mode::Reading(Ahead::new(stream)),
             Ear::Taring(stretch_us, readout) => Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array))),
         };
-        Self { mode, sinks, say, found: vec![], events, zeroings: vec![], frames: options.frames() }
+        Self { mode, found: vec![], events, zeroings: vec![], frames: options.frames() }
     }
 
-    pub(super) fn run(mut self, shared: &Shared) {
+    /// Says whether it takes a tare, and what it takes for rest: before the first events.
+    pub(super) fn begin_with(&self, shared: &Shared) {
         shared.shown().counters.taring = matches!(self.mode, Mode::Taring(_));
         self.show_rest(shared);
-        loop {
-            let taken = shared.handover.take(&mut self.events, &mut self.zeroings);
-            if let Err(error) = self.hear(shared, taken) {
-                shared.fail(error);
-                self.mode = Mode::Idle;
-            }
-            if taken.last {
-                break;
-            }
-        }
-        shared.ended.store(true, Ordering::Release);
     }
 
-    fn hear(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
+    /// In a thread of its own: takes what is handed over until the last of it, and says what it finds.
+    pub(super) fn run(mut self, shared: &Shared, saying: &Saying) {
+        let mut last = false;
+        loop {
+            if !self.found.is_empty() {
+                saying.add(shared, &mut self.found);
+                saying.speak(shared);
+            }
+            if last {
+                break;
+            }
+            let taken = shared.handover.take(&mut self.events, &mut self.zeroings);
+            self.hear(shared, taken);
+            last = taken.last;
+        }
+    }
+
+    /// In the thread that decodes: takes its events, and leaves the memory of the last ones.
+    pub(super) fn take(&mut self, shared: &Shared, events: &mut Events, taken: Taken) {
+        std::mem::swap(&mut self.events, events);
+        self.hear(shared, taken);
+        self.events.clear();
+    }
+
+    /// Nothing came, but time has.
+    pub(super) fn wait(&mut self, shared: &Shared, taken: Taken) {
+        self.events.clear();
+        self.hear(shared, taken);
+    }
+
+    /// Takes what is to be zeroed, in its own time.
+    pub(super) fn zero(&mut self, zeroings: &[Zeroing]) {
+        self.zeroings.extend_from_slice(zeroings);
+    }
+
+    fn hear(&mut self, shared: &Shared, taken: Taken) {
+        if let Err(error) = self.try_hear(shared, taken) {
+            shared.fail(error);
+            self.mode = Mode::Idle;
+        }
+    }
+
+    fn try_hear(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
         match &mut self.mode {
             Mode::Reading(readout) => {
                 self.zeroings.drain(..).try_for_each(|zeroing| readout.zero(&zeroing))?;
@@ -119,7 +144,7 @@ impl Reader {
                 (counters.late, counters.wrong) = (readout.late(), readout.wrong());
             }
         }
-        self.say_all(shared)
+        Ok(())
     }
 
     /// The rest is over: begins to read with the first event after it.
@@ -142,30 +167,5 @@ impl Reader {
             let rest = readout.rest();
             shared.shown().rest = if rest.iter().all(Option::is_none) { vec![] } else { rest };
         }
-    }
-
-    /// From the thread that made them: to the sinks first, then into the recording and to who asks.
-    fn say_all(&mut self, shared: &Shared) -> crate::Result<()> {
-        for detection in self.found.drain(..) {
-            let said_ns = now_ns();
-            let offset = shared.shown().counters.offset;
-            let said = Said { said: offset.map_or(detection.known, |o| o.board_us(said_ns)), detection, said_ns };
-            self.sinks.iter_mut().try_for_each(|sink| sink.take(&said)).map_err(Error::Sink)?;
-            if let Some(recorder) = &*lock(&shared.recorder) {
-                // Where only a guest's recording is broken, the decoding thread will find that too.
-                recorder.detection(&said).or_else(|error| if recorder.is_a_guest() { Ok(()) } else { Err(error) })?;
-            }
-            shared.happened([said.detection.t, said.detection.known]);
-            lock(&shared.listeners).retain(|listener| {
-                !matches!(listener.try_send(said.clone()), Err(crossbeam_channel::TrySendError::Disconnected(_)))
-            });
-            let late_ns = (said.said - said.detection.known) * 1000;
-            let dropped = self.say.try_send(said).is_err();
-            let mut shown = shared.shown();
-            shown.counters.detections += 1;
-            shown.counters.detections_dropped += u64::from(dropped);
-            shown.said_latency.note(late_ns);
-        }
-        Ok(())
     }
 }

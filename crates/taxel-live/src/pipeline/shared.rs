@@ -101,6 +101,11 @@ impl Shared {
         lock(&self.happened).extend(times);
     }
 
+    /// Everything was worked through.
+    pub(super) fn end(&self) {
+        self.ended.store(true, Ordering::Release);
+    }
+
     pub(super) fn has_ended(&self) -> bool {
         self.ended.load(Ordering::Acquire)
     }
