@@ -147,6 +147,22 @@ def test_in_silence_what_is_owed_is_said() -> None:
     assert said.t > events.t[3]
 
 
+def test_what_a_thread_keeps_for_itself_lasts_from_one_call_to_the_next() -> None:
+    own, calls = threading.local(), []
+
+    def count(said: Said) -> None:
+        own.calls = getattr(own, "calls", 0) + 1
+        calls.append((threading.get_ident(), own.calls))
+
+    with Live(0, host=LOOPBACK, array=SMALL, readout=touch(), guard_frames=1e6, say=count) as live:
+        play(presses(6), live.address[1])
+        for _ in zip(range(4), live, strict=False):
+            pass
+    each = {thread: [k for t, k in calls if t == thread] for thread, _ in calls}
+    assert all(numbers == list(range(1, len(numbers) + 1)) for numbers in each.values()), calls
+    assert max(len(numbers) for numbers in each.values()) > 1
+
+
 def test_what_the_callers_function_raises_is_raised() -> None:
     def refuse(said: Said) -> None:
         raise LookupError(f"nothing to do with {said.label}")

@@ -41,7 +41,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
         "taxel-python",
         &[
             &["errors"],
-            &["enter", "convert", "parameters"],
+            &["enter", "guest", "convert", "parameters"],
             &["bridge"],
             &[
                 "calibration",

@@ -3,6 +3,7 @@
 mod convert;
 mod enter;
 mod errors;
+mod guest;
 mod knock;
 
 mod bridge;

@@ -20,6 +20,7 @@ use crate::bridge::{Copies, Feed};
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core, live};
+use crate::guest;
 use crate::parameters::parsed;
 
 /// What Python may choose; everything else is as Rust has it.
@@ -154,7 +155,7 @@ impl Live {
         }
         if let Some(say) = say {
             sinks.push(Box::new(move |said: &Said| {
-                Python::attach(|py| say.call1(py, said_parts(said.clone())).map(drop)).map_err(std::io::Error::other)
+                guest::attach(|py| say.call1(py, said_parts(said.clone())).map(drop)).map_err(std::io::Error::other)
             }));
         }
         let readout = readout.map(Readout::from_json).transpose().map_err(core)?;
