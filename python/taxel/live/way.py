@@ -160,7 +160,8 @@ class Live:
     gap_frames : float, 0 or more
         At a gap in the sequence of wire version 2 time waits so many frames for what may only be late.
     say : callable, optional
-        Called with each `Said` in the thread that made it; what it raises ends the way and is raised by `next`.
+        Called with each `Said` in the thread that made it, one at a time; what it raises ends the way and is raised by
+        `next`. Where it takes longer than 2 ms another thread goes on receiving; up to 16 384 detections wait for it.
     lines : bool
         Write each detection to the standard output as one line of JSON, from the thread that made it.
     send : str or sequence of str
