@@ -169,7 +169,7 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         (("seed = 5", "array.rows = 0"), "rows"),
         (
             ("seed = 5", "array.rows = 300\narray.columns = 300"),
-            r"array is 300 x 300: .*5.2 kHz.* does not read so many: 19 x step_",
+            r"array is 300 x 300: .*5.2 kHz.* read such a one: 19 x step_.*; must be up to 64 rows of 64",
         ),
         (("seed = 5", "tare_ms = -50"), "tare_ms is -50 ms: must be from 0 to 60000"),
         (("seed = 5", "tare_ms = 1e15"), r"tare_ms is 1e\+15 ms: must be from 0"),
