@@ -281,24 +281,29 @@ impl Afferents {
     /// Reckons those that may fire.
     #[inline(always)]
     fn reckon(&mut self, t: i64, held: &[Block], near: &[Near], out: &mut Vec<Spike>) {
-        let (mut values, mut rho) = ([0.0; BLOCK], [0.0; BLOCK]);
+        let (mut values, mut rho, mut base) = ([0.0; BLOCK], [0.0; BLOCK], [0.0; BLOCK]);
         for some in near.chunks(BLOCK) {
-            for (value, near) in values.iter_mut().zip(some) {
-                *value = held[near.channel as usize / BLOCK][near.channel as usize % BLOCK];
+            for (k, near) in some.iter().enumerate() {
+                let (block, lane) = (near.channel as usize / BLOCK, near.channel as usize % BLOCK);
+                (values[k], base[k]) = (held[block][lane], self.blocks[block].base[lane]);
             }
             Self::compress(self.alpha, &mut self.table, &values, &mut rho);
-            for ((&Near { channel, theta }, &rho), &value) in some.iter().zip(&rho).zip(&values) {
-                let place = channel as usize;
-                let u = rho - self.blocks[place / BLOCK].base[place % BLOCK];
+            // Who fires is known first, without a branch that nobody could foresee.
+            let (mut firing, mut n) = ([0; BLOCK], 0);
+            for (k, near) in some.iter().enumerate() {
+                let u = rho[k] - base[k];
+                firing[n] = k;
                 // Below 0, theta has both said of a small U, which is neither.
-                let said = f64::from(i8::from(u > theta) - i8::from(u < -theta));
-                if said != 0.0 {
-                    // A baseline of 0 makes every change as large as can be said.
-                    let size = if self.most > 1.0 { (u.abs() / self.theta_0).trunc().clamp(1.0, self.most) } else { 1.0 };
-                    out.push(Spike { t: ms(t), train: channel, value: (said * size) as f32 });
-                    self.reset(place, value, rho, theta + self.jump);
-                    self.blocks[place / BLOCK].still = false;
-                }
+                n += usize::from((u > near.theta) != (u < -near.theta));
+            }
+            for &k in &firing[..n] {
+                let (Near { channel, theta }, u) = (some[k], rho[k] - base[k]);
+                // A baseline of 0 makes every change as large as can be said.
+                let size = if self.most > 1.0 { (u.abs() / self.theta_0).trunc().clamp(1.0, self.most) } else { 1.0 };
+                let said = if u > theta { size } else { -size };
+                out.push(Spike { t: ms(t), train: channel, value: said as f32 });
+                self.reset(channel as usize, values[k], rho[k], theta + self.jump);
+                self.blocks[channel as usize / BLOCK].still = false;
             }
         }
     }

@@ -17,6 +17,12 @@ use super::filling::Filling;
 use crate::vectors::Instructions;
 use crate::wire::v1::WORD_BYTES;
 
+/// From so many bytes on, rows go to memory past the caches, which they would only fill, and without being read first.
+const STREAMED: usize = 4 << 20;
+
+/// Of a cache line.
+const LINE_BYTES: usize = 64;
+
 /// Words of the longest block.
 const BLOCK_WORDS: usize = 32;
 
@@ -31,6 +37,15 @@ pub(super) fn plain(
     filling: &mut Filling<'_>,
 ) -> usize {
     let mut done = 0;
+    if bytes.len() >= STREAMED {
+        // Rows that go past the caches begin where a line does.
+        let ahead = filling.room.x[filling.rows..].as_ptr().align_offset(LINE_BYTES);
+        let words = scalar::words(bytes, columns, rows, state, filling, ahead);
+        done = words * WORD_BYTES;
+        if words < ahead {
+            return done;
+        }
+    }
     loop {
         done += blocks(set, &bytes[done..], columns, rows, state, filling);
         // An odd number, so that pairs that lie across the blocks' edges come to lie inside.

@@ -2,6 +2,7 @@
 
 use std::arch::x86_64::*;
 
+use super::STREAMED;
 use super::carried::{Carried, indices, value};
 use crate::wire::decoder::filling::Filling;
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
@@ -82,6 +83,7 @@ pub(super) unsafe fn blocks(
         (_mm512_set1_epi16(columns.min(64) as i16 - 1), _mm512_set1_epi16(rows.min(64) as i16 - 1));
     let (one_up, one_down) = (table(&ONE_UP), table(&ONE_DOWN));
 
+    let streamed = bytes.len() >= STREAMED;
     let mut at = 0;
     while at + BYTES <= bytes.len() {
         // SAFETY: `at + 160 <= bytes.len()`, and the loads end at 64, 128 and 160.
@@ -187,19 +189,42 @@ pub(super) unsafe fn blocks(
         };
         // SAFETY: as above. What lies beyond the block's changes is written again by later rows, or never read.
         unsafe {
-            let t = filling.room.t.as_mut_ptr().add(first).cast::<i64>();
-            _mm512_storeu_si512(t.cast(), time(_mm512_castsi512_si128(ahead)));
-            _mm512_storeu_si512(t.add(8).cast(), time(_mm512_extracti32x4_epi32::<1>(ahead)));
-            _mm512_storeu_si512(t.add(16).cast(), time(_mm512_extracti32x4_epi32::<2>(ahead)));
-            _mm512_storeu_si512(t.add(24).cast(), time(_mm512_extracti32x4_epi32::<3>(ahead)));
-            _mm512_storeu_si512(filling.room.x.as_mut_ptr().add(first).cast(), xs);
-            _mm512_storeu_si512(filling.room.y.as_mut_ptr().add(first).cast(), ys);
-            _mm256_storeu_si256(filling.room.p.as_mut_ptr().add(first).cast(), _mm256_maskz_set1_epi8(ps, 1));
+            let t: *mut __m512i = filling.room.t.as_mut_ptr().add(first).cast();
+            let x: *mut __m512i = filling.room.x.as_mut_ptr().add(first).cast();
+            let y: *mut __m512i = filling.room.y.as_mut_ptr().add(first).cast();
+            let p: *mut __m256i = filling.room.p.as_mut_ptr().add(first).cast();
+            let times = [
+                time(_mm512_castsi512_si128(ahead)),
+                time(_mm512_extracti32x4_epi32::<1>(ahead)),
+                time(_mm512_extracti32x4_epi32::<2>(ahead)),
+                time(_mm512_extracti32x4_epi32::<3>(ahead)),
+            ];
+            let ps = _mm256_maskz_set1_epi8(ps, 1);
+            // Whole lines only: 32 rows fill them, fewer are written over.
+            if streamed && count == WORDS && [t, x, y].iter().all(|to| to.is_aligned()) && p.is_aligned() {
+                for (k, times) in times.into_iter().enumerate() {
+                    _mm512_stream_si512(t.add(k), times);
+                }
+                _mm512_stream_si512(x, xs);
+                _mm512_stream_si512(y, ys);
+                _mm256_stream_si256(p, ps);
+            } else {
+                for (k, times) in times.into_iter().enumerate() {
+                    _mm512_storeu_si512(t.add(k), times);
+                }
+                _mm512_storeu_si512(x, xs);
+                _mm512_storeu_si512(y, ys);
+                _mm256_storeu_si256(p, ps);
+            }
         }
         filling.rows = first + count;
         filling.open = changes >> 31 == 1;
         state.latest += i64::from(farthest);
         at += BYTES;
+    }
+    if streamed {
+        // So that other threads see these rows as they see any.
+        _mm_sfence();
     }
     at
 }
