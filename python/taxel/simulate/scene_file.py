@@ -131,8 +131,8 @@ class SceneFile:
             truth([Silence(_AFTER_MS)], preset=preset, array=array)
         except _core.DeviceError as error:
             size = f"array is {array.rows} x {array.columns}"
-            said = f'the preset "{preset}" does not read such a one: {error}'
-            raise SceneError(f"{size}: {said}; must be up to 64 rows of 64 columns") from None
+            why = f'the preset "{preset}" does not read such a one: {error}'
+            raise SceneError(f"{size}: {why}; must be up to 64 rows of 64 columns") from None
         tare_ms = number("tare_ms", said.get("tare_ms", cls.tare_ms))
         if not 0 <= tare_ms <= _LONGEST_MS:
             raise SceneError(f"tare_ms is {tare_ms:g} ms: must be from 0 to {_LONGEST_MS:g}")
