@@ -6,7 +6,7 @@
 //! reckoned at the end of a sample instead of at the start of the next: the same numbers, one array less.)
 //!
 //! Few afferents fire at a sample, and a power is dear. So each keeps how far its pressure may go from the one at its last
-//! spike without firing, in proportion to the threshold ([`Afferents::reach`]); only those beyond are reckoned by 5.1 and
+//! spike without firing, in proportion to the threshold (`Afferents::reach`); only those beyond are reckoned by 5.1 and
 //! 5.4. That bound is safe, so spikes are the same to the bit as if all were.
 //!
 //! Reading: as printed, equation 5.5 lets the threshold sink below `theta_0` for one sample, by less than `B theta_0`,
