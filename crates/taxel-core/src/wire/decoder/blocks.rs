@@ -13,12 +13,9 @@ mod scalar;
 
 pub(super) use carried::Carried;
 
-use super::filling::Filling;
+use super::filling::{Filling, STREAMED};
 use crate::vectors::Instructions;
 use crate::wire::v1::WORD_BYTES;
-
-/// From so many bytes on, rows go to memory past the caches, which they would only fill, and without being read first.
-const STREAMED: usize = 4 << 20;
 
 /// Of a cache line.
 const LINE_BYTES: usize = 64;

@@ -2,6 +2,9 @@
 
 use crate::wire::columns::Room;
 
+/// From so many bytes on, rows go to memory past the caches, which they would only fill, and without being read first.
+pub(super) const STREAMED: usize = 4 << 20;
+
 /// A change whose intensity may be the next word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Change {

@@ -2,9 +2,8 @@
 
 use std::arch::x86_64::*;
 
-use super::STREAMED;
 use super::carried::{Carried, indices, value};
-use crate::wire::decoder::filling::Filling;
+use crate::wire::decoder::filling::{Filling, STREAMED};
 use crate::wire::v1::{STAMP_US, WORD_BYTES};
 
 const WORDS: usize = 32;
