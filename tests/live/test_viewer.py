@@ -172,11 +172,10 @@ def recorded(path: Path) -> tuple[taxel.Recording, list[Said]]:
 
 
 def spikes_of(events: taxel.Events) -> list[tuple[int, int, float]]:
-    """The spikes of a recording but those of its last stamp, which a panel never sees to be over."""
+    """The spikes of a recording."""
     trains = ChangeEvents().encode(events)
     numbers = np.repeat(np.arange(len(trains)), np.diff(trains.offsets))
-    all_of_them = sorted(zip(np.round(trains.times * 1000).astype(int), numbers, trains.values, strict=True))
-    return [spike for spike in all_of_them if spike[0] < events.t[-1]]
+    return sorted(zip(np.round(trains.times * 1000).astype(int), numbers, trains.values, strict=True))
 
 
 def above_rest(events: taxel.Events) -> np.ndarray:
