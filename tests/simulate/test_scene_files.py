@@ -168,8 +168,8 @@ def test_a_height_map_may_lie_in_a_file(tmp_path):
         (("seed = 5", "taxels.noise = 3"), "taxels.noise is not known"),
         (("seed = 5", "array.rows = 0"), "rows"),
         (
-            ("seed = 5", "array.rows = 300\narray.columns = 300"),
-            r"array is 300 x 300: .*5.2 kHz.* read such a one: 19 x step_.*; must be up to 64 rows of 64",
+            ("seed = 5", 'preset = "5.2 kHz"\narray.rows = 300\narray.columns = 300'),
+            r'preset "5.2 kHz" does not read 300 x 300 taxels: 19 x step_',
         ),
         (("seed = 5", "tare_ms = -50"), "tare_ms is -50 ms: must be from 0 to 60000"),
         (("seed = 5", "tare_ms = 1e15"), r"tare_ms is 1e\+15 ms: must be from 0"),
@@ -250,3 +250,23 @@ def test_the_emulator_plays_a_scene_from_a_file(tmp_path):
     expected = [round(c.start_us) for c in truth(file.acts())[0]]
     written = [int(row.split(",")[1]) for row in labels.read_text().splitlines() if row.startswith("contact")]
     assert written == expected
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "preset"), [(24, 40, None), (80, 70, None), (128, 128, "128 x 128, 2 kHz")]
+)
+def test_an_array_of_any_size_feels_a_scene(tmp_path, rows, columns, preset):
+    """By the lines that it has: it is felt where and when it happens."""
+    said = BALL.replace("x_mm = 70", "x_mm = 50").replace("y_mm = 90", "y_mm = 30").replace("seed = 5", "seed = 5\n")
+    said = f"array = {{ rows = {rows}, columns = {columns} }}\n" + (f'preset = "{preset}"\n' if preset else "") + said
+    file = SceneFile.open(write(tmp_path, said))
+    assert file.registers.lines == columns
+    assert file.registers.wire_version == (1 if max(rows, columns) <= 64 else 2)
+    contacts, _ = truth(file.acts(), preset=file.preset, array=file.array)
+    events = play(file.acts(), seed=file.seed, **file.options).events
+    first = contacts[0].start_us
+    before, after = events.between(first - 110_000, first - 10_000), events.between(first, first + 10_000)
+    near = np.hypot(after.x * 2.67 - 50, after.y * 2.67 - 30) < 30
+    # Noise, of as long a time.
+    assert len(before) / 10 < 0.05 * len(after)
+    assert near.mean() > 0.9

@@ -87,15 +87,15 @@ fn motion<'py>(py: Python<'py>, parts: ArrayParts, json: &str, step_us: f64) -> 
     Ok((motion.tracks.into_iter().map(out).collect(), contacts))
 }
 
-/// Works acts out without playing them: touches in us of the board's clock, force in N by frame.
+/// Works acts out without playing them: touches in us of the board's clock, force in N by frame. `registers` is JSON.
 #[pyfunction]
 fn truth<'py>(
     py: Python<'py>,
     parts: ArrayParts,
-    preset: &str,
+    registers: &str,
     acts: Vec<ActIn<'py>>,
 ) -> PyResult<(ContactsOut, Bound<'py, PyArray1<f32>>)> {
-    let registers = Registers::preset(preset).map_err(core)?;
+    let registers = parsed("registers", registers)?;
     let (array_felt, sensor) = (to_array(parts)?, Sensor::default());
     let (circuit, asynchronous, tare_ms) = (None, false, 0.0);
     let acts = to_acts(acts)?;
@@ -108,13 +108,12 @@ fn truth<'py>(
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PlayedBy {
-    wire: u8,
     circuit: Option<Chain>,
     asynchronous: bool,
 }
 
 /// Plays acts to a board that arms, is tared and starts; gives what a host decodes of its datagrams, and how many they
-/// were, with their words and bytes. `options` is JSON.
+/// were, with their words and bytes. `registers` and `options` are JSON.
 ///
 /// `watch` hears, once a second of the board's, what share is played; what it raises ends the play.
 #[pyfunction]
@@ -122,7 +121,7 @@ struct PlayedBy {
 fn play<'py>(
     py: Python<'py>,
     parts: ArrayParts,
-    preset: &str,
+    registers: &str,
     sensor: &str,
     seed: u64,
     acts: Vec<ActIn<'py>>,
@@ -130,9 +129,8 @@ fn play<'py>(
     options: &str,
     watch: Py<PyAny>,
 ) -> PyResult<(EventsOut<'py>, u64, u64, u64)> {
-    let (array, registers) = (to_array(parts)?, Registers::preset(preset).map_err(core)?);
-    let PlayedBy { wire, circuit, asynchronous } = parsed("options", options)?;
-    let (registers, sensor) = (Registers { wire_version: wire, ..registers }, to_sensor(sensor)?);
+    let (array, registers, sensor) = (to_array(parts)?, parsed("registers", registers)?, to_sensor(sensor)?);
+    let PlayedBy { circuit, asynchronous } = parsed("options", options)?;
     let play = Play { array, registers, sensor, seed, acts: to_acts(acts)?, tare_ms, circuit, asynchronous };
     let Played { events, datagrams, words, bytes } = enter_telling(py, |stop, teller| {
         play.hear(|share| teller.tell(Some(&watch), |py, told| told.call1(py, (share,))), stop)

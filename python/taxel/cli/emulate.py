@@ -23,8 +23,8 @@ from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
+from taxel.simulate.board import fitting
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
-from taxel.wire import Registers
 
 __all__ = ["emulate"]
 
@@ -51,7 +51,10 @@ def emulate(
         ),
     ] = None,
     preset: Annotated[
-        str | None, typer.Option(help='The registers: "5.2 kHz" (or the scene\'s), "2 kHz", "20.8 kHz".')
+        str | None,
+        typer.Option(
+            help='The registers: "5.2 kHz" (or the scene\'s, or those of a larger array at reset), "2 kHz", "20.8 kHz".'
+        ),
     ] = None,
     wire: Annotated[
         int | None,
@@ -124,11 +127,8 @@ def emulate(
     if labels is not None:
         try_whole(labels, overwrite=overwrite)
     written = None if scene is None else SceneFile.open(scene)
-    said_by = written or SceneFile(Scene({}))
+    said_by = _with(written or SceneFile(Scene({})), preset, known=replay is None and not pipe)
     tare = said_by.tare_ms / 1e3 if tare is None else tare
-    preset = said_by.preset if preset is None else preset
-    # Wrong ones are said before anything else is.
-    Registers.preset(preset)
     seed = (secrets.randbelow(TRAINING_SEED) if written is None else written.seed) if seed is None else seed
     flaws, faults, lines = _flaws(flaw or [], seed), _faults(fault or [], seed), _circuit(circuit or [], seed)
     console = Console(stderr=True, quiet=as_json)
@@ -167,7 +167,7 @@ def emulate(
                     f"[{host}]:{port}" if ":" in host else f"{host}:{port}",
                     touch,
                     seed=seed,
-                    preset=preset,
+                    preset=said_by.preset,
                     tare_ms=1e3 * tare,
                     array=said_by.array,
                     sensor=said_by.sensor,
@@ -199,11 +199,19 @@ def emulate(
     if labels is not None:
         console.print(f"truth: {labels}", soft_wrap=True)
     if as_json:
-        about: dict[str, Any] = {"seed": seed, "scenes": scenes, "preset": preset, "held": report.held}
+        about: dict[str, Any] = {"seed": seed, "scenes": scenes, "preset": said_by.preset, "held": report.held}
         about |= {"verdict": report.verdict, "wanted_hz": report.wanted_hz, "reached_hz": report.reached_hz}
         typer.echo(json.dumps({**about, **asdict(report)}))
     else:
         _say(report, in_time=not pipe)
+
+
+def _with(file: SceneFile, preset: str | None, *, known: bool) -> SceneFile:
+    """Return what the board plays by; a wrong preset is said before anything else, where the array is known."""
+    chosen = file if preset is None else replace(file, preset=preset)
+    if known:
+        fitting(chosen.preset, chosen.array)
+    return chosen
 
 
 def _together(*, scene: Path | None, replay: Path | None, pipe: bool, rest: bool, counted: bool) -> None:

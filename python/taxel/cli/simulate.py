@@ -41,7 +41,6 @@ def simulate(
     from taxel._files import try_whole, write_whole  # noqa: PLC0415
     from taxel.plot.film import film, writer_of  # noqa: PLC0415
     from taxel.simulate import SceneFile, play, truth  # noqa: PLC0415
-    from taxel.wire import Registers  # noqa: PLC0415
 
     said = SceneFile.open(scene)
     seed = said.seed if seed is None else seed
@@ -69,8 +68,7 @@ def simulate(
             lines += [f"  a {output.suffix} cannot hold: {what}" for what in lost]
         if movie is not None:
             task = bar.add_task("drawing", total=1.0)
-            frame_us = Registers.preset(said.preset).frame_us
-            film(played.events, movie, force, frame_us=frame_us, slower=slower, overwrite=overwrite,
+            film(played.events, movie, force, frame_us=said.registers.frame_us, slower=slower, overwrite=overwrite,
                  watch=lambda share: bar.update(task, completed=share))  # fmt: skip
             lines.append(f"film written to {movie}")
     if labels is not None:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from taxel import _core
 from taxel._arguments import callback, instance, mapping, number, parameters, several, shown, text, whole
 from taxel._arguments import path as checked_path
-from taxel._core import FormatError, ProblemError
+from taxel._core import DeviceError, FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
@@ -162,12 +162,12 @@ class Replay:
         """The sensor."""
         return self.source.array
 
-    def registers(self, preset: str) -> Registers:
+    def registers(self, preset: str | None) -> Registers:
         """Return what the board holds that plays it: as it was recorded where that is known, else a preset."""
         known = None if self.recording is None else self.recording.registers
         if known is not None:
             return known.replace(record=False)
-        return _fitting(preset, self.array)
+        return fitting(preset, self.array)
 
     def _touch(self, registers: Registers) -> tuple[Any, ...]:
         if isinstance(self.source, Events):
@@ -215,7 +215,7 @@ class Pipe:
         held, self.shift = _core.registers_of_source(self.array._parts(), self.rate_hz, whole("bits", bits, 1, 16))
         self._held = json.loads(held)
 
-    def registers(self, preset: str) -> Registers:  # noqa: ARG002  the frames say how fast they are
+    def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames say how fast they are
         """Return what the board holds that scans such frames."""
         return Registers._of(self._held, self.array).replace(noise_floor=self._floor)
 
@@ -232,30 +232,44 @@ class Pipe:
         return self._descriptor, list(self._ahead), self.shift, registers.ramp
 
 
-def _fitting(preset: str, array: Array) -> Registers:
-    """Return a preset, fitted to an array where that has other lines."""
-    if max(array.shape) > _THESIS_LINES:
-        return Registers(array=array)
-    held = Registers.preset(preset)
-    return held if array == Array.thesis() else Registers._of({**held._held, "lines": array.columns}, array)
+def fitting(preset: str | None, array: Array) -> Registers:
+    """Return a preset with as many of its lines as an array has; unnamed: "5.2 kHz", or what a larger board resets to.
+
+    Raises
+    ------
+    ProblemError : no such preset
+    DeviceError : the array has more lines than the preset reads
+    """
+    if preset is None:
+        if max(array.shape) > _THESIS_LINES:
+            return Registers(array=array)
+        preset = "5.2 kHz"
+    held = json.loads(_core.registers_preset(text("preset", preset)))
+    try:
+        return Registers._of({**held, "lines": min(held["lines"], array.columns)}, array)
+    except DeviceError as error:
+        size = f"{array.rows} x {array.columns} taxels"
+        raise DeviceError(f'preset "{preset}" does not read {size}: {error}') from None
 
 
 def truth(
-    acts: Sequence[Act], *, preset: str = "5.2 kHz", array: Array | None = None
+    acts: Sequence[Act], *, preset: str | None = None, array: Array | None = None
 ) -> tuple[list[Contact], NDArray[np.float32]]:
     """Return what really happens in acts: touches by the board's clock (us from its first frame), force (N) by frame.
 
     Parameters
     ----------
     acts : sequence of Scene, Silence, Pictures
-    preset : str
-        The board's registers: "5.2 kHz", "2 kHz" or "20.8 kHz".
+    preset : str, optional
+        The board's registers, one of `taxel.wire.PRESETS`, with as many lines as the array has; left out, "5.2 kHz", or
+        what a board of more than 64 lines resets to.
     array : Array, optional
         The thesis' 64 x 64 taxels where it is left out.
 
     Raises
     ------
     SceneError : an act that cannot be played (names it)
+    DeviceError : the array has more lines than the preset reads
 
     Examples
     --------
@@ -263,7 +277,9 @@ def truth(
     >>> round(contacts[0].start_us), float(force[:520].max())
     (427782, 0.0)
     """
-    contacts, force = _core.truth(Array._of(array)._parts(), text("preset", preset), _parts(acts, Array._of(array)))
+    sensed = Array._of(array)
+    held = json.dumps(fitting(preset, sensed)._held)
+    contacts, force = _core.truth(sensed._parts(), held, _parts(acts, sensed))
     return [Contact(*contact) for contact in contacts], force
 
 
@@ -271,7 +287,7 @@ def play(
     acts: Sequence[Act],
     *,
     seed: int,
-    preset: str = "5.2 kHz",
+    preset: str | None = None,
     tare_ms: float = 50.0,
     array: Array | None = None,
     sensor: Mapping[str, float] | None = None,
@@ -298,7 +314,7 @@ def play(
         What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm, gain_spread,
         offset_mv, noise_ticks.
     wire : {1, 2}, optional
-        The version of the wire that it speaks; left out, 1, or 2 where it is asynchronous.
+        The version of the wire that it speaks; left out, its registers', or 2 where it is asynchronous.
     circuit : Circuit, optional
         Lines that its taxels share, settling, comparators with hysteresis; left out, each taxel reads by itself. Its
         voltage and resistor must be the sensor's; the converter's times are the preset's.
@@ -311,6 +327,7 @@ def play(
     ------
     SceneError : an act or a sensor that makes no sense
     ProblemError : acts too short for the tare; a circuit of another voltage or resistor; asynchronous on version 1
+    DeviceError : the array has more lines than the preset, or that version of the wire, reads
 
     Examples
     --------
@@ -318,17 +335,18 @@ def play(
     >>> played.events.markers
     ((50300, True), (59900, False))
     """
-    parts = _parts(acts, Array._of(array))
-    told = reading(circuit, asynchronous)
-    told["wire"] = whole("wire", (2 if asynchronous else 1) if wire is None else wire, 1, 2)
+    sensed = Array._of(array)
+    parts, held = _parts(acts, sensed), fitting(preset, sensed)
+    if wire is not None or asynchronous:
+        held = held.replace(wire_version=2 if wire is None else whole("wire", wire, 1, 2))
     events, datagrams, words, taken = _core.play(
-        Array._of(array)._parts(),
-        text("preset", preset),
+        sensed._parts(),
+        json.dumps(held._held),
         parameters({} if sensor is None else mapping("sensor", sensor)),
         whole("seed", seed, 0),
         parts,
         number("tare_ms", tare_ms),
-        parameters(told),
+        parameters(reading(circuit, asynchronous)),
         callback("watch", watch),
     )
     return Played(Events._from_parts(events), datagrams, words, taken)
@@ -339,7 +357,7 @@ def emulate(
     touch: Iterable[Act] | Replay | Pipe,
     *,
     seed: int = 0,
-    preset: str = "5.2 kHz",
+    preset: str | None = None,
     registers: Registers | None = None,
     tare_ms: float = 50.0,
     array: Array | None = None,
@@ -427,11 +445,11 @@ def emulate(
     felt: Any
     if isinstance(touch, Replay | Pipe):
         sensed, acts = touch.array, None
-        held = touch.registers(text("preset", preset)) if registers is None else registers
+        held = touch.registers(preset) if registers is None else registers
         felt = touch._touch(instance("registers", held, Registers))
     else:
         sensed, acts = Array._of(array), _checked(touch, Array._of(array))
-        held = _fitting(text("preset", preset), sensed) if registers is None else registers
+        held = fitting(preset, sensed) if registers is None else registers
         felt = acts
     held = instance("registers", held, Registers)
     if wire is not None:

@@ -19,7 +19,7 @@ from taxel._arguments import path as checked_path
 from taxel._core import SceneError
 from taxel.array import Array
 from taxel.simulate.acts import Act, Scene, Silence
-from taxel.simulate.board import truth
+from taxel.simulate.board import fitting
 from taxel.wire import Registers
 
 __all__ = ["SceneFile"]
@@ -72,8 +72,8 @@ class SceneFile:
     scene: Scene
     seed: int = 0
     """Draws the taxels' spread and their noise."""
-    preset: str = "5.2 kHz"
-    """The board's registers."""
+    preset: str | None = None
+    """The board's registers, as in `play`."""
     tare_ms: float = 50.0
     array: Array = field(default_factory=Array.thesis)
     sensor: Mapping[str, float] = field(default_factory=dict)
@@ -125,14 +125,8 @@ class SceneFile:
         _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
         if not np.isfinite(scene.motion(array=array).force_n).all():
             raise SceneError("foam: the force on it is too large to be told; take a softer one")
-        preset = text("preset", said.get("preset", cls.preset))
-        Registers.preset(preset)
-        try:
-            truth([Silence(_AFTER_MS)], preset=preset, array=array)
-        except _core.DeviceError as error:
-            size = f"array is {array.rows} x {array.columns}"
-            why = f'the preset "{preset}" does not read such a one: {error}'
-            raise SceneError(f"{size}: {why}; must be up to 64 rows of 64 columns") from None
+        preset = text("preset", said["preset"]) if "preset" in said else cls.preset
+        fitting(preset, array)
         tare_ms = number("tare_ms", said.get("tare_ms", cls.tare_ms))
         if not 0 <= tare_ms <= _LONGEST_MS:
             raise SceneError(f"tare_ms is {tare_ms:g} ms: must be from 0 to {_LONGEST_MS:g}")
@@ -144,6 +138,11 @@ class SceneFile:
             array,
             sensor,
         )
+
+    @property
+    def registers(self) -> Registers:
+        """What the board holds that plays it."""
+        return fitting(self.preset, self.array)
 
     def acts(self) -> list[Act]:
         """Return silence for the tare, the scene, and a little silence: what `play` and `emulate` take."""
