@@ -15,10 +15,10 @@ from taxel.information import panzeri_treves
 from taxel.information.bits import confusion_matrix
 from taxel.information.neighbours import distances_of
 from taxel.spikes import to_ms
-from taxel.studies import dropped
+from taxel.studies import dropped, kept_bits
 from taxel.studies.dropped import LENGTH_MS, REGION
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table
 from taxel.wire import FRAME_US
 
 if TYPE_CHECKING:
@@ -272,11 +272,7 @@ def _at_printed(p: Parameters, line: dict[str, Any] | None) -> str:
 
 
 def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> list[Statement]:
-    share = {
-        name: [line["by"][name]["bits"] / line["by"][name]["most"] for line in (short, long)]
-        for name in VARIED
-        if name in short["by"]
-    }
+    share = {name: kept_bits.shares((short, long), name) for name in VARIED if name in short["by"]}
     if len(share) < len(VARIED):
         return []
     lost = {name: a - b for name, (a, b) in share.items()}
@@ -330,32 +326,14 @@ def tables(p: Parameters, said: Said) -> list[Table]:
 
 def draw(p: Parameters, said: Said) -> list[Figure]:
     """Draw 5.11, 5.12 and 5.13."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
-    lines = said["lines"]
-    periods = [line["period_ms"] for line in lines]
-    figures = []
-    for title, label in (("5.11", "bits"), ("5.12", "share of the bits that can be told"), ("5.13", "bits")):
-        figure = Figure(figsize=(6, 4), layout="constrained")
-        ax = figure.subplots()
-        if title == "5.11":
-            ax.plot(periods, [line["bits"] for line in lines], "o-", label="sampled from the impact on")
-            ax.plot(periods, [line["any_phase_bits"] for line in lines], "s--", mfc="w", label="at any phase")
-            ax.axhline(np.log2(said["conditions"]), color="0.6", ls=":", label="ceiling")
-        elif title == "5.12":
-            for name in lines[0]["by"]:
-                shares = [line["by"][name]["bits"] / line["by"][name]["most"] for line in lines]
-                ax.plot(periods, shares, "o-", label=VARIED[name])
-        else:
-            for line in lines:
-                ax.plot(*zip(*line["times"], strict=True), ".-", label=_ms(line["period_ms"]))
-        logarithmic(ax, x=p["times_ms"] if title == "5.13" else periods)
-        ax.set_xlabel("ms since impact" if title == "5.13" else "sampling period, ms")
-        ax.set_ylabel(label)
-        ax.set_title(f"figure {title}")
-        ax.legend(fontsize="small")
-        figures.append(figure)
-    return figures
+    return kept_bits.by_period_parameter_and_time(
+        said,
+        figures=("5.11", "5.12", "5.13"),
+        curves={"bits": "sampled from the impact on", "any_phase_bits": "at any phase"},
+        named=VARIED,
+        times_ms=p["times_ms"],
+        since="impact",
+    )
 
 
 STUDY = Study(

@@ -13,9 +13,9 @@ from taxel import encode, information
 from taxel.encode import FA1
 from taxel.simulate import fem
 from taxel.simulate.fem import SamplingGrid
-from taxel.studies import indented
+from taxel.studies import indented, kept_bits
 from taxel.studies.runner import Task
-from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
+from taxel.studies.study import Parameters, Row, Said, Statement, Study, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -202,9 +202,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
 
 
 def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> list[Statement]:
-    share = {
-        name: [line["by"][name]["bits"] / line["by"][name]["most"] for line in (short, long)] for name in short["by"]
-    }
+    share = {name: kept_bits.shares((short, long), name) for name in short["by"]}
     if not {"diameter_mm", "depth_mm"} <= set(share):
         return []
     lost = {name: a - b for name, (a, b) in share.items()}
@@ -266,32 +264,14 @@ def tables(p: Parameters, said: Said) -> list[Table]:
 
 def draw(p: Parameters, said: Said) -> list[Figure]:
     """Draw 5.5, 5.6 and 5.8."""
-    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
-
-    lines = said["lines"]
-    periods = [line["period_ms"] for line in lines]
-    figures = []
-    for title, label in (("5.5", "bits"), ("5.6", "share of the bits that can be told"), ("5.8", "bits")):
-        figure = Figure(figsize=(6, 4), layout="constrained")
-        ax = figure.subplots()
-        if title == "5.5":
-            ax.plot(periods, [line["bits"] for line in lines], "o-", label="A T as printed")
-            ax.plot(periods, [line["even_bits"] for line in lines], "s--", mfc="w", label=f"A T of {p['even_ms']:g} ms")
-            ax.axhline(np.log2(said["conditions"]), color="0.6", ls=":", label="ceiling")
-        elif title == "5.6":
-            for name in lines[0]["by"]:
-                shares = [line["by"][name]["bits"] / line["by"][name]["most"] for line in lines]
-                ax.plot(periods, shares, "o-", label=VARIED[name])
-        else:
-            for line in lines:
-                ax.plot(*zip(*line["times"], strict=True), ".-", label=f"{line['period_ms']:g} ms")
-        logarithmic(ax, x=p["times_ms"] if title == "5.8" else periods)
-        ax.set_xlabel("ms since contact" if title == "5.8" else "sampling period, ms")
-        ax.set_ylabel(label)
-        ax.set_title(f"figure {title}")
-        ax.legend(fontsize="small")
-        figures.append(figure)
-    return figures
+    return kept_bits.by_period_parameter_and_time(
+        said,
+        figures=("5.5", "5.6", "5.8"),
+        curves={"bits": "A T as printed", "even_bits": f"A T of {p['even_ms']:g} ms"},
+        named=VARIED,
+        times_ms=p["times_ms"],
+        since="contact",
+    )
 
 
 STUDY = Study(

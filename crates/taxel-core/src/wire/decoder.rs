@@ -730,6 +730,11 @@ mod tests {
         }
     }
 
+    /// So many rounds; under Miri, which is thousands of times slower, two.
+    fn rounds(many: u64) -> std::ops::Range<u64> {
+        0..if cfg!(miri) { 2 } else { many }
+    }
+
     /// A stream of runs: clean changes, pairs, a mix, stamps that jump or fall, rare kinds, damage.
     fn stream(random: &mut StdRng, words: usize) -> Vec<u8> {
         let mut bytes = vec![];
@@ -798,7 +803,7 @@ mod tests {
     fn every_set_of_instructions_decodes_alike() {
         let mut random = StdRng::seed_from_u64(11);
         let mut seen = (0, 0);
-        for round in 0..250 {
+        for round in rounds(250) {
             let side = *[8, 40, 63, 64, 200].choose(&mut random).unwrap();
             let decoder = Decoder::new(Array::new(side, 64, 1.0, "array").unwrap());
             let bytes = stream(&mut random, 3000);
@@ -817,6 +822,7 @@ mod tests {
     }
 
     #[test]
+    #[cfg_attr(miri, ignore = "takes Miri days")]
     fn long_stretches_into_aligned_columns_decode_alike() {
         let mut random = StdRng::seed_from_u64(18);
         let (mut bytes, mut stamp) = (vec![], 0_u16);
@@ -863,7 +869,7 @@ mod tests {
     fn overtaken_datagrams_decode_as_byte_by_byte() {
         let mut random = StdRng::seed_from_u64(17);
         let mut back = 0;
-        for round in 0..60 {
+        for round in rounds(60) {
             let mut datagrams: Vec<Vec<u8>> = Vec::new();
             let mut stamp: u16 = random.random();
             for _ in 0..40 {
@@ -907,7 +913,7 @@ mod tests {
     #[test]
     fn a_cut_changes_nothing() {
         let mut random = StdRng::seed_from_u64(12);
-        for round in 0..100 {
+        for round in rounds(100) {
             let bytes = stream(&mut random, 500);
             for pairing in [Pairing::Direct, Pairing::Taxel] {
                 for differences in [false, true] {
@@ -923,7 +929,7 @@ mod tests {
     fn columns_filled_again_hold_the_same() {
         let mut random = StdRng::seed_from_u64(13);
         let mut columns = Events::empty(Array::thesis());
-        for _ in 0..20 {
+        for _ in rounds(20) {
             let bytes = stream(&mut random, 300);
             let fresh = Decoder::new(Array::thesis()).push(&bytes, None);
             columns.clear();
