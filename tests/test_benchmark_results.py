@@ -14,7 +14,6 @@ RESULTS = ROOT / "benchmarks" / "results"
 #: Commits by the results that name them: they went when history was written anew, or were not clean. To be rerun;
 #: none may be added.
 TO_BE_RERUN: dict[str, str] = {
-    "capture_udp.json": "723d39c",
     "demo.json": "325fc11",
 }
 
