@@ -74,7 +74,7 @@ def emulate(
         typer.Option(
             metavar="NAME=VALUE",
             help="Taxels share lines: gain, switch_ohm, wire_ohm, offset_mv, hysteresis_v, settle_us, amplifier_us; "
-            "one of them puts in the whole circuit, the others as usual. Takes the board below 5.2 kHz.",
+            "one of them puts in the whole circuit, the others as usual. Takes the board to some 2.4 kHz.",
         ),
     ] = None,
     asynchronous: Annotated[
