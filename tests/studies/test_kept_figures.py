@@ -3,9 +3,11 @@
 import importlib.util
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from matplotlib.container import BarContainer
 
 from taxel.studies import load
 from taxel.studies.runner import code_digest
@@ -56,3 +58,14 @@ def test_a_report_of_other_code_or_of_uncommitted_code_is_not_kept(
 def test_statements_are_judged_from_the_numbers_that_stand_beside_them(file: Path) -> None:
     section = json.loads(file.read_text())
     assert section["statements"] == figures.judged(section), "run docs/figures.py"
+
+
+@pytest.mark.parametrize("file", sorted(figures.FIGURES.glob("*.json")), ids=lambda file: file.stem)
+def test_bars_begin_at_zero(file: Path) -> None:
+    """A bar's length is what is read of it."""
+    section = json.loads(file.read_text())
+    drawn = load(file.stem).draw(section["parameters"], section["said"])
+    for axes in (axes for figure in (drawn if isinstance(drawn, Sequence) else [drawn]) for axes in figure.axes):
+        for bars in (holder for holder in axes.containers if isinstance(holder, BarContainer)):
+            low, high = sorted(axes.get_ylim() if bars.orientation == "vertical" else axes.get_xlim())
+            assert low <= 0 <= high, f"{axes.get_ylabel()} from {low:g} to {high:g}"

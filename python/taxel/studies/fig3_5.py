@@ -219,25 +219,28 @@ def draw(p: Parameters, said: Said) -> list[Figure]:
     """Draw 3.5, accuracy by force, and 3.6, training error over epochs."""
     from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
 
-    bars, curves = Figure(figsize=(6, 3.6), layout="constrained"), Figure(figsize=(6, 3.6), layout="constrained")
-    ax = bars.subplots()
+    accuracy, curves = (Figure(figsize=(6, 3.6), layout="constrained") for _ in range(2))
+    ax = accuracy.subplots()
     lines = [{**line, "reading": "ours"} for line in said["forces"]] + said["others"]
     readings = list(dict.fromkeys(line["reading"] for line in lines))
     for k, force in enumerate(p["forces_n"]):
         here = [line for line in lines if line["force_n"] == force]
-        at = np.arange(len(readings)) + (k - (len(p["forces_n"]) - 1) / 2) * 0.38
-        ax.bar(
+        # Points, beside each other: bars would have to begin at 0, and what matters lies above chance.
+        at = np.arange(len(readings)) + (k - (len(p["forces_n"]) - 1) / 2) * 0.2
+        ax.errorbar(
             at,
             [o["accuracy"] for o in here],
             yerr=[o["sd"] for o in here],
+            fmt="o",
             color=f"C{k}",
-            width=0.36,
+            markersize=5,
             capsize=3,
             label=f"{force:g} N",
         )
+    ax.axhline(50, color="grey", linestyle=":", linewidth=0.8, label="by chance")
     ax.set_xticks(range(len(readings)), readings, rotation=20, ha="right")
-    ax.set(ylabel="accuracy, %", ylim=(min(90.0, *(line["accuracy"] - line["sd"] - 2 for line in lines)), 102))
-    ax.legend(fontsize="small", loc="upper left")
+    ax.set_ylabel("accuracy, % (mean, sd over splits)")
+    accuracy.legend(fontsize="small", loc="outside upper center", ncols=3)
     ax = curves.subplots()
     for k, line in enumerate(said["forces"]):
         epochs, error = np.arange(1, len(line["error"]) + 1), 100 * np.array(line["error"])
@@ -247,7 +250,7 @@ def draw(p: Parameters, said: Said) -> list[Figure]:
     ax.axhline(100 * ERROR, color="0.6", lw=0.8)
     ax.set(xlabel="epoch", ylabel="training error, %")
     ax.legend(fontsize="small")
-    return [bars, curves]
+    return [accuracy, curves]
 
 
 STUDY = Study(
