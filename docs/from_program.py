@@ -6,6 +6,7 @@ A page asks for them by ``{eval-rst}`` directives: ``.. studies::`` and ``.. com
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -44,12 +45,28 @@ class Studies(FromProgram):
     def lines(self) -> list[str]:
         """Return a section a study."""
         self.state.document.settings.env.note_dependency(str(FIGURES))
-        found = []
-        for name in STUDIES:
-            file = FIGURES / f"{name}.json"
-            if file.exists():
-                found += study(json.loads(file.read_text()))
-        return found
+        files = [FIGURES / f"{name}.json" for name in STUDIES]
+        kept = [json.loads(file.read_text()) for file in files if file.exists()]
+        return [*times(kept), *(line for section in kept for line in study(section))]
+
+
+def times(kept: list[dict[str, Any]]) -> list[str]:
+    """Return what the studies took, added up by the chapter that each is of or stands beside."""
+    chapters: dict[str, list[dict[str, Any]]] = {}
+    for section in kept:
+        stated = re.search(r"\b(\d)\.\d", section["where"])
+        chapters.setdefault(stated[1] if stated else "none", []).append(section)
+    rows = []
+    for title, here in [*sorted(chapters.items()), ("all", kept)]:
+        other = [
+            f"{one['name']} ({', '.join([one['size']] * (one['size'] != 'full') + one['changed'])})"
+            for one in here
+            if one["size"] != "full" or one["changed"]
+        ]
+        minutes = sum(one["cpu_seconds"] for one in here) / 60
+        rows.append([title, str(len(here)), f"{minutes:.1f}", ", ".join(other) if title != "all" else ""])
+    head = ["chapter", "studies", "CPU minutes", "not at full size, or with other parameters"]
+    return [*heading("What they took"), *table(head, rows, "10 10 15 65")]
 
 
 def study(section: dict[str, Any]) -> list[str]:

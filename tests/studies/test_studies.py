@@ -124,6 +124,17 @@ def test_the_page_holds_every_picture_and_names_what_was_not_run(report, tmp_pat
     assert '"axes":[' not in empty.text
 
 
+def test_the_page_adds_up_what_its_studies_took(report, tmp_path):
+    for name, seconds in zip(MADE_HERE, (3600.0, 3000.0), strict=False):
+        load(name).run(report, size="toy", quiet=True)
+        folder = shutil.copytree(report / name, tmp_path / name)
+        section = json.loads((folder / "summary.json").read_text())
+        (folder / "summary.json").write_text(json.dumps(section | {"cpu_seconds": seconds}))
+    page = Page()
+    page.feed(write_page(tmp_path).read_text())
+    assert "1.8 h of CPU" in page.text
+
+
 def test_a_page_shows_the_kept_picture_of_numbers_that_the_code_cannot_draw_any_more(report, tmp_path):
     name = MADE_HERE[0]
     load(name).run(report, size="toy", quiet=True)
