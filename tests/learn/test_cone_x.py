@@ -258,6 +258,24 @@ def test_a_shift_in_time_and_another_order_of_trains_change_nothing():
     assert moved.weights_ == pytest.approx(here.weights_[order], abs=1e-6)
 
 
+@pytest.mark.parametrize("after", ["keep", "ignore", "reset"])
+def test_days_from_time_0_the_verdict_is_the_same(after):
+    for seed in range(60):
+        random = np.random.default_rng([after == "keep", seed])
+        tau = float(random.choice([0.5, 15.0, 190.0]))
+        neuron = Neuron(tau=tau, refractory=random.uniform(0.05, 1.5) * tau, after_spike=after)
+        # In 1024ths of a ms all that is given moves without rounding; the end of a refractory time does not.
+        times = [np.unique(np.round(random.uniform(0, 12 * tau, 6) * 1024)) / 1024 for _ in range(30)]
+        targets = np.round(np.array([3.0, 6.0, 9.0]) * tau * 1024) / 1024
+        fits = []
+        for shift in (0.0, 2.0 ** random.integers(25, 33)):
+            trains = SpikeTrains.from_lists([t + shift for t in times], start=shift, stop=14 * tau + shift)
+            fits.append(ConeX(neuron=neuron, lb=-1, ub=1).fit([trains], [targets + shift]))
+        here, there = fits
+        assert there.status_ == here.status_
+        assert there.objective_ == pytest.approx(here.objective_, rel=1e-4)
+
+
 @pytest.mark.parametrize(
     "options",
     [

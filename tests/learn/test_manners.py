@@ -100,9 +100,10 @@ def test_scores_lie_between_0_and_1_and_predictions_are_spikes(name):
 
 
 @each_learner
-def test_moved_in_time_it_learns_the_same(name):
+@pytest.mark.parametrize("shift", [1000.0, 1e9])
+def test_moved_in_time_it_learns_the_same(name, shift):
     here, _ = fitted(name)
-    there, _ = fitted(name, 1000.0)
+    there, _ = fitted(name, shift)
     assert there.weights_ == pytest.approx(here.weights_, abs=2e-4 * np.abs(here.weights_).max())
 
 

@@ -206,15 +206,27 @@ def test_a_finer_grid_comes_to_the_exact_crossings():
     assert all(0 <= d <= step for d, step in zip(late, (1.0, 0.1, 0.01, 0.001), strict=True))
 
 
-@given(seed=st.integers(0, 10_000), shift=st.integers(-1000, 1000), after=st.sampled_from(["keep", "ignore", "reset"]))
-@settings(max_examples=60, deadline=None)
-def test_a_shift_in_time_shifts_the_spikes(seed, shift, after):
+@given(
+    seed=st.integers(0, 10_000),
+    shift=st.one_of(st.integers(-1000, 1000), st.integers(20, 35).map(lambda k: 2.0**k)),
+    tau=st.sampled_from([0.5, 7.0, 190.0]),
+    refractory=st.sampled_from([0.37, 3.0]),
+    after=st.sampled_from(["keep", "ignore", "reset"]),
+    first=st.sampled_from(["theta_0", "printed"]),
+    time=st.sampled_from([{}, {"time": "grid", "step_ms": 0.1}, {"time": "grid", "step_ms": 1.0}]),
+)
+@settings(max_examples=300, deadline=None)
+def test_a_shift_in_time_shifts_the_spikes(seed, shift, tau, refractory, after, first, time):
     weights, trains = random_trains(seed)
-    there = SpikeTrains.from_lists([t + shift for t in trains], start=trains.start + shift, stop=trains.stop + shift)
-    neuron = Neuron(tau=7.0, after_spike=after)
-    here, moved = neuron.run(weights, trains), neuron.run(weights, there)
-    # Rounding of the shifted inputs can part the trains after many spikes; the first ones must agree.
-    assert moved[:3] - shift == pytest.approx(here[:3], abs=1e-6)
+    # In 1024ths of a ms inputs move without rounding, a year from time 0 too.
+    times = [np.round(t * 1024) / 1024 for t in trains]
+    there = SpikeTrains.from_lists([t + shift for t in times], start=trains.start + shift, stop=trains.stop + shift)
+    here = SpikeTrains.from_lists(times, start=trains.start, stop=trains.stop)
+    neuron = Neuron(tau=tau, refractory=refractory, after_spike=after, first_threshold=first, **time)
+    fired, moved = neuron.run(weights, here), neuron.run(weights, there)
+    for other in (moved, neuron.run_many([weights], there)[0]):
+        assert len(other) == len(fired)
+        assert other - shift == pytest.approx(fired, abs=1e-6 + 1e-13 * abs(shift))
 
 
 @given(seed=st.integers(0, 10_000), factor=st.floats(0.1, 10.0))

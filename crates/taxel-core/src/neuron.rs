@@ -16,7 +16,7 @@ mod threshold;
 
 pub(crate) use crossing::peak;
 pub use kernel::{Kernel, KernelSum, Shape, Step};
-pub(crate) use model::{AT_EDGE, ROUNDING_MS};
+pub(crate) use model::{AT_EDGE, rounding_ms};
 pub use model::{AfterSpike, FirstThreshold, Neuron, Time};
 pub(crate) use points::{MOST_LAID_OUT, check_points, points_between};
 pub use population::Weight;

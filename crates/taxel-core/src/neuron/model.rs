@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::kernel::{Kernel, Shape};
 use super::points::{MOST_LAID_OUT, check_points, points_between};
+use super::threshold::left_of_rise;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};
@@ -81,11 +82,18 @@ pub struct Neuron {
 /// An input so near an end of a refractory time counts as at it, and one so short a time before the neuron's own spike as at
 /// the spike, ms: trained neurons fire within 1e-6 ms of their targets, and inputs at whole ms often lie just there.
 pub(crate) const AT_EDGE: f64 = 1e-6;
-/// Rounding of a time that is the sum of others, on the very edge of a refractory time, ms.
-pub(crate) const ROUNDING_MS: f64 = 1e-9;
+/// Rounding of a time that is the sum of others, on the very edge of a refractory time, ms, and in neighbouring numbers: from
+/// some 20 minutes on these lie farther apart.
+const ROUNDING_MS: f64 = 1e-9;
+const ROUNDINGS: f64 = 4.0;
 /// How far below the threshold a potential may end and still count as reaching it, mV where `theta_0` is 0.3 mV and in
 /// proportion elsewhere: rounding of a potential that was trained to touch the threshold.
 const TOUCH: f64 = 1e-12;
+
+/// How far apart two sums of times may lie at `t` and count as equal, ms.
+pub(crate) fn rounding_ms(t: f64) -> f64 {
+    (ROUNDINGS * f64::EPSILON * t.abs()).max(ROUNDING_MS)
+}
 
 impl Default for Neuron {
     fn default() -> Self {
@@ -188,16 +196,12 @@ impl Neuron {
     /// In the refractory time the potential is 0 and the threshold does not matter.
     #[must_use]
     pub fn threshold(&self, since: Option<f64>) -> f64 {
-        self.theta_0 + self.rise(since)
+        self.theta_0 + since.map_or(0.0, |t| self.rise(Some(0.0), t))
     }
 
-    /// What is left of the threshold's rise `since` ms after the last spike, mV.
-    pub(crate) fn rise(&self, since: Option<f64>) -> f64 {
-        since.map_or(0.0, |s| {
-            let recovering = s - self.refractory;
-            // A rise that rounding puts a hair before its time must still be there (an input can lie just on the edge).
-            if recovering < -ROUNDING_MS { 0.0 } else { self.theta_plus * (-recovering / self.tau_rec()).exp() }
-        })
+    /// What is left at `t` of the threshold's rise by the last spike, mV.
+    pub(crate) fn rise(&self, spike: Option<f64>, t: f64) -> f64 {
+        spike.map_or(0.0, |spike| left_of_rise(self.theta_plus, t - spike - self.refractory, self.tau_rec(), t))
     }
 
     /// How many points of the grid lie from `start` to `end`.

@@ -1,6 +1,6 @@
 //! The threshold after a spike, and the spike that crossed it.
 
-use super::model::{FirstThreshold, Neuron, ROUNDING_MS};
+use super::model::{FirstThreshold, Neuron, rounding_ms};
 
 /// A spike of the neuron.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,6 +9,13 @@ pub struct OutputSpike {
     pub t: f64,
     /// How steeply it crossed, mV/ms.
     pub slope: f64,
+}
+
+/// What is left at `t` of a rise of `plus` mV that set in `recovering` ms ago, mV (6.8).
+///
+/// One that rounding puts a hair before its time must still be there: an input can lie just on the edge.
+pub(super) fn left_of_rise(plus: f64, recovering: f64, tau_rec: f64, t: f64) -> f64 {
+    if plus == 0.0 || recovering < -rounding_ms(t) { 0.0 } else { plus * (-recovering / tau_rec).exp() }
 }
 
 /// The threshold with its memory of the last spike.
@@ -47,18 +54,12 @@ impl Threshold {
 
     /// What is left of the rise at `t`, mV.
     pub(super) fn rise(&self, t: f64) -> f64 {
-        if self.plus == 0.0 {
-            return 0.0;
-        }
-        self.since.map_or(0.0, |since| {
-            let recovering = t - since - self.refractory;
-            if recovering < -ROUNDING_MS { 0.0 } else { self.plus * (-recovering / self.tau_rec).exp() }
-        })
+        self.since.map_or(0.0, |since| left_of_rise(self.plus, t - since - self.refractory, self.tau_rec, t))
     }
 
     /// Whether the neuron cannot fire at `t`: `0 < t - spike <= refractory` (6.6).
     pub(super) fn silent_at(&self, t: f64) -> bool {
-        self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + ROUNDING_MS)
+        self.fired.is_some_and(|spike| spike < t && t <= spike + self.refractory + rounding_ms(t))
     }
 
     /// Whether a potential on a grid has reached the threshold at `t`, and the neuron may fire.

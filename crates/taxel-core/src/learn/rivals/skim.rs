@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use super::batch::{BatchRule, Learnt};
 use crate::allowed::{Range, one_weight_a_train, ranges};
 use crate::metrics::matching::matched;
-use crate::neuron::{Kernel, KernelSum, MOST_LAID_OUT, Shape, check_points, points_between};
+use crate::neuron::{Kernel, KernelSum, MOST_LAID_OUT, Shape, check_points, points_between, rounding_ms};
 use crate::parameters::Described;
 use crate::vectors::dot;
 use crate::{Result, SpikeTrains, Stop, problem};
@@ -256,7 +256,7 @@ impl Skim {
                     if row > 0 {
                         branch.state = step.apply(branch.state);
                     }
-                    while let Some(&(at, weight)) = branch.inputs.get(branch.next).filter(|i| i.0 <= t + 1e-9) {
+                    while let Some(&(at, weight)) = branch.inputs.get(branch.next).filter(|i| i.0 <= t + rounding_ms(t)) {
                         shape.add(&mut branch.state, weight, (t - at).max(0.0));
                         branch.next += 1;
                     }
@@ -279,8 +279,8 @@ impl Skim {
                 wanted.clear();
                 wanted.extend((first..first + block[0].len()).map(|row| {
                     let t = pattern.start + row as f64 * self.step_ms;
-                    let come = targets.partition_point(|&at| at <= t + 1e-9);
-                    let on = come > 0 && t < targets[come - 1] + self.pulse_ms - 1e-9;
+                    let come = targets.partition_point(|&at| at <= t + rounding_ms(t));
+                    let on = come > 0 && t < targets[come - 1] + self.pulse_ms - rounding_ms(t);
                     if on { 1.0 } else { 0.0 }
                 }));
                 block.push(std::mem::take(&mut wanted));

@@ -11,7 +11,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, KernelSum, Neuron, ROUNDING_MS, Shape, Time};
+use crate::neuron::{AT_EDGE, AfterSpike, FirstThreshold, KernelSum, Neuron, Shape, Time, rounding_ms};
 use crate::{Result, SpikeTrains, problem};
 
 /// From so near a target on the target's row and its slope row stand for silence, ms; an input so near before it is at it and
@@ -381,7 +381,7 @@ impl Statement {
     /// The same of a time between the last target before it and the first one not before it.
     pub(crate) fn is_silent_between(&self, fired: Option<f64>, t: f64, next: Option<f64>) -> bool {
         let free = fired.is_some_and(|target| match self.neuron.time {
-            Time::Grid => t <= target + self.neuron.refractory + ROUNDING_MS,
+            Time::Grid => t <= target + self.neuron.refractory + rounding_ms(t),
             Time::Continuous => t < target + self.neuron.refractory,
         });
         !free && next.is_none_or(|target| t <= until(target))
@@ -395,7 +395,7 @@ impl Statement {
     /// What is left at `t` of the threshold's rise, the neuron having last fired at `fired`, mV.
     pub(crate) fn rise(&self, sheet: &Sheet, fired: Option<f64>, t: f64) -> f64 {
         let printed = (self.neuron.first_threshold == FirstThreshold::Printed).then_some(sheet.start);
-        self.neuron.rise(fired.or(printed).map(|spike| t - spike))
+        self.neuron.rise(fired.or(printed), t)
     }
 
     /// The margin at `t`, mV.

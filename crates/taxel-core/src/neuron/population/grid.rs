@@ -2,9 +2,9 @@
 
 use super::lanes::{FADED, LANES, Lanes, SLACK, Weight};
 use crate::SpikeTrains;
-use crate::neuron::ROUNDING_MS;
 use crate::neuron::kernel::{KernelSum, Step};
 use crate::neuron::model::{AfterSpike, Neuron};
+use crate::neuron::rounding_ms;
 use crate::neuron::threshold::Threshold;
 use crate::vectors::wide;
 
@@ -39,7 +39,7 @@ struct Input {
 impl Lanes {
     /// The rise sets in where it is time.
     fn recover(&mut self, lane: usize, threshold: &Threshold, t: f64) {
-        if self.edge[lane] <= t + ROUNDING_MS {
+        if self.edge[lane] <= t + rounding_ms(t) {
             self.edge[lane] = f64::INFINITY;
             self.rise[lane] = threshold.rise(t);
         }
@@ -154,7 +154,7 @@ pub(super) fn run<W: Weight>(neuron: &Neuron, script: &Script, block: &[[W; LANE
 
 #[inline(always)]
 fn may_matter(lanes: &Lanes, l: usize, t: f64, floor: f64) -> bool {
-    (lanes.b[l] >= floor + lanes.rise[l] * FADED) | (lanes.edge[l] <= t + ROUNDING_MS)
+    (lanes.b[l] >= floor + lanes.rise[l] * FADED) | (lanes.edge[l] <= t + rounding_ms(t))
 }
 
 wide! {
