@@ -7,10 +7,7 @@
 
 use super::peak::{Peak, exceeds};
 use super::rows::{Sheet, Statement, lost, until};
-use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak};
-
-/// How long before a rise of the threshold silence is asked for at the lower one, ms: the simulator's edge has some width.
-const BEFORE_RISE: f64 = 2e-9;
+use crate::neuron::{AfterSpike, FirstThreshold, KernelSum, Shape, Step, peak, rounding_ms};
 
 /// A time at which something happens, with what the sweep needs at each.
 #[derive(Debug, Clone, Copy)]
@@ -138,8 +135,8 @@ fn strip(statement: &Statement, sheet: &Sheet) -> Strip {
     }
     if neuron.first_threshold == FirstThreshold::Printed {
         let rise = sheet.start + neuron.refractory;
-        // Far from time 0 two neighbouring times are farther apart than that.
-        times.extend([(rise - BEFORE_RISE).min(rise.next_down()), rise]);
+        // Silence is asked for at the lower threshold up to there: the neuron's edge has some width.
+        times.extend([rise - 2.0 * rounding_ms(rise), rise]);
     }
     times.retain(|&t| sheet.start <= t && t <= sheet.end);
     times.sort_unstable_by(f64::total_cmp);
