@@ -81,6 +81,28 @@ def test_features_that_never_vary_or_tell_each_other_are_as_in_scikit_learn():
         assert LDA().fit(silent, y).rank_ == 8
 
 
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(("noise", "within"), [(None, 1e-9), (3e-4, 1e-3)])
+def test_directions_in_which_no_class_varies_are_left_out_as_by_scikit_learn(seed, noise, within):
+    """Of spikes, their sums, and of features that tell each other but for the class; by pivots, or by eigenvectors
+    where a feature is neither clearly told nor clearly not (and rounding weighs more)."""
+    random = np.random.default_rng(seed)
+    y = np.arange(600) % 5
+    spikes = random.random((600, 14)) < random.uniform(0.1, 0.5, (5, 14))[y]
+    x = spikes * random.choice([1.0, -1.0, 40.0], 14)
+    x = np.column_stack([x, x[:, :3] @ random.normal(size=(3, 4)), x[:, 3] - x[:, 4], x[:, 5] + 2.0 * y, y == 2])
+    if noise is not None:
+        x = np.column_stack([x, x[:, 0] + noise * x[:, 0].std() * random.normal(size=600)])
+    with pytest.warns(UserWarning, match=r"of \d+ directions"):
+        ours = LDA().fit(x, y)
+    # Their cut is of the singular value, ours of its square.
+    theirs = LinearDiscriminantAnalysis(tol=1e-5).fit(x, y)
+    new = x + random.normal(size=x.shape)
+    expected = theirs.decision_function(new)
+    assert apart(ours.decision_function(new), expected) < within * np.abs(expected).max()
+    assert np.array_equal(ours.predict(x), theirs.predict(x))
+
+
 def test_values_far_from_zero_keep_their_digits():
     x, y = clouds(300, 6, 3, 4)
     fold = folds(y, count=5)
