@@ -1,6 +1,6 @@
 """Parts of the documentation that are made of the program: the studies' figures, every command's options.
 
-A page asks for them by ``{eval-rst}`` directives: ``.. studies::`` and ``.. commands::``.
+A page asks for them by directives: ``.. studies::``, ``.. commands::`` and ``.. rivals::``.
 """
 
 from __future__ import annotations
@@ -16,6 +16,8 @@ from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 
+from taxel import learn
+from taxel._parameters import Parameters
 from taxel.cli import app as command_line
 from taxel.studies import STUDIES
 
@@ -86,6 +88,20 @@ def study(section: dict[str, Any]) -> list[str]:
     rows = [[s["says"], s["published"], s["ours"], VERDICTS[s["holds"]], s["why"]] for s in section["statements"]]
     lines += table(["statement", "published", "ours", "", "why, or under which reading"], rows, "30 15 20 10 25")
     return [*lines, "", f"**Protocol.** {literal(section['protocol'])}", ""]
+
+
+class Rivals(FromProgram):
+    """Every learner of the registry that is not CONE."""
+
+    def lines(self) -> list[str]:
+        """Return a class a learner."""
+        kinds = [kind for kind in vars(learn).values() if isinstance(kind, type) and issubclass(kind, Parameters)]
+        others = sorted(kind.__name__ for kind in kinds if "Cone" not in kind.__name__)
+        return [
+            line
+            for name in others
+            for line in (f".. autoclass:: taxel.learn.{name}", "   :members:", "   :inherited-members:", "")
+        ]
 
 
 class Commands(FromProgram):
@@ -161,4 +177,5 @@ def setup(app: Sphinx) -> dict[str, Any]:
     """Register the directives."""
     app.add_directive("studies", Studies)
     app.add_directive("commands", Commands)
+    app.add_directive("rivals", Rivals)
     return {"parallel_read_safe": True}

@@ -18,6 +18,8 @@ from encode import test_laws as laws
 from matplotlib.figure import Figure
 
 import taxel
+from taxel import _core
+from taxel._parameters import described
 
 mpl.use("Agg")
 
@@ -912,6 +914,12 @@ CALLED = {"answer", "progress", "say", "watch"}
 for encoder in laws.ENCODERS.values():
     # One sound call of each encoder of the registry: its first example.
     SOUND.setdefault(f"taxel.encode.{type(encoder).__name__}", plain(type(encoder), **encoder.get_params(deep=False)))
+
+for metric in _core.metric_names():
+    # And of each metric that has no more to be asked than defaults say.
+    distance = getattr(taxel.metrics, metric, None)
+    if distance is not None and not described(metric)["required"]:
+        SOUND.setdefault(f"taxel.metrics.{metric}", plain(distance, a=UNSIGNED, b=UNSIGNED))
 
 #: What is not tried, and why.
 LEFT_OUT = {

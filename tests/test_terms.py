@@ -11,7 +11,10 @@ from typing import Any
 import typer
 
 import taxel
+from taxel import _core
+from taxel._parameters import Parameters
 from taxel.cli import app
+from taxel.encode import Encoder
 
 PAGE = (Path(__file__).parents[1] / "docs" / "terms.md").read_text()
 NAMES, OPTIONS = PAGE.split("## Names")[1].split("## Options of the command line")
@@ -30,6 +33,12 @@ def public() -> set[str]:
     return {name for room in ROOMS for name in importlib.import_module(room).__all__}
 
 
+def registered() -> set[str]:
+    """Return encoders, learners and metrics: a new one needs no line, its docstring stands on the page of its room."""
+    learners = {n for n, kind in vars(taxel.learn).items() if isinstance(kind, type) and issubclass(kind, Parameters)}
+    return learners | {kind.__name__ for kind in Encoder._by_name.values()} | set(_core.metric_names())
+
+
 def options(command: Any) -> set[str]:
     """Return the long options of a command and of those below it."""
     below = getattr(command, "commands", {}).values()
@@ -39,7 +48,8 @@ def options(command: Any) -> set[str]:
 
 def test_every_public_name_has_its_line() -> None:
     known, said = public(), first_cells(NAMES)
-    assert not known - said, f"docs/terms.md: add what {', '.join(sorted(known - said))} is, with its source"
+    without = known - said - registered()
+    assert not without, f"docs/terms.md: add what {', '.join(sorted(without))} is, with its source"
     assert not said - known, f"docs/terms.md: {', '.join(sorted(said - known))} is no public name"
 
 

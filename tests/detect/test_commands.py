@@ -83,7 +83,7 @@ def test_a_trained_readout_finds_what_it_never_heard(folder: Path, trained: Path
     assert len(result["detections"]) == 12
     # The labels of all recordings do as well: this one is named in them.
     code, out, _ = call(capsys, *arguments, "--truth", folder / "labels.csv", "--window-ms", 10)
-    assert (code, out.count("contact")) == (0, 6 + 2)
+    assert (code, out.count("contact")) == (0, 6 + 4)
     assert "known (ms)" in out
 
 
@@ -361,8 +361,12 @@ def test_folds_judge_what_was_not_trained_on_and_search_chooses(folder: Path, ca
     code, _, error = call(capsys, *arguments, "--search", "-o", tmp_path / "b.json")
     assert (code, "lists no other points" in error) == (2, True)
     point = ("--set", "neurons.contact.search=[{ub = 1e-6}]")
-    code, out, _ = call(capsys, *arguments, *point, "--search", "--folds", 3, "-o", tmp_path / "c.json")
+    report = ("--report", tmp_path / "r")
+    code, out, _ = call(capsys, *arguments, *point, "--search", "--folds", 3, "-o", tmp_path / "c.json", *report)
     assert code == 0
+    page = (tmp_path / "r" / "report.html").read_text()
+    held, own = page.index("On what was held out"), page.index("On its own training data")
+    assert page.count("9.npz</td>", held, own) == page.count("9.npz</td>", own, page.index("The worst")) == 2
     assert "on what was held out: whole recordings, 3 folds" in out
     assert "contact, chosen: tau 1.5" in out
     code, out, _ = call(capsys, *arguments, "-o", tmp_path / "d.json")

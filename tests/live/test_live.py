@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import socket
 import subprocess
@@ -400,6 +401,24 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path) -> None:
     detected = json.loads(again.stdout)["detections"]
     assert detected == [{key: line[key] for key in keys} for line in lines], "one schema"
     np.testing.assert_array_equal([line["t_us"] for line in lines], taxel.open(tmp_path / "live.mcap").detections.t)
+
+
+def test_taxel_live_prints_a_line_a_detection_where_nobody_watches(tmp_path: Path) -> None:
+    port = free_port()
+    touch().save(tmp_path / "touch.json")
+    arguments = command("live", "--readout", tmp_path / "touch.json", "--host", LOOPBACK, "--port", port)
+    arguments += ["--array", "4x4", "--guard-frames", "1e6"]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        listening(process)
+        play(presses(5), port)
+        assert process.stdout is not None
+        lines = [process.stdout.readline() for _ in range(4)]
+        process.send_signal(signal.SIGINT)
+        rest = process.stdout.read()
+    assert process.returncode == 0
+    lines += rest.splitlines()[:1]
+    assert all(re.match(r" +\d+\.\d{4} s  touch +said -?\d+\.\d\d ms after it was known", line) for line in lines)
+    assert rest.splitlines()[1].startswith("5 detections, ")
 
 
 def test_taxel_live_says_which_taxels_its_tare_does_not_know(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import os
 import re
 import shutil
 import subprocess
+from importlib.resources import files
 
 import matplotlib as mpl
 import numpy as np
@@ -173,6 +174,7 @@ def page(*figures):
         labels=["contact"],
         drawn=charts,
         rows=[],
+        held_out=[],
         worst=[],
         viewed=["'a walk.mcap'"],
         scored=False,
@@ -223,6 +225,25 @@ def test_a_browser_draws_every_chart(tmp_path):
     assert re.findall(r'class="charts" data-drawn="(\d+)"', seen) == ["2", "1"]
     assert seen.count("<canvas") == 3
     assert "a line" in seen
+
+
+@pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")
+def test_a_logarithmic_axis_has_round_numbers_wherever_it_begins(tmp_path):
+    own = files("taxel.report").joinpath("charts.js").read_text(encoding="utf-8")
+    function = re.search(r"^function logSplits\(.*?^}$", own, re.MULTILINE | re.DOTALL)[0]
+    stretches = [(1e4, 1e9), (9.2, 870.0), (3e-7, 0.02), (1.0, 10.0), (2.2, 2.9), (97.3, 115.0), (0.4, 1.2)]
+    asked = f"<p id=said></p><script>{function}; document.getElementById('said').textContent = JSON.stringify("
+    seen = opened(f"{asked}{json.dumps(stretches)}.map(([a, b]) => logSplits(a, b)))</script>", tmp_path)
+    said = json.loads(re.search(r'<p id="said">(.*?)</p>', seen)[1])
+    for (low, high), splits in zip(stretches, said, strict=True):
+        decades = [m * 10.0**e for e in range(-9, 10) for m in range(1, 10)]
+        wanted = [v for v in decades if low * (1 - 1e-12) <= v <= high * (1 + 1e-12)]
+        if len(wanted) > 2:
+            assert np.allclose(splits, wanted, rtol=1e-12, atol=0)
+        else:
+            assert 2 <= len(splits) <= 6, splits
+            assert len(set(np.round(np.diff(splits), 12))) == 1
+        assert low <= splits[0] < splits[-1] <= high
 
 
 @pytest.mark.skipif(shutil.which("chromium") is None, reason="no chromium here to open the page")

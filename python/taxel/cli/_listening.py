@@ -74,7 +74,7 @@ def tare_of(said: str | None, recording: Recording) -> Tare | None:
         seconds = float(said)
     except ValueError:
         return Tare.load(said)
-    if not 0 < seconds < 1e6:
+    if not 0 < seconds < np.inf:
         raise ProblemError(f"--tare {said}: must be seconds above 0, or a file")
     source = recorded(recording)
     if not len(source):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections import deque
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -42,9 +43,6 @@ __all__ = ["live"]
 
 #: How often the display is drawn anew, and the end looked for, s.
 _REDRAW = 0.1
-
-#: How many detections the display keeps.
-_SHOWN = 12
 
 
 @app.command()
@@ -97,11 +95,12 @@ def live(
 ) -> None:
     """Listen to a board and say what a readout detects, while it happens; with --panel or --to, show it.
 
-    Shows rates, losses and latency. With --json each detection is one line, written by the thread that made it: label;
-    t_us, known_us and said_us of the board's clock; slope_mv_per_ms; said_ns by this computer's. --send sends the same
-    lines elsewhere; who reads them too slowly loses some, and is told how many. --panel shows the board in a browser,
-    --to in a viewer of others, which loses pictures where it is too slow. Exit code 3 where nothing came or something
-    was lost after it had arrived, 2 where the board has more taxels than the array.
+    Prints a line a detection, and shows rates, losses and latency. With --json each detection is one line of JSON,
+    written by the thread that made it: label; t_us, known_us and said_us of the board's clock; slope_mv_per_ms; said_ns
+    by this computer's. --send sends the same lines elsewhere; who reads them too slowly loses some, and is told how
+    many. --panel shows the board in a browser, --to in a viewer of others, which loses pictures where it is too slow.
+    Exit code 3 where nothing came or something was lost after it had arrived, 2 where the board has more taxels than
+    the array.
 
     Example: taxel live --port 5208 --readout ball.json --tare 0.05 --record ball.mcap
     Example: taxel live --readout ball.json --tare 0.05 --send udp:127.0.0.1:9000 --send serial:/dev/ttyACM0
@@ -158,6 +157,8 @@ def live(
             last = pipeline if shows is None or shows.live is None else shows.live
             summary = last.stop()
             taken = summary.tare
+            # What was still under way when it was asked to end.
+            _drain(last, console, typer.echo)
     if save_tare is not None and taken is not None:
         taken.save(save_tare)
         console.print(f"tare written to {save_tare}")
@@ -268,9 +269,11 @@ def _watch(
     fresh: bool,
 ) -> None:
     """Show what comes and what is said until the time is over; what holds `at_rest` ends with a `fresh` tare."""
-    shown: deque[Said] = deque(maxlen=_SHOWN)
+    # Above the display where both go to one terminal; else what was said is the command's output.
+    above = console.is_terminal and sys.stdout.isatty()
+    say: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else typer.echo
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
-    with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
+    with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True, redirect_stdout=False) as display:
         before, told = None, False
         while before is None or seconds is None or before["seconds"] < seconds:
             try:
@@ -280,9 +283,9 @@ def _watch(
                 if before is None:
                     before = pipeline.counters
                 said = pipeline.next(_REDRAW)
-                while said is not None:
-                    shown.append(said)
-                    said = pipeline.next(0.0)
+                if said is not None:
+                    _tell(said, console, say)
+                _drain(pipeline, console, say)
                 now = pipeline.counters
             except ProblemError:
                 if panel is None or panel.live is pipeline:
@@ -299,17 +302,26 @@ def _watch(
                 told = True
             if now["seconds"] - before["seconds"] >= _REDRAW:
                 lines = [Text(how_it_goes(viewer)) for viewer in looks]
-                display.update(Group(counters_table(before, now), _state(now, shown), *lines))
+                display.update(Group(counters_table(before, now), _state(now), *lines))
                 before = now
 
 
-def _state(now: dict[str, Any], shown: deque[Said]) -> Text:
-    """Return the last detections, the newest last, each with how long after `known` it was said."""
+def _tell(said: Said, console: Console, say: Callable[[str], None]) -> None:
+    """Say a detection in a line, with how long after `known` it was said; with --json its thread has written it."""
+    if not console.quiet:
+        say(f"{said.t / 1e6:10.4f} s  {said.label:<16} said {to_ms(said.said - said.known):.2f} ms after it was known")
+
+
+def _drain(pipeline: Live, console: Console, say: Callable[[str], None]) -> None:
+    """Say all detections that wait."""
+    while (said := pipeline.next(0.0)) is not None:
+        _tell(said, console, say)
+
+
+def _state(now: dict[str, Any]) -> Text:
+    """Return what goes on beside what was said: the tare, lines and events that were lost."""
     if now["taring"]:
         return Text("taking a tare: leave the sensor at rest")
-    lines = [
-        f"{s.t / 1e6:10.4f} s  {s.label:<16} said {to_ms(s.said - s.known):.2f} ms after it was known" for s in shown
-    ]
     sent = "".join(f"\n{one['lost']} lines lost to {one['to']}" for one in now["sent"] if one["lost"])
     dropped = f"\n{now['events_dropped']} events dropped before the readout" if now["events_dropped"] else ""
-    return Text("\n".join(lines) + dropped + sent)
+    return Text((dropped + sent).lstrip())

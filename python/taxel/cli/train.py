@@ -123,7 +123,8 @@ def train(
     if report is not None:
         from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
-        write_listening(report, readout, heard, title=f"How {out} was trained", judged=trained.how)
+        held = () if judged is None else judged.scores
+        write_listening(report, readout, heard, title=f"How {out} was trained", judged=trained.how, held_out=held)
     typer.echo(json.dumps(trained.to_dict()) if as_json else trained.page())
 
 

@@ -177,7 +177,8 @@ def delays_by_class(judged: Judged, plain: Judged) -> Figure:
         axis.set_xticks([-30, -10, -3, -1, 0, 1, 3, 10, 30], ["-30", "-10", "-3", "-1", "0", "1", "3", "10", "30"])
         axis.minorticks_off()
     axes[0, 0].set_yticks(range(len(names)), names)
-    axes[0, 0].invert_yaxis()
+    # Half a class of room at either end, from the first class at the top.
+    axes[0, 0].set_ylim(len(names) - 0.5, -0.5)
     return figure
 
 

@@ -133,21 +133,19 @@ class Score:
 
     def __repr__(self) -> str:
         rows = [*self.by_label.values()] if len(self.by_label) > 1 else []
-        table: list[tuple[str, ...]] = [
-            ("", "events", "found", "missed", "false", "near", "t - event (ms)", "known - event (ms)")
-        ]
-        for one in [*rows, self]:
-            counts = (one.events, one.found, one.missed, one.false, one.false_near)
-            table.append((one.label, *map(str, counts), repr(one.error), repr(one.delay)))
+        every = [*rows, self]
+        counts = [(one.events, one.found, one.missed, one.false, one.false_near) for one in every]
+        table: list[tuple[str, ...]] = [("", "events", "found", "missed", "false", "near")]
+        table += [(one.label, *map(str, row)) for one, row in zip(every, counts, strict=True)]
         widths = [max(len(row[k]) for row in table) for k in range(len(table[0]))]
         lines = [
-            "  ".join(
-                cell.rjust(w) if 0 < k < 6 else cell.ljust(w)
-                for k, (cell, w) in enumerate(zip(row, widths, strict=True))
-            )
+            "  ".join([row[0].ljust(widths[0]), *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))])
             for row in table
         ]
-        return "\n".join(line.rstrip() for line in lines)
+        # Spreads are long: each on a line of its own, within the 80 columns of a terminal.
+        for what, of in (("t - event (ms)", "error"), ("known - event (ms)", "delay")):
+            lines += [what, *(f"{one.label.ljust(widths[0])}  {getattr(one, of)!r}" for one in every)]
+        return "\n".join(lines)
 
 
 def score(

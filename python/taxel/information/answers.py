@@ -348,7 +348,9 @@ class _Asked:
         else:
             reach = to_us(number("window_ms", self.window_ms))
             if not self.finest <= reach < 1e12:
-                raise ProblemError(f"window_ms is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least")
+                raise ProblemError(
+                    f"window_ms is {shown(self.window_ms)}: must be {to_ms(self.finest):g} at least, and below 1e9"
+                )
         self.contact = contacts(self.trials, self.held, self.encoder, self.finest, reach)
         if np.isnan(self.contact).all():
             lasts = max(int(np.ptp(one.source.t)) for one in self.trials if len(one.source))

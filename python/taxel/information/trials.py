@@ -109,7 +109,7 @@ def read_trials(
     place = Path(path("table", table))
     opened = _once(recordings)
     if window_ms is not None and not 0 < number("window_ms", window_ms) < 1e9:
-        raise ProblemError(f"window_ms is {shown(window_ms)}: must be above 0")
+        raise ProblemError(f"window_ms is {shown(window_ms)}: must be above 0 and below 1e9")
     by_name = _named(opened)
     rows = _rows(place, opened)
     named = {row["recording"] for _, row in rows}

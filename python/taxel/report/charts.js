@@ -60,6 +60,23 @@ function folded(text, most) {
   return parts.length ? `${fitted(first, most)}\n${fitted(parts.join(" "), most)}` : fitted(first, most);
 }
 
+/** The numbers from 1 to 9 of each decade between two ends; even steps where these are too few. */
+function logSplits(min, max) {
+  const found = [];
+  for (let e = Math.floor(Math.log10(min)); e <= Math.log10(max); e++) {
+    for (let m = 1; m < 10; m++) {
+      const v = Number(`${m}e${e}`);
+      if (v >= min && v <= max) found.push(v);
+    }
+  }
+  if (found.length > 2) return found;
+  const least = (max - min) / 4;
+  const power = 10 ** Math.floor(Math.log10(least));
+  const step = power * [1, 2, 5, 10].find((s) => s * power >= least);
+  const first = Math.ceil(min / step);
+  return Array.from({ length: Math.floor(max / step) - first + 1 }, (_, k) => +((first + k) * step).toPrecision(12));
+}
+
 function axisOf(axis, upright, width) {
   const said = {
     label: axis.label || undefined,
@@ -78,22 +95,37 @@ function axisOf(axis, upright, width) {
     measure.font = FONT;
     const widest = Math.max(0, ...[...names.values()].flatMap((name) => name.split("\n")).map((name) => measure.measureText(name).width));
     said.splits = (u, k, min, max) => axis.names.map(([at]) => at).filter((at) => at >= min && at <= max);
-    said.values = (u, splits) => splits.map((at) => names.get(at) ?? "");
+    // Of names that would stand in one another the first is said.
+    said.values = (u, splits) => {
+      let last = null;
+      return splits.map((at) => {
+        const name = names.get(at) ?? "";
+        if (upright || lean) return name;
+        const [place, half] = [u.valToPos(at, "x"), measure.measureText(name).width / 2];
+        if (last && Math.abs(place - last.place) < half + last.half + 3) return "";
+        last = { place, half };
+        return name;
+      });
+    };
     said.filter = (u, splits) => splits;
     said.size = upright ? widest + 14 : lean ? widest * 0.75 + 16 : 24;
     if (lean) said.rotate = -45;
   }
   if (axis.scale === "log" && !axis.names) {
-    // Few decades: as many numbers as fit; many: the powers alone.
+    // uPlot's own would begin at the scale's end, whatever number that is.
+    said.splits = (u, k, min, max) => logSplits(min, max);
+    // Few decades: as many numbers as fit; many: the powers alone; within one step: all.
     said.filter = (u, splits) => {
       const scale = u.scales[upright ? "y" : "x"];
       const wide = scale.max / scale.min;
       const first = wide < 12 ? "123456789" : wide < 1000 ? "125" : "1";
-      return splits.map((v) => (v !== null && first.includes(v.toExponential()[0]) && !/^\d\.\d*[1-9]/.test(v.toExponential()) ? v : null));
+      const round = splits.map((v) => (/^\d(e|$)/.test(v.toExponential()) && first.includes(v.toExponential()[0]) ? v : null));
+      return round.filter((v) => v !== null).length > 1 ? round : splits;
     };
   }
   if (axis.names) return said;
-  said.values = (u, splits) => splits.map((v) => (v === null ? "" : Math.abs(v) >= 1e5 || (v !== 0 && Math.abs(v) < 1e-4) ? v.toExponential().replace("e+", "e") : String(+v.toPrecision(9))));
+  const large = axis.scale === "log" ? 1e4 : 1e5;
+  said.values = (u, splits) => splits.map((v) => (v === null ? "" : Math.abs(v) >= large || (v !== 0 && Math.abs(v) < 1e-4) ? v.toExponential().replace("e+", "e") : String(+v.toPrecision(9))));
   if (upright) {
     said.size = (u, values) => {
       measure.font = FONT;

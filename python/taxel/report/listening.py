@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -71,6 +71,7 @@ def write_listening(
     *,
     title: str,
     judged: str = "",
+    held_out: Sequence[Score] = (),
 ) -> Path:
     """Write what a readout heard in recordings as a page with pictures, ``report.html`` in a new folder.
 
@@ -82,7 +83,9 @@ def write_listening(
     listened : list of Listened, one or more
     title : str
     judged : str
-        On what the scores are: held-out data, or the readout's own training data.
+        On what the scores of `listened` are: held-out data, or the readout's own training data.
+    held_out : list of Score, one a recording, or none
+        How readouts trained without each recording, or without parts of it, did on it.
 
     Returns
     -------
@@ -115,7 +118,12 @@ def write_listening(
         readout=repr(readout),
         labels=readout.labels,
         drawn=drawn,
-        rows=[_row(one, label) for one in listened for label in readout.labels],
+        rows=[_row(one, label, one.score) for one in listened for label in readout.labels],
+        held_out=[
+            _row(one, label, own)
+            for one, own in zip(listened, held_out, strict=bool(held_out))
+            for label in readout.labels
+        ],
         worst=[(listened[m.recording].name, m) for label in readout.labels for m in moments[label] if m.badness > 0],
         viewed=[quote(one.name) for one in listened if one.name.endswith(_VIEWED)][:_MOST_VIEWED],
         scored=any(one.score is not None for one in listened),
@@ -131,9 +139,10 @@ def _drawn(figure: Figure | None) -> Markup | None:
     return said
 
 
-def _row(one: Listened, label: str) -> dict[str, Any]:
-    own = None if one.score is None else one.score[label]
-    return {"recording": one.name, "label": label, "said": len(one.found[label]), "score": own}
+def _row(one: Listened, label: str, score: Score | None) -> dict[str, Any]:
+    own = None if score is None else score[label]
+    said = len(one.found[label]) if own is None else own.found + own.false
+    return {"recording": one.name, "label": label, "said": said, "score": own}
 
 
 def _moments(listened: list[Listened], label: str) -> list[_Moment]:
