@@ -23,5 +23,5 @@ pub use converter::{Converter, Moment, Scan};
 pub use fabric::Fabric;
 pub use grid::{Grid, Idle};
 pub use limit::Limit;
-pub use ramp::{Ramp, Shape};
+pub use ramp::{Ramp, RampShape};
 pub use readout::{Divider, VirtualGround};

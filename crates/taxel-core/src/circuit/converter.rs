@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ramp::{RAMP_END_V, Ramp, Shape};
+use super::ramp::{RAMP_END_V, Ramp, RampShape};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};
@@ -19,7 +19,7 @@ pub const TICKS_A_US: f64 = 300.0;
 #[serde(default, deny_unknown_fields)]
 pub struct Converter {
     /// How the ramp rises.
-    pub shape: Shape,
+    pub shape: RampShape,
     /// How long it rises, ticks of 1/300 us.
     pub ramp: u32,
     /// Between a comparator's two thresholds, V (thesis 4.3.2).
@@ -43,7 +43,7 @@ pub struct Converter {
 impl Default for Converter {
     fn default() -> Self {
         Self {
-            shape: Shape::Rc,
+            shape: RampShape::Rc,
             ramp: 150,
             hysteresis_v: 0.1,
             settle_us: 0.05,

@@ -10,7 +10,7 @@ pub const RAMP_END_V: f64 = 3.0;
 /// How the ramp rises.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Shape {
+pub enum RampShape {
     /// A resistor charges a capacitor towards the supply, as the board does (Appendix 1, 2.2.3).
     #[default]
     Rc,
@@ -22,7 +22,7 @@ pub enum Shape {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ramp {
     /// How it rises.
-    pub shape: Shape,
+    pub shape: RampShape,
     /// How long it takes, ticks.
     pub ticks: f64,
 }
@@ -31,7 +31,7 @@ impl Ramp {
     /// An RC ramp.
     #[must_use]
     pub fn rc(ticks: f64) -> Self {
-        Self { shape: Shape::Rc, ticks }
+        Self { shape: RampShape::Rc, ticks }
     }
 
     /// Its time constant, ticks, where it is an RC ramp.
@@ -44,8 +44,8 @@ impl Ramp {
     pub fn volts(&self, ticks: f64) -> f64 {
         let ticks = ticks.clamp(0.0, self.ticks);
         match self.shape {
-            Shape::Rc => -SUPPLY_V * (-ticks / self.constant()).exp_m1(),
-            Shape::Linear => RAMP_END_V * ticks / self.ticks,
+            RampShape::Rc => -SUPPLY_V * (-ticks / self.constant()).exp_m1(),
+            RampShape::Linear => RAMP_END_V * ticks / self.ticks,
         }
     }
 
@@ -59,9 +59,9 @@ impl Ramp {
     #[must_use]
     pub fn ticks_if_it_went_on(&self, volts: f64) -> f64 {
         match self.shape {
-            Shape::Rc if volts >= SUPPLY_V => f64::INFINITY,
-            Shape::Rc => self.constant() * (SUPPLY_V / (SUPPLY_V - volts.max(0.0))).ln(),
-            Shape::Linear => self.ticks * volts.max(0.0) / RAMP_END_V,
+            RampShape::Rc if volts >= SUPPLY_V => f64::INFINITY,
+            RampShape::Rc => self.constant() * (SUPPLY_V / (SUPPLY_V - volts.max(0.0))).ln(),
+            RampShape::Linear => self.ticks * volts.max(0.0) / RAMP_END_V,
         }
     }
 
@@ -69,8 +69,8 @@ impl Ramp {
     #[must_use]
     pub fn least_slope(&self) -> f64 {
         match self.shape {
-            Shape::Rc => (SUPPLY_V - RAMP_END_V) / self.constant(),
-            Shape::Linear => RAMP_END_V / self.ticks,
+            RampShape::Rc => (SUPPLY_V - RAMP_END_V) / self.constant(),
+            RampShape::Linear => RAMP_END_V / self.ticks,
         }
     }
 }
@@ -81,7 +81,7 @@ mod tests {
 
     #[test]
     fn a_ramp_of_either_shape_is_inverted_and_ends_at_three_volts() {
-        for shape in [Shape::Rc, Shape::Linear] {
+        for shape in [RampShape::Rc, RampShape::Linear] {
             let ramp = Ramp { shape, ticks: 150.0 };
             for tick in [0.0, 0.25, 1.0, 77.7, 149.9, 150.0] {
                 assert!((ramp.ticks(ramp.volts(tick)) - tick).abs() < 1e-9, "{shape:?} {tick}");

@@ -22,7 +22,7 @@ const PATIENCE_MS: f64 = 5_000.0;
 /// What kind of touch it was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum TouchKind {
     /// The first impact after the drop.
     First,
     /// A later impact.
@@ -39,7 +39,7 @@ pub enum Kind {
     Pictures,
 }
 
-impl Kind {
+impl TouchKind {
     /// As it is written in JSON.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -59,7 +59,7 @@ impl Kind {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Contact {
     /// What kind.
-    pub kind: Kind,
+    pub kind: TouchKind,
     /// Force leaves zero, us.
     pub start_us: f64,
     /// Force returns to zero, us.
@@ -240,16 +240,16 @@ impl<'a> Player<'a> {
                         if self.touching
                             && let Some(last) = self.contacts.last_mut()
                         {
-                            last.kind = Kind::Rest;
+                            last.kind = TouchKind::Rest;
                         }
-                        self.hand(self.depth, -CLEAR_MM, lift_mm_s * 1e-3, Kind::Rest);
+                        self.hand(self.depth, -CLEAR_MM, lift_mm_s * 1e-3, TouchKind::Rest);
                     }
                 }
                 Ok(())
             }
             Move::Pressed(press) => self.press(press),
-            Move::Rolled(along) => self.go(along, Kind::Roll),
-            Move::Slid(along) => self.go(along, Kind::Slide),
+            Move::Rolled(along) => self.go(along, TouchKind::Roll),
+            Move::Slid(along) => self.go(along, TouchKind::Slide),
         }
     }
 
@@ -262,14 +262,14 @@ impl<'a> Player<'a> {
             (None, depth) => self.push.down_of_depth_mm(depth.unwrap_or(0.0)),
         };
         self.reachable(deep)?;
-        self.hand(-CLEAR_MM, deep, speed, Kind::Hand);
-        self.hand(deep, deep, press.hold_ms, Kind::Hand);
-        self.hand(deep, -CLEAR_MM, speed, Kind::Hand);
+        self.hand(-CLEAR_MM, deep, speed, TouchKind::Hand);
+        self.hand(deep, deep, press.hold_ms, TouchKind::Hand);
+        self.hand(deep, -CLEAR_MM, speed, TouchKind::Hand);
         Ok(())
     }
 
     /// Sets the body down, lets it go or pushes it along, and lifts it.
-    fn go(&mut self, along: &Along, kind: Kind) -> Result<()> {
+    fn go(&mut self, along: &Along, kind: TouchKind) -> Result<()> {
         let weight = self.mass() * GRAVITY * self.scene.slant_deg.to_radians().cos();
         let deep = self.push.down_mm(along.press_n.unwrap_or(weight));
         self.reachable(deep)?;
@@ -280,7 +280,7 @@ impl<'a> Player<'a> {
         if along.press_n.is_some() {
             self.hand(deep, deep, along.for_ms, kind);
         } else {
-            if kind == Kind::Roll {
+            if kind == TouchKind::Roll {
                 // What rolls does not slip where it can turn: a ball each way, a cylinder across its axis.
                 let (ball, _, axis_deg) = self.body.shape.turns();
                 let free = if ball > 0.0 { self.along } else { only_across(self.along, axis_deg) };
@@ -349,7 +349,7 @@ impl<'a> Player<'a> {
         self.speed = 0.0;
         (self.along, self.turning) = ([0.0; 2], [0.0; 2]);
         for _ in 0..steps {
-            self.arrive(self.depth, 0.0, Kind::Hand);
+            self.arrive(self.depth, 0.0, TouchKind::Hand);
         }
     }
 
@@ -408,7 +408,7 @@ impl<'a> Player<'a> {
                 self.scene.foam.modulus_kpa
             )));
         }
-        let kind = if self.contacts.is_empty() { Kind::First } else { Kind::Bounce };
+        let kind = if self.contacts.is_empty() { TouchKind::First } else { TouchKind::Bounce };
         let (down_y, down_x) = self.scene.downhill_deg.to_radians().sin_cos();
         self.along[0] += dt * GRAVITY * tilt_sin * down_x;
         self.along[1] += dt * GRAVITY * tilt_sin * down_y;
@@ -443,7 +443,7 @@ impl<'a> Player<'a> {
     }
 
     /// Moves the body by hand from one depth to another at a speed in mm/ms; where both are one, holds it for `pace` ms.
-    fn hand(&mut self, from: f64, to: f64, pace: f64, kind: Kind) {
+    fn hand(&mut self, from: f64, to: f64, pace: f64, kind: TouchKind) {
         let ms = if from == to { pace } else { (to - from).abs() / pace };
         let steps = (ms / self.inner_ms).round().max(1.0) as u64;
         let speed = (to - from) / (steps as f64 * self.inner_ms);
@@ -459,7 +459,7 @@ impl<'a> Player<'a> {
     }
 
     /// Takes the state at the end of a step, and notes when force left zero or returned there.
-    fn arrive(&mut self, depth: f64, speed: f64, kind: Kind) {
+    fn arrive(&mut self, depth: f64, speed: f64, kind: TouchKind) {
         let (elastic, loss) = self.foam(depth);
         let raw = elastic + loss * speed;
         let touching = depth > 0.0 && raw > 0.0;
@@ -588,7 +588,7 @@ mod tests {
     #[test]
     fn force_is_zero_outside_touches_and_only_there() {
         let motion = play(&dropped(Foam::default(), 30.0, 150.0, 3), QUARTER_US).unwrap();
-        assert_eq!(motion.contacts.iter().filter(|c| c.kind == Kind::Hand).count(), 1);
+        assert_eq!(motion.contacts.iter().filter(|c| c.kind == TouchKind::Hand).count(), 1);
         for (k, force) in motion.tracks[0].force_n.iter().enumerate() {
             let at = k as f64 * QUARTER_US;
             let inside = motion.contacts.iter().any(|c| c.start_us < at && at < c.stop_us);
@@ -610,7 +610,7 @@ mod tests {
         scene.bodies[0].motion = Move::Dropped { height_mm: 120.0, ending };
         let motion = play(&scene, QUARTER_US).unwrap();
         let last = motion.contacts.last().unwrap();
-        assert_eq!(last.kind, Kind::Rest);
+        assert_eq!(last.kind, TouchKind::Rest);
         let still = ((20.0 + 1400.0) * 1e3 / QUARTER_US) as usize;
         assert!(
             (f64::from(motion.tracks[0].force_n[still]) - 36.0 * GRAVITY).abs() < 2e-3,

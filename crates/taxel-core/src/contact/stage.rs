@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bonded::MOST_SWEPT;
 use super::push::Sinking;
-use super::{Bonded, Contact, Footprint, Kind, Motion, Scene, Shape, Taxels, Track};
+use super::{Bonded, Contact, Footprint, Motion, Scene, Shape, Taxels, TouchKind, Track};
 use crate::spikes::us;
 use crate::{Array, Error, Result};
 
@@ -430,7 +430,7 @@ fn touched(pictures: &Pictures, count: usize, size: usize) -> Vec<Contact> {
     let Some(first) = (0..count).find(|k| loaded(*k)) else { return vec![] };
     let last = (0..count).rev().find(|k| loaded(*k)).unwrap_or(first);
     vec![Contact {
-        kind: Kind::Pictures,
+        kind: TouchKind::Pictures,
         start_us: first.saturating_sub(1) as f64 * pictures.period_us,
         stop_us: (last + 1) as f64 * pictures.period_us,
         speed_m_s: 0.0,

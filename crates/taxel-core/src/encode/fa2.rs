@@ -109,7 +109,7 @@ pub(super) struct Fast {
 }
 
 #[derive(Clone)]
-pub(super) struct State {
+pub(super) struct FastState {
     x: Lanes,
     /// The low pass that the first high pass takes away, and what is left.
     first: Lanes,
@@ -120,15 +120,15 @@ pub(super) struct State {
 }
 
 impl Filter for Fast {
-    type State = State;
+    type State = FastState;
 
-    fn settled(&self, x: &Lanes) -> (State, Lanes) {
+    fn settled(&self, x: &Lanes) -> (FastState, Lanes) {
         let none = [0.0; BLOCK];
-        (State { x: *x, first: *x, once: none, second: none, twice: none }, none)
+        (FastState { x: *x, first: *x, once: none, second: none, twice: none }, none)
     }
 
     #[inline(always)]
-    fn step(&self, state: &mut State, x: &Lanes, u: &mut Lanes) -> bool {
+    fn step(&self, state: &mut FastState, x: &Lanes, u: &mut Lanes) -> bool {
         let mut moved = 0;
         for lane in 0..BLOCK {
             let first = self.corner.step(state.first[lane], state.x[lane], x[lane]);
@@ -150,7 +150,7 @@ impl Filter for Fast {
         moved != 0
     }
 
-    fn shift(&self, state: &mut State, lane: usize, by: f64) {
+    fn shift(&self, state: &mut FastState, lane: usize, by: f64) {
         state.x[lane] += by;
         state.first[lane] += by;
     }

@@ -75,7 +75,7 @@ impl Default for Skin {
 
 /// The four types of afferents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Kind {
+pub enum ReceptorKind {
     /// Slowly adapting, small fields.
     #[serde(rename = "SA-1")]
     Sa1,
@@ -90,7 +90,7 @@ pub enum Kind {
     Fa2,
 }
 
-impl Kind {
+impl ReceptorKind {
     /// As people write it.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -107,7 +107,7 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placed {
     /// Its type.
-    pub kind: Kind,
+    pub kind: ReceptorKind,
     /// To the right.
     pub x_mm: f64,
     /// Downwards.
@@ -132,12 +132,12 @@ impl Skin {
     }
 
     /// Type, density a cm^2 and field in mm^2, in the order of the trains.
-    fn types(&self) -> [(Kind, f64, f64); 4] {
+    fn types(&self) -> [(ReceptorKind, f64, f64); 4] {
         [
-            (Kind::Sa1, self.sa1_per_cm2, self.sa1_field_mm2),
-            (Kind::Fa1, self.fa1_per_cm2, self.fa1_field_mm2),
-            (Kind::Sa2, self.sa2_per_cm2, self.sa2_field_mm2),
-            (Kind::Fa2, self.fa2_per_cm2, self.fa2_field_mm2),
+            (ReceptorKind::Sa1, self.sa1_per_cm2, self.sa1_field_mm2),
+            (ReceptorKind::Fa1, self.fa1_per_cm2, self.fa1_field_mm2),
+            (ReceptorKind::Sa2, self.sa2_per_cm2, self.sa2_field_mm2),
+            (ReceptorKind::Fa2, self.fa2_per_cm2, self.fa2_field_mm2),
         ]
     }
 

@@ -27,7 +27,7 @@ impl Slow {
 }
 
 #[derive(Clone)]
-pub(super) struct State {
+pub(super) struct SlowState {
     x: Lanes,
     recent: Lanes,
     long: Lanes,
@@ -35,17 +35,17 @@ pub(super) struct State {
 }
 
 impl Filter for Slow {
-    type State = State;
+    type State = SlowState;
 
     const TELLS_VALUES: bool = true;
 
-    fn settled(&self, x: &Lanes) -> (State, Lanes) {
+    fn settled(&self, x: &Lanes) -> (SlowState, Lanes) {
         let drive = x.map(|x| (1.0 - self.loss) * x);
-        (State { x: *x, recent: *x, long: *x, drive }, drive)
+        (SlowState { x: *x, recent: *x, long: *x, drive }, drive)
     }
 
     #[inline(always)]
-    fn step(&self, state: &mut State, x: &Lanes, u: &mut Lanes) -> bool {
+    fn step(&self, state: &mut SlowState, x: &Lanes, u: &mut Lanes) -> bool {
         let mut moved = 0;
         for lane in 0..BLOCK {
             let (before, now) = (state.x[lane], x[lane]);

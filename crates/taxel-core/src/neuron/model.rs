@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::kernel::{Kernel, Shape};
 use super::points::{MOST_LAID_OUT, check_points, points_between};
-use super::threshold::left_of_rise;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Result, problem};
@@ -93,6 +92,13 @@ const TOUCH: f64 = 1e-12;
 /// How far apart two sums of times may lie at `t` and count as equal, ms.
 pub(crate) fn rounding_ms(t: f64) -> f64 {
     (ROUNDINGS * f64::EPSILON * t.abs()).max(ROUNDING_MS)
+}
+
+/// What is left at `t` of a rise of `plus` mV that set in `recovering` ms ago, mV (6.8).
+///
+/// One that rounding puts a hair before its time must still be there: an input can lie just on the edge.
+pub(super) fn left_of_rise(plus: f64, recovering: f64, tau_rec: f64, t: f64) -> f64 {
+    if plus == 0.0 || recovering < -rounding_ms(t) { 0.0 } else { plus * (-recovering / tau_rec).exp() }
 }
 
 impl Default for Neuron {

@@ -1,6 +1,6 @@
 //! The threshold after a spike, and the spike that crossed it.
 
-use super::model::{FirstThreshold, Neuron, rounding_ms};
+use super::model::{FirstThreshold, Neuron, left_of_rise, rounding_ms};
 
 /// A spike of the neuron.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,13 +9,6 @@ pub struct OutputSpike {
     pub t: f64,
     /// How steeply it crossed, mV/ms.
     pub slope: f64,
-}
-
-/// What is left at `t` of a rise of `plus` mV that set in `recovering` ms ago, mV (6.8).
-///
-/// One that rounding puts a hair before its time must still be there: an input can lie just on the edge.
-pub(super) fn left_of_rise(plus: f64, recovering: f64, tau_rec: f64, t: f64) -> f64 {
-    if plus == 0.0 || recovering < -rounding_ms(t) { 0.0 } else { plus * (-recovering / tau_rec).exp() }
 }
 
 /// The threshold with its memory of the last spike.

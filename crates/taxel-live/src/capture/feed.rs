@@ -24,7 +24,7 @@ struct Session {
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct FeedState {
     bridged: Bridged,
     clock: HostClock,
     session: Option<Session>,
@@ -36,7 +36,7 @@ struct State {
 #[derive(Debug, Clone)]
 pub struct Feed {
     queue: Arc<Queue>,
-    state: Arc<Mutex<State>>,
+    state: Arc<Mutex<FeedState>>,
 }
 
 impl Feed {
@@ -49,7 +49,7 @@ impl Feed {
     /// What cannot be read, or came before, is counted and left out.
     pub fn take(&self, parcel: &[u8]) -> bool {
         let mut state = lock(&self.state);
-        let State { bridged, session, heard, batch, clock } = &mut *state;
+        let FeedState { bridged, session, heard, batch, clock } = &mut *state;
         let Some(parcel) = Parcel::read(parcel) else {
             bridged.refused += 1;
             return true;

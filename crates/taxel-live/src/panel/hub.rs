@@ -86,7 +86,7 @@ pub(super) struct Label {
 
 /// What changes.
 #[derive(Debug, Default)]
-pub(super) struct State {
+pub(super) struct HubState {
     pub(super) control: Option<String>,
     pub(super) registers: Registers,
     pub(super) known: bool,
@@ -103,7 +103,7 @@ pub(super) struct Hub {
     live: Mutex<Option<Arc<LiveSide>>>,
     telling: broadcast::Sender<Told>,
     moved: watch::Sender<u64>,
-    state: Mutex<State>,
+    state: Mutex<HubState>,
     films: Mutex<HashMap<PathBuf, Weak<FileFilm>>>,
     pub(super) recorder: Recorder,
     viewers: AtomicUsize,
@@ -120,7 +120,7 @@ impl Drop for Seat {
 
 impl Hub {
     pub(super) fn new(options: PanelOptions, live: Option<Handle>, office: Box<dyn Office>) -> Result<Arc<Self>> {
-        let state = State { control: options.control.clone(), ..State::default() };
+        let state = HubState { control: options.control.clone(), ..HubState::default() };
         let hub = Arc::new(Self {
             options,
             office: office.into(),
@@ -182,7 +182,7 @@ impl Hub {
         lock(&self.live).clone()
     }
 
-    pub(super) fn state(&self) -> MutexGuard<'_, State> {
+    pub(super) fn state(&self) -> MutexGuard<'_, HubState> {
         lock(&self.state)
     }
 

@@ -42,7 +42,7 @@ pub(super) enum Doing {
 }
 
 #[derive(Debug, Default)]
-pub(super) struct State {
+pub(super) struct RecorderState {
     pub(super) doing: Doing,
     pub(super) plan: Option<Plan>,
     pub(super) last: Option<(String, String)>,
@@ -52,7 +52,7 @@ pub(super) struct State {
 /// See the module.
 #[derive(Debug, Default)]
 pub(super) struct Recorder {
-    pub(super) state: Mutex<State>,
+    pub(super) state: Mutex<RecorderState>,
     pub(super) stop: Notify,
 }
 

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use serde_json::json;
 
 use super::hub::Hub;
-use super::recorder::{Doing, Plan, State};
+use super::recorder::{Doing, Plan, RecorderState};
 use crate::locked::lock;
 use crate::pipeline::Record;
 use crate::recording::Compression;
@@ -32,7 +32,7 @@ pub(super) fn start(hub: &Arc<Hub>, plan: Plan) -> Result<(), String> {
     Ok(())
 }
 
-fn set(hub: &Hub, change: impl FnOnce(&mut State)) {
+fn set(hub: &Hub, change: impl FnOnce(&mut RecorderState)) {
     change(&mut lock(&hub.recorder.state));
     hub.tell_all(&hub.recorder.said());
 }

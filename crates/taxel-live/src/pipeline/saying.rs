@@ -16,9 +16,9 @@ use crate::{Error, Result};
 const WAITING: usize = 1 << 14;
 
 /// Says detections in their order, one at a time: who finds that another thread speaks leaves them to it.
-pub(super) struct Saying(Mutex<State>);
+pub(super) struct Saying(Mutex<SayingState>);
 
-struct State {
+struct SayingState {
     waiting: VecDeque<Detection>,
     /// None while a thread speaks.
     voice: Option<Voice>,
@@ -34,7 +34,7 @@ struct Voice {
 impl Saying {
     pub(super) fn new(sinks: Vec<Box<dyn Sink>>, say: Sender<Said>) -> Self {
         let voice = Some(Voice { sinks, say, failed: false });
-        Self(Mutex::new(State { waiting: VecDeque::new(), voice }))
+        Self(Mutex::new(SayingState { waiting: VecDeque::new(), voice }))
     }
 
     /// Takes detections that are to be said, and says whether nobody speaks.

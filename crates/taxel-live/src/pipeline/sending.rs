@@ -102,11 +102,11 @@ pub(super) struct Sending {
 /// What the thread that makes detections shares with the one that sends what waits.
 pub(super) struct Line {
     to: Destination,
-    state: Mutex<State>,
+    state: Mutex<SendingState>,
     came: Condvar,
 }
 
-struct State {
+struct SendingState {
     device: Option<Device>,
     waiting: VecDeque<Vec<u8>>,
     /// Bytes of the first that have gone already.
@@ -130,7 +130,7 @@ impl Sending {
     pub(super) fn open(to: &Destination) -> Result<Self> {
         let device = Device::open(to)?;
         let counts = Sent { to: to.to_string(), ..Sent::default() };
-        let state = State { device, waiting: VecDeque::new(), gone: 0, counts, closed: false };
+        let state = SendingState { device, waiting: VecDeque::new(), gone: 0, counts, closed: false };
         let line = Arc::new(Line { to: to.clone(), state: Mutex::new(state), came: Condvar::new() });
         let theirs = Arc::clone(&line);
         let thread = std::thread::Builder::new().name("taxel-send".to_owned()).spawn(move || theirs.send_what_waits());
@@ -216,7 +216,7 @@ impl Line {
     }
 }
 
-impl State {
+impl SendingState {
     /// The destination was tried again.
     fn opened(&mut self, tried: Result<Option<Device>>) {
         match tried {

@@ -31,11 +31,11 @@ pub(super) struct Still {
     pub(super) t_us: i64,
     /// Ticks by taxel index; 0 of one that was never heard of.
     pub(super) held: Vec<u16>,
-    state: State,
+    state: StillState,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum State {
+enum StillState {
     Unasked,
     Wanted,
     Given,
@@ -43,8 +43,8 @@ enum State {
 
 impl Still {
     fn want(&mut self) {
-        if self.state == State::Unasked {
-            self.state = State::Wanted;
+        if self.state == StillState::Unasked {
+            self.state = StillState::Wanted;
         }
     }
 }
@@ -71,7 +71,7 @@ impl Stills {
         let values = memory.get_or_insert_default();
         values.clear();
         values.extend(held);
-        let mut still = Still { at_ns, t_us, held: memory.unwrap_or_default(), state: State::Unasked };
+        let mut still = Still { at_ns, t_us, held: memory.unwrap_or_default(), state: StillState::Unasked };
         let asked = self.awaited.len();
         self.awaited.retain(|&t| t > t_us);
         let tenth = self.wanted.is_none_or(|wanted| now.saturating_duration_since(wanted) >= PICTURE_EVERY);
@@ -99,8 +99,8 @@ impl Stills {
 
     /// Gives those that the recording gets and has not got, in order of time.
     pub(super) fn give(&mut self) -> impl Iterator<Item = &Still> {
-        self.kept.iter_mut().filter(|still| still.state == State::Wanted).map(|still| {
-            still.state = State::Given;
+        self.kept.iter_mut().filter(|still| still.state == StillState::Wanted).map(|still| {
+            still.state = StillState::Given;
             &*still
         })
     }

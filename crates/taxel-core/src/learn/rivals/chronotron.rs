@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::epochs::{Correction, Presented, Rule};
 use super::source::Source;
-use super::stepped::{Shape, SteppedNeuron};
+use super::stepped::{Kernels, SteppedNeuron};
 use crate::allowed::{Range, ranges};
 use crate::{Result, problem};
 
@@ -59,12 +59,12 @@ pub(super) const SOURCE: Source = Source {
 };
 
 pub(super) struct ERule {
-    shape: Shape,
+    kernels: Kernels,
     tau_q: f64,
     gamma_r: f64,
 }
 
-pub(super) struct IRule(Shape);
+pub(super) struct IRule(Kernels);
 
 impl ELearning {
     ranges! {
@@ -74,19 +74,19 @@ impl ELearning {
 
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<ERule> {
         self.check_ranges()?;
-        Ok(ERule { shape: neuron.shape(), tau_q: self.tau_q, gamma_r: self.gamma_r })
+        Ok(ERule { kernels: neuron.kernels(), tau_q: self.tau_q, gamma_r: self.gamma_r })
     }
 }
 
 impl ILearning {
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<IRule> {
-        Ok(IRule(neuron.shape()))
+        Ok(IRule(neuron.kernels()))
     }
 }
 
 impl Rule for ERule {
     fn factor(&self, since: f64) -> f64 {
-        self.shape.value(since)
+        self.kernels.value(since)
     }
 
     fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {

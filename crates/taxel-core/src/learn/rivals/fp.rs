@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::epochs::{Correction, Presented, Rule};
 use super::source::Source;
-use super::stepped::{Reset, Shape, SteppedNeuron};
+use super::stepped::{Kernels, Reset, SteppedNeuron};
 use crate::Result;
 use crate::allowed::{Range, ranges};
 
@@ -30,7 +30,7 @@ pub(super) const SOURCE: Source = Source {
 };
 
 pub(super) struct FpRule {
-    shape: Shape,
+    kernels: Kernels,
     window: f64,
     forgets: bool,
 }
@@ -43,13 +43,13 @@ impl Fp {
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<FpRule> {
         self.check_ranges()?;
         neuron.check_linear("FP")?;
-        Ok(FpRule { shape: neuron.shape(), window: self.window_ms, forgets: neuron.after_spike == Reset::Reset })
+        Ok(FpRule { kernels: neuron.kernels(), window: self.window_ms, forgets: neuron.after_spike == Reset::Reset })
     }
 }
 
 impl Rule for FpRule {
     fn factor(&self, since: f64) -> f64 {
-        self.shape.value(since)
+        self.kernels.value(since)
     }
 
     fn correct(&self, of: &Presented<'_>, _: &[f64], fired: &[f64], out: &mut Vec<Correction>) {

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::epochs::{Correction, Presented, Rule};
 use super::source::Source;
-use super::stepped::{Reset, Shape, SteppedNeuron};
+use super::stepped::{Kernels, Reset, SteppedNeuron};
 use crate::Result;
 use crate::allowed::{Range, ranges};
 
@@ -32,7 +32,7 @@ pub(super) const SOURCE: Source = Source {
 };
 
 pub(super) struct HtpRule {
-    shape: Shape,
+    kernels: Kernels,
     window: f64,
     theta_0: f64,
     forgets: bool,
@@ -48,7 +48,7 @@ impl Htp {
         self.check_ranges()?;
         neuron.check_linear("HTP")?;
         Ok(HtpRule {
-            shape: neuron.shape(),
+            kernels: neuron.kernels(),
             window: self.window_ms,
             theta_0: neuron.theta_0,
             forgets: neuron.after_spike == Reset::Reset,
@@ -67,7 +67,7 @@ impl HtpRule {
             .enumerate()
             .map(|(n, w)| {
                 let inputs = of.trains.train(n).iter().filter(|&&s| s > after && s < t);
-                w * inputs.map(|s| self.shape.value(t - s)).sum::<f64>()
+                w * inputs.map(|s| self.kernels.value(t - s)).sum::<f64>()
             })
             .sum();
         if self.forgets {
@@ -85,7 +85,7 @@ impl HtpRule {
 
 impl Rule for HtpRule {
     fn factor(&self, since: f64) -> f64 {
-        self.shape.value(since)
+        self.kernels.value(since)
     }
 
     fn correct(&self, of: &Presented<'_>, weights: &[f64], _: &[f64], out: &mut Vec<Correction>) {

@@ -5,7 +5,7 @@ use serde_json::json;
 
 use super::epochs::Rule;
 use super::source::Source;
-use super::stepped::{Shape, SteppedNeuron};
+use super::stepped::{Kernels, SteppedNeuron};
 use crate::Result;
 
 /// `eta [sum over targets of eps - sum over output spikes of eps]`, eps being the potential that an input makes.
@@ -27,11 +27,11 @@ pub(super) const SOURCE: Source = Source {
     arrange: |_| Ok(()),
 };
 
-pub(super) struct InstRule(Shape);
+pub(super) struct InstRule(Kernels);
 
 impl Inst {
     pub(super) fn rule(&self, neuron: &SteppedNeuron) -> Result<InstRule> {
-        Ok(InstRule(neuron.shape()))
+        Ok(InstRule(neuron.kernels()))
     }
 }
 

@@ -256,7 +256,8 @@ impl Skim {
                     if row > 0 {
                         branch.state = step.apply(branch.state);
                     }
-                    while let Some(&(at, weight)) = branch.inputs.get(branch.next).filter(|i| i.0 <= t + rounding_ms(t)) {
+                    while let Some(&(at, weight)) = branch.inputs.get(branch.next).filter(|i| i.0 <= t + rounding_ms(t))
+                    {
                         shape.add(&mut branch.state, weight, (t - at).max(0.0));
                         branch.next += 1;
                     }

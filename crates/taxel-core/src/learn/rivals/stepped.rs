@@ -92,7 +92,7 @@ pub(super) fn peak_factor(slow: f64, fast: f64) -> f64 {
 
 /// A neuron's kernels.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shape {
+pub(super) struct Kernels {
     tau: f64,
     slow: f64,
     fast: f64,
@@ -101,7 +101,7 @@ pub(super) struct Shape {
     twice: bool,
 }
 
-impl Shape {
+impl Kernels {
     /// The potential `since` ms after an input of weight 1, mV.
     pub(super) fn value(&self, since: f64) -> f64 {
         if since <= 0.0 {
@@ -188,7 +188,7 @@ impl SteppedNeuron {
     }
 
     /// Its kernels, with their constants reckoned once.
-    pub(super) fn shape(&self) -> Shape {
+    pub(super) fn kernels(&self) -> Kernels {
         let (tau, (slow, fast)) = (
             self.tau,
             match self.current {
@@ -197,7 +197,7 @@ impl SteppedNeuron {
             },
         );
         let twice = matches!(self.current, Current::DoubleExponential { .. });
-        Shape { tau, slow, fast, peak: peak_factor(slow, fast), twice }
+        Kernels { tau, slow, fast, peak: peak_factor(slow, fast), twice }
     }
 
     /// Lays a pattern out: inputs by time, each with what it brings at its first grid point.
@@ -206,7 +206,7 @@ impl SteppedNeuron {
     ///
     /// `Problem` where its grid has too many points.
     pub(super) fn lay_out(&self, trains: &SpikeTrains) -> Result<Laid> {
-        let shape = self.shape();
+        let kernels = self.kernels();
         let points = points_between(trains.start, trains.stop, self.step_ms);
         check_points(points, MOST_LAID_OUT, self.step_ms)?;
         let steps = points as usize - 1;
@@ -216,7 +216,7 @@ impl SteppedNeuron {
             .map(|spike| {
                 let step = ((spike.t - trains.start) / self.step_ms - 1e-9).ceil().max(0.0) as usize;
                 let age = (trains.start + step as f64 * self.step_ms - spike.t).max(0.0);
-                let pass = shape.pass(age);
+                let pass = kernels.pass(age);
                 Input {
                     step,
                     train: spike.train as usize,
@@ -298,7 +298,7 @@ struct Walk<'a> {
 impl<'a> Walk<'a> {
     fn new(neuron: &SteppedNeuron, weights: &'a [f64], laid: &'a Laid) -> Self {
         let inputs = laid.inputs.iter().copied().peekable();
-        Self { weights, inputs, pass: neuron.shape().pass(neuron.step_ms), a: 0.0, b: 0.0, v: 0.0 }
+        Self { weights, inputs, pass: neuron.kernels().pass(neuron.step_ms), a: 0.0, b: 0.0, v: 0.0 }
     }
 
     /// One step on, but for the first.
