@@ -72,7 +72,8 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     """Tell which taxels are dead, stuck or noisy, each against its up to 8 neighbours.
 
     A recording in which a place was never touched cannot show whether its taxels live: a taxel counts as dead only
-    where most of its neighbours spoke.
+    where most of its neighbours spoke. What a state of wire version 2 told (`Events.repaired`) is the board's word, not
+    the taxel's, and does not count.
 
     Parameters
     ----------
@@ -104,9 +105,10 @@ def health(recorded: Events | Frames | Recorded) -> Health:
     """
     held = held_by(recorded)
     if isinstance(held, Events):
+        own = np.ones(len(held), bool) if held.repaired is None else ~held.repaired
         activity = np.zeros(held.array.shape, np.int64)
-        np.add.at(activity, (held.y, held.x), 1)
-        values = _values_of_events(held)
+        np.add.at(activity, (held.y[own], held.x[own]), 1)
+        values = _values_of_events(held, own)
     elif isinstance(held, Frames):
         changes = held.values[1:] != held.values[:-1]
         activity = changes.sum(axis=0, dtype=np.int64).reshape(held.array.shape)
@@ -147,11 +149,11 @@ def judged(array: Array, activity: NDArray[np.int64], values: NDArray[np.int64] 
     return Health(array, activity, dead, stuck, noisy)
 
 
-def _values_of_events(events: Events) -> NDArray[np.int64] | None:
-    """Return how many different intensities each taxel showed."""
+def _values_of_events(events: Events, own: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+    """Return how many different intensities each taxel showed in its own events."""
     if events.intensity is None or events.present is None:
         return None
-    there = events.present
+    there = events.present & own
     index = events.array.index(events.x[there], events.y[there])
     pairs = np.unique(index * 65_536 + events.intensity[there].astype(np.int64))
     size = events.array.rows * events.array.columns

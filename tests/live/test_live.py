@@ -18,6 +18,7 @@ import taxel
 from taxel import Array, DeviceError, Events, Neuron, ProblemError, Readout, wire
 from taxel.encode import ChangeEvents, ContactArea
 from taxel.live import Live, Said, heard, send
+from taxel.simulate import Scene, emulate
 
 LOOPBACK = "127.0.0.1"
 SMALL = Array(4, 4, pitch_mm=2.0, name="small")
@@ -312,6 +313,19 @@ def test_taxel_record_keeps_what_comes_until_ctrl_c_and_gives_a_verdict(tmp_path
     assert again.returncode == 2
     said = f"taxel: {file}: exists already; say --overwrite, or name another"
     assert again.stderr.strip().splitlines() == [said]
+
+
+def test_taxel_record_says_how_much_a_board_of_version_2_sent(tmp_path: Path) -> None:
+    port = free_port()
+    arguments = command("record", tmp_path / "two.mcap", "--host", LOOPBACK, "--port", port, "--markers")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        listening(process)
+        report = emulate(f"{LOOPBACK}:{port}", [Scene.draw(seed=3)], seed=1, tare_ms=20.0, wire=2)
+        said, _ = process.communicate(timeout=60)
+    counted, verdict = said.splitlines()
+    assert f"{report.datagrams} datagrams, {report.bytes} bytes, " in counted
+    assert counted.endswith(" 2 markers")
+    assert verdict == "nothing lost"
 
 
 def test_taxel_record_ends_with_the_boards_stop_marker(tmp_path: Path) -> None:

@@ -7,6 +7,8 @@ import pytest
 
 import taxel
 from taxel._core import ProblemError
+from taxel.simulate import Board, Version2
+from taxel.wire import Registers
 
 
 def pressed(seed: int = 2) -> dict[str, np.ndarray]:
@@ -55,6 +57,23 @@ def test_a_taxel_that_does_not_exist_is_not_dead() -> None:
     array = taxel.Array(10, 10, exists=exists)
     found = taxel.health(taxel.Events(**{name: column[keep] for name, column in columns.items()}, array=array))
     assert found.named()["dead"] == []
+
+
+def test_what_a_state_tells_of_a_dead_taxel_does_not_make_it_alive() -> None:
+    rng, dead = np.random.default_rng(3), (4, 7)
+    board = Board(Registers(wire_version=2), version_2=Version2(states_us=2_000))
+    sent = []
+    for _ in range(60):
+        ticks = rng.integers(40, 100, board.array.taxels).astype(np.uint16)
+        ticks[board.array.index(*dead)] = 0
+        sent += board.frame(ticks)
+    stream = b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent)
+    told, counts, _ = taxel.wire_v2.decode(stream, array=board.array)
+    of_it = (told.x == dead[0]) & (told.y == dead[1])
+    assert told.repaired is not None
+    assert counts.repaired == 1
+    assert told.repaired[of_it].tolist() == [True]
+    assert taxel.health(told).named() == {"dead": [dead], "stuck": [], "noisy": []}
 
 
 def test_a_taxel_that_shows_one_value_only_is_stuck() -> None:

@@ -208,11 +208,10 @@ def _say(summary: Summary, as_json: bool) -> None:
         typer.echo(json.dumps(asdict(summary) | {"path": path}))
         return
     counters = summary.counters
-    wire = counters["wire"]
     if summary.path is not None:
         typer.echo(
-            f"{summary.path}: {counters['seconds']:.1f} s, {counters['decoded']} datagrams, {wire['bytes']} bytes, "
-            f"{counters['events']} events, {wire['markers']} markers"
+            f"{summary.path}: {counters['seconds']:.1f} s, {counters['decoded']} datagrams, "
+            f"{counters['capture']['bytes']} bytes, {counters['events']} events, {counters['markers']} markers"
         )
     for name, came in counters["sources"].items():
         what = (
