@@ -29,7 +29,7 @@ mod tap;
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -40,7 +40,7 @@ use taxel_core::{Marker, Stop};
 
 use crate::capture::{Origin, Receiver};
 use crate::locked::lock;
-use crate::{Error, Result};
+use crate::{Error, Result, recording};
 pub use copies::{Copied, Copies};
 pub use counters::{Counters, SourceCounts, Summary};
 use decode::Work;
@@ -50,7 +50,7 @@ use lead::Lead;
 pub use options::{LiveOptions, Record};
 pub use read::Ear;
 use read::Reader;
-use recorder::{Part, Recorder};
+use recorder::{Host, Part, Recorder};
 pub use said::{Lines, Said, Sink};
 use saying::Saying;
 use sending::Sending;
@@ -102,7 +102,12 @@ impl Live {
         ear: Ear,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
-        if let (None, Some(source)) = (&options.record, options.sources.first()) {
+        if options.record_later && options.record.is_some() {
+            return Err(
+                taxel_core::problem!("recordings that begin later, and one from the beginning: choose one").into()
+            );
+        }
+        if let (None, false, Some(source)) = (&options.record, options.record_later, options.sources.first()) {
             return Err(
                 taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
             );
@@ -334,6 +339,92 @@ impl Live {
         Ok(())
     }
 
+    /// Records what comes from here on, of all sources, beginning with the registers and what the taxels hold. A recording that
+    /// runs ends with what came before, and is given back: each datagram, and each line, belongs to one of them.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where recordings were not to begin later ([`LiveOptions::record_later`]), `File` where the file exists or
+    /// cannot be created: then the one that runs goes on. What ended that one early, or `File` where its end cannot be written.
+    pub fn record(&self, record: &Record) -> Result<Option<Summary>> {
+        if !self.shared.options.record_later {
+            return Err(taxel_core::problem!("a recording while listening: begin without one, for later ones").into());
+        }
+        let handle = self.handle();
+        if !handle.records() {
+            // Else one that broke has not been heard of.
+            self.broken()?;
+        }
+        self.next_recording(Some(handle.reserve(record, self.shared.options.sources.clone())?))
+    }
+
+    /// Has the recording that runs begin anew, where nothing came into it of any source; gives whether it does.
+    #[must_use]
+    pub fn record_again(&self) -> bool {
+        // Before the lock: who counts and who records must not wait for each other.
+        let now = self.shared.counters();
+        lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.again(&now))
+    }
+
+    /// Ends the recording that [`Live::record`] began: what came into it, and the file, where anything did.
+    ///
+    /// # Errors
+    ///
+    /// What ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
+    pub fn end_recording(&self) -> Result<Summary> {
+        self.next_recording(None)?.ok_or_else(|| taxel_core::problem!("nothing is recorded").into())
+    }
+
+    /// Whether a recording that began while listening runs, and has not been ended by an error.
+    #[must_use]
+    pub fn records(&self) -> bool {
+        let others = lock(&self.others);
+        self.handle().records() && others.boards.iter().all(|(_, board)| lock(&board.shared.broken).is_none())
+    }
+
+    /// What ended a recording early, of this board or another.
+    fn broken(&self) -> Result<()> {
+        let others = lock(&self.others);
+        let all = others.boards.iter().map(|(_, board)| &board.shared).chain([&self.shared]);
+        let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.broken).take()).collect();
+        errors.into_iter().next().map_or(Ok(()), Err)
+    }
+
+    fn next_recording(&self, next: Option<Recorder>) -> Result<Option<Summary>> {
+        let others = lock(&self.others);
+        let mut sources = BTreeMap::new();
+        let mut ended = vec![];
+        for (name, board) in &others.boards {
+            let host: Weak<dyn Host> = Arc::<Shared>::downgrade(&self.shared);
+            let part = Part { host, name: name.clone() };
+            let part =
+                next.as_ref().map(|next| next.part_of(part, &board.shared.options, board.place())).transpose()?;
+            let (recorder, counts) = board.handle().next_recording(part)?;
+            let counters =
+                recorder.as_ref().and_then(Recorder::since).map_or_else(Counters::default, |s| counts.since(s));
+            sources.insert(name.clone(), SourceCounts::Board(Box::new(counters)));
+            ended.push((recorder, counts));
+        }
+        for (name, numbers) in &others.numbers {
+            let track = next.as_ref().map(|next| next.writer(name)).transpose()?;
+            sources.insert(name.clone(), numbers.keep_in(track));
+        }
+        let (recorder, counters) = self.handle().next_recording(next)?;
+        // Parts end before the whole.
+        for (part, counts) in ended {
+            part.map_or(Ok(None), |part| part.finish(&counts))?;
+        }
+        drop(others);
+        self.broken()?;
+        let Some(recorder) = recorder else { return Ok(None) };
+        let came =
+            Counters { sources, ..recorder.since().map_or_else(Counters::default, |since| counters.since(since)) };
+        let losses = recorder.losses(&counters);
+        let path = recorder.finish(&counters)?;
+        let verdict = self.verdict(&came, came.nothing_came(), losses);
+        Ok(Some(Summary { counters: came, verdict, path, tare: self.tare() }))
+    }
+
     /// Asks all threads to end once they have worked through what came; [`Live::stop`] waits for them.
     pub fn end(&self) {
         self.shared.receiver.stop();
@@ -351,21 +442,22 @@ impl Live {
         let counters = Counters { sources, ..self.shared.counters() };
         let recorder = lock(&self.shared.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
-        let verdict = if counters.nothing_came() {
-            nothing_came(self.place(), counters.seconds)
-        } else {
-            recorder::losses(&counters, None).verdict()
-        };
+        let verdict = self.verdict(&counters, counters.nothing_came(), recorder::losses(&counters, None));
         joined?;
         self.check()?;
         ended?;
+        Ok(Summary { counters, verdict, path, tare: self.tare() })
+    }
+
+    /// One line: what was lost, or that nothing came.
+    fn verdict(&self, counters: &Counters, nothing: bool, losses: recording::Counts) -> String {
+        let verdict = if nothing { nothing_came(self.place(), counters.seconds) } else { losses.verdict() };
         let others = counters.sources.iter().filter_map(|(name, counts)| match counts {
             SourceCounts::Board(counts) => Some(format!("{name}: {}", recorder::losses(counts, None).verdict())),
             SourceCounts::Numbers { strange: 0, .. } => None,
             SourceCounts::Numbers { strange, .. } => Some(format!("{name}: {strange} lines could not be read")),
         });
-        let verdict = std::iter::once(verdict).chain(others).collect::<Vec<_>>().join("; ");
-        Ok(Summary { counters, verdict, path, tare: self.tare() })
+        std::iter::once(verdict).chain(others).collect::<Vec<_>>().join("; ")
     }
 
     fn join(&mut self) -> Result<()> {

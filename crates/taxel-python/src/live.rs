@@ -42,6 +42,8 @@ struct Chosen {
     name: String,
     /// What else the recording holds: what it is called, and what it is.
     sources: Vec<(String, String)>,
+    /// Whether recordings begin and end while all is heard.
+    record_later: bool,
 }
 
 impl Chosen {
@@ -61,6 +63,10 @@ type ZeroingOut = (i64, u16, u16, f64, Option<f64>);
 
 fn zeroing_out(one: Zeroing) -> ZeroingOut {
     (one.t, one.x, one.y, one.rest, one.before)
+}
+
+fn to_record(path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Record> {
+    Ok(Record { path, compression: compression.parse().map_err(core)?, overwrite })
 }
 
 fn said_parts(said: Said) -> SaidParts {
@@ -122,9 +128,7 @@ impl Live {
         let chosen: Chosen = parsed("options", options)?;
         let record = match record {
             None => None,
-            Some((path, compression, overwrite)) => {
-                Some(Record { path, compression: compression.parse().map_err(core)?, overwrite })
-            }
+            Some((path, compression, overwrite)) => Some(to_record(path, &compression, overwrite)?),
         };
         let usual = LiveOptions::new(to_array(parts)?);
         let sources = enter(py, |_| {
@@ -146,6 +150,7 @@ impl Live {
                 gro: chosen.gro.unwrap_or(usual.capture.gro),
             },
             record,
+            record_later: chosen.record_later,
             send: chosen.send.iter().map(|to| to.parse()).collect::<Result<_, _>>().map_err(live)?,
             ..usual
         };
@@ -251,6 +256,28 @@ impl Live {
     /// Writes something down in the recording.
     fn note(&self, py: Python<'_>, text: &str) -> PyResult<()> {
         self.with(py, |pipeline| pipeline.note(text))
+    }
+
+    /// Records what comes from here on; gives how a recording that ran ended, as JSON.
+    fn record(&self, py: Python<'_>, path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Option<String>> {
+        let record = to_record(path, compression, overwrite)?;
+        let ended = self.with(py, |pipeline| pipeline.record(&record))?;
+        Ok(ended.map(|summary| json!(summary).to_string()))
+    }
+
+    /// Has the recording that runs begin anew where nothing came into it; gives whether it does.
+    fn record_again(&self, py: Python<'_>) -> PyResult<bool> {
+        self.with(py, |pipeline| Ok(pipeline.record_again()))
+    }
+
+    /// Ends the recording that runs; gives how, as JSON.
+    fn end_recording(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(json!(self.with(py, Pipeline::end_recording)?).to_string())
+    }
+
+    /// Whether a recording that began while listening runs.
+    fn records(&self, py: Python<'_>) -> bool {
+        self.with(py, |pipeline| Ok(pipeline.records())).unwrap_or(false)
     }
 
     /// Says that the host told the board to speak this version of the wire.

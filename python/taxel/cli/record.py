@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import time
-from contextlib import nullcontext
+from contextlib import nullcontext, suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
@@ -16,7 +16,7 @@ from rich.live import Live as Display
 
 from taxel import _core
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import OUTSIDE, app
 from taxel.cli._board import (
     ArrayOption,
     FromOption,
@@ -36,6 +36,9 @@ __all__ = ["record"]
 
 #: How often the display is drawn anew, and the end looked for, s.
 _REDRAW = 0.1
+
+#: With --trials: so many in a row to which nothing came end it.
+_EMPTY = 3
 
 
 @app.command()
@@ -73,11 +76,13 @@ def record(
     """Record what a board sends by UDP, and say what was lost.
 
     Ends with Ctrl-C, after --seconds, or with the board's stop marker (--markers). With --length it records one trial
-    after the other, the index appended to the name, a countdown with beeps before each. While it records, a key on the
-    terminal, or a line on any other standard input, writes a note with that label and the board's time into the .mcap
-    (give it < /dev/null where its input is meant for others). --source records other boards, and lines of numbers, into
-    the same .mcap, each by its own clock. Exit code 3 where nothing came
-    or something was lost after it had arrived, 2 where the board has more taxels than --array.
+    after the other, the index appended to the name, a countdown with beeps before each. It listens all the time, so
+    that each begins with what the taxels hold; with --countdown 0 nothing is lost between two. A trial to which nothing
+    came is not kept, and its number is used again; with --trials, three of them in a row end it, exit code 3. While it
+    records, a key on the terminal, or a line on any other standard input, writes a note with that label and the board's
+    time into the .mcap (give it < /dev/null where its input is meant for others). --source records other boards, and
+    lines of numbers, into the same .mcap, each by its own clock. Exit code 3 where nothing came or something was lost
+    after it had arrived, 2 where the board has more taxels than --array.
 
     Example: taxel record --port 5208 walk.mcap
     Example: taxel record walk.mcap --source left=udp:0.0.0.0:5209 --source imu=serial:/dev/ttyACM0,columns=t_us:ax:ay
@@ -101,7 +106,7 @@ def record(
     }
     console = Console(stderr=True, quiet=as_json)
     if length is None:
-        summary, _, code = _one(file, live, seconds, markers, console)
+        summary, code = _one(file, live, seconds, markers, console)
         _say(summary, as_json)
     else:
         code = _automatic(file, live, length, countdown, start_index, trials, markers, console, as_json)
@@ -120,22 +125,57 @@ def _automatic(
     console: Console,
     as_json: bool,
 ) -> int:
-    """Record trial after trial until Ctrl-C, which ends the one that runs well; return the worst exit code."""
-    code = done = 0
-    while trials is None or done < trials:
-        name = Path(_core.numbered_path(file, index + done))
-        if name.exists() and not live["overwrite"]:
+    """Record trial after trial from one receiver until Ctrl-C, which ends the one that runs well; return a code."""
+    how = {name: live.pop(name) for name in ("compression", "overwrite")}
+    codes: list[int] = []
+    empty = 0
+
+    def following(kept: int) -> Path:
+        name = Path(_core.numbered_path(file, index + kept))
+        if name.exists() and not how["overwrite"]:
             raise FileExistsError(errno.EEXIST, "exists already", str(name))
-        try:
-            _count_down(name, countdown, console)
-        except KeyboardInterrupt:
-            break
-        summary, stopped, ended = _one(name, live, length, markers, console)
-        _say(summary, as_json)
-        code, done = max(code, ended), done + 1
-        if stopped:
-            break
-    return code
+        return name
+
+    def say(ended: Summary | None) -> None:
+        """Say how a trial ended; one to which nothing came leaves its number to the next."""
+        nonlocal empty
+        if ended is not None and ended.path is not None:
+            _say(ended, as_json)
+            codes.append(exit_code(ended, heard.array))
+            empty = 0
+        else:
+            typer.echo(f"taxel: {name}: nothing arrived at {heard.place}; not kept", err=True)
+            empty += 1
+
+    name = following(0)
+    with remote(live["remote"], None, keeps=True) as far, Live(record_later=True, **{**live, "remote": far}) as heard:
+        takes = noting(heard.note, console.print) if _takes_notes(file, live["sources"]) else nullcontext("")
+        with takes as keys:
+            try:
+                while trials is None or (len(codes) < trials and empty < _EMPTY):
+                    if not heard.records:
+                        _count_down(name, countdown, console)
+                        heard.record(name, **how)
+                    _watch(heard, name, length, markers, console, keys, trial=True)
+                    if countdown or len(codes) + 1 == trials or not heard.records:
+                        say(heard.end_recording())
+                        name = following(len(codes)) if trials is None or len(codes) < trials else name
+                    elif heard.record_again():
+                        say(None)
+                    else:
+                        try:
+                            after = following(len(codes) + 1)
+                        except FileExistsError:
+                            say(heard.end_recording())
+                            raise
+                        say(heard.record(after, **how))
+                        name = after
+            except KeyboardInterrupt:
+                pass
+            gave_up = trials is not None and empty >= _EMPTY
+            if heard.records and ((ended := heard.end_recording()).path is not None or not gave_up):
+                say(ended)
+    return max([*codes, OUTSIDE if gave_up or not codes else 0])
 
 
 def _count_down(name: Path, seconds: int, console: Console) -> None:
@@ -150,33 +190,37 @@ def _count_down(name: Path, seconds: int, console: Console) -> None:
 
 def _one(
     file: Path, options: dict[str, Any], seconds: float | None, markers: bool, console: Console
-) -> tuple[Summary, bool, int]:
-    """Record one file until its time is over, the board marks a stop, or Ctrl-C; return that, and a code."""
+) -> tuple[Summary, int]:
+    """Record one file until its time is over, the board marks a stop, or Ctrl-C; return how it ended, and a code."""
     with remote(options["remote"], None, keeps=True) as far, Live(record=file, **{**options, "remote": far}) as live:
-        try:
-            # A .lsa holds no notes, and a source may have the standard input for itself.
-            notes = file.suffix == ".mcap" and not any(
-                what.startswith("pipe:-") for what in options["sources"].values()
-            )
-            takes = noting(live.note, console.print) if notes else nullcontext("")
-            with takes as how:
-                console.print(f"listening on {live.place}, recording to {file}; Ctrl-C ends")
-                if how:
-                    console.print(how)
-                _watch(live, seconds, markers, console)
-            stopped = False
-        except KeyboardInterrupt:
-            stopped = True
+        takes = noting(live.note, console.print) if _takes_notes(file, options["sources"]) else nullcontext("")
+        with suppress(KeyboardInterrupt), takes as keys:
+            _watch(live, file, seconds, markers, console, keys, trial=False)
         summary = live.stop()
-        return summary, stopped, exit_code(summary, live.array)
+        return summary, exit_code(summary, live.array)
 
 
-def _watch(live: Live, seconds: float | None, markers: bool, console: Console) -> None:
-    """Show what comes until the time is over or, if `markers` count, a stop was marked."""
+def _takes_notes(file: Path, sources: dict[str, str]) -> bool:
+    """Return whether what is typed is noted: a .lsa holds no notes, a source may have the input for itself."""
+    return file.suffix == ".mcap" and not any(what.startswith("pipe:-") for what in sources.values())
+
+
+def _watch(
+    live: Live, file: Path, seconds: float | None, markers: bool, console: Console, keys: str, *, trial: bool
+) -> None:
+    """Show what comes until the time is over, a stop was marked (if `markers` count), or the recording broke."""
+    console.print(f"listening on {live.place}, recording to {file}; Ctrl-C ends")
+    if keys:
+        console.print(keys)
     with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
         before, told = live.counters, False
-        while seconds is None or before["seconds"] < seconds:
-            live.next(_REDRAW)
+        began = before["seconds"]
+        if trial:
+            # What was marked before is none of its business.
+            live.take_markers()
+        while seconds is None or before["seconds"] - began < seconds:
+            left = _REDRAW if seconds is None else min(_REDRAW, seconds - (before["seconds"] - began))
+            live.next(left)
             for t, start in live.take_markers():
                 console.print(f"{t / 1e6:.4f} s: {'start' if start else 'stop'} marked")
                 if markers and not start:
@@ -186,6 +230,8 @@ def _watch(live: Live, seconds: float | None, markers: bool, console: Console) -
                 typer.echo(f"taxel: {said}", err=True)
                 told = True
             display.update(counters_table(before, now))
+            if trial and not live.records:
+                return
             before = now
 
 

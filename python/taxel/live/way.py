@@ -141,6 +141,9 @@ class Live:
         ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
     record : path, optional
         A new file: `.mcap` keeps all that is known, `.lsa` the manual's raw bytes.
+    record_later : bool
+        Whether recordings are begun and ended while all is heard (`record`, `end_recording`); then none is begun here,
+        and `sources` are kept where one runs.
     name : str
         What the board is called in the recording.
     sources : mapping of str to str, optional
@@ -209,6 +212,7 @@ class Live:
         readout: Readout | None = None,
         tare: Tare | float | None = None,
         record: str | os.PathLike[str] | None = None,
+        record_later: bool = False,
         name: str = "board",
         sources: Mapping[str, str] | None = None,
         compression: str = "none",
@@ -252,14 +256,16 @@ class Live:
             "gro": None if gro is None else flag("gro", gro),
             "send": [to for to in goes if not to.startswith(_LSL)],
             "name": text("name", name),
+            "record_later": flag("record_later", record_later),
             "sources": [(what, _given(inlets[what]) if what in inlets else how) for what, how in heard_of],
             **{what: None if size is None else whole(what, size, 0, 2**31 - 1) for what, size in sizes.items()},
         }
         #: What is needed to begin again on another address.
         self._how: dict[str, Any] = {
             "array": self.array, "registers": registers, "differences": differences, "readout": readout, "tare": tare,
-            "record": record, "name": name, "sources": sources, "compression": compression, "overwrite": overwrite,
-            "guard_frames": guard_frames, "gap_frames": gap_frames, "say": say, "lines": lines, "send": send,
+            "record": record, "record_later": record_later, "name": name, "sources": sources,
+            "compression": compression, "overwrite": overwrite, "guard_frames": guard_frames,
+            "gap_frames": gap_frames, "say": say, "lines": lines, "send": send,
             "kernel_buffer_bytes": kernel_buffer_bytes, "queue_bytes": queue_bytes, "readout_events": readout_events,
             "gro": gro,
         }  # fmt: skip
@@ -455,6 +461,53 @@ class Live:
         """
         self._core.note(text("note", said))
 
+    def record(
+        self, path: str | os.PathLike[str], *, compression: str = "none", overwrite: bool = False
+    ) -> Summary | None:
+        """Record what comes from here on, of all sources, beginning with what the taxels hold and the registers.
+
+        A recording that runs ends with what came before: each datagram, and each line, belongs to one of the two.
+
+        Parameters
+        ----------
+        path : path
+            As `record` of the constructor; so are the others.
+        compression : {"none", "lz4", "zstd"}
+        overwrite : bool
+
+        Returns
+        -------
+        Summary or None : how the recording that ran ended, with what came while it ran (latencies are of all)
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false; the recording that runs goes on
+        OSError : the file cannot be created; the disk was full before the end of the one that ran
+        ProblemError : `record_later` was not said
+        """
+        place = checked_path("path", path)
+        ended = self._core.record(place, text("compression", compression), flag("overwrite", overwrite))
+        return None if ended is None else _summary(ended)
+
+    def record_again(self) -> bool:
+        """Have the recording that runs begin anew, where nothing came into it of any source; return whether it does."""
+        return self._core.record_again()
+
+    def end_recording(self) -> Summary:
+        """End the recording that `record` began; a file to which nothing came is not kept.
+
+        Raises
+        ------
+        OSError : the disk was full before its end; what was written before stays readable
+        ProblemError : nothing is recorded
+        """
+        return _summary(self._core.end_recording())
+
+    @property
+    def records(self) -> bool:
+        """Whether a recording that `record` began runs; false where an error ended it, which `end_recording` raises."""
+        return self._core.records()
+
     def stop(self) -> Summary:
         """Work through what came, close the file, and say what was lost; once ended, say it again.
 
@@ -466,10 +519,7 @@ class Live:
             self._inlets.pop().close()
         said = self._core.stop()
         if said is not None:
-            values = json.loads(said)
-            path = None if values["path"] is None else Path(values["path"])
-            taken = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
-            self._summary = Summary(values["counters"], values["verdict"], path, taken)
+            self._summary = _summary(said)
         if self._summary is None:
             raise ProblemError("live: ended by an error, which was raised then")
         return self._summary
@@ -566,6 +616,13 @@ class Source:
     def __repr__(self) -> str:
         rows, columns = self.array.shape
         return f"Source({rows} x {columns} taxels, {1e6 / self.registers.frame_us:g} frames/s)"
+
+
+def _summary(said: str) -> Summary:
+    values = json.loads(said)
+    path = None if values["path"] is None else Path(values["path"])
+    taken = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
+    return Summary(values["counters"], values["verdict"], path, taken)
 
 
 def _sources(sources: Mapping[str, str] | None) -> list[tuple[str, str]]:

@@ -58,6 +58,26 @@ pub struct Counts {
     pub back: u64,
 }
 
+impl Counts {
+    /// What was counted since an earlier time.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self {
+            bytes: self.bytes - earlier.bytes,
+            words: self.words - earlier.words,
+            skipped: self.skipped - earlier.skipped,
+            short: self.short - earlier.short,
+            changes: self.changes - earlier.changes,
+            intensities: self.intensities - earlier.intensities,
+            unpaired: self.unpaired - earlier.unpaired,
+            markers: self.markers - earlier.markers,
+            contradictory: self.contradictory - earlier.contradictory,
+            outside: self.outside - earlier.outside,
+            back: self.back - earlier.back,
+        }
+    }
+}
+
 /// Turns bytes into events as they come, wherever they are cut.
 ///
 /// A change waits for the next word (its intensity), the end of its datagram ([`Self::end_of_datagram`]) or the end of

@@ -82,6 +82,47 @@ impl Counters {
     pub fn nothing_came(&self) -> bool {
         self.capture.messages + self.capture.dropped_by_kernel == 0
     }
+
+    /// What came since an earlier time, and what became of it. What is of a moment (clocks, versions) and the latencies stay
+    /// those of now; what waits at the end is left out.
+    #[must_use]
+    pub(super) fn since(&self, earlier: &Self) -> Self {
+        let decoded = self.decoded - earlier.decoded;
+        let (now, before) = (&self.capture, &earlier.capture);
+        let dropped_by_queue = now.dropped_by_queue - before.dropped_by_queue;
+        let datagrams = decoded + dropped_by_queue;
+        let capture = capture::Counts {
+            // A message may have come whose datagrams wait.
+            messages: if datagrams == 0 { 0 } else { (now.messages - before.messages).max(1) },
+            datagrams,
+            bytes: now.bytes - before.bytes,
+            dropped_by_kernel: now.dropped_by_kernel - before.dropped_by_kernel,
+            dropped_by_queue,
+            bytes_dropped_by_queue: now.bytes_dropped_by_queue - before.bytes_dropped_by_queue,
+            waiting: 0,
+            ..*now
+        };
+        Self {
+            capture,
+            bridged: self.bridged.map(|now| now.since(&earlier.bridged.unwrap_or_default())),
+            decoded,
+            wire: self.wire.since(&earlier.wire),
+            wire_v2: self.wire_v2.since(&earlier.wire_v2),
+            wire_refused: self.wire_refused - earlier.wire_refused,
+            wire_changes: self.wire_changes - earlier.wire_changes,
+            wire_late: self.wire_late - earlier.wire_late,
+            events: self.events - earlier.events,
+            read_out: self.read_out - earlier.read_out,
+            events_dropped: self.events_dropped - earlier.events_dropped,
+            late: self.late - earlier.late,
+            detections: self.detections - earlier.detections,
+            wrong: self.wrong - earlier.wrong,
+            detections_dropped: self.detections_dropped - earlier.detections_dropped,
+            markers: self.markers - earlier.markers,
+            seconds: self.seconds - earlier.seconds,
+            ..self.clone()
+        }
+    }
 }
 
 /// How a [`Live`](super::Live) ended.

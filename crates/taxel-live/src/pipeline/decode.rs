@@ -13,7 +13,7 @@ use super::copies::{Copier, GATHER, copier};
 use super::handover::{Quiet, Taken};
 use super::read::Reader;
 use super::recorder::Recorder;
-use super::shared::{Shared, Wish};
+use super::shared::{Ended, Shared, Wish};
 use super::stills::Stills;
 use super::tap::{Tap, UNKNOWN, tap};
 use crate::Result;
@@ -277,7 +277,7 @@ impl Work {
         let mut slot = lock(&self.shared.recorder);
         let Some(recorder) = &mut *slot else { return Ok(()) };
         match work(recorder) {
-            Err(error) if recorder.is_a_guest() => {
+            Err(error) if recorder.since().is_some() => {
                 *slot = None;
                 lock(&self.shared.broken).get_or_insert(error);
                 self.shared.records.store(false, Ordering::Release);
@@ -292,28 +292,10 @@ impl Work {
         let wishes = std::mem::take(&mut *lock(&self.shared.wishes));
         for wish in wishes {
             match wish {
-                Wish::Begin(mut recorder, give) => {
-                    self.apart()?;
-                    let begun = recorder.begin(&self.shared.counters(), &self.held);
-                    if begun.is_ok() {
-                        let decoder = Decoder::new(self.shared.options.array.clone())
-                            .differences(self.shared.options.differences);
-                        self.fresh = Some(Box::new(Receiver::new(decoder, 1)));
-                        // What was zeroed before holds in this recording too.
-                        let zeroed: Vec<Zeroing> = self.shared.shown().zeroed.values().copied().collect();
-                        *lock(&self.shared.recorder) = Some(*recorder);
-                        self.record(|recorder| zeroed.iter().try_for_each(|one| recorder.zeroing(one)))?;
-                    }
+                Wish::Record(next, give) => {
+                    let ended = self.next_recording(next);
                     // Who asked may have gone.
-                    let _ = give.send(begun);
-                }
-                Wish::End(give) => {
-                    self.still(true)?;
-                    self.fresh = None;
-                    let recorder = lock(&self.shared.recorder).take();
-                    self.shared.records.store(false, Ordering::Release);
-                    // Who asked may have gone.
-                    let _ = give.send((recorder, self.shared.counters()));
+                    let _ = give.send(ended);
                 }
                 Wish::Look(give) => {
                     let counters = &self.shared.shown().counters;
@@ -341,6 +323,37 @@ impl Work {
             }
         }
         Ok(())
+    }
+
+    /// What has come so far belongs to the recording that runs, what comes from here on to the next one.
+    fn next_recording(&mut self, next: Option<Box<Recorder>>) -> Result<Ended> {
+        self.still(true)?;
+        let now = self.shared.counters();
+        let ended = lock(&self.shared.recorder).take();
+        self.fresh = None;
+        if let Some(mut next) = next {
+            self.apart()?;
+            if let Err(error) = next.begin(&now, &self.held) {
+                *lock(&self.shared.recorder) = ended;
+                return Err(error);
+            }
+            let decoder = Decoder::new(self.shared.options.array.clone()).differences(self.shared.options.differences);
+            self.fresh = Some(Box::new(Receiver::new(decoder, 1)));
+            self.tared = false;
+            let timed = next.is_timed();
+            *lock(&self.shared.recorder) = Some(*next);
+            if timed {
+                self.zeroed_before()?;
+            }
+        }
+        self.shared.records.store(self.fresh.is_some(), Ordering::Release);
+        Ok((ended, now))
+    }
+
+    /// What was zeroed before holds in the recording that was begun, too.
+    fn zeroed_before(&self) -> Result<()> {
+        let zeroed: Vec<Zeroing> = self.shared.shown().zeroed.values().copied().collect();
+        self.record(|recorder| zeroed.iter().try_for_each(|one| recorder.zeroing(one)))
     }
 
     /// Takes what these taxels hold for their rest, from now on: where one cannot be zeroed none is.
@@ -398,7 +411,14 @@ impl Work {
             self.events.markers.get(marked).zip(events.markers.first()).map(|(ours, theirs)| ours.t - theirs.t);
         if let Some(origin_us) = by_event.or(by_marker) {
             self.fresh = None;
-            self.record(|recorder| recorder.set_origin(origin_us))?;
+            let mut timed = true;
+            self.record(|recorder| {
+                timed = recorder.is_timed();
+                recorder.set_origin(origin_us)
+            })?;
+            if !timed {
+                self.zeroed_before()?;
+            }
         }
         Ok(())
     }

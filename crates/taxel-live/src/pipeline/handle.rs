@@ -15,7 +15,8 @@ use super::counters::Counters;
 use super::options::{LiveOptions, Record};
 use super::recorder::Recorder;
 use super::said::Said;
-use super::shared::{Shared, Wish};
+use super::shared::{Ended, Shared, Wish};
+use super::source::Source;
 use super::tap::Outlet;
 use crate::Result;
 use crate::capture::Origin;
@@ -113,17 +114,29 @@ impl Handle {
         if lock(&self.shared.recorder).is_some() {
             return Err(taxel_core::problem!("a recording runs already: stop it first").into());
         }
-        let header = LiveOptions { registers: self.registers(), ..self.shared.options.clone() };
-        let recorder = Recorder::reserve(record, &header, self.place())?;
+        // What else is heard belongs to the recording that it was begun with.
+        let recorder = self.reserve(record, vec![])?;
         lock(&self.shared.broken).take();
-        self.shared.records.store(true, Ordering::Release);
-        let (give, begun) = channel::bounded(1);
-        self.shared.wish(Wish::Begin(Box::new(recorder), give));
-        let begun = self.wait(&begun).and_then(std::convert::identity);
-        if begun.is_err() {
-            self.shared.records.store(false, Ordering::Release);
+        self.next_recording(Some(recorder)).map(drop)
+    }
+
+    /// A recording that is to begin, with the board's registers as they are now, and those other sources.
+    pub(super) fn reserve(&self, record: &Record, sources: Vec<Source>) -> Result<Recorder> {
+        let header = LiveOptions { registers: self.registers(), sources, ..self.shared.options.clone() };
+        Recorder::reserve(record, &header, self.place())
+    }
+
+    /// Has what comes from here on go to this recording, or to none; gives the one that ran.
+    pub(super) fn next_recording(&self, next: Option<Recorder>) -> Result<Ended> {
+        // Who looks whether it goes on finds that it does.
+        self.shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
+        let (give, ended) = channel::bounded(1);
+        self.shared.wish(Wish::Record(next.map(Box::new), give));
+        let ended = self.wait(&ended).and_then(std::convert::identity);
+        if ended.is_err() {
+            self.shared.records.store(lock(&self.shared.recorder).is_some(), Ordering::Release);
         }
-        begun
+        ended
     }
 
     /// Ends the recording that [`Handle::record`] began. Gives the file, where anything came, and what was lost, in a line.
@@ -132,9 +145,7 @@ impl Handle {
     ///
     /// What ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
     pub fn end_recording(&self) -> Result<(Option<PathBuf>, String)> {
-        let (give, recorder) = channel::bounded(1);
-        self.shared.wish(Wish::End(give));
-        let (recorder, counters) = self.wait(&recorder)?;
+        let (recorder, counters) = self.next_recording(None)?;
         if let Some(error) = lock(&self.shared.broken).take() {
             return Err(error);
         }

@@ -30,6 +30,8 @@ pub struct LiveOptions {
     pub capture: ReceiverOptions,
     /// Where everything is kept, if anywhere.
     pub record: Option<Record>,
+    /// Whether recordings are begun and ended while all is heard ([`Live::record`](super::Live::record)); then none from the beginning.
+    pub record_later: bool,
     /// Where detections go as lines, besides to the sinks.
     pub send: Vec<Destination>,
     /// What the board is called in a recording.
@@ -51,6 +53,7 @@ impl LiveOptions {
             readout_events: 1 << 20,
             capture: ReceiverOptions::default(),
             record: None,
+            record_later: false,
             send: vec![],
             name: "board".to_owned(),
             sources: vec![],

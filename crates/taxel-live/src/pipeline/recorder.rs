@@ -2,7 +2,7 @@
 
 use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError, Weak};
 
 use taxel_core::detect::Detection;
@@ -35,36 +35,23 @@ pub(super) struct Recorder {
     kind: OnceLock<Kind>,
     /// Held by the one who opens the file.
     opening: Mutex<()>,
-    guest: Option<Guest>,
+    /// What had been counted when it began, where that was while listening.
+    since: Option<Box<Counters>>,
+    clock: Mutex<Clock>,
     /// Whose file it is, where it is another's.
     host: Option<Part>,
 }
 
-/// A recording that was begun while listening. Its own clock begins with its first stamp, so the file is opened when that
-/// is known; what comes before waits.
-struct Guest {
-    /// What had been counted when it began.
-    since: Counters,
-    waiting: Mutex<Vec<Entry>>,
-    /// Its bytes.
-    bytes: AtomicUsize,
+/// How a recording's clock goes against the pipeline's.
+#[derive(Clone, Copy)]
+enum Clock {
+    /// So far behind it, us.
+    Behind(i64),
+    /// As the pipeline's: its file waits until that can be said in it.
+    Waits,
+    /// Begins with its first stamp, which has not come.
+    Unknown,
 }
-
-/// What waits for a guest's file.
-enum Entry {
-    Datagram(i64, u64, Vec<u8>),
-    Registers(i64, Registers),
-    Board(BoardChange),
-    Held(i64, Option<i64>, Vec<u16>),
-    Note(i64, Option<i64>, String),
-    Zeroing(i64, Zeroing),
-    Marker(i64, Marker),
-    Detection(i64, Detection),
-    Tare(Box<Tare>),
-}
-
-/// What may wait for a guest's first event, bytes: heartbeats of a board of version 2 at rest for hours.
-const MOST_WAITING: usize = 1 << 22;
 
 enum Kind {
     Mcap(Box<Writer>),
@@ -110,22 +97,39 @@ impl Part {
 }
 
 impl Recorder {
-    /// A part of another's recording.
-    pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, place: &Origin) -> Self {
-        let name = host.name.clone();
-        let board = Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
+    fn of(record: &Record, header: Header) -> Self {
         Self {
             record: record.clone(),
-            header: Header { name, ..board },
+            header,
             new: false,
             noted: AtomicBool::new(false),
             refused: AtomicBool::new(false),
             begun: AtomicBool::new(false),
             kind: OnceLock::new(),
             opening: Mutex::new(()),
-            guest: None,
-            host: Some(host),
+            since: None,
+            clock: Mutex::new(Clock::Behind(0)),
+            host: None,
         }
+    }
+
+    /// A part of another's recording.
+    pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, place: &Origin) -> Self {
+        let name = host.name.clone();
+        let board = Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
+        Self { host: Some(host), ..Self::of(record, Header { name, ..board }) }
+    }
+
+    /// A part of another's recording that begins while this one's board is listened to.
+    pub(super) fn part_of(&self, host: Part, options: &LiveOptions, place: &Origin) -> Result<Self> {
+        let track = self.writer(&host.name)?;
+        let part = Self::join(host, &self.record, options, place);
+        Ok(Self {
+            kind: OnceLock::from(Kind::Track(track)),
+            since: Some(Box::default()),
+            clock: Mutex::new(Clock::Unknown),
+            ..part
+        })
     }
 
     /// Another source's part of this recording.
@@ -142,18 +146,7 @@ impl Recorder {
         let header = Header { difference: options.differences, name: options.name.clone(), sources, ..board };
         let path = &record.path;
         let new = !(record.overwrite && path.exists());
-        let recorder = Self {
-            record: record.clone(),
-            header,
-            new,
-            noted: AtomicBool::new(false),
-            refused: AtomicBool::new(false),
-            begun: AtomicBool::new(false),
-            kind: OnceLock::new(),
-            opening: Mutex::new(()),
-            guest: None,
-            host: None,
-        };
+        let recorder = Self { new, ..Self::of(record, header) };
         if !recorder.header.sources.is_empty() && named(path)? != "mcap" {
             return Err(problem!("{}: only a .mcap holds several sources", path.display()).into());
         }
@@ -170,73 +163,98 @@ impl Recorder {
     /// A recording that begins while listening: takes the name, so that nobody else can; the file is written later.
     pub(super) fn reserve(record: &Record, options: &LiveOptions, place: &Origin) -> Result<Self> {
         let path = &record.path;
-        named(path)?;
-        let done = path.with_extension("lss");
-        if path.extension().is_some_and(|e| e == "lsa") && done.exists() {
-            return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
+        let kind = named(path)?;
+        let new = !(record.overwrite && path.exists());
+        if new {
+            let done = path.with_extension("lss");
+            if kind == "lsa" && done.exists() {
+                return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
+            }
+            OpenOptions::new().write(true).create_new(true).open(path).map_err(Error::file(path))?;
         }
-        OpenOptions::new().write(true).create_new(true).open(path).map_err(Error::file(path))?;
-        // What else is heard belongs to the recording that it was begun with.
-        let options = LiveOptions { sources: vec![], ..options.clone() };
-        let whole = Self::create(&Record { overwrite: true, ..record.clone() }, &options, place)?;
-        let guest = Guest { since: Counters::default(), waiting: Mutex::default(), bytes: AtomicUsize::new(0) };
-        Ok(Self { new: true, guest: Some(guest), ..whole })
+        let whole = Self::create(&Record { overwrite: true, ..record.clone() }, options, place);
+        let whole = whole.and_then(|whole| {
+            if kind == "mcap" {
+                // Where nothing else is heard it waits for the board's first stamp, so that its times are ours.
+                let for_clock = whole.header.sources.is_empty();
+                let how = recording::WriterOptions { compression: record.compression, overwrite: true };
+                let writer = Writer::plan(path, &whole.header, how, for_clock)?;
+                let clock = Mutex::new(if for_clock { Clock::Waits } else { Clock::Unknown });
+                return Ok(Self { kind: OnceLock::from(Kind::Mcap(Box::new(writer))), clock, ..whole });
+            }
+            Ok(whole)
+        });
+        if new && whole.is_err() {
+            // It was empty, and ours.
+            let _ = std::fs::remove_file(path);
+        }
+        Ok(Self { new, since: Some(Box::default()), ..whole? })
     }
 
     /// Begins with the registers and what the taxels hold, by the counters of now.
     pub(super) fn begin(&mut self, now: &Counters, held: &[u16]) -> Result<()> {
-        let Some(guest) = &mut self.guest else { return Ok(()) };
-        guest.since = now.clone();
-        if let Some(registers) = self.header.registers {
-            self.push(Entry::Registers(now_ns(), registers))?;
+        self.since = Some(Box::new(now.clone()));
+        if let Some(registers) = &self.header.registers {
+            self.registers(registers)?;
         }
-        self.push(Entry::Held(now_ns(), now.board_us, held.to_vec()))
+        let t_us = now.board_us.and_then(|t| self.timed(t));
+        self.track(|track| track.held(now_ns(), t_us, held))
     }
 
-    /// Whether it was begun while listening: then it ends alone.
-    pub(super) fn is_a_guest(&self) -> bool {
-        self.guest.is_some()
+    /// Begins anew where nothing came into it yet; gives whether it does.
+    pub(super) fn again(&mut self, now: &Counters) -> bool {
+        if self.holds_anything() {
+            return false;
+        }
+        self.since = Some(Box::new(now.clone()));
+        if let Some(Kind::Mcap(writer)) = self.kind.get() {
+            writer.started(now_ns());
+        }
+        true
     }
 
-    /// Says by how much its own clock, which begins with its first stamp, is behind, us: now it can be written.
+    /// Whether anything came of any source, or was noted.
+    pub(super) fn holds_anything(&self) -> bool {
+        let others = matches!(self.kind.get(), Some(Kind::Mcap(writer)) if writer.holds_anything());
+        others || self.begun.load(Ordering::Relaxed) || self.noted.load(Ordering::Relaxed)
+    }
+
+    /// What had been counted when it began, where that was while listening: then it ends alone.
+    pub(super) fn since(&self) -> Option<&Counters> {
+        self.since.as_deref()
+    }
+
+    /// Says by how much a clock that begins with the recording's first stamp is behind ours, us: a file that waits for that can be
+    /// written.
     pub(super) fn set_origin(&mut self, origin_us: i64) -> Result<()> {
-        self.header.origin_us = origin_us;
-        self.kind().map(drop)
+        let said = match self.kind.get() {
+            Some(Kind::Mcap(writer)) => writer.begin(origin_us)?,
+            _ => false,
+        };
+        *lock(&self.clock) = Clock::Behind(if said { 0 } else { origin_us });
+        Ok(())
     }
 
-    /// Keeps it now, or when the file is open.
-    fn push(&self, entry: Entry) -> Result<()> {
-        if let (Some(guest), None) = (&self.guest, self.kind.get()) {
-            let bytes = match &entry {
-                Entry::Datagram(_, _, bytes) => bytes.len() + 64,
-                _ => 64,
-            };
-            lock(&guest.waiting).push(entry);
-            if guest.bytes.fetch_add(bytes, Ordering::Relaxed) + bytes > MOST_WAITING {
-                self.kind()?;
-            }
+    /// A time of the pipeline's clock on the recording's; none where that is not known yet.
+    fn timed(&self, t: i64) -> Option<i64> {
+        match *lock(&self.clock) {
+            Clock::Behind(us) => Some(t - us),
+            Clock::Waits => Some(t),
+            Clock::Unknown => None,
+        }
+    }
+
+    /// Does something where more than bytes is kept.
+    fn track(&self, work: impl FnOnce(&Track) -> Result<()>) -> Result<()> {
+        if named(&self.record.path)? == "lsa" {
             return Ok(());
         }
-        Self::write(self.kind()?, entry)
+        self.kind()?.track().map_or(Ok(()), work)
     }
 
-    fn write(kind: &Kind, entry: Entry) -> Result<()> {
-        match (kind, kind.track(), entry) {
-            (_, Some(track), Entry::Datagram(at, number, bytes)) => track.datagram(at, number, &bytes),
-            (Kind::Lsa(writer), _, Entry::Datagram(_, _, bytes)) => lock(writer).bytes(&bytes),
-            (_, Some(track), Entry::Registers(at, registers)) => track.registers(at, &registers),
-            (_, Some(track), Entry::Board(change)) => track.board_change(&change),
-            (_, Some(track), Entry::Held(at, t_us, held)) => track.held(at, t_us, &held),
-            (_, Some(track), Entry::Note(at, t_us, text)) => track.note(at, t_us, &text),
-            (_, Some(track), Entry::Zeroing(at, zeroing)) => track.zeroing(at, &zeroing),
-            (_, Some(track), Entry::Marker(at, marker)) => track.marker(at, marker),
-            (_, Some(track), Entry::Detection(at, detection)) => track.detection(at, &detection),
-            (_, Some(track), Entry::Tare(tare)) => {
-                track.tare(&tare);
-                Ok(())
-            }
-            (_, None, _) => Ok(()),
-        }
+    /// Whether times of the pipeline's clock can be said in it.
+    pub(super) fn is_timed(&self) -> bool {
+        self.timed(0).is_some()
     }
 
     /// The open file.
@@ -257,23 +275,11 @@ impl Recorder {
             }
             _ => Kind::Lsa(Mutex::new(LsaWriter::create(path, *overwrite)?)),
         };
-        if let Some(guest) = &self.guest {
-            lock(&guest.waiting).drain(..).try_for_each(|entry| Self::write(&kind, entry))?;
-        }
         Ok(self.kind.get_or_init(|| kind))
-    }
-
-    /// Whether the file waits for its first event.
-    fn waits(&self) -> bool {
-        self.guest.is_some() && self.kind.get().is_none()
     }
 
     pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
         self.begun.store(true, Ordering::Relaxed);
-        if self.waits() {
-            let mut all = batch.iter();
-            return all.try_for_each(|(d, bytes)| self.push(Entry::Datagram(d.arrived_ns, d.number, bytes.to_vec())));
-        }
         let kind = self.kind()?;
         if let Some(track) = kind.track() {
             batch.iter().try_for_each(|(d, bytes)| track.datagram(d.arrived_ns, d.number, bytes))?;
@@ -287,7 +293,7 @@ impl Recorder {
 
     /// The board's registers as they are from now on.
     pub(super) fn registers(&self, registers: &Registers) -> Result<()> {
-        self.push(Entry::Registers(now_ns(), *registers))
+        self.track(|track| track.registers(now_ns(), registers))
     }
 
     /// Raw bytes are of version 1: those of version 2 do not say where a datagram ends.
@@ -302,27 +308,34 @@ impl Recorder {
     }
 
     pub(super) fn board_change(&self, change: &BoardChange) -> Result<()> {
-        self.push(Entry::Board(*change))
+        let t_us = change.t_us.and_then(|t| self.timed(t));
+        self.track(|track| track.board_change(&BoardChange { t_us, ..*change }))
     }
 
     pub(super) fn marker(&self, marker: Marker) -> Result<()> {
-        self.push(Entry::Marker(now_ns(), marker))
+        let Some(t) = self.timed(marker.t) else { return Ok(()) };
+        self.track(|track| track.marker(now_ns(), Marker { t, ..marker }))
     }
 
     pub(super) fn detection(&self, said: &Said) -> Result<()> {
-        self.push(Entry::Detection(said.said_ns, said.detection.clone()))
+        let found = &said.detection;
+        let (Some(t), Some(known)) = (self.timed(found.t), self.timed(found.known)) else { return Ok(()) };
+        self.track(|track| track.detection(said.said_ns, &Detection { t, known, ..found.clone() }))
     }
 
     /// What is taken off the pictures from here on.
     pub(super) fn tare(&self, tare: &Tare) -> Result<()> {
-        self.push(Entry::Tare(Box::new(tare.clone())))
+        self.track(|track| {
+            track.tare(tare);
+            Ok(())
+        })
     }
 
     pub(super) fn picture(&self, at_ns: i64, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
-        if self.waits() {
-            return Ok(());
-        }
-        self.kind()?.track().map_or(Ok(()), |track| track.picture(at_ns, board_us, columns, held))
+        // Of a file that is not there yet nothing is to be seen.
+        let there = !matches!(self.kind()?, Kind::Mcap(writer) if !writer.has_begun());
+        let Some(t_us) = self.timed(board_us).filter(|_| there) else { return Ok(()) };
+        self.track(|track| track.picture(at_ns, t_us, columns, held))
     }
 
     /// What an unfinished recording will know of its losses; a raw one knows nothing, but its bytes reach the system.
@@ -344,7 +357,7 @@ impl Recorder {
             return Err(problem!("a .lsa holds raw bytes and no notes: record to a .mcap file").into());
         }
         self.noted.store(true, Ordering::Relaxed);
-        self.push(Entry::Note(now_ns(), board_us, text.to_owned()))
+        self.track(|track| track.note(now_ns(), board_us.and_then(|t| self.timed(t)), text))
     }
 
     /// A taxel that a person zeroed.
@@ -352,12 +365,13 @@ impl Recorder {
         if named(&self.record.path)? == "lsa" {
             return Err(problem!("a .lsa cannot keep that a taxel was zeroed: record to a .mcap file").into());
         }
-        self.push(Entry::Zeroing(now_ns(), *zeroing))
+        let Some(t) = self.timed(zeroing.t) else { return Ok(()) };
+        self.track(|track| track.zeroing(now_ns(), &Zeroing { t, ..*zeroing }))
     }
 
     /// What was lost, as the file keeps it.
-    fn losses(&self, counters: &Counters) -> recording::Counts {
-        losses(counters, self.guest.as_ref().map(|guest| &guest.since))
+    pub(super) fn losses(&self, counters: &Counters) -> recording::Counts {
+        losses(counters, self.since())
     }
 
     /// The same in a line.
@@ -374,18 +388,10 @@ impl Recorder {
             }
             return Ok(None);
         }
-        let others = matches!(self.kind.get(), Some(Kind::Mcap(writer)) if writer.holds_anything());
-        let nothing = !others
-            && match &self.guest {
-                Some(guest) => counters.decoded == guest.since.decoded,
-                None => counters.nothing_came(),
-            };
-        if (!nothing || self.noted.load(Ordering::Relaxed)) && self.waits() {
-            self.kind()?;
-        }
+        let nothing = !self.holds_anything() && (self.since.is_some() || counters.nothing_came());
         let path = self.record.path;
         let refused = self.refused.into_inner();
-        if (nothing && !self.noted.into_inner()) || (refused && !self.begun.into_inner()) {
+        if nothing || (refused && !self.begun.into_inner()) {
             drop(self.kind);
             if self.new {
                 std::fs::remove_file(&path).map_err(Error::file(&path))?;

@@ -78,7 +78,7 @@ impl Voice {
         self.sinks.iter_mut().try_for_each(|sink| sink.take(&said)).map_err(Error::Sink)?;
         if let Some(recorder) = &*lock(&shared.recorder) {
             // Where only a guest's recording is broken, the decoding thread will find that too.
-            recorder.detection(&said).or_else(|error| if recorder.is_a_guest() { Ok(()) } else { Err(error) })?;
+            recorder.detection(&said).or_else(|error| if recorder.since().is_some() { Ok(()) } else { Err(error) })?;
         }
         shared.happened([said.detection.t, said.detection.known]);
         lock(&shared.listeners).retain(|listener| {

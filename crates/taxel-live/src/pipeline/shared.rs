@@ -69,12 +69,13 @@ pub(super) struct Shared {
     pub(super) ended: AtomicBool,
 }
 
+/// The recording that ran, where one did, and the counters of its last datagram.
+pub(super) type Ended = (Option<Recorder>, Counters);
+
 /// What the decoding thread does between two batches.
 pub(super) enum Wish {
-    /// Record from here on, and say when.
-    Begin(Box<Recorder>, channel::Sender<Result<()>>),
-    /// End the recording: the recorder and the counters of its last datagram go where they are waited for.
-    End(channel::Sender<(Option<Recorder>, Counters)>),
+    /// End the recording that runs, and record into this one, where there is one, from the next datagram on.
+    Record(Option<Box<Recorder>>, channel::Sender<Result<Ended>>),
     /// Let somebody look on.
     Look(channel::Sender<Outlet>),
     /// Give copies for other computers.

@@ -23,7 +23,9 @@ use crate::{Error, Result};
 /// A stream of numbers at work.
 pub(super) struct Numbers {
     part: Part,
-    track: Mutex<Option<Arc<Track>>>,
+    /// Whether they are kept from the first one on; else where a recording runs.
+    always: bool,
+    track: Mutex<Kept>,
     stream: Stream,
     lines: AtomicU64,
     strange: AtomicU64,
@@ -31,10 +33,19 @@ pub(super) struct Numbers {
     ends: AtomicBool,
 }
 
+/// Where numbers go.
+#[derive(Default)]
+struct Kept {
+    track: Option<Track>,
+    /// Lines, and strange ones, that came before it.
+    before: (u64, u64),
+}
+
 impl Numbers {
-    pub(super) fn new(part: Part, stream: Stream) -> Self {
+    pub(super) fn new(part: Part, stream: Stream, always: bool) -> Self {
         Self {
             part,
+            always,
             track: Mutex::default(),
             stream,
             lines: AtomicU64::new(0),
@@ -46,13 +57,22 @@ impl Numbers {
 
     /// Keeps numbers that came.
     pub(super) fn sample(&self, arrived_ns: i64, values: &[f64]) -> Result<()> {
-        let track = self.track()?;
         if !self.stream.takes(values) {
             let columns = self.stream.columns.join(", ");
             let (name, n) = (&self.part.name, values.len());
             return Err(problem!("source {name}: {n} values; its columns are {columns}").into());
         }
-        track.sample(arrived_ns, self.lines.fetch_add(1, Ordering::Relaxed), values)
+        self.keep(|track, number| track.sample(arrived_ns, number, values))
+    }
+
+    /// Counts a line, and keeps it where it is to be kept. One belongs to one recording.
+    fn keep(&self, keep: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
+        let mut kept = lock(&self.track);
+        if self.always && kept.track.is_none() {
+            kept.track = Some(self.part.open()?);
+        }
+        let number = self.lines.fetch_add(1, Ordering::Relaxed);
+        kept.track.as_ref().map_or(Ok(()), |track| keep(track, number))
     }
 
     /// Keeps a line that came.
@@ -61,19 +81,26 @@ impl Numbers {
             Some(values) => self.sample(arrived_ns, &values),
             // A line that names the columns again is none.
             None if fields(line).eq(self.stream.columns.iter().map(String::as_str)) || line.trim().is_empty() => Ok(()),
-            None => {
+            None => self.keep(|track, number| {
                 self.strange.fetch_add(1, Ordering::Relaxed);
-                self.track()?.strange_line(arrived_ns, self.lines.fetch_add(1, Ordering::Relaxed), line)
-            }
+                track.strange_line(arrived_ns, number, line)
+            }),
         }
     }
 
-    fn track(&self) -> Result<Arc<Track>> {
-        let mut track = lock(&self.track);
-        if track.is_none() {
-            *track = Some(Arc::new(self.part.open()?));
+    /// What comes from here on goes to this part of a recording, or to none; says in the one before what came, and gives that.
+    pub(super) fn keep_in(&self, track: Option<Track>) -> SourceCounts {
+        let mut kept = lock(&self.track);
+        let now = (self.lines.load(Ordering::Relaxed), self.strange.load(Ordering::Relaxed));
+        let Kept { track: ended, before } = std::mem::replace(&mut *kept, Kept { track, before: now });
+        drop(kept);
+        let (lines, strange) = (now.0 - before.0, now.1 - before.1);
+        if let Some(track) = ended {
+            let decoder = BTreeMap::from([("lines_that_could_not_be_read".to_owned(), strange)]);
+            let counts = recording::Counts { received: lines, decoder, ..recording::Counts::default() };
+            track.end(&self.part.name, counts);
         }
-        track.clone().ok_or_else(|| problem!("source {}: nothing is recorded", self.part.name).into())
+        SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone() }
     }
 
     pub(super) fn counts(&self) -> SourceCounts {
@@ -84,12 +111,7 @@ impl Numbers {
     /// Nothing is taken any more: says in the recording what came.
     pub(super) fn end(&self) {
         self.ends.store(true, Ordering::Release);
-        if let Some(track) = &*lock(&self.track) {
-            let strange = self.strange.load(Ordering::Relaxed);
-            let decoder = BTreeMap::from([("lines_that_could_not_be_read".to_owned(), strange)]);
-            let received = self.lines.load(Ordering::Relaxed);
-            track.end(&self.part.name, recording::Counts { received, decoder, ..recording::Counts::default() });
-        }
+        self.keep_in(None);
     }
 
     /// Reads lines until the end, in a thread of its own; a line that breaks is opened again.
@@ -163,7 +185,7 @@ impl<Board> Others<Board> {
                 }
                 SourceKind::Lines(_, stream) | SourceKind::Given(stream) => stream,
             };
-            let numbers = Arc::new(Numbers::new(part, stream.clone()));
+            let numbers = Arc::new(Numbers::new(part, stream.clone(), options.record.is_some()));
             if let SourceKind::Lines(place, _) = kind {
                 others.threads.push(numbers.read(place)?);
             }

@@ -28,6 +28,7 @@ use taxel_core::{Marker, problem};
 
 use super::picture::Pictures;
 use super::{BoardChange, Compression, Counts, FLUSH_EVERY, Header, LATE, Stream, Topic, WriterOptions, create};
+use crate::locked::lock;
 use crate::{Error, Result};
 
 /// A chunk is closed when it is this large, or when the queue is empty.
@@ -44,14 +45,18 @@ pub(super) const BEGIN: &str = "taxel";
 /// Name of the metadata record at its end.
 pub(super) const END: &str = "taxel.end";
 
+/// What may wait in memory for the clock of a recording that is not at its file yet, bytes: heartbeats of a board of version 2
+/// at rest for hours.
+const WAITING_BYTES: usize = 1 << 22;
+
 /// A recording being written; one may be fed from several threads.
 ///
-/// Dropped without [`Writer::finish`], it keeps everything that was given, and says that it was not finished.
+/// Dropped without [`Writer::finish`], it keeps everything that was given, and says that it was not finished; one that has not
+/// begun its file leaves none.
 pub struct Writer {
     /// The first source.
     track: Track,
     header: Header,
-    thread: Option<JoinHandle<Result<()>>>,
 }
 
 /// One source's part of a recording being written; fed from any thread. A [`Writer`] is the first one's.
@@ -75,8 +80,11 @@ impl std::ops::Deref for Writer {
 }
 
 struct Shared {
-    /// Held by who writes; taken before `state` where both are. `None` once writing is over.
+    /// How the file is begun, as long as it is not.
+    plan: Mutex<Option<Plan>>,
+    /// Held by who writes; taken before `state` where both are. `None` before the file is begun, and once writing is over.
     pen: Mutex<Option<Pen>>,
+    thread: Mutex<Option<JoinHandle<Result<()>>>>,
     /// Whether who writes waits for the operating system.
     at_disk: Arc<AtomicBool>,
     state: Mutex<Pending>,
@@ -86,9 +94,19 @@ struct Shared {
     room: Condvar,
 }
 
+/// A file that is not begun yet.
+struct Plan {
+    header: Header,
+    how: WriterOptions,
+}
+
 #[derive(Default)]
 struct Pending {
     queue: Queue,
+    /// Whether the file is begun; until then everything waits.
+    begun: bool,
+    /// Whether the file waits for the board's clock ([`Writer::begin`]), and not only for something to keep.
+    for_clock: bool,
     /// Datagrams and samples of each source.
     recorded: Vec<u64>,
     /// What each source but the first said at its end.
@@ -145,22 +163,29 @@ impl Writer {
     /// `File` where the file exists (and `overwrite` is not set), or cannot be created or written; `Core(Problem)` for sources
     /// that make no sense.
     pub fn create(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
-        let mut writer = Self::alone(path, header, options)?;
-        let (shared, path) = (Arc::clone(&writer.shared), path.to_owned());
-        let thread = std::thread::Builder::new().name("taxel-record".to_owned()).spawn(move || shared.write(&path));
-        writer.thread = Some(thread.map_err(Error::file(&writer.path))?);
+        let writer = Self::plan(path, header, options, false)?;
+        writer.begin(0)?;
         Ok(writer)
     }
 
-    /// A writer whose thread has not begun.
-    fn alone(path: &Path, header: &Header, options: WriterOptions) -> Result<Self> {
+    /// As [`Writer::create`], but the file is touched with the first datagram or sample; or, where it waits `for_clock`, with
+    /// [`Writer::begin`]. What is given before waits.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` for sources that make no sense.
+    pub fn plan(path: &Path, header: &Header, how: WriterOptions, for_clock: bool) -> Result<Self> {
         header.check()?;
-        let at_disk = Arc::new(AtomicBool::new(false));
-        let file = create(path, options.overwrite)?;
-        let pen = Pen::begin(file, header, options.compression, &at_disk).map_err(|e| Broken::of(e).named(path))?;
         let recorded = vec![0; header.sources.len() + 1];
-        let (pen, state) = (Mutex::new(Some(pen)), Mutex::new(Pending { recorded, ..Pending::default() }));
-        let shared = Arc::new(Shared { pen, at_disk, state, work: Condvar::new(), room: Condvar::new() });
+        let shared = Arc::new(Shared {
+            plan: Mutex::new(Some(Plan { header: header.clone(), how })),
+            pen: Mutex::default(),
+            thread: Mutex::default(),
+            at_disk: Arc::new(AtomicBool::new(false)),
+            state: Mutex::new(Pending { recorded, for_clock, ..Pending::default() }),
+            work: Condvar::new(),
+            room: Condvar::new(),
+        });
         let track = Track {
             path: path.to_owned(),
             shared,
@@ -169,7 +194,30 @@ impl Writer {
             columns: header.array.columns.into(),
             pictures: Mutex::default(),
         };
-        Ok(Self { track, header: header.clone(), thread: None })
+        Ok(Self { track, header: header.clone() })
+    }
+
+    /// Begins the file of [`Writer::plan`] with what is added to decoded times, us ([`Header::origin_us`]); gives whether that came
+    /// in time, before it was begun without.
+    ///
+    /// # Errors
+    ///
+    /// As [`Writer::create`].
+    pub fn begin(&self, origin_us: i64) -> Result<bool> {
+        self.shared.begin(&self.track.path, origin_us)
+    }
+
+    /// Whether the file is begun.
+    #[must_use]
+    pub fn has_begun(&self) -> bool {
+        self.shared.lock().begun
+    }
+
+    /// Says when it was begun, ns since 1970, where its file is not.
+    pub fn started(&self, at_ns: i64) {
+        if let Some(plan) = &mut *lock(&self.shared.plan) {
+            plan.header.started_ns = at_ns;
+        }
     }
 
     /// Another source's part.
@@ -206,7 +254,8 @@ impl Writer {
     /// # Errors
     ///
     /// `File` where the disk is full or gone; the file keeps everything that was written before.
-    pub fn finish(mut self, counts: Counts) -> Result<Counts> {
+    pub fn finish(self, counts: Counts) -> Result<Counts> {
+        self.begin(0)?;
         let counts = {
             let mut state = self.shared.lock();
             let counts = Counts { recorded: state.recorded[0], ..counts };
@@ -218,8 +267,9 @@ impl Writer {
         Ok(counts)
     }
 
-    fn join(&mut self) -> Result<()> {
-        match self.thread.take().map(JoinHandle::join) {
+    fn join(&self) -> Result<()> {
+        let thread = lock(&self.shared.thread).take();
+        match thread.map(JoinHandle::join) {
             None => Ok(()),
             Some(Ok(outcome)) => outcome,
             Some(Err(panic)) => std::panic::resume_unwind(panic),
@@ -423,7 +473,7 @@ impl Track {
         }
         let before = state.queue.bytes.len();
         state.queue.bytes.extend_from_slice(bytes);
-        if before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
+        if state.begun && before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
             self.shared.work.notify_all();
         }
         // The format's number has 32 bits; the reader unwraps it.
@@ -432,7 +482,15 @@ impl Track {
         let at_ns = u64::try_from(at_ns).unwrap_or(0);
         state.queue.messages.push(Queued { channel: topic.channel(self.source), number, at_ns, bytes: bytes.len() });
         state.queue.since.get_or_insert_with(Instant::now);
-        state.recorded[self.source] += u64::from(matches!(topic, Topic::Datagrams | Topic::Samples));
+        let data = matches!(topic, Topic::Datagrams | Topic::Samples);
+        state.recorded[self.source] += u64::from(data);
+        if !state.begun {
+            if data && (!state.for_clock || state.queue.bytes.len() > WAITING_BYTES) {
+                drop(state);
+                self.shared.begin(&self.path, 0)?;
+            }
+            return Ok(());
+        }
         if !state.queue.is_late() || self.shared.at_disk.load(Ordering::Relaxed) {
             return Ok(());
         }
@@ -443,7 +501,7 @@ impl Track {
 
 impl Drop for Writer {
     fn drop(&mut self) {
-        if self.thread.is_some() {
+        if lock(&self.shared.thread).is_some() {
             self.shared.lock().end.get_or_insert(None);
             self.shared.work.notify_all();
             // Nobody is left to hear of it; the file says itself that it was not finished.
@@ -459,6 +517,43 @@ impl Shared {
 
     fn pen(&self) -> MutexGuard<'_, Option<Pen>> {
         self.pen.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins the file, once; gives whether it was this call that did.
+    fn begin(self: &Arc<Self>, path: &Path, origin_us: i64) -> Result<bool> {
+        // Held until the file is there: who comes second finds it begun.
+        let mut planned = lock(&self.plan);
+        let Some(Plan { header, how }) = planned.take() else {
+            return self.lock().broken.clone().map_or(Ok(false), |broken| Err(broken.named(path)));
+        };
+        let begun = self.open(path, &Header { origin_us, ..header }, how);
+        if let Err(error) = &begun {
+            self.lock().broken = Some(Broken::again(error));
+            self.room.notify_all();
+        }
+        begun.map(|()| true)
+    }
+
+    fn open(self: &Arc<Self>, path: &Path, header: &Header, how: WriterOptions) -> Result<()> {
+        self.set_out(path, header, how)?;
+        let (shared, to) = (Arc::clone(self), path.to_owned());
+        let thread = std::thread::Builder::new().name("taxel-record".to_owned()).spawn(move || shared.write(&to));
+        *lock(&self.thread) = Some(thread.map_err(Error::file(path))?);
+        Ok(())
+    }
+
+    /// The file without the thread that writes it.
+    fn set_out(&self, path: &Path, header: &Header, how: WriterOptions) -> Result<()> {
+        let file = create(path, how.overwrite)?;
+        let pen = Pen::begin(file, header, how.compression, &self.at_disk).map_err(|e| Broken::of(e).named(path))?;
+        *self.pen() = Some(pen);
+        let mut state = self.lock();
+        state.begun = true;
+        // What waited for the file is as new as the file.
+        if state.queue.since.is_some() {
+            state.queue.since = Some(Instant::now());
+        }
+        Ok(())
     }
 
     /// The thread's whole life: write the queue, wait.
@@ -521,6 +616,14 @@ impl Shared {
 }
 
 impl Broken {
+    /// What is said again of an error that was given.
+    fn again(error: &Error) -> Self {
+        match error {
+            Error::File { source, .. } => Self { code: source.raw_os_error(), text: source.to_string() },
+            other => Self { code: None, text: other.to_string() },
+        }
+    }
+
     fn of(error: McapError) -> Self {
         match error {
             McapError::Io(error) => {
@@ -782,11 +885,19 @@ mod tests {
         serde_json::from_value(json!({ "array": taxel_core::Array::thesis() })).unwrap()
     }
 
+    /// A writer whose thread has not begun.
+    fn alone(path: &Path, how: WriterOptions) -> Writer {
+        let writer = Writer::plan(path, &header(), how, false).unwrap();
+        let plan = lock(&writer.shared.plan).take().unwrap();
+        writer.shared.set_out(path, &plan.header, how).unwrap();
+        writer
+    }
+
     #[test]
     fn a_writer_whose_thread_gets_no_processor_loses_at_most_what_is_not_late() {
         let path = std::env::temp_dir().join(format!("taxel-starved-{}.mcap", std::process::id()));
         let how = WriterOptions { overwrite: true, ..WriterOptions::default() };
-        let writer = Writer::alone(&path, &header(), how).unwrap();
+        let writer = alone(&path, how);
         for k in 0..20_u32 {
             writer.datagram(i64::from(k), u64::from(k), &[7; 1400]).unwrap();
             std::thread::sleep(LATE / 4);
@@ -803,7 +914,7 @@ mod tests {
     fn while_the_disk_is_waited_for_callers_go_on() {
         let path = std::env::temp_dir().join(format!("taxel-stalled-{}.mcap", std::process::id()));
         let how = WriterOptions { overwrite: true, ..WriterOptions::default() };
-        let writer = Writer::alone(&path, &header(), how).unwrap();
+        let writer = alone(&path, how);
         writer.shared.at_disk.store(true, Ordering::Relaxed);
         // The pen is held by who waits for the disk: a caller who wanted it would wait forever.
         let pen = writer.shared.pen();

@@ -60,3 +60,30 @@ pub struct Counts {
     /// Resets that were noticed.
     pub resets: u64,
 }
+
+impl Counts {
+    /// What was counted since an earlier time; numbers that were missing then and came later leave none missing.
+    #[must_use]
+    pub fn since(&self, earlier: &Self) -> Self {
+        Self {
+            datagrams: self.datagrams - earlier.datagrams,
+            intact: self.intact - earlier.intact,
+            repeated: self.repeated - earlier.repeated,
+            old: self.old - earlier.old,
+            short: self.short - earlier.short,
+            foreign: self.foreign - earlier.foreign,
+            checksum: self.checksum - earlier.checksum,
+            missing: self.missing.saturating_sub(earlier.missing),
+            unknown_kind: self.unknown_kind - earlier.unknown_kind,
+            unknown_flags: self.unknown_flags - earlier.unknown_flags,
+            malformed: self.malformed - earlier.malformed,
+            events: self.events - earlier.events,
+            repaired: self.repaired - earlier.repaired,
+            states: self.states - earlier.states,
+            outside: self.outside - earlier.outside,
+            markers: self.markers - earlier.markers,
+            dropped: self.dropped - earlier.dropped,
+            resets: self.resets - earlier.resets,
+        }
+    }
+}

@@ -1,0 +1,302 @@
+"""Trial after trial from one receiver: each begins with what the taxels hold, and nothing is lost between two."""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import Array, Events, wire
+from taxel.live import Live
+
+LOOPBACK = "127.0.0.1"
+SMALL = Array(4, 4, pitch_mm=2.0, name="small")
+#: What each taxel is told to hold once, before all else.
+REST = 40 + np.arange(16)
+#: From one datagram to the next by the board's clock: its 6.5 s turn within a second of the test's.
+STEP_US = 5000
+
+
+def told() -> bytes:
+    """Every taxel, once: what a board says when it begins."""
+    taxel_of = np.arange(16)
+    return wire.encode(
+        Events(np.zeros(16, int), taxel_of % 4, taxel_of // 4, np.ones(16, bool), array=SMALL, intensity=REST)
+    )
+
+
+def step(n: int) -> bytes:
+    """The n-th datagram after that: one event whose stamp and ticks name it; the last row never changes again."""
+    at = n % 12
+    return wire.encode(
+        Events([STEP_US * (n + 1)], [at % 4], [at // 4], [True], array=SMALL, intensity=[100 + n % 50_000])
+    )
+
+
+@contextmanager
+def board(port: int) -> Iterator[list[int]]:
+    """Tell all once, then a step each half ms, until the block ends; give what was sent, one number a step."""
+    sent: list[int] = []
+    over = threading.Event()
+
+    def run() -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+            link.sendto(told(), (LOOPBACK, port))
+            while not over.wait(0.0005):
+                link.sendto(step(len(sent)), (LOOPBACK, port))
+                sent.append(len(sent))
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    try:
+        yield sent
+    finally:
+        over.set()
+        thread.join()
+
+
+def until(what: Callable[[], bool]) -> None:
+    end = time.monotonic() + 30
+    while not what():
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def steps(recording: taxel.Recording) -> list[int]:
+    return [int(ticks) - 100 for ticks in recording.events.intensity if ticks >= 100]
+
+
+def begun(recording: taxel.Recording) -> np.ndarray[tuple[int], np.dtype[np.float32]]:
+    """Return what the taxels held when it began."""
+    assert recording.held is not None
+    return recording.held.reshape(-1)
+
+
+def assert_follow_each_other(trials: list[Path]) -> None:
+    """Each datagram is in one trial, in order; each trial knows what the taxels held, on one clock."""
+    held = REST.astype(float)
+    seen: list[int] = []
+    for path in trials:
+        recording = taxel.open(path)
+        mine = steps(recording)
+        assert mine, path
+        if not seen:
+            held = np.where(np.isnan(begun(recording)), held, begun(recording))
+        else:
+            np.testing.assert_array_equal(begun(recording), held)
+            np.testing.assert_array_equal(recording.events.t, STEP_US * (np.array(mine) + 1))
+        for n in mine:
+            held[n % 12] = 100 + n
+        seen += mine
+    assert seen == list(range(seen[0], seen[0] + len(seen)))
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
+        link.bind((LOOPBACK, 0))
+        return int(link.getsockname()[1])
+
+
+def record(port: int, *arguments: object) -> list[str]:
+    said = ["record", *arguments, "--host", LOOPBACK, "--port", port, "--array", "4x4"]
+    return [sys.executable, "-m", "taxel", *map(str, said)]
+
+
+def test_trials_that_follow_each_other_lose_nothing_and_know_what_was_held(tmp_path: Path) -> None:
+    port = free_port()
+    arguments = record(port, tmp_path / "step.mcap", "--length", 0.25, "--countdown", 0, "--trials", 4, "--json")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
+        until((tmp_path / "step1.mcap").exists)
+        with board(port):
+            said, _ = process.communicate(timeout=60)
+    assert process.returncode == 0
+    trials = [tmp_path / f"step{n}.mcap" for n in (1, 2, 3, 4)]
+    assert sorted(tmp_path.iterdir()) == trials
+    assert_follow_each_other(trials)
+    lines = [json.loads(line) for line in said.splitlines()]
+    assert [line["path"] for line in lines] == [str(path) for path in trials]
+    for line, path in zip(lines, trials, strict=True):
+        counters, capture = line["counters"], line["counters"]["capture"]
+        assert counters["events"] == len(taxel.open(path).events), "of this trial, not of all"
+        assert capture["datagrams"] == counters["decoded"] + capture["dropped_by_queue"]
+        assert counters["wire"]["bytes"] == 5 * counters["wire"]["words"]
+        assert line["verdict"].startswith("nothing lost after arrival")
+
+
+@pytest.mark.parametrize("kind", ["mcap", "lsa"])
+def test_each_datagram_belongs_to_one_recording_wherever_the_border_falls(tmp_path: Path, kind: str) -> None:
+    paths = [tmp_path / f"{n}.{kind}" for n in range(12)]
+    with Live(0, host=LOOPBACK, array=SMALL, record_later=True) as live, board(live.address[1]) as sent:
+        until(lambda: live.counters["decoded"] > 0)
+        for n, path in enumerate(paths):
+            before = live.record(path)
+            assert (before is None) == (n == 0)
+            came = live.counters["decoded"]
+            until(lambda: live.counters["decoded"] > came + 1 + 20 * (n % 3))  # noqa: B023
+        last = live.end_recording()
+        assert last.path == paths[-1]
+        with pytest.raises(taxel.ProblemError, match="nothing is recorded"):
+            live.end_recording()
+    assert not live.stop().lost
+    if kind == "mcap":
+        assert_follow_each_other(paths)
+    else:
+        all_of_them = b"".join(path.read_bytes() for path in paths)
+        whole = b"".join(step(n) for n in sent)
+        assert all_of_them in told() + whole
+        assert all(path.with_suffix(".lss").exists() for path in paths)
+
+
+def test_what_came_between_two_trials_is_in_neither_and_is_known_to_the_next(tmp_path: Path) -> None:
+    with (
+        Live(0, host=LOOPBACK, array=SMALL, record_later=True) as live,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
+    ):
+
+        def hear(data: bytes) -> None:
+            before = live.counters["decoded"]
+            link.sendto(data, live.address)
+            until(lambda: live.counters["decoded"] > before)
+
+        hear(told())
+        live.record(tmp_path / "a.mcap")
+        hear(step(0))
+        assert live.end_recording().counters["decoded"] == 1
+        hear(step(1))
+        live.record(tmp_path / "b.mcap")
+        hear(step(2))
+        # What is there already stays as it is, and what runs goes on.
+        with pytest.raises(FileExistsError):
+            live.record(tmp_path / "a.mcap")
+        assert live.records
+        hear(step(3))
+        live.end_recording()
+    a, b = taxel.open(tmp_path / "a.mcap"), taxel.open(tmp_path / "b.mcap")
+    assert (steps(a), steps(b)) == ([0], [2, 3])
+    np.testing.assert_array_equal(begun(a), REST)
+    np.testing.assert_array_equal(begun(b), np.r_[100, 101, REST[2:]])
+
+
+def test_a_trial_to_which_nothing_came_keeps_its_number_for_the_next(tmp_path: Path) -> None:
+    port = free_port()
+    arguments = record(port, tmp_path / "step.mcap", "--length", 0.4, "--countdown", 0, "--trials", 2)
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        nothing = next(line for line in process.stderr if "nothing arrived" in line)
+        with board(port):
+            _, more = process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert nothing == f"taxel: {tmp_path / 'step1.mcap'}: nothing arrived at UDP {LOOPBACK}:{port}; not kept\n"
+    assert "nothing arrived" not in more
+    trials = [tmp_path / "step1.mcap", tmp_path / "step2.mcap"]
+    assert sorted(tmp_path.iterdir()) == trials
+    assert_follow_each_other(trials)
+
+
+@pytest.mark.parametrize("kind", ["mcap", "lsa"])
+@pytest.mark.parametrize("countdown", [0, 1])
+def test_where_no_trial_held_anything_no_file_is_left_and_the_code_says_so(
+    tmp_path: Path, countdown: int, kind: str
+) -> None:
+    (tmp_path / f"a1.{kind}").write_bytes(b"as it was")
+    how = ["--length", 0.1, "--countdown", countdown, "--trials", 5, "--overwrite"]
+    done = subprocess.run(
+        record(free_port(), tmp_path / f"a.{kind}", *how), capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.returncode == 3
+    assert done.stdout == ""
+    said = [line for line in done.stderr.splitlines() if "nothing arrived" in line]
+    assert len(said) == 3
+    assert all(f"a1.{kind}: nothing arrived" in line for line in said)
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"as it was"]
+
+
+def test_ctrl_c_ends_the_trial_that_runs_well(tmp_path: Path) -> None:
+    port = free_port()
+    arguments = record(port, tmp_path / "step.mcap", "--length", 0.3, "--countdown", 0, "--json")
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
+        until((tmp_path / "step1.mcap").exists)
+        with board(port):
+            until((tmp_path / "step3.mcap").exists)
+            time.sleep(0.05)
+            process.send_signal(signal.SIGINT)
+            process.communicate(timeout=60)
+    assert process.returncode == 0
+    trials = sorted(tmp_path.iterdir())
+    assert len(trials) >= 3
+    assert_follow_each_other(trials)
+    assert all(taxel.open(path).verdict.startswith("nothing lost after arrival") for path in trials)
+
+
+def heard(live: Live) -> int:
+    """Return how many datagrams of either board were decoded at least."""
+    return min(int(live.counters["decoded"]), int(live.counters["sources"]["left"]["decoded"]))
+
+
+def test_every_source_is_in_every_trial_and_each_of_its_lines_in_one(tmp_path: Path) -> None:
+    paths = [tmp_path / f"{n}.mcap" for n in range(4)]
+    sources = {"left": f"udp:{LOOPBACK}:0,array=4x4", "force": "given,columns=n"}
+    with Live(0, host=LOOPBACK, array=SMALL, record_later=True, name="right", sources=sources) as live:
+        # What comes while nothing is recorded is heard and not kept.
+        live.sample("force", [-1.0])
+        with board(live.address[1]), board(live.source_address("left")[1]):
+            until(lambda: heard(live) > 0)
+            given = 0
+            for n, path in enumerate(paths):
+                live.record(path)
+                for _ in range(10 + n):
+                    live.sample("force", [float(given)])
+                    given += 1
+                came = live.counters["decoded"] + live.counters["sources"]["left"]["decoded"]
+                until(lambda: heard(live) > came + 10)  # noqa: B023
+                live.note(f"note {n}")
+            ended = live.end_recording()
+        assert ended.counters["sources"]["force"]["lines"] == 13
+    lines: list[float] = []
+    for name in ("right", "left"):
+        seen: list[int] = []
+        held = REST.astype(float)
+        for path in paths:
+            recording = taxel.open(path).sources[name]
+            if not seen:
+                held = begun(recording).astype(float)
+            np.testing.assert_array_equal(begun(recording), held)
+            mine = steps(recording)
+            for n in mine:
+                held[n % 12] = 100 + n
+            seen += mine
+        assert seen == list(range(seen[0], seen[0] + len(seen)))
+    for n, path in enumerate(paths):
+        lines += taxel.open(path).sources["force"].frames().values.reshape(-1).tolist()
+        notes = taxel.open(path).sources["right"].notes
+        assert [note.text for note in notes] == [f"note {n}"]
+        right = taxel.open(path).sources["right"].events.t
+        # Notes are on the recording's own clock, whatever the pipeline's is.
+        assert right[0] <= notes[0].t <= right[-1]
+    assert lines == [float(n) for n in range(given)]
+
+
+def test_a_full_disk_ends_the_trials_in_one_line(tmp_path: Path) -> None:
+    if not Path("/dev/full").exists():
+        pytest.skip("needs /dev/full, a disk that is always full")
+    (tmp_path / "full1.mcap").symlink_to("/dev/full")
+    port = free_port()
+    how = ["--length", 30, "--countdown", 0, "--overwrite"]
+    with subprocess.Popen(
+        record(port, tmp_path / "full.mcap", *how), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        next(line for line in process.stderr if "listening" in line)
+        with board(port):
+            _, said = process.communicate(timeout=60)
+    assert process.returncode == 3
+    assert "no space left on device" in said.splitlines()[-1]
