@@ -40,6 +40,8 @@ class Counts:
         Events on the array, those of them that a state gave, states, taxels outside the array, starts and stops.
     dropped, resets : int
         How often the board said that it had dropped events; resets that were noticed.
+    unknown_value : int
+        Differences from a value that was not heard, as the stream was joined later: their events have none.
     """
 
     datagrams: int
@@ -60,6 +62,7 @@ class Counts:
     markers: int
     dropped: int
     resets: int
+    unknown_value: int
 
 
 @dataclass(frozen=True)

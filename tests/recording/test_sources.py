@@ -10,6 +10,7 @@ import time
 import tty
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from hypothesis import strategies as st
 import taxel
 from taxel import _core
 from taxel.live import Live
+from taxel.simulate import Board
 
 LOOPBACK = "127.0.0.1"
 SMALL = taxel.Array(4, 4, pitch_mm=2.0, name="small")
@@ -350,6 +352,40 @@ def test_differences_begun_in_mid_stream_add_up_from_what_the_taxels_held(tmp_pa
     events = taxel.open(tmp_path / "mid.mcap").events
     np.testing.assert_array_equal(events.intensity, [91, 0, 1])
     np.testing.assert_array_equal(events.present, [True, False, True])
+
+
+@pytest.mark.parametrize("knows", [True, False])
+@pytest.mark.parametrize("intensity", ["difference", "value"])
+def test_version_2_begun_in_mid_stream_says_what_the_whole_says(tmp_path: Path, intensity: Any, knows: bool) -> None:
+    """With what the taxels held its events are the whole's; without, differences have no value until one is told."""
+    draw, ticks = np.random.default_rng(3), np.full(16, 40)
+    registers = taxel.wire.Registers(array=SMALL, wire_version=2)
+    board, whole = Board(registers, SMALL, intensity=intensity), taxel.wire_v2.Decoder(array=SMALL)
+    heard, at = [], 40
+    writer = _core.RecordingWriter(tmp_path / "mid.mcap", json.dumps({"array": SMALL._geometry()}), "none", True)
+    for k in range(100):
+        ticks[draw.integers(0, 16)] = draw.integers(0, 150)
+        for datagram in board.frame(ticks.astype(np.uint16)):
+            if k == at:
+                held = np.where(whole.held < 0, 65_535, whole.held).astype(np.uint16).reshape(-1)
+                if knows:
+                    writer.held(1_700_000_000_000_000_000, None, held)
+                at = -1
+            events = whole.push(datagram).events
+            if at < 0:
+                heard.append(events)
+                writer.datagram(1_700_000_000_000_000_000 + 192_000 * k, k, datagram)
+    writer.finish("{}")
+    begun, right = taxel.open(tmp_path / "mid.mcap").events, sum(heard[1:], heard[0])
+    assert right.present is None or right.present.all()
+    if knows:
+        assert begun == right
+    else:
+        told = begun.repaired if begun.repaired is not None else np.zeros(len(begun), bool)
+        mine = begun[~told]
+        np.testing.assert_array_equal(mine.t, right.t)
+        assert mine.present.all() == (intensity == "value")
+        np.testing.assert_array_equal(mine.intensity[mine.present], right.intensity[mine.present])
 
 
 def test_a_recording_begun_in_mid_stream_begins_with_what_the_taxels_held(tmp_path: Path) -> None:

@@ -120,6 +120,18 @@ VECTORS = {
             one(6, [(40, 1, 1, 0, 40), (40, 2, 2, 0, 0)], base=40, stride=3, flags=1, sequence=5),
         ],
     ),
+    "joined": (
+        "Joined in mid-stream: a difference has no value before a state or a value told one.",
+        8,
+        8,
+        [
+            one(1, [(0, 1, 1, 1, 50), (0, 2, 2, 1, 7)], stride=3, flags=3, sequence=7),
+            one(6, [(10, 1, 1, 0, 40)], base=10, stride=3, flags=1, sequence=8),
+            one(1, [(20, 1, 1, 0, 15), (20, 2, 2, 1, 7)], base=20, stride=3, flags=3, sequence=9),
+            one(1, [(30, 2, 2, 1, 9)], base=30, stride=3, flags=1, sequence=10),
+            one(1, [(40, 2, 2, 0, 10), (40, 3, 3, 1, 1)], base=40, stride=3, flags=3, sequence=11),
+        ],
+    ),
     "old_states": (
         "A state that comes behind a later event does not undo it.",
         8,

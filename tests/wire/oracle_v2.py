@@ -55,7 +55,7 @@ def markers(*given):
 
 NAMES = (
     "datagrams intact repeated short foreign checksum missing unknown_kind unknown_flags malformed events repaired "
-    "states outside markers dropped resets"
+    "states outside markers dropped resets unknown_value"
 )
 
 
@@ -67,7 +67,7 @@ class Reader:
         self.counts = dict.fromkeys(NAMES.split(), 0)
         self.events, self.markers = [], []
         self.board, self.seen, self.offset, self.latest = None, {}, {}, 0
-        self.held, self.held_at = {}, {}
+        self.held, self.held_at, self.whole = {}, {}, False
 
     def refused(self, data):
         if data[:1] not in (b"", b"\x54") or (len(data) > 1 and data[1] >> 4 != 2):
@@ -90,9 +90,9 @@ class Reader:
         session, flags, span = int.from_bytes(data[14:16], "little"), data[17], int.from_bytes(data[-6:-4], "little")
         if session not in self.seen:
             self.offset[session] = self.latest - base if self.seen else 0
-            if self.seen:
-                self.counts["resets"] += 1
-                self.held, self.held_at = {}, {}
+            self.counts["resets"] += bool(self.seen)
+            # From the board's reset on a taxel holds 0; who joins later has to be told.
+            self.held, self.held_at, self.whole = {}, {}, sequence == 0
             self.seen[session] = set()
         if sequence in self.seen[session]:
             self.counts["repeated"] += 1
@@ -140,6 +140,11 @@ class Reader:
                 return
             self.counts["repaired"] += 1
             p = value >= (before or 0)
+        elif flags & 2 and kind and before is None and not self.whole:
+            self.counts["unknown_value"] += 1
+            self.events.append((t, x, y, bool(p), None, False))
+            self.latest = max(self.latest, t)
+            return
         elif flags & 2:
             value = max(0, min(65535, (before or 0) + (value if p else -value)))
         if kind and (newest or flags & 2):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import taxel
@@ -25,7 +25,9 @@ VECTORS = sorted(path.stem for path in DATA.glob("*.json"))
 def rows(heard):
     for h in heard:
         e = h.events
-        values = [None] * len(e) if e.intensity is None else np.where(e.present, e.intensity, -1).tolist()
+        values = [None] * len(e)
+        if e.intensity is not None:
+            values = [int(ticks) if there else None for ticks, there in zip(e.intensity, e.present, strict=True)]
         repaired = np.zeros(len(e), bool) if e.repaired is None else e.repaired
         yield from zip(e.t.tolist(), e.x.tolist(), e.y.tolist(), e.p.tolist(), values, repaired.tolist(), strict=True)
 
@@ -111,6 +113,36 @@ def test_any_bytes_are_survived_and_counted(data, sealed):
     c = decoder.counts
     assert heard.intact == (c.intact == 1)
     assert c.datagrams == 1 == c.intact + c.repeated + c.old + c.short + c.foreign + c.checksum
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_differences_joined_in_mid_stream_say_what_is_right_or_nothing(seed):
+    """From a taxel that was not heard of no sum begins; with what the taxels hold, all are known at once."""
+    draw, array = np.random.default_rng(seed), taxel.Array(8, 8)
+    board = Board(Registers(array=array, wire_version=2), array, intensity="difference")
+    ticks, sent = draw.integers(0, 100, 64), []
+    for _ in range(int(draw.integers(5, 60))):
+        changed = draw.random(64) < 0.1
+        ticks[changed] = np.clip(ticks[changed] + draw.integers(-60, 61, 64)[changed], 0, 150)
+        sent += board.frame(ticks.astype(np.uint16))
+    assume(sent)
+    whole = Decoder(array=array)
+    at = int(draw.integers(0, len(sent)))
+    before = [list(rows([whole.push(d)])) for d in sent[:at]]
+    assert all(row[4] is not None for d in before for row in d), "heard from the board's reset on"
+    joined = Decoder(array=array)
+    heard = [(list(rows([joined.push(d)])), list(rows([whole.push(d)]))) for d in sent[at:]]
+    unknown = 0
+    for ours, right in heard:
+        told = {row[:3]: row[4] for row in right}
+        # A state of a taxel that was not heard of is an event to who joined, and to nobody else.
+        assert [row[:3] for row in ours if not row[5]] == [row[:3] for row in right if not row[5]]
+        assert [row[4] for row in ours if row[4] is not None and not row[5] and row[4] != told[row[:3]]] == []
+        unknown += sum(row[4] is None for row in ours)
+    held, right = joined.held, whole.held
+    assert (held[held >= 0] == right[held >= 0]).all(), "what is said to be held is right"
+    assert joined.counts.unknown_value == unknown
+    assert at > 0 or unknown == 0
 
 
 def test_a_large_board_is_heard():

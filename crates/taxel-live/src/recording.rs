@@ -296,6 +296,7 @@ pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String
         ("times_that_the_board_dropped_events", counts.dropped),
         ("resets", counts.resets),
         ("events_repaired", counts.repaired),
+        ("differences_from_an_unknown_value", counts.unknown_value),
     ];
     (counts.intact > 0).then(|| (causes.map(|(cause, n)| (cause.to_owned(), n)).into(), counts.missing))
 }

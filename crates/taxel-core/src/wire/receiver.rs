@@ -62,9 +62,10 @@ impl Receiver {
         self.version
     }
 
-    /// Says what the taxels hold, by index: as [`Decoder::begin_with`], of version 1; a board of version 2 tells it by itself.
-    pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
-        self.one.begin_with(held);
+    /// Says what the taxels hold, by index: as [`Decoder::begin_with`] and [`v2::Decoder::begin_with`].
+    pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>> + Clone) {
+        self.one.begin_with(held.clone());
+        self.two.begin_with(held);
     }
 
     /// What was heard of version 1.

@@ -59,6 +59,8 @@ pub struct Counts {
     pub dropped: u64,
     /// Resets that were noticed.
     pub resets: u64,
+    /// Differences from a value that was not heard: their events have none.
+    pub unknown_value: u64,
 }
 
 impl Counts {
@@ -84,6 +86,7 @@ impl Counts {
             markers: self.markers - earlier.markers,
             dropped: self.dropped - earlier.dropped,
             resets: self.resets - earlier.resets,
+            unknown_value: self.unknown_value - earlier.unknown_value,
         }
     }
 }

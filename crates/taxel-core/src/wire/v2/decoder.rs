@@ -128,7 +128,7 @@ fn place(number: i64) -> (usize, u64) {
 /// Turns one board's datagrams into events, in the order in which they come.
 ///
 /// It keeps what each taxel holds, so that differences are added up and a state that says something else becomes an event,
-/// marked as repaired. Memory is bounded, whatever comes.
+/// marked as repaired. A difference from what was not heard gives an event without a value. Memory is bounded, whatever comes.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     array: Array,
@@ -206,6 +206,12 @@ impl Decoder {
     /// The latest time that was heard or promised, us.
     pub(crate) fn latest(&self) -> i64 {
         self.latest
+    }
+
+    /// Says what the taxels hold, by index, none where that is not known: differences add up from there, and a state that says the
+    /// same is no event. It holds until the board's next reset.
+    pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
+        self.held.begin_with(held);
     }
 
     /// What each taxel holds as far as was heard, by index.
@@ -301,11 +307,13 @@ impl Decoder {
             };
             self.latest + passed.max(0) - header.base as i64
         };
-        if !began {
-            self.counts.resets += 1;
-            // After its reset the board compares with 0, and tells every taxel that differs from it.
-            self.held.forget();
+        // After its reset the board compares with 0, and tells every taxel that differs from it. What it said first may not have
+        // been heard, and where it spoke version 1 before there may have been no reset.
+        let whole = header.sequence == 0 && !(began && self.goes_on);
+        if whole || !began {
+            self.held.forget(whole.then_some(0));
         }
+        self.counts.resets += u64::from(!began);
         if self.sessions.len() == SESSIONS {
             self.missed_before += self.sessions.remove(0).missing();
         }

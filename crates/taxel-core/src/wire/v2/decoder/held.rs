@@ -16,10 +16,15 @@ pub(super) struct Held {
     pub(super) since: Vec<i64>,
     /// No entry of `since` is later.
     pub(super) newest: i64,
+    /// What a taxel holds that was not heard of: 0 where all was heard since the board's reset.
+    pub(super) unheard: Option<u16>,
 }
 
 /// Before any time.
 pub(super) const NEVER: i64 = i64::MIN;
+
+/// Of what is known from elsewhere: before anything that is heard.
+const BEFORE: i64 = NEVER + 1;
 
 impl Held {
     pub(super) fn new(array: &Array) -> Self {
@@ -32,6 +37,18 @@ impl Held {
             values: vec![0; places],
             since: vec![NEVER; places],
             newest: NEVER,
+            unheard: None,
+        }
+    }
+
+    /// Says what taxels hold, by index, none where that is not known.
+    pub(super) fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
+        let (rows, columns) = (self.rows, self.columns);
+        let places = (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y)));
+        for ((x, y), held) in places.zip(held) {
+            if let Some(value) = held {
+                self.set(self.place(x, y), value, BEFORE);
+            }
         }
     }
 
@@ -53,9 +70,11 @@ impl Held {
         self.newest = self.newest.max(t);
     }
 
-    pub(super) fn forget(&mut self) {
+    /// What was held holds no more; `unheard` as the field.
+    pub(super) fn forget(&mut self, unheard: Option<u16>) {
         self.since.fill(NEVER);
         self.newest = NEVER;
+        self.unheard = unheard;
     }
 
     /// By taxel index.

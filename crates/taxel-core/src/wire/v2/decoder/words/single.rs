@@ -45,15 +45,18 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
             continue;
         }
         let (x, y) = (x as u16, y as u16);
-        let (mut p, mut told) = (p, value);
+        let (mut p, mut told, mut known) = (p, value, VALUE > 0);
         if VALUE > 0 {
             let place = held.place(x, y);
             let newest = t >= held.since[place];
             match body.meaning {
                 Meaning::Changes => {}
                 Meaning::Differences => {
-                    let from = held.get(place).unwrap_or_default();
-                    told = if p { from.saturating_add(value) } else { from.saturating_sub(value) };
+                    let from = held.get(place).or(held.unheard);
+                    known = from.is_some();
+                    counts.unknown_value += u64::from(!known);
+                    told =
+                        from.map_or(0, |from| if p { from.saturating_add(value) } else { from.saturating_sub(value) });
                 }
                 Meaning::States => {
                     counts.states += 1;
@@ -65,7 +68,7 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
                     p = value >= before.unwrap_or_default();
                 }
             }
-            if newest || body.meaning == Meaning::Differences {
+            if known && (newest || body.meaning == Meaning::Differences) {
                 held.set(place, told, t);
             }
         }
@@ -75,8 +78,8 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
         room.y[n].write(y);
         room.p[n].write(p);
         if paired {
-            room.ticks[n].write(if VALUE > 0 { told } else { 0 });
-            room.present[n].write(VALUE > 0);
+            room.ticks[n].write(if known { told } else { 0 });
+            room.present[n].write(known);
         }
         n += 1;
     }
