@@ -198,18 +198,6 @@ macro_rules! ranges {
 }
 pub(crate) use ranges;
 
-/// Whether a value is above 0 and finite.
-#[must_use]
-pub fn is_above_0(value: f64) -> bool {
-    Range::ABOVE_0.holds(value)
-}
-
-/// Whether a value is 0 or more and finite.
-#[must_use]
-pub fn is_at_least_0(value: f64) -> bool {
-    Range::FROM_0.holds(value)
-}
-
 /// Refuses a value that is not above 0 and finite; `unit` may be empty.
 ///
 /// # Errors

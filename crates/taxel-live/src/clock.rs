@@ -159,17 +159,6 @@ pub struct BoardClock {
 }
 
 impl BoardClock {
-    /// The line through many datagrams: their board times, us, and when they arrived, ns. Of more than 64 s of them it is
-    /// the line at their end.
-    #[must_use]
-    pub fn offset_of(board_us: &[i64], arrived_ns: &[i64]) -> Option<Offset> {
-        let mut clock = Self::default();
-        for (&board, &arrived) in board_us.iter().zip(arrived_ns) {
-            clock.note(board, arrived);
-        }
-        clock.finish()
-    }
-
     /// Lines through many datagrams, each from the board's time on that stands beside it, us: one for each 32 s.
     #[must_use]
     pub fn offsets_of(board_us: &[i64], arrived_ns: &[i64]) -> Vec<(i64, Offset)> {
