@@ -164,3 +164,11 @@ def test_in_real_time_the_board_is_a_process_of_its_own_and_its_recording_says_t
     assert values["recording_agrees"] or host["late"] > 0
     assert values["neuron"]["classes"]["first impact"]["contact"]["found"] == 2
     shutil.rmtree(tmp_path / folder)
+
+
+def test_no_bar_of_a_delay_is_clipped_where_a_part_takes_no_time():
+    from taxel.demo.pictures import delay_split
+
+    (axes,) = delay_split({"lift": {"physics": 0.2, "kernel": 0.5, "frame": 0.3, "host": 0.0}}).axes
+    assert axes.get_xlim()[1] > 1.01
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["physics", "kernel", "frame"]

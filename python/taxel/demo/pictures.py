@@ -187,12 +187,17 @@ def delay_split(parts: Mapping[str, Mapping[str, float]]) -> Figure:
     figure, axes = _figure(1, 1, (9.5, 0.9 + 0.34 * max(1, len(parts))))
     axis = axes[0, 0]
     colours = {"physics": _TRUE, "kernel": "#b5423c", "frame": "#2f6690", "host": "#4b8f4b"}
+    named: set[str] = set()
     for place, split in enumerate(parts.values()):
         left = 0.0
         for name, value in split.items():
+            # A bar of no width would have the axis end where it stands, and clip the others.
+            if value == 0.0:
+                continue
             # Below 0, as where the base loses the ball before it leaves: thin, and over what starts there.
             shape = {"height": 0.7} if value >= 0 else {"height": 0.25, "zorder": 3}
-            axis.barh(place, value, left=left, color=colours[name], label=name if place == 0 else None, **shape)
+            axis.barh(place, value, left=left, color=colours[name], label=None if name in named else name, **shape)
+            named.add(name)
             left += value
     axis.set_yticks(range(len(parts)), list(parts))
     axis.invert_yaxis()
