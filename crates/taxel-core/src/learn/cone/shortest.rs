@@ -10,6 +10,9 @@ use crate::{Result, Stop, problem};
 
 /// Cuts have the full margin, but this share of it is asked for: each cut has room around it, so rounds end.
 const ASKED_SHARE: f64 = 0.999;
+/// Of what is broken this share enters, the worst, and no fewer rows than that: the others are often met with them.
+const ENTER_SHARE: f64 = 0.4;
+const ENTER_LEAST: usize = 100;
 /// A proof of so many rows or less is made one in which every row is needed.
 const FEW: usize = 60;
 
@@ -226,9 +229,11 @@ impl Working {
         self.targets.len() + self.there.len()
     }
 
-    /// Drops what does not bind and adds what is broken; says whether anything is new.
+    /// Drops what does not bind and adds the worst of what is broken; says whether anything is new.
     fn cut(&mut self, statement: &Statement, broken: &[Peak], flat: &[usize]) -> Result<bool> {
-        let new: Vec<&Peak> = broken.iter().filter(|p| !self.there.contains(&(p.pattern, p.t.to_bits()))).collect();
+        let mut new: Vec<&Peak> = broken.iter().filter(|p| !self.there.contains(&(p.pattern, p.t.to_bits()))).collect();
+        new.sort_by(|a, b| b.excess.total_cmp(&a.excess));
+        new.truncate(((ENTER_SHARE * new.len() as f64) as usize).max(ENTER_LEAST));
         if new.is_empty() && flat.is_empty() {
             return Ok(false);
         }

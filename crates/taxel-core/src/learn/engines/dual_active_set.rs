@@ -30,6 +30,10 @@ const DEPENDENT: [f64; 4] = [1e-16, 1e-20, 1e-24, 1e-28];
 const BLOCK: usize = 64;
 /// Rows that enter at once when each step must raise the dual.
 const FEW: usize = 32;
+/// Rows that enter for each that could still be held, beyond which each step must raise the dual.
+const CROWD: usize = 2;
+/// The product from which on two rows, scaled to length 1, hardly differ.
+const ALIKE: f64 = 0.999;
 /// Candidates for single steps between two looks at all rows.
 const QUEUE: usize = 16;
 /// Block exchanges in one call of `solve`, after which single steps go on.
@@ -291,7 +295,8 @@ impl DualActiveSet {
     ///
     /// None so far; a stop is a verdict.
     pub fn solve(&mut self, stop: Stop<'_>) -> Result<Verdict> {
-        self.extend_gram();
+        let fresh = self.extend_gram();
+        self.exchange(&fresh);
         let (mut exchanges, mut bold) = (EXCHANGES, BOLD);
         let mut best: Option<(f64, Vec<usize>, Vec<f64>)> = None;
         let mut undecided: Vec<usize> = Vec::new();
@@ -319,6 +324,9 @@ impl DualActiveSet {
                 exchanges -= 1;
                 let slots: Vec<usize> = candidates.iter().map(|c| c.0).collect();
                 let (held, here) = (self.active.len(), self.dual(&self.weights));
+                if slots.len() > CROWD * self.lower.len().saturating_sub(held) {
+                    bold = 0;
+                }
                 if bold > 0 {
                     if best.as_ref().is_none_or(|b| here < b.0) {
                         best = Some((here, self.active.clone(), self.multipliers.clone()));
@@ -432,8 +440,8 @@ impl DualActiveSet {
         (self.gram, self.gram_stride) = (gram, stride);
     }
 
-    /// Computes the products of the fresh rows with all others, in one matrix product.
-    fn extend_gram(&mut self) {
+    /// Computes the products of the fresh rows with all others, in one matrix product; gives those rows.
+    fn extend_gram(&mut self) -> Vec<usize> {
         self.room();
         let fresh = std::mem::take(&mut self.fresh);
         let (slots, stride) = (self.rows.len(), self.stride);
@@ -453,6 +461,32 @@ impl DualActiveSet {
                 }
             }
         }
+        fresh
+    }
+
+    /// Holds fresh rows in the place of held ones that they hardly differ from.
+    ///
+    /// Cuts at a peak that moves a little from round to round would enter and leave by turns before they are told apart.
+    /// The dual may fall, but no row is lost by it: `solve` ends above where it began.
+    fn exchange(&mut self, fresh: &[usize]) {
+        let mut entering = Vec::new();
+        let mut leaves = vec![false; self.active.len()];
+        for &slot in fresh.iter().filter(|slot| !self.is_equality(**slot)) {
+            let products = &self.gram[slot * self.gram_stride..][..self.rows.len()];
+            let others = self.active.iter().enumerate().filter(|(k, other)| !leaves[*k] && !self.is_equality(**other));
+            let nearest = others.max_by(|a, b| products[*a.1].total_cmp(&products[*b.1]));
+            if let Some((k, _)) = nearest.filter(|(_, other)| products[**other] >= ALIKE) {
+                leaves[k] = true;
+                entering.push(slot);
+            }
+        }
+        if entering.is_empty() {
+            return;
+        }
+        let leaving: Vec<usize> = (0..leaves.len()).filter(|&k| leaves[k]).collect();
+        self.leave(&leaving, None);
+        self.take(&entering);
+        self.project();
     }
 
     /// The slot of a bound's row, taken if it has none yet.
