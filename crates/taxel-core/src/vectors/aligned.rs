@@ -2,17 +2,33 @@
 
 use super::eight::LANES;
 
-/// Numbers on a cache line's border, so that no vector straddles two lines.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Aligned(Vec<Line>);
+/// Bytes of a cache line.
+const LINE: usize = 64;
 
-#[derive(Debug, Clone, Copy)]
-#[repr(C, align(64))]
-struct Line([f64; LANES]);
+/// Numbers on a cache line's border, so that no vector straddles two lines.
+#[derive(Debug, Default)]
+pub(crate) struct Aligned {
+    /// With room before and behind, as the allocator knows no such border.
+    numbers: Vec<f64>,
+    from: usize,
+    len: usize,
+}
 
 impl Aligned {
+    /// Zeros, which take no memory from the machine until something is written there.
     pub(crate) fn zeros(len: usize) -> Self {
-        Self(vec![Line([0.0; LANES]); len.div_ceil(LANES)])
+        let len = len.next_multiple_of(LANES);
+        let numbers = vec![0.0; len + LANES];
+        let from = numbers.as_ptr().align_offset(LINE).min(LANES);
+        Self { numbers, from, len }
+    }
+}
+
+impl Clone for Aligned {
+    fn clone(&self) -> Self {
+        let mut new = Self::zeros(self.len);
+        new.copy_from_slice(self);
+        new
     }
 }
 
@@ -20,14 +36,12 @@ impl std::ops::Deref for Aligned {
     type Target = [f64];
 
     fn deref(&self) -> &[f64] {
-        // SAFETY: a `Line` is eight f64 and nothing else (repr(C), 64 bytes), so n of them are 8 n f64 in a row.
-        unsafe { std::slice::from_raw_parts(self.0.as_ptr().cast(), self.0.len() * LANES) }
+        &self.numbers[self.from..self.from + self.len]
     }
 }
 
 impl std::ops::DerefMut for Aligned {
     fn deref_mut(&mut self) -> &mut [f64] {
-        // SAFETY: as above, and the borrow is the only one.
-        unsafe { std::slice::from_raw_parts_mut(self.0.as_mut_ptr().cast(), self.0.len() * LANES) }
+        &mut self.numbers[self.from..self.from + self.len]
     }
 }

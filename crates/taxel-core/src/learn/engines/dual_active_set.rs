@@ -26,6 +26,8 @@ const REFINED: f64 = 2e-14;
 const DOUBTFUL: f64 = 1e-5;
 /// Squared pivots at which a row counts as dependent: the next one where no proof comes of it.
 const DEPENDENT: [f64; 4] = [1e-16, 1e-20, 1e-24, 1e-28];
+/// Rows that memory is laid out for at first, where so many could be held: more of them move what is there.
+const AT_FIRST: usize = 1024;
 /// Rows appended to the factor in one go.
 const BLOCK: usize = 64;
 /// Rows that enter at once when each step must raise the dual.
@@ -412,7 +414,7 @@ impl DualActiveSet {
             self.multipliers.push(0.0);
             self.excess.push(0.0);
             if self.coefficients.len() < self.rows.len() * self.stride {
-                let mut coefficients = Aligned::zeros((self.rows.len() + self.rows.len() / 2 + 64) * self.stride);
+                let mut coefficients = Aligned::zeros(self.roomy(self.rows.len()) * self.stride);
                 coefficients[..self.coefficients.len()].copy_from_slice(&self.coefficients);
                 self.coefficients = coefficients;
             }
@@ -425,13 +427,18 @@ impl DualActiveSet {
         slot
     }
 
+    /// How many slots to lay out memory for where so many are in use.
+    fn roomy(&self, slots: usize) -> usize {
+        (slots + slots / 2 + 64).max(self.lower.len().min(AT_FIRST))
+    }
+
     /// Makes room in the Gram matrix for every slot.
     fn room(&mut self) {
         let slots = self.rows.len();
         if slots <= self.gram_stride {
             return;
         }
-        let stride = (slots + slots / 2 + 64).next_multiple_of(LANES);
+        let stride = self.roomy(slots).next_multiple_of(LANES);
         let stride = if stride.is_multiple_of(64) { stride + LANES } else { stride };
         let mut gram = Aligned::zeros(stride * stride);
         for (new, old) in gram.chunks_exact_mut(stride).zip(self.gram.chunks_exact(self.gram_stride.max(1))) {
