@@ -1031,11 +1031,45 @@ mod tests {
         }
     }
 
+    /// A row that hardly differs.
+    fn beside(random: &mut StdRng, a: &[f64]) -> Vec<f64> {
+        let length = a.iter().map(|a| a * a).sum::<f64>().sqrt();
+        a.iter().map(|a| a + 3e-3 * length * random.random_range(-1.0..1.0)).collect()
+    }
+
+    #[test]
+    fn a_cut_takes_the_place_of_one_that_it_hardly_differs_from() {
+        let mut random = StdRng::seed_from_u64(6);
+        let mut stated = Stated::random(&mut random, 20, 3, 0, 9.0);
+        let mut solver = stated.solver();
+        assert_eq!(solver.solve(Stop::never()).unwrap(), Verdict::Optimal);
+        let a: Vec<f64> = (0..20).map(|_| random.random_range(0.0..1.0)).collect();
+        let limit = dot(&a, solver.weights()) - 0.3;
+        let near = beside(&mut random, &a);
+        let mut held = Vec::new();
+        for (row, limit, exchanged) in [(a, limit, false), (near, limit - 0.1, true)] {
+            held.push(solver.inequality(&row, limit).unwrap());
+            stated.inequalities.push((row, limit));
+            let fresh = solver.extend_gram();
+            solver.exchange(&fresh);
+            assert_eq!(solver.place[fresh[0]].is_some(), exchanged, "it is held at once where one is near");
+            assert_eq!(solver.active.len(), 3 + usize::from(exchanged), "in the place of that");
+            assert_eq!(solver.solve(Stop::never()).unwrap(), Verdict::Optimal);
+        }
+        assert_eq!(solver.multipliers().inequalities.iter().map(|(id, _)| *id).collect::<Vec<_>>(), held[1..]);
+        stated.assert_optimal(&solver);
+    }
+
     #[test]
     fn rows_in_rounds_give_what_all_rows_at_once_give() {
         let mut random = StdRng::seed_from_u64(4);
-        for _ in 0..20 {
-            let stated = Stated::random(&mut random, 40, 6, 60, 0.5);
+        for trial in 0..20 {
+            let mut stated = Stated::random(&mut random, 40, 6, 60, 0.5);
+            // Every other time each with one beside it, which the rounds exchange for each other.
+            for k in 0..if trial % 2 == 0 { 0 } else { 60 } {
+                let (a, limit) = stated.inequalities[k].clone();
+                stated.inequalities.push((beside(&mut random, &a), limit));
+            }
             let (whole, verdict) = stated.solve();
             let mut solver = stated.solver();
             let (mut names, mut round) = (Vec::new(), 0);
