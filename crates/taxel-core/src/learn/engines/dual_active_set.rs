@@ -6,7 +6,8 @@
 //!
 //! Goldfarb and Idnani (1983), Mathematical Programming 27:1, take in one violated row after another. Here all violated
 //! rows enter at once, and those whose multiplier would turn negative leave again, as long as that raises the dual
-//! objective; single steps do the rest, and decide what cannot be met.
+//! objective; single steps do the rest, and decide what cannot be met. A new row that hardly differs from one that is held
+//! takes its place before all that.
 
 mod factor;
 mod kernels;
