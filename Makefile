@@ -22,7 +22,7 @@ check:
 	@command -v cc >/dev/null || { echo "taxel needs a C compiler: on Debian, apt install build-essential"; exit 1; }
 
 $(VENV)/.installed: pyproject.toml | check
-	@echo "taxel: installing what it needs into $(VENV): some 150 packages, minutes the first time"
+	@echo "taxel: installing what it needs into $(VENV): over a hundred packages, minutes the first time"
 	@$(PYTHON) -m venv $(VENV)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.16,<2"
 	@$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]; print("\n".join(p["dependencies"] + sum((e[x] for x in ("test", "lint", "docs", "bench", "foxglove", "neo", "nir", "nwb", "cluster")), [])))' > $(VENV)/wanted.txt
@@ -30,7 +30,7 @@ $(VENV)/.installed: pyproject.toml | check
 	@touch $@
 
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
-	@echo "taxel: building: five minutes of two cores the first time"
+	@echo "taxel: building: minutes the first time"
 	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release
 	@touch $@
 
