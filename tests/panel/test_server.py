@@ -20,6 +20,8 @@ import taxel
 import taxel.device
 from taxel.cli import main
 from taxel.live import Live, Panel, send
+from taxel.simulate import Board, Version2
+from taxel.wire import Registers
 
 websockets = pytest.importorskip("websockets", reason="the test extra brings websockets")
 client = pytest.importorskip("websockets.sync.client")
@@ -581,6 +583,47 @@ def test_health_of_what_is_shown_is_that_of_taxel_health(live, panel):
             pass
         assert page.ask("health")["type"] == "done"
         assert next(m for m in page.said if m["type"] == "health")["dead"] == [[2, 2]]
+
+
+def test_a_dead_taxel_of_a_board_of_version_2_is_found_though_states_tell_of_it(live, panel):
+    random = np.random.default_rng(3)
+    board = Board(Registers(wire_version=2), version_2=Version2(states_us=2_000))
+    sent = []
+    for _ in range(60):
+        ticks = random.integers(40, 100, board.array.taxels).astype(np.uint16)
+        ticks[board.array.index(4, 7)] = 0
+        sent += board.frame(ticks)
+    send(sent, *live.address, each=20, seconds=0.002)
+    with Client(panel) as page:
+        page.send(type="credit", n=1)
+        # A state has told what the dead one holds.
+        while section(page.until("picture"), 0, "<u2").reshape(64, 64)[7, 4] != 0:
+            pass
+        assert page.ask("health")["type"] == "done"
+        assert next(m for m in page.said if m["type"] == "health")["dead"] == [[4, 7]]
+
+
+def test_a_board_that_was_reset_is_shown_anew(live, panel):
+    board = Board(Registers(wire_version=2), version_2=Version2(states_us=0))
+
+    def said(columns, ticks):
+        pictures = np.zeros((8, 64, 64), np.uint16)
+        pictures[1:, 5, :columns] = ticks + 4 * np.arange(7)[:, None]
+        return [datagram for picture in pictures for datagram in board.frame(picture.ravel())]
+
+    with Client(panel) as page:
+        page.send(type="credit", n=1)
+        send(said(40, 60), *live.address, each=1, seconds=0.002)
+        while np.sum(section(page.until("picture"), 0, "<u2") != 65_535) != 40:
+            pass
+        while head(page.until("picture"))[0]["flags"] & 4:
+            pass
+        here = len(page.pictures)
+        board.reset()
+        send(said(5, 80), *live.address, each=1, seconds=0.002)
+        while np.sum(section(page.until("picture"), 0, "<u2") != 65_535) != 5:
+            pass
+        assert any(head(picture)[0]["flags"] & 4 for picture in page.pictures[here:])
 
 
 def test_a_recording_alone_is_viewed_and_the_address_names_it(tmp_path):

@@ -136,6 +136,23 @@ impl Events {
         }
     }
 
+    /// Takes the events from place `rows` on away, and the markers from place `markers` on.
+    #[must_use]
+    pub fn split_off(&mut self, rows: usize, markers: usize) -> Self {
+        let intensity = self.intensity.as_mut();
+        Self {
+            array: self.array.clone(),
+            t: self.t.split_off(rows),
+            x: self.x.split_off(rows),
+            y: self.y.split_off(rows),
+            p: self.p.split_off(rows),
+            intensity: intensity
+                .map(|i| Intensities { ticks: i.ticks.split_off(rows), present: i.present.split_off(rows) }),
+            repaired: self.repaired.as_mut().map(|repaired| repaired.split_off(rows)),
+            markers: self.markers.split_off(markers),
+        }
+    }
+
     /// Forgets all events and markers but keeps the columns' memory, to be filled again.
     pub fn clear(&mut self) {
         self.t.clear();

@@ -17,6 +17,7 @@ use super::guests::Guests;
 use super::hub::{Hub, Office};
 use super::limits::MOST_BYTES;
 use super::options::PanelOptions;
+use super::requests::prepare;
 use super::session;
 use crate::pipeline::Handle;
 use crate::{Error, Result};
@@ -159,6 +160,13 @@ fn escaped(name: &str) -> String {
 async fn serve(listener: std::net::TcpListener, door: Arc<Door>) {
     let Ok(listener) = tokio::net::TcpListener::from_std(listener) else { return };
     let pump = tokio::spawn(Arc::clone(&door.hub).pump());
+    let hub = Arc::clone(&door.hub);
+    let reads = tokio::spawn(async move {
+        loop {
+            hub.unknown.notified().await;
+            prepare(&hub).await;
+        }
+    });
     let mut end = door.end.clone();
     let app = Router::new().fallback(enter).with_state(door);
     let ended = async move {
@@ -171,6 +179,7 @@ async fn serve(listener: std::net::TcpListener, door: Arc<Door>) {
         () = ended => {}
     }
     pump.abort();
+    reads.abort();
 }
 
 async fn enter(State(door): State<Arc<Door>>, request: Request) -> Response {

@@ -251,7 +251,7 @@ impl Reel for RingReel {
         #[allow(clippy::cast_possible_truncation)]
         let Some(kept) = ring.pieces.get((self.number - ring.first) as usize).cloned() else { return Ok(Next::End) };
         drop(ring);
-        if (lost || kept.piece.missing > 0)
+        if (lost || kept.piece.missing > 0 || kept.piece.reset)
             && self.told != Some(self.number)
             && let Some(held) = &kept.piece.held
         {
@@ -360,8 +360,11 @@ impl Activity {
         Self { events: vec![0; taxels], values: vec![0; taxels], first: vec![UNKNOWN; taxels] }
     }
 
-    /// Takes a change.
+    /// Takes a change; one that a state told is none of the taxel's own, as a dead one is told of too.
     pub fn take(&mut self, change: &Change) {
+        if change.repaired {
+            return;
+        }
         let taxel = change.taxel as usize;
         self.events[taxel] = self.events[taxel].saturating_add(1);
         if change.ticks == UNKNOWN {
@@ -555,7 +558,13 @@ impl FileFilm {
             // A sensor has 2^22 taxels at most (recording's limits).
             #[allow(clippy::cast_possible_truncation)]
             let taxel = (usize::from(events.y[k]) * columns + usize::from(events.x[k])) as u32;
-            Change { t: events.t[k] + self.header.origin_us, taxel, ticks, up: events.p[k] }
+            Change {
+                t: events.t[k] + self.header.origin_us,
+                taxel,
+                ticks,
+                up: events.p[k],
+                repaired: events.is_repaired(k),
+            }
         }));
     }
 
@@ -1191,8 +1200,20 @@ mod tests {
         // Who looks before anything came is told so.
         film.keep(Piece { held: Some(blank.clone()), ..Piece::default() }, &lens);
         assert_eq!(film.range(), None);
-        film.keep(Piece { changes: vec![Change { t: 5, taxel: 0, ticks: 50, up: true }], ..Piece::default() }, &lens);
-        film.keep(Piece { changes: vec![Change { t: 9, taxel: 0, ticks: 51, up: true }], ..Piece::default() }, &lens);
+        film.keep(
+            Piece {
+                changes: vec![Change { t: 5, taxel: 0, ticks: 50, up: true, repaired: false }],
+                ..Piece::default()
+            },
+            &lens,
+        );
+        film.keep(
+            Piece {
+                changes: vec![Change { t: 9, taxel: 0, ticks: 51, up: true, repaired: false }],
+                ..Piece::default()
+            },
+            &lens,
+        );
         assert_eq!(film.range(), Some((5, 9)));
         let film = RingFilm::new(array.clone(), 3);
         let (mut held, mut all, mut random) = (blank, vec![], StdRng::seed_from_u64(9));
@@ -1203,6 +1224,7 @@ mod tests {
                     taxel: random.random_range(0..4096),
                     ticks: random.random_range(20..140),
                     up: true,
+                    repaired: false,
                 })
                 .collect();
             let since = all.last().map(|change: &Change| change.t);

@@ -12,7 +12,7 @@ use taxel_core::encode::Zeroing;
 use taxel_core::wire::Registers;
 use taxel_core::wire::registers::PRESETS;
 use taxel_core::{encode, problem};
-use tokio::sync::{broadcast, watch};
+use tokio::sync::{Notify, broadcast, watch};
 
 use super::film::{Activity, FileFilm, Film, REACH_US, RingFilm};
 use super::lens::{COLUMN_US, COLUMNS_US, Keyframe, Lens, SPAN, Strip};
@@ -106,6 +106,8 @@ pub(super) struct Hub {
     state: Mutex<HubState>,
     films: Mutex<HashMap<PathBuf, Weak<FileFilm>>>,
     pub(super) recorder: Recorder,
+    /// The board was reset: its registers are to be read again.
+    pub(super) unknown: Notify,
     viewers: AtomicUsize,
 }
 
@@ -130,6 +132,7 @@ impl Hub {
             state: Mutex::new(state),
             films: Mutex::default(),
             recorder: Recorder::default(),
+            unknown: Notify::new(),
             viewers: AtomicUsize::new(0),
         });
         if let Some(live) = live {
@@ -244,6 +247,10 @@ impl Hub {
                         lens.set_back(heard);
                     }
                 }
+                if piece.reset {
+                    lens.forget();
+                    self.is_unknown();
+                }
                 let kept = live.film.keep(piece, &lens);
                 if let Some(held) =
                     kept.piece.held.as_ref().filter(|_| kept.piece.missing > 0 || lens.latest().is_none())
@@ -299,6 +306,14 @@ impl Hub {
                 }
             }
         }
+    }
+
+    /// A board that was reset holds other registers than were read.
+    fn is_unknown(&self) {
+        if std::mem::take(&mut self.state().known) {
+            self.tell_all(&self.registers());
+        }
+        self.unknown.notify_one();
     }
 
     /// What the board said on its serial line since it was asked last.

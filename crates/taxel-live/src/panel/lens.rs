@@ -258,8 +258,8 @@ pub struct Lens {
     /// From where to where a moment is in both, us.
     within: std::ops::Range<i64>,
     latest: Option<i64>,
-    /// How often time was set back.
-    set_back: u64,
+    /// How often time was set back, or the board was reset.
+    restarts: u64,
     events: u64,
     sum: u64,
     sum_x: u64,
@@ -290,7 +290,7 @@ impl Lens {
             fades: 0,
             within: 0..0,
             latest: from.latest,
-            set_back: 0,
+            restarts: 0,
             events: from.events,
             sum: 0,
             sum_x: 0,
@@ -437,13 +437,20 @@ impl Lens {
         let column = column_of(t, self.column_us);
         self.strip.cut(column);
         self.come_to(column, column_of(t, COLUMN_US));
-        self.set_back += 1;
+        self.restarts += 1;
     }
 
-    /// How often time was set back.
+    /// The board was reset: its taxels hold nothing until they are heard again.
+    pub fn forget(&mut self) {
+        self.held.fill(UNKNOWN);
+        self.reckon();
+        self.restarts += 1;
+    }
+
+    /// How often time was set back, or the board was reset.
     #[must_use]
-    pub fn times_set_back(&self) -> u64 {
-        self.set_back
+    pub fn restarts(&self) -> u64 {
+        self.restarts
     }
 
     /// Events were missing: what the taxels hold now.
@@ -633,7 +640,7 @@ mod tests {
     }
 
     fn change(t: i64, taxel: u32, ticks: u16) -> Change {
-        Change { t, taxel, ticks, up: true }
+        Change { t, taxel, ticks, up: true, repaired: false }
     }
 
     #[test]
@@ -744,7 +751,7 @@ mod tests {
         }
         once.settle();
         stalled.settle();
-        assert_eq!(stalled.times_set_back(), 1);
+        assert_eq!(stalled.restarts(), 1);
         assert_eq!(stalled.strip().reach(), once.strip().reach());
         for column in 0..=column_of(81_000, COLUMN_US) {
             let (mut a, mut b) = (vec![], vec![]);

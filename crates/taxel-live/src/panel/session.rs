@@ -71,7 +71,7 @@ struct Session {
     restart: bool,
     from: i64,
     rests: Option<u64>,
-    set_back: u64,
+    restarts: u64,
     rest_sent: Option<Instant>,
     /// A column of time, us.
     column_us: i64,
@@ -107,7 +107,7 @@ pub(super) async fn run(socket: WebSocket, hub: Arc<Hub>, end: watch::Receiver<b
         restart: true,
         from: i64::MIN,
         rests: None,
-        set_back: 0,
+        restarts: 0,
         rest_sent: None,
         column_us: COLUMN_US,
         watched: None,
@@ -281,8 +281,8 @@ impl Session {
 
     fn picture(&mut self) -> Option<Vec<u8>> {
         if let (View::Following, Some(live)) = (&self.view, &self.live) {
-            let set_back = lock(&live.lens).times_set_back();
-            self.restart |= std::mem::replace(&mut self.set_back, set_back) != set_back;
+            let restarts = lock(&live.lens).restarts();
+            self.restart |= std::mem::replace(&mut self.restarts, restarts) != restarts;
         }
         let records = self.hub.recorder.file().is_some() || self.hub.state().registers.record;
         let mut flags = if records { RECORDS } else { 0 };

@@ -62,7 +62,9 @@ impl Spikes {
             let held = held.iter().enumerate().filter(|&(_, &ticks)| ticks != UNKNOWN);
             // A sensor has 2^22 taxels at most (recording's limits).
             #[allow(clippy::cast_possible_truncation)]
-            let held: Vec<_> = held.map(|(taxel, &ticks)| Change { t, taxel: taxel as u32, ticks, up: true }).collect();
+            let held: Vec<_> = held
+                .map(|(taxel, &ticks)| Change { t, taxel: taxel as u32, ticks, up: true, repaired: false })
+                .collect();
             let mut events = spikes.events(&held);
             events.repaired = Some(vec![true; events.len()]);
             spikes.push(&events);

@@ -458,9 +458,13 @@ impl Work {
     #[allow(clippy::cast_possible_truncation)]
     fn decode(&mut self, batch: &Batch) -> Result<()> {
         for (datagram, bytes) in batch.iter() {
-            let (before, marked) = (self.events.len(), self.events.markers.len());
+            let (mut before, mut marked) = (self.events.len(), self.events.markers.len());
             let arrived_us = datagram.arrived_ns / 1000;
             let took = self.sender.push(bytes, Some(arrived_us), &mut self.events);
+            if took.reset {
+                self.begin_anew(before, marked)?;
+                (before, marked) = (0, 0);
+            }
             let now = now_ns();
             self.decoded += 1;
             self.mark(&took, datagram.arrived_ns)?;
@@ -487,6 +491,16 @@ impl Work {
             }
         }
         self.hand_on()
+    }
+
+    /// The board was reset: hands on what came before; what its taxels held holds no more.
+    fn begin_anew(&mut self, rows: usize, markers: usize) -> Result<()> {
+        let later = self.events.split_off(rows, markers);
+        self.hand_on()?;
+        self.held.fill(UNKNOWN);
+        self.taps.iter_mut().for_each(Tap::forget);
+        self.events.append(&later, later.len());
+        Ok(())
     }
 
     #[allow(clippy::cast_possible_truncation)]

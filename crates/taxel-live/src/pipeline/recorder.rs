@@ -438,6 +438,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
     let damage = |now: &Counters| {
         let (second, missing) = recording::damage_of_version_2(&now.wire_v2).unzip();
         let mut decoder = recording::damage(&now.wire);
+        decoder.insert("bytes_of_version_1_refused".to_owned(), now.wire_refused);
         decoder.extend(second.unwrap_or_default());
         (decoder, missing)
     };
@@ -445,6 +446,10 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
     for (cause, n) in &mut decoder {
         *n -= earlier.get(cause).copied().unwrap_or(0).min(*n);
     }
+    // Of version 1 nobody knows what was sent: a recording that holds any of it cannot say that nothing is missing.
+    let [of_1, of_2] = [counters.wire.bytes - begun.wire.bytes, counters.wire_v2.intact - begun.wire_v2.intact];
+    let missing = missing.map(|n| n.saturating_sub(missed.unwrap_or(0)));
+    let missing = missing.filter(|n| *n > 0 || of_2 > 0 && of_1 == 0);
     let recorded = counters.decoded - begun.decoded;
     let dropped_by_queue = capture.dropped_by_queue - before.dropped_by_queue;
     recording::Counts {
@@ -454,7 +459,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         dropped_by_kernel: capture.dropped_by_kernel - before.dropped_by_kernel,
         dropped_by_queue,
         decoder,
-        missing: missing.map(|n| n.saturating_sub(missed.unwrap_or(0))),
+        missing,
         bridged: counters.bridged.map(|now| Box::new(now.since(&begun.bridged.unwrap_or_default()))),
         converted: None,
     }

@@ -41,6 +41,8 @@ pub struct Change {
     pub ticks: u16,
     /// More pressure.
     pub up: bool,
+    /// Whether a state of version 2 told it, not the taxel itself.
+    pub repaired: bool,
 }
 
 /// Changes in the order in which they came.
@@ -56,6 +58,8 @@ pub struct Piece {
     pub before: u64,
     /// Events that are missing between the last piece and this one.
     pub missing: u64,
+    /// Whether the board was reset before it: what was held before holds no more.
+    pub reset: bool,
     /// Starts and stops of the board.
     pub markers: Vec<Marker>,
 }
@@ -134,7 +138,13 @@ impl Tap {
                 // An array has 65 536 positions at most where it is live; files have 2^22.
                 #[allow(clippy::cast_possible_truncation)]
                 let taxel = taxel as u32;
-                self.piece.changes.push(Change { t: events.t[k], taxel, ticks, up: events.p[k] });
+                self.piece.changes.push(Change {
+                    t: events.t[k],
+                    taxel,
+                    ticks,
+                    up: events.p[k],
+                    repaired: events.is_repaired(k),
+                });
             }
         }
         self.events += events.len() as u64;
@@ -143,8 +153,9 @@ impl Tap {
         if taken < events.len() {
             // Too much waits: what is there is given up, and the next piece begins anew with what is held.
             let missing = self.piece.missing + (self.piece.changes.len() + events.len() - taken) as u64;
+            let reset = self.piece.reset;
             self.begin(true);
-            self.piece.missing = missing;
+            (self.piece.missing, self.piece.reset) = (missing, reset);
         }
     }
 
@@ -167,6 +178,18 @@ impl Tap {
             }
             Err(TrySendError::Disconnected(_)) => false,
         }
+    }
+
+    /// The board was reset: its taxels hold nothing until they are heard again.
+    pub(super) fn forget(&mut self) {
+        let waits = std::mem::take(&mut self.piece);
+        let (missing, markers) = match self.pieces.try_send(waits) {
+            Err(TrySendError::Full(piece)) => (piece.missing + piece.changes.len() as u64, piece.markers),
+            Ok(()) | Err(TrySendError::Disconnected(_)) => (0, vec![]),
+        };
+        self.held.fill(UNKNOWN);
+        self.begin(true);
+        self.piece = Piece { missing, markers, reset: true, ..std::mem::take(&mut self.piece) };
     }
 
     fn begin(&mut self, with_held: bool) {

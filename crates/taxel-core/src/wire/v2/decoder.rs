@@ -19,6 +19,9 @@ const WINDOW: usize = 65_536;
 /// Sessions that are remembered, for datagrams that come behind a reset.
 const SESSIONS: usize = 4;
 
+/// Five totals of 64 bits.
+const STATUS_BYTES: usize = 40;
+
 /// What one datagram was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Heard {
@@ -144,6 +147,8 @@ pub struct Decoder {
     goes_on: bool,
     held: Held,
     status: Option<Status>,
+    /// The number of the datagram that told it, in the latest session.
+    told: i64,
     counts: Counts,
 }
 
@@ -163,6 +168,7 @@ impl Decoder {
             goes_on: false,
             held,
             status: None,
+            told: i64::MIN,
             counts: Counts::default(),
         }
     }
@@ -275,7 +281,16 @@ impl Decoder {
         self.counts.dropped += u64::from(header.flags & DROPPED != 0);
         self.counts.unknown_flags += u64::from(header.flags & !(FRAME_SYNC | DIFFERENCES | DROPPED) != 0);
         self.latest = self.latest.max(base);
-        self.body(header, body, base, out);
+        let number = session.number_of(header.sequence);
+        if which + 1 == self.sessions.len() {
+            self.body(header, body, base, Some(number), out);
+        } else {
+            // A straggler of before a reset says nothing of what the taxels hold since.
+            let blank = self.held.blank();
+            let since = std::mem::replace(&mut self.held, blank);
+            self.body(header, body, base, None, out);
+            self.held = since;
+        }
         if let Some(now) = arrived {
             self.heard = Some((now, self.latest));
         }
@@ -314,6 +329,7 @@ impl Decoder {
             self.held.forget(whole.then_some(0));
         }
         self.counts.resets += u64::from(!began);
+        self.told = i64::MIN;
         if self.sessions.len() == SESSIONS {
             self.missed_before += self.sessions.remove(0).missing();
         }
@@ -321,7 +337,8 @@ impl Decoder {
         (self.sessions.len() - 1, !began)
     }
 
-    fn body(&mut self, header: &Header, body: &[u8], base: i64, out: &mut impl Table) {
+    /// `number` is the datagram's, where it is of the latest session.
+    fn body(&mut self, header: &Header, body: &[u8], base: i64, number: Option<i64>, out: &mut impl Table) {
         let Some(kind) = Kind::of(header.kind) else {
             self.counts.unknown_kind += 1;
             return;
@@ -342,12 +359,14 @@ impl Decoder {
                     }
                 }
             }
+            Kind::Status if body.len() < STATUS_BYTES => self.counts.malformed += 1,
             Kind::Status => {
+                let Some(number) = number.filter(|number| *number > self.told) else { return };
+                self.told = number;
                 let mut totals =
                     body.chunks_exact(8).map(|b| u64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]));
                 let mut next = || totals.next().unwrap_or_default();
                 let (frames, events, dropped, datagrams, faults) = (next(), next(), next(), next(), next());
-                self.counts.malformed += u64::from(body.len() < 40);
                 self.status = Some(Status { frames, events, dropped, datagrams, faults });
             }
         }
@@ -381,6 +400,8 @@ mod tests {
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
     use super::*;
+    use crate::board::Board;
+    use crate::wire::Registers;
 
     #[test]
     fn a_number_is_new_once_however_far_apart_they_come() {
@@ -402,5 +423,67 @@ mod tests {
             }
             assert_eq!(session.missing(), (highest + 1 - seen.first().unwrap()) as u64 - seen.len() as u64);
         }
+    }
+
+    /// A datagram with its checksum.
+    fn datagram(kind: Kind, session: u16, sequence: u32, base: u64, body: &[u8]) -> Vec<u8> {
+        let (kind, stride) = (kind as u8, crate::wire::v2::stride(64));
+        let header = Header { kind, board: 0, sequence, base, session, stride, flags: 0, span: 0 };
+        let mut bytes = vec![];
+        header.write(body, &mut bytes);
+        bytes
+    }
+
+    #[test]
+    fn the_newest_status_of_the_latest_session_counts() {
+        let mut decoder = Decoder::new(Array::thesis());
+        let mut events = Events::empty(Array::thesis());
+        let totals = |n: u64| [n; 5].map(u64::to_le_bytes).concat();
+        for (session, sequence, body, frames) in [
+            (1, 5, totals(50), 50),
+            (1, 4, totals(40), 50),
+            (1, 7, totals(70)[..39].to_vec(), 50),
+            (2, 0, totals(1), 1),
+            (1, 9, totals(90), 1),
+            (2, 1, totals(2), 2),
+        ] {
+            decoder.push(&datagram(Kind::Status, session, sequence, 1000, &body), None, &mut events);
+            assert_eq!(decoder.status().unwrap().frames, frames, "session {session}, number {sequence}");
+        }
+        assert_eq!((decoder.counts().malformed, decoder.counts().intact), (1, 6));
+    }
+
+    #[test]
+    fn a_straggler_of_before_a_reset_changes_nothing_that_is_held_since() {
+        let array = Array::thesis();
+        let registers = Registers { wire_version: 2, ..Registers::default() };
+        let mut board = Board::new(registers, &array).unwrap();
+        let mut said = |ticks: u16, taxels: usize| {
+            let mut out = vec![];
+            for level in [0, ticks, ticks + 20] {
+                let mut pressed = vec![0; 4096];
+                pressed[..taxels].fill(level);
+                board
+                    .frame(&pressed, |datagram| {
+                        out.push(datagram.to_vec());
+                        true
+                    })
+                    .unwrap();
+            }
+            board.reset().unwrap();
+            out
+        };
+        let (before, since) = (said(50, 4096), said(200, 100));
+        let (late, begun) = before.split_last().unwrap();
+        let mut decoder = Decoder::new(array.clone());
+        let mut events = Events::empty(array);
+        for datagram in begun.iter().chain(&since) {
+            decoder.push(datagram, None, &mut events);
+        }
+        let held = decoder.held();
+        let heard = events.len();
+        assert!(matches!(decoder.push(late, None, &mut events), Heard::Intact { reset: false, .. }));
+        assert!(events.len() > heard, "its events are events");
+        assert_eq!(decoder.held(), held);
     }
 }

@@ -41,6 +41,12 @@ impl Held {
         }
     }
 
+    /// The same array, of whose taxels nothing was heard.
+    pub(super) fn blank(&self) -> Self {
+        let places = self.values.len();
+        Self { values: vec![0; places], since: vec![NEVER; places], newest: NEVER, unheard: None, ..*self }
+    }
+
     /// Says what taxels hold, by index, none where that is not known.
     pub(super) fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
         let (rows, columns) = (self.rows, self.columns);
