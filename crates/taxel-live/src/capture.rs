@@ -102,18 +102,19 @@ impl Receiver {
         Ok(Self { queue, place: Origin::Udp(address), from })
     }
 
-    /// From now on a thread of its own receives, until the end; a feed has one anyway.
+    /// From now on a thread of its own receives, until the end; a feed has one anyway. Where nobody waits for what comes it may
+    /// `gather` for so long after each time: fewer wake-ups, the kernel keeps and stamps what comes meanwhile.
     ///
     /// # Errors
     ///
     /// `Socket` where the system has no thread left.
-    pub fn apart(&self) -> Result<()> {
+    pub fn apart(&self, gather: Duration) -> Result<()> {
         let From::Socket(socket, thread) = &self.from else { return Ok(()) };
         let Some(socket) = lock(socket).take() else { return Ok(()) };
         let queue = Arc::clone(&self.queue);
         let begun = std::thread::Builder::new()
             .name("taxel-receive".to_owned())
-            .spawn(move || receive(socket, &queue))
+            .spawn(move || receive(socket, &queue, gather))
             .map_err(|error| {
                 // The socket went with the thread that did not begin: nothing can come any more.
                 self.queue.close(None);
@@ -241,7 +242,7 @@ impl Drop for Receiver {
 }
 
 /// The thread's one job: from the socket into the queue, until told to stop or the socket fails.
-fn receive(mut socket: Socket, queue: &Queue) {
+fn receive(mut socket: Socket, queue: &Queue, gather: Duration) {
     let mut scratch = Batch::new();
     let ended = loop {
         scratch.begin(AT_ONCE);
@@ -249,9 +250,14 @@ fn receive(mut socket: Socket, queue: &Queue) {
         match fill(&mut socket, &mut scratch, stopped_ns.map_or(Some(LOOK_EVERY), |_| None)) {
             Ok(messages) => {
                 let ended = stopped_ns.is_some_and(|stopped_ns| scratch.ends_after(stopped_ns));
+                let full = scratch.room() < socket::LARGEST;
                 queue.put(&mut scratch, messages, socket.dropped());
                 if ended {
                     break Ok(());
+                }
+                // Of a full batch the rest waits already.
+                if messages > 0 && !full && stopped_ns.is_none() && !gather.is_zero() {
+                    std::thread::sleep(gather);
                 }
             }
             Err(error) => break Err(error),

@@ -35,6 +35,9 @@ const TICK: Duration = Duration::from_micros(500);
 /// How long to wait for datagrams where silence means nothing.
 const IDLE: Duration = Duration::from_millis(20);
 
+/// While it records and nothing is read out, what comes within so long is received together: it costs half the CPU.
+const TOGETHER: Duration = Duration::from_millis(1);
+
 /// Events are handed on when so many are there, also in the middle of a large batch.
 const HAND_ON: usize = 1 << 14;
 
@@ -193,7 +196,7 @@ impl Work {
 
     /// From now on a thread of its own receives, and another one reads out: a disk may hold this one up.
     fn apart(&mut self) -> Result<()> {
-        self.shared.receiver.apart()?;
+        self.shared.receiver.apart(if self.listens { Duration::ZERO } else { TOGETHER })?;
         self.leave();
         Ok(())
     }
