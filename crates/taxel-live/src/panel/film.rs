@@ -594,9 +594,7 @@ impl FileFilm {
                         key.frame = lens.keyframe();
                     }
                 }
-                for change in &changes {
-                    lens.take(change);
-                }
+                lens.take_all(&changes);
             }
             decoding.join().unwrap_or_else(|_| Err(problem!("indexing failed within taxel; please report it").into()))
         })?;
@@ -845,11 +843,9 @@ impl Player {
             let ahead = &self.waiting[self.place..];
             let now = ahead.iter().position(|change| change.t > t).unwrap_or(ahead.len());
             let (now, later) = ahead.split_at(now);
-            for change in now {
-                self.lens.take(change);
-                if let Some(history) = &mut self.history {
-                    history.take(change);
-                }
+            self.lens.take_all(now);
+            if let Some(history) = &mut self.history {
+                now.iter().for_each(|change| history.take(change));
             }
             if let Some(spikes) = &mut self.spikes {
                 spikes.take(now);

@@ -258,10 +258,8 @@ impl Hub {
                     lens.hold(held, kept.piece.before);
                 }
                 let mut activity = lock(&live.activity);
-                for change in &kept.piece.changes {
-                    lens.take(change);
-                    activity.take(change);
-                }
+                lens.take_all(&kept.piece.changes);
+                kept.piece.changes.iter().for_each(|change| activity.take(change));
                 new |= !kept.piece.changes.is_empty();
             }
             drop(outlet);

@@ -167,15 +167,19 @@ impl Strip {
         }
     }
 
-    fn mark(&mut self, column: i64, row: usize, up: bool) {
+    /// Marks changes of a column: their rows, and whether they rose.
+    fn mark(&mut self, column: i64, changes: impl Iterator<Item = (u16, bool)>) {
         if self.reach.is_some_and(|(first, _)| column < first) {
             return;
         }
         let rows = self.rows;
         let (block, k) = self.block(column);
-        let cell = &mut block.raster[k * rows + row];
-        let (ups, downs) = (*cell & 15, *cell >> 4);
-        *cell = if up { (ups + 1).min(15) | downs << 4 } else { ups | (downs + 1).min(15) << 4 };
+        let cells = &mut block.raster[k * rows..(k + 1) * rows];
+        for (row, up) in changes {
+            let cell = &mut cells[usize::from(row)];
+            let (ups, downs) = ((*cell & 15) + u8::from(up), (*cell >> 4) + u8::from(!up));
+            *cell = ups.min(15) | downs.min(15) << 4;
+        }
     }
 
     /// From this column on to the end of its block the curves are these.
@@ -238,7 +242,7 @@ pub struct Keyframe {
 #[derive(Debug, Clone)]
 pub struct Lens {
     /// Column and row of each taxel: a division a change would take most of its time.
-    at: Arc<[(u32, u32)]>,
+    at: Arc<[(u16, u16)]>,
     floor: u16,
     held: Vec<u16>,
     rest: Vec<u16>,
@@ -272,9 +276,9 @@ impl Lens {
     #[must_use]
     pub fn new(columns: u16, floor: u16, from: &Keyframe, column_us: i64, strip_bytes: usize) -> Self {
         let columns = usize::from(columns).max(1);
-        // A sensor has 2^22 taxels at most (recording's limits).
+        // An array has 65 535 rows and columns at most.
         #[allow(clippy::cast_possible_truncation)]
-        let at = |taxel: usize| ((taxel % columns) as u32, (taxel / columns) as u32);
+        let at = |taxel: usize| ((taxel % columns) as u16, (taxel / columns) as u16);
         let mut lens = Self {
             at: (0..from.held.len()).map(at).collect(),
             floor,
@@ -314,34 +318,27 @@ impl Lens {
     fn reckon(&mut self) {
         (self.sum, self.sum_x, self.sum_y, self.area) = (0, 0, 0, 0);
         for taxel in 0..self.held.len() {
-            self.weigh(taxel, true);
+            self.weigh(taxel, 0, self.above(taxel));
         }
     }
 
     /// Ticks above rest, 0 up to the noise floor.
     fn above(&self, taxel: usize) -> u16 {
         let (held, rest) = (self.held[taxel], self.rest[taxel]);
-        if held == UNKNOWN || rest == UNKNOWN {
-            return 0;
-        }
         let above = held.saturating_sub(rest);
-        if above > self.floor { above } else { 0 }
+        // No branch: which taxels are pressed nobody can foresee.
+        if (held != UNKNOWN) & (rest != UNKNOWN) & (above > self.floor) { above } else { 0 }
     }
 
-    fn weigh(&mut self, taxel: usize, on: bool) {
-        let above = u64::from(self.above(taxel));
-        if above == 0 {
-            return;
-        }
+    /// A taxel is so many ticks above rest that was so many before.
+    fn weigh(&mut self, taxel: usize, before: u16, now: u16) {
         let (x, y) = self.at[taxel];
-        let (x, y) = (u64::from(x) * above, u64::from(y) * above);
-        if on {
-            (self.sum, self.sum_x, self.sum_y, self.area) =
-                (self.sum + above, self.sum_x + x, self.sum_y + y, self.area + 1);
-        } else {
-            (self.sum, self.sum_x, self.sum_y, self.area) =
-                (self.sum - above, self.sum_x - x, self.sum_y - y, self.area - 1);
-        }
+        // A fall is a large number: the sums come out right, modulo 2^64.
+        let moved = u64::from(now).wrapping_sub(before.into());
+        self.sum = self.sum.wrapping_add(moved);
+        self.sum_x = self.sum_x.wrapping_add(moved.wrapping_mul(x.into()));
+        self.sum_y = self.sum_y.wrapping_add(moved.wrapping_mul(y.into()));
+        self.area = self.area + u32::from(now > 0) - u32::from(before > 0);
     }
 
     #[allow(clippy::cast_possible_truncation, clippy::cast_precision_loss)]
@@ -353,39 +350,51 @@ impl Lens {
         Curve { sum: self.sum.min(u64::from(u32::MAX)) as u32, area: self.area, x: x as f32, y: y as f32 }
     }
 
-    /// Takes a change.
+    /// Takes changes, in their order; those of one moment together, as most of the work is the moment's.
+    pub fn take_all(&mut self, changes: &[Change]) {
+        for together in changes.chunk_by(|one, next| one.t == next.t) {
+            let t = together[0].t;
+            self.advance(t);
+            self.events += together.len() as u64;
+            together.iter().for_each(|change| self.press(change));
+            let column = match self.column {
+                Some(column) if self.within.contains(&t) => column,
+                _ => column_of(t, self.column_us),
+            };
+            self.strip.mark(column, together.iter().map(|change| (self.at[change.taxel as usize].1, change.up)));
+        }
+    }
+
+    /// Takes one.
     pub fn take(&mut self, change: &Change) {
-        self.advance(change.t);
-        self.events += 1;
+        self.take_all(std::slice::from_ref(change));
+    }
+
+    /// What a change changes of its taxel.
+    #[inline]
+    fn press(&mut self, change: &Change) {
         let taxel = change.taxel as usize;
         if change.ticks == UNKNOWN {
             let size = if change.up { UNVALUED } else { -UNVALUED };
             self.change[taxel] = self.change[taxel].saturating_add(size).max(-127);
-        } else {
-            let before = self.held[taxel];
-            // What is heard for the first time has not changed.
-            let moved = if before == UNKNOWN { 0 } else { i32::from(change.ticks) - i32::from(before) };
-            #[allow(clippy::cast_possible_truncation)]
-            let size = moved.clamp(-127, 127) as i8;
-            if size.unsigned_abs() >= self.change[taxel].unsigned_abs() {
-                self.change[taxel] = size;
-            }
-            self.weigh(taxel, false);
-            self.held[taxel] = change.ticks;
-            if (self.rest[taxel] == UNKNOWN || self.lowest && change.ticks < self.rest[taxel])
-                && !self.zeroed.contains(&taxel)
-            {
-                self.rest[taxel] = change.ticks;
-                self.rests += 1;
-            }
-            self.weigh(taxel, true);
+            return;
         }
-        let column = match self.column {
-            // A division a change would take much of its time.
-            Some(column) if self.within.contains(&change.t) => column,
-            _ => column_of(change.t, self.column_us),
-        };
-        self.strip.mark(column, self.at[taxel].1 as usize, change.up);
+        let before = self.held[taxel];
+        // What is heard for the first time has not changed.
+        let moved = if before == UNKNOWN { 0 } else { i32::from(change.ticks) - i32::from(before) };
+        #[allow(clippy::cast_possible_truncation)]
+        let size = moved.clamp(-127, 127) as i8;
+        let largest = self.change[taxel];
+        self.change[taxel] = if size.unsigned_abs() >= largest.unsigned_abs() { size } else { largest };
+        let above = self.above(taxel);
+        self.held[taxel] = change.ticks;
+        if (self.rest[taxel] == UNKNOWN || self.lowest && change.ticks < self.rest[taxel])
+            && !self.zeroed.contains(&taxel)
+        {
+            self.rest[taxel] = change.ticks;
+            self.rests += 1;
+        }
+        self.weigh(taxel, above, self.above(taxel));
     }
 
     /// Moves time on; back does nothing.
@@ -469,11 +478,11 @@ impl Lens {
 
     /// A taxel rests at `rest` from here on, until the rest of all is set.
     pub fn zero(&mut self, taxel: usize, rest: u16) {
-        self.weigh(taxel, false);
+        let above = self.above(taxel);
         self.rest[taxel] = rest;
         self.zeroed.insert(taxel);
         self.rests += 1;
-        self.weigh(taxel, true);
+        self.weigh(taxel, above, self.above(taxel));
     }
 
     /// What is held now is the rest from here on.
@@ -655,7 +664,12 @@ mod tests {
         let mut changes = vec![];
         for _ in 0..5000 {
             // Pauses of an hour too.
-            t += if random.random_range(0..500) == 0 { 3_600_000_000 } else { random.random_range(0..3000) };
+            t += match random.random_range(0..500) {
+                0 => 3_600_000_000,
+                // Of one moment.
+                1..200 => 0,
+                _ => random.random_range(0..5000),
+            };
             // Some come late.
             let back = if random.random_range(0..9) == 0 { random.random_range(0..9000) } else { 0 };
             changes.push(change(t - back, random.random_range(0..taxels), random.random_range(0..300)));
@@ -670,7 +684,7 @@ mod tests {
         }
         for (k, keyframe) in keyframes {
             let mut fresh = Lens::new(4, 3, &keyframe, us, 1 << 20);
-            changes[k..].iter().for_each(|one| fresh.take(one));
+            fresh.take_all(&changes[k..]);
             assert_eq!(fresh.held(), whole.held());
             assert_eq!(fresh.rest(), whole.rest());
             assert_eq!((fresh.events(), fresh.latest()), (whole.events(), whole.latest()));
