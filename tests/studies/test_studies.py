@@ -166,7 +166,7 @@ def test_the_command_prints_json(small, capsys):
     [
         (["--size", "huge"], "size is 'huge'"),
         (["--set", "kapa=1"], "fig6.11 has no parameter 'kapa': there are"),
-        (["--set", "kappa=wide"], "kappa is 'wide': must be of the kind of 1.04"),
+        (["--set", "kappa=wide"], "kappa is 'wide': must be a number, as 1.04"),
         (["--set", "kappa"], "--set kappa: must be KEY=VALUE"),
         (["--realisations", "0"], "realisations is 0"),
         (["--jobs", "0"], "jobs is 0"),

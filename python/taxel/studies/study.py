@@ -181,9 +181,8 @@ class Study:
             if name not in values:
                 raise ProblemError(f"{self.name} has no parameter {name!r}: there are {', '.join(values)}")
             if not _alike(value, values[name]):
-                raise ProblemError(
-                    f"{name} is {arguments.shown(value)}: must be of the kind of {arguments.shown(values[name])}"
-                )
+                kind = f"{_kind(values[name])}, as {arguments.shown(values[name])}"
+                raise ProblemError(f"{name} is {arguments.shown(value)}: must be {kind}")
             values[name] = value
         if "realisations" in values:
             arguments.whole("realisations", values["realisations"], 1)
@@ -312,6 +311,12 @@ def _alike(value: Any, other: Any) -> bool:
     if isinstance(other, list | tuple):
         return isinstance(value, list | tuple) and all(_alike(v, other[0]) for v in value if other)
     return isinstance(value, type(other))
+
+
+def _kind(value: Any) -> str:
+    """Say in words what is alike."""
+    kinds = {bool: "true or false", int: "a whole number", float: "a number", list: "a list", tuple: "a list"}
+    return kinds.get(type(value), "a text")
 
 
 def _machine() -> dict[str, Any]:

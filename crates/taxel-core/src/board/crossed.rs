@@ -120,7 +120,13 @@ mod tests {
 
     fn ideal() -> Chain {
         Chain {
-            readout: VirtualGround::default().ideal(),
+            readout: VirtualGround {
+                gain: None,
+                offset_mv: 0.0,
+                switch_ohm: 0.0,
+                wire_ohm: 0.0,
+                ..VirtualGround::default()
+            },
             converter: Converter { hysteresis_v: 0.0, settle_us: 0.0, discharge_us: 0.0, ..Converter::default() },
         }
     }

@@ -86,12 +86,6 @@ impl VirtualGround {
         wire_is_sound(self.wire_ohm)
     }
 
-    /// The same with nothing that makes taxels touch each other.
-    #[must_use]
-    pub fn ideal(&self) -> Self {
-        Self { gain: None, offset_mv: 0.0, switch_ohm: 0.0, wire_ohm: 0.0, ..self.clone() }
-    }
-
     /// What an amplifier makes of one taxel by itself, V; the rail is left out.
     #[must_use]
     pub fn volts_alone(&self, conductance_us: f64) -> f64 {
