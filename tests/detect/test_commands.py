@@ -430,7 +430,10 @@ def test_a_folder_of_trials_is_trained_on_and_heard_as_its_recordings_are(tmp_pa
     assert code == 0
     files = [trials / f"t{k}.npz" for k in range(4)]
     listed = tmp_path / "b.json"
-    assert call(capsys, "train", *files, "--labels", trials / "labels.csv", "-o", listed, *plain)[0] == 0
+    code, said, _ = call(capsys, "train", *files, "--labels", trials / "labels.csv", "-o", listed, "--json", *plain)
+    assert code == 0
+    assert json.loads(said)["judged_on"] == "its own training data"
+    assert json.loads(said)["score"]["found"] == 4
     assert taxel.Readout.load(out) == taxel.Readout.load(listed)
 
     table = tmp_path / "found.csv"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 import typer
 
 from taxel._core import ProblemError
@@ -25,7 +26,7 @@ from taxel.cli._listening import (
 )
 
 if TYPE_CHECKING:
-    from taxel.detect import Example, Judged, Readout, Recipe, Score
+    from taxel.detect import Example, Judged, Readout, Recipe
     from taxel.events import Events
     from taxel.frames import Frames
     from taxel.recording import Recording
@@ -118,8 +119,9 @@ def train(
         readout = train_readout(examples, plan, progress=tell)
         heard = [] if judged is not None and report is None else _on_itself(readout, opened, examples, window_ms, tell)
     readout.save(out, overwrite=overwrite)
-    scores = judged.scores if judged is not None else [one.score for one in heard if one.score is not None]
-    trained = _Trained(out, readout, recipe, plan, opened, scores, judged, window_ms, search, report)
+    trained = _Trained(
+        out, readout, recipe, plan, opened, judged or _own(heard, window_ms), judged, window_ms, search, report
+    )
     if report is not None:
         from taxel.report import write_listening  # noqa: PLC0415  pictures load slowly
 
@@ -160,11 +162,21 @@ def _on_itself(
     heard = []
     for one, example in zip(opened, examples, strict=True):
         tell(f"hearing {one.path} again")
-        truth = {label: example.labels.get(label, []) for label in readout.labels}
+        truth = {label: np.asarray(example.labels.get(label, []), np.int64) for label in readout.labels}
         found = run(readout, one, tare=example.tare)
         own = score(found, truth, window_ms)
         heard.append(Listened(str(one.path), _source(one), found, example.tare, truth, own))
     return heard
+
+
+def _own(heard: Sequence[Listened], window_ms: float) -> Judged:
+    """Say how it did on what it was trained on."""
+    from taxel.detect import Judged  # noqa: PLC0415
+    from taxel.detect.scoring import score_together  # noqa: PLC0415
+
+    truths = [one.truth for one in heard if one.truth is not None]
+    together = score_together([one.found for one in heard], truths, window_ms)
+    return Judged(tuple(one.score for one in heard if one.score is not None), together, "its own training data")
 
 
 @dataclass(frozen=True)
@@ -176,7 +188,7 @@ class _Trained:
     recipe: str | None
     plan: Recipe
     opened: Sequence[Recording]
-    scores: Sequence[Score]
+    scored: Judged
     judged: Judged | None
     window_ms: float
     searched: bool
@@ -197,15 +209,14 @@ class _Trained:
             "readout": str(self.out),
             "labels": list(self.readout.labels),
             "recipe": self.recipe,
-            "judged_on": "its own training data" if self.judged is None else self.judged.how,
+            "judged_on": self.scored.how,
             "window_ms": self.window_ms,
             "recordings": [
                 {"recording": str(one.path), "score": each.to_dict()}
-                for one, each in zip(self.opened, self.scores, strict=True)
+                for one, each in zip(self.opened, self.scored.scores, strict=True)
             ],
         }
-        if self.judged is not None:
-            said["score"] = self.judged.together.to_dict()
+        said["score"] = self.scored.together.to_dict()
         if self.report is not None:
             said["report"] = str(self.report / "report.html")
         if self.searched:
@@ -223,9 +234,9 @@ class _Trained:
             lines.append(f"{label}, chosen: {chosen}")
         how = "on its own training data" if self.judged is None else f"on what was held out: {self.judged.how}"
         lines.append(f"\n{how} (window {self.window_ms:g} ms)")
-        lines += [f"\n{one.path}:\n{each!r}" for one, each in zip(self.opened, self.scores, strict=True)]
-        if self.judged is not None and len(self.scores) > 1:
-            lines.append(f"\nall recordings:\n{self.judged.together!r}")
+        lines += [f"\n{one.path}:\n{each!r}" for one, each in zip(self.opened, self.scored.scores, strict=True)]
+        if len(self.scored.scores) > 1:
+            lines.append(f"\nall recordings:\n{self.scored.together!r}")
         lines.append(f"\nwritten to {self.out}")
         if self.report is not None:
             lines.append(f"report: {self.report / 'report.html'}")
