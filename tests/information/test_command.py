@@ -198,6 +198,8 @@ def test_recordings_that_make_no_sense_together_are_one_clear_error(tmp_path):
         assert text in str(done.exception)
     done = run(first, first, "--window-ms", "50", "--report", tmp_path / "page.html")
     assert "is named twice" in str(done.exception)
+    done = run(first, "--window-ms", "50", "--report", tmp_path / "page")
+    assert "page: is one page, so its name must end in .html" in str(done.exception)
     assert not (tmp_path / "page.html").exists()
 
 

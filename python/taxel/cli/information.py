@@ -58,6 +58,8 @@ def information(
     from taxel.information import answer, read_trials, recordings_as_trials  # noqa: PLC0415  starts quickly
     from taxel.report.information import write_information  # noqa: PLC0415
 
+    if report.suffix != ".html":
+        raise ProblemError(f"--report {report}: is one page, so its name must end in .html")
     if report.exists() and not overwrite:
         raise FileExistsError(17, "exists already; say --overwrite or another --report", str(report))
     chosen = _encoder(encoder, values or [])
