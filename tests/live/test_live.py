@@ -18,7 +18,8 @@ import taxel
 from taxel import Array, DeviceError, Events, Neuron, ProblemError, Readout, wire
 from taxel.encode import ChangeEvents, ContactArea
 from taxel.live import Live, Said, heard, send
-from taxel.simulate import Scene, emulate
+from taxel.simulate import Board, Scene, emulate
+from taxel.wire import Registers
 
 LOOPBACK = "127.0.0.1"
 SMALL = Array(4, 4, pitch_mm=2.0, name="small")
@@ -510,15 +511,21 @@ def test_taxel_live_to_which_nothing_came_names_no_latency(tmp_path: Path) -> No
         assert live.counters["decode_latency"] == {"count": 0, "p50_us": None, "p99_us": None, "max_us": None}
 
 
-def test_a_board_with_more_taxels_than_the_array_is_said_while_it_runs(tmp_path: Path) -> None:
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_board_with_more_taxels_than_the_array_is_said_while_it_runs(tmp_path: Path, version: int) -> None:
     port, file = free_port(), tmp_path / "walk.mcap"
     n = 500
     far = Events(np.arange(n) * 100, np.full(n, 40), np.full(n, 2), np.ones(n, bool), array=Array(64, 64))
+    board = Board(Registers(wire_version=2))
+    pressed = [datagram for ticks in (0, 90) for datagram in board.frame(np.full(4096, ticks, np.uint16))]
     arguments = command("record", file, "--host", LOOPBACK, "--port", port, "--array", "8x8")
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         listening(process)
         assert process.stderr is not None
-        play(far, port)
+        if version == 1:
+            play(far, port)
+        else:
+            send(pressed, LOOPBACK, port)
         said = next(line for line in process.stderr if line.startswith("taxel: "))
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=60)

@@ -99,14 +99,13 @@ _OUTSIDE, _OUTSIDE_SHARE = 100, 0.01
 
 def outside(counters: dict[str, Any], array: Array) -> str | None:
     """Return what to say where the board has more taxels than `array`; None where it has not."""
-    wire = counters["wire"]
-    if wire["outside"] < max(_OUTSIDE, _OUTSIDE_SHARE * wire["words"]):
+    first, second = counters["wire"], counters["wire_v2"]
+    beyond = first["outside"] + second["outside"]
+    words = first["words"] + second["events"] + second["states"] + second["outside"]
+    if beyond < max(_OUTSIDE, _OUTSIDE_SHARE * words):
         return None
     size = f"{array.rows} x {array.columns}"
-    return (
-        f"{wire['outside']:,} of {wire['words']:,} words name taxels outside {size}, and are dropped: "
-        "give the board's own --array"
-    )
+    return f"{beyond:,} of {words:,} words name taxels outside {size}, and are dropped: give the board's own --array"
 
 
 def exit_code(summary: Summary, array: Array) -> int:
@@ -145,6 +144,12 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
 
     capture, wire, earlier = now["capture"], now["wire"], before["capture"]
     damaged = wire["skipped"] + wire["contradictory"] + wire["outside"] + wire["unpaired"]
+    damage, lost = f"{damaged:,} bytes and words, {wire['back']:,} steps back in time", ""
+    if now["wire_version"] == 2:
+        second = now["wire_v2"]
+        damaged = second["checksum"] + second["short"] + second["foreign"] + second["malformed"]
+        damage = f"{damaged:,} datagrams, {second['outside']:,} words, {now['wire_refused']:,} bytes of version 1"
+        lost = f", {second['missing']:,} on the way"
     board = "-" if now["board_us"] is None else f"{now['board_us'] / 1e6:.2f} s"
     drift = "" if now["offset"] is None else f", drift {now['offset']['drift_ppm']:+.1f} ppm"
     table = Table.grid(padding=(0, 2))
@@ -152,9 +157,13 @@ def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:
         ("datagrams", f"{capture['datagrams']:,}", rate(capture["datagrams"], earlier["datagrams"])),
         ("bytes", f"{capture['bytes']:,}", rate(capture["bytes"], earlier["bytes"])),
         ("events", f"{now['events']:,}", rate(now["events"], before["events"])),
-        ("lost", f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue", ""),
+        (
+            "lost",
+            f"{capture['dropped_by_kernel']:,} by the kernel, {capture['dropped_by_queue']:,} by our queue{lost}",
+            "",
+        ),
         *_bridged(now["bridged"]),
-        ("damaged", f"{damaged:,} bytes and words, {wire['back']:,} steps back in time", ""),
+        ("damaged", damage, ""),
         ("arrival to decoded", delays(now["decode_latency"]), ""),
         ("board's clock", f"{board}{drift}", ""),
     ):
