@@ -100,6 +100,7 @@ OPTIONS = {
     "sources": [],
     "registers": "5.2 kHz",
     "differences": False,
+    "record_later": False,
     "guard_frames": 5.0,
     "gap_frames": 1.0,
     "send": [],
