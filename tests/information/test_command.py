@@ -247,6 +247,6 @@ def test_a_recording_that_the_table_does_not_name_is_said(tmp_path):
     events, _ = ordered(4)
     taxel.convert(events, tmp_path / "forgotten.npz")
     done = run(
-        recording, tmp_path / "forgotten.npz", "--labels", labels, "--window-ms", "20", "--report", tmp_path / "p"
+        recording, tmp_path / "forgotten.npz", "--labels", labels, "--window-ms", "20", "--report", tmp_path / "p.html"
     )
     assert "says nothing of" in str(done.exception)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import re
+import signal
+import threading
+from collections.abc import Iterator
 from typing import Annotated, Any
 
 import typer
@@ -22,6 +25,7 @@ __all__ = [
     "HostOption",
     "PortOption",
     "PresetOption",
+    "asked_to_end",
     "counters_table",
     "exit_code",
     "geometry",
@@ -133,6 +137,22 @@ def _bridged(counted: dict[str, Any] | None) -> list[tuple[str, str, str]]:
         ahead, within = (clock[name] / 1e6 for name in ("ahead_ns", "within_ns"))
         compared = f"{ahead:+,.3f} ms, within {within:.3f} ms, {clock['drift_ppm']:+.1f} ppm"
     return [("other computer", said, ""), ("lost between", lost, ""), ("its clock", compared, "")]
+
+
+@contextlib.contextmanager
+def asked_to_end() -> Iterator[threading.Event]:
+    """Hear the first Ctrl-C as a flag: nothing is lost between being taken and being said; the next one raises."""
+    asked, before = threading.Event(), signal.getsignal(signal.SIGINT)
+
+    def hear(*_: object) -> None:
+        asked.set()
+        signal.signal(signal.SIGINT, before)
+
+    signal.signal(signal.SIGINT, hear)
+    try:
+        yield asked
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def counters_table(before: dict[str, Any], now: dict[str, Any]) -> Table:

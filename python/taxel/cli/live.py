@@ -23,6 +23,7 @@ from taxel.cli._board import (
     HostOption,
     PortOption,
     PresetOption,
+    asked_to_end,
     counters_table,
     exit_code,
     geometry,
@@ -273,9 +274,10 @@ def _watch(
     above = console.is_terminal and sys.stdout.isatty()
     say: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else typer.echo
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
-    with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True, redirect_stdout=False) as display:
+    display = Display(console=console, refresh_per_second=1 / _REDRAW, transient=True, redirect_stdout=False)
+    with asked_to_end() as asked, display:
         before, told = None, False
-        while before is None or seconds is None or before["seconds"] < seconds:
+        while not asked.is_set() and (before is None or seconds is None or before["seconds"] < seconds):
             try:
                 if panel is not None and panel.live is not None and panel.live is not pipeline:
                     # A page chose another address.

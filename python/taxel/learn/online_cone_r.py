@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from threading import Lock
 from typing import Any, Self
 
 from numpy.typing import ArrayLike
@@ -100,10 +101,11 @@ class OnlineConeR(ConeR):
         -----
         UserWarning : as `ConeR.fit`
         """
-        if not hasattr(self, "_stream"):
-            self._begin()
-        self._add(pattern, targets, "pattern", "targets")
-        return self._fit()
+        with self._alone():
+            if not hasattr(self, "_stream"):
+                self._begin()
+            self._add(pattern, targets, "pattern", "targets")
+            return self._fit()
 
     def fit(
         self,
@@ -139,10 +141,16 @@ class OnlineConeR(ConeR):
         trains, times = several("patterns", patterns), several("targets", targets)
         if len(trains) != len(times) or not trains:
             raise ProblemError(f"targets: {len(times)} lists for {len(trains)} patterns, must be one a pattern")
-        self._begin()
-        for p, (pattern, wanted) in enumerate(zip(trains, times, strict=True)):
-            self._add(pattern, wanted, f"pattern {p}", f"targets of pattern {p}")
-        return self._fit()
+        with self._alone():
+            self._begin()
+            for p, (pattern, wanted) in enumerate(zip(trains, times, strict=True)):
+                self._add(pattern, wanted, f"pattern {p}", f"targets of pattern {p}")
+            return self._fit()
+
+    def _alone(self) -> Lock:
+        """Return what lets one thread in: a window and what is told of its last fit belong together."""
+        lock: Lock = vars(self).setdefault("_lock", Lock())
+        return lock
 
     def _add(self, pattern: SpikeTrains, targets: ArrayLike, name: str, wanted: str) -> None:
         given = instance(name, pattern, SpikeTrains)._parts(), floats(wanted, targets, "ms")
@@ -157,7 +165,7 @@ class OnlineConeR(ConeR):
         self._held = deque(maxlen=self.window)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {name: value for name, value in vars(self).items() if name != "_stream"}
+        return {name: value for name, value in vars(self).items() if name not in ("_stream", "_lock")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
