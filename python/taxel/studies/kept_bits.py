@@ -63,6 +63,8 @@ def by_period_parameter_and_time(
         ax.set_xlabel(f"ms since {since}" if k == 2 else "sampling period, ms")
         ax.set_ylabel(label)
         ax.set_title(f"figure {title}")
-        ax.legend(fontsize="small")
+        # Curves over time fill the axes; their names stand beside them.
+        beside: dict[str, Any] = {"loc": "center left", "bbox_to_anchor": (1.0, 0.5)} if k == 2 else {}
+        ax.legend(fontsize="small", **beside)
         found.append(figure)
     return found
