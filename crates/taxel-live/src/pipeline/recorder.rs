@@ -464,3 +464,31 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         converted: None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_recording_of_nothing_but_version_2_says_that_nothing_is_missing() {
+        let mut now = Counters::default();
+        now.wire_v2.intact = 100;
+        assert_eq!(losses(&now, None).missing, Some(0));
+        assert_eq!(losses(&now, None).verdict(), "nothing lost");
+        let begun = now.clone();
+        // Since it began the board has spoken version 1.
+        now.wire.bytes = 50;
+        assert_eq!(losses(&now, Some(&begun)).missing, None);
+        now.wire_v2.intact += 10;
+        assert_eq!(losses(&now, Some(&begun)).missing, None, "some of it");
+        now.wire_v2.missing += 3;
+        now.wire_refused += 25;
+        let lost = losses(&now, Some(&begun));
+        assert_eq!(lost.missing, Some(3));
+        assert!(
+            lost.verdict().ends_with("in the bytes that came: 25 bytes of version 1 refused"),
+            "{}",
+            lost.verdict()
+        );
+    }
+}
