@@ -14,7 +14,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from panel.browser import running
+from panel.browser import free_port, running
 
 import taxel
 import taxel.device
@@ -479,6 +479,27 @@ def test_the_command_stays_while_a_page_begins_its_board_anew(tmp_path):
                 assert page.ask("listen", host="127.0.0.1", port=0)["type"] == "done"
         # Nothing came; that is all there is to complain of.
         assert server.end() == 3, "".join([*server.said, *iter(server.lines.get, "")])
+
+
+def test_registers_are_read_again_when_the_board_was_reset(tmp_path):
+    port = str(free_port())
+    board = ("emulate", "--port", port, "--wire", "2", "--control", "0", "--reset-every", "3")
+    with running(*board, folder=tmp_path) as emulated:
+        control = emulated.wait_for(r"commands are taken at (\S+)")
+        panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
+        with running(*panel, folder=tmp_path) as server:
+            url = urlsplit(server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
+            door = SimpleNamespace(address=(url.hostname, url.port), token=url.fragment.removeprefix("token="))
+            with Client(door) as page:
+                page.send(type="credit", n=1)
+                page.until("registers", known=True)
+                while page.ask("set", values={"noise_floor": 9})["type"] != "done":
+                    pass  # it is being reset just now
+                floors = []
+                while not floors or floors[-1] != 3:
+                    said = page.until("registers", known=True)
+                    floors.append(said["values"]["noise_floor"])
+                assert set(floors) <= {3, 9}
 
 
 def spikes_of(page, columns):
