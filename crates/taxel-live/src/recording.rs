@@ -298,7 +298,7 @@ pub fn damage_of_version_2(counts: &wire::v2::Counts) -> Option<(BTreeMap<String
         ("events_repaired", counts.repaired),
         ("differences_from_an_unknown_value", counts.unknown_value),
     ];
-    (counts.intact > 0).then(|| (causes.map(|(cause, n)| (cause.to_owned(), n)).into(), counts.missing))
+    (counts.datagrams > 0).then(|| (causes.map(|(cause, n)| (cause.to_owned(), n)).into(), counts.missing))
 }
 
 /// Something written down while recording.

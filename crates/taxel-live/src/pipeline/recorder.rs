@@ -432,35 +432,24 @@ fn named(path: &Path) -> Result<&str> {
 
 /// What was lost, as recordings keep it; of one that began later, since then.
 pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::Counts {
-    let none = Counters::default();
-    let begun = since.unwrap_or(&none);
-    let (capture, before) = (&counters.capture, &begun.capture);
-    let damage = |now: &Counters| {
-        let (second, missing) = recording::damage_of_version_2(&now.wire_v2).unzip();
-        let mut decoder = recording::damage(&now.wire);
-        decoder.insert("bytes_of_version_1_refused".to_owned(), now.wire_refused);
-        decoder.extend(second.unwrap_or_default());
-        (decoder, missing)
-    };
-    let ((mut decoder, missing), (earlier, missed)) = (damage(counters), damage(begun));
-    for (cause, n) in &mut decoder {
-        *n -= earlier.get(cause).copied().unwrap_or(0).min(*n);
-    }
+    // What waits when it ends is none of its business.
+    let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
+    let mut decoder = recording::damage(&now.wire);
+    decoder.insert("bytes_of_version_1_refused".to_owned(), now.wire_refused);
+    let missing = recording::damage_of_version_2(&now.wire_v2).map(|(causes, missing)| {
+        decoder.extend(causes);
+        missing
+    });
     // Of version 1 nobody knows what was sent: a recording that holds any of it cannot say that nothing is missing.
-    let [of_1, of_2] = [counters.wire.bytes - begun.wire.bytes, counters.wire_v2.intact - begun.wire_v2.intact];
-    let missing = missing.map(|n| n.saturating_sub(missed.unwrap_or(0)));
-    let missing = missing.filter(|n| *n > 0 || of_2 > 0 && of_1 == 0);
-    let recorded = counters.decoded - begun.decoded;
-    let dropped_by_queue = capture.dropped_by_queue - before.dropped_by_queue;
+    let knows = now.wire_v2.intact > 0 && now.wire.bytes == 0;
     recording::Counts {
-        // What waits when it ends is none of its business.
-        received: if since.is_some() { recorded + dropped_by_queue } else { capture.datagrams },
-        recorded,
-        dropped_by_kernel: capture.dropped_by_kernel - before.dropped_by_kernel,
-        dropped_by_queue,
+        received: now.capture.datagrams,
+        recorded: now.decoded,
+        dropped_by_kernel: now.capture.dropped_by_kernel,
+        dropped_by_queue: now.capture.dropped_by_queue,
         decoder,
-        missing,
-        bridged: counters.bridged.map(|now| Box::new(now.since(&begun.bridged.unwrap_or_default()))),
+        missing: missing.filter(|n| *n > 0 || knows),
+        bridged: now.bridged.map(Box::new),
         converted: None,
     }
 }
@@ -472,14 +461,14 @@ mod tests {
     #[test]
     fn only_a_recording_of_nothing_but_version_2_says_that_nothing_is_missing() {
         let mut now = Counters::default();
-        now.wire_v2.intact = 100;
+        (now.wire_v2.datagrams, now.wire_v2.intact) = (100, 100);
         assert_eq!(losses(&now, None).missing, Some(0));
         assert_eq!(losses(&now, None).verdict(), "nothing lost");
         let begun = now.clone();
         // Since it began the board has spoken version 1.
         now.wire.bytes = 50;
         assert_eq!(losses(&now, Some(&begun)).missing, None);
-        now.wire_v2.intact += 10;
+        (now.wire_v2.datagrams, now.wire_v2.intact) = (110, 110);
         assert_eq!(losses(&now, Some(&begun)).missing, None, "some of it");
         now.wire_v2.missing += 3;
         now.wire_refused += 25;
