@@ -477,7 +477,8 @@ The logic checks nothing; host and emulated board do, before a write. `steps` is
 {newline.join(presets)}
 
 A board of up to 64 lines resets to the first; a larger one to version 2 and *128 x 128, 1 kHz*, with 16 channels to
-*128 x 128, 1.3 kHz*, its lines and steps fitted to the array.
+*128 x 128, 1.3 kHz*, its lines and steps fitted to the array. *wire* is what a board speaks that begins with the preset. Who sets a board that
+runs to a preset by its name (`taxel device apply`, the panel) leaves the version that it speaks, and the channels, which are its build.
 
 ## FA-1 on the board
 

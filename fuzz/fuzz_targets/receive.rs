@@ -53,6 +53,7 @@ fn seal(piece: &[u8], kind: u8, out: &mut Vec<u8>) {
         base: (0..6).fold(0, |base, at| base << 8 | u64::from(head[8 + at])) >> (kind & 0x38),
         session: u16::from(head[14] & 7),
         stride: head[16],
+        line: head[16] >> 5 | head[17] & 0x70,
         flags: head[17],
         span: u16::from_le_bytes([head[3], head[15]]),
     };

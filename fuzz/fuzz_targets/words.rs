@@ -19,8 +19,8 @@ fuzz_target!(|input: &[u8]| {
         // Nearly always the array's own stride, nearly always ahead.
         let stride = if flags & 0xe0 == 0xe0 { on % 32 } else { stride(array.rows) };
         base = if flags & 0x1c == 0x1c { u64::from(on) } else { base + u64::from(on) };
-        let header =
-            Header { kind: kind & 7, board: 1, sequence: datagrams.len() as u32, base, session: 1, stride, flags, span: 0 };
+        let (sequence, line) = (datagrams.len() as u32, if kind & 0x40 == 0 { 0 } else { on });
+        let header = Header { kind: kind & 7, board: 1, sequence, base, session: 1, stride, line, flags, span: 0 };
         let mut datagram = vec![];
         header.write(body, &mut datagram);
         datagrams.push(datagram);

@@ -101,6 +101,7 @@ def decode(
     pairing: Literal["direct", "taxel"] = "direct",
     differences: bool = False,
     lengths: ArrayLike | None = None,
+    columns: Columns | None = None,
 ) -> Events:
     """Read a whole stream of bytes; see `Decoder`, which also counts what is dropped.
 
@@ -114,6 +115,9 @@ def decode(
     lengths : array of int, shape (datagrams,), optional
         Bytes of each datagram, where `data` is datagrams one behind the other: then each is heard by itself, so that no
         intensity belongs to a change of the datagram before.
+    columns : Columns, optional
+        Memory that is used again, with room for ``len(data) // 5 + 2`` events: the events are views of it, good until
+        it is filled again. With pairing "taxel", and where it is left out, they have memory of their own.
 
     Returns
     -------
@@ -129,14 +133,14 @@ def decode(
     Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
     """
     decoder = Decoder(array=array, pairing=pairing, differences=differences)
+    stream = _bytes(data)
+    room, own = Columns._asked_for(columns, _rows(stream))
     if lengths is not None:
         each = column("lengths", lengths, np.int64)
-        stream = _bytes(data)
-        columns = Columns._fresh(_rows(stream))
-        rows, paired, markers = decoder._core.fill_datagrams(stream, each, columns._parts())
-        events = columns._given(decoder.array, rows, paired, None, markers)
+        rows, paired, markers = decoder._core.fill_datagrams(stream, each, room._parts())
     else:
-        events = decoder._take(data, None, last=pairing == "direct")
+        rows, paired, markers = decoder._fill(room, stream, None, last=pairing == "direct")
+    events = (room._given if own else room._first)(decoder.array, rows, paired, None, markers)
     if pairing == "taxel":
         heard, events = events.markers, decoder.finish()
         events.markers = heard
@@ -186,7 +190,7 @@ class Counts:
 
 
 class Columns:
-    """Keep memory for decoded events, to be filled again and again (`Decoder.push_into`).
+    """Keep memory for decoded events, to be filled again and again (`Decoder.push_into`, `decode`).
 
     Fresh memory costs more than decoding: the first write to each page is a call of the kernel.
 
@@ -245,6 +249,11 @@ class Columns:
         columns = cls.__new__(cls)
         columns._lay_out(max(rows, _LARGE) if rows >= _LARGE // 4 else rows, np.empty)
         return columns
+
+    @classmethod
+    def _asked_for(cls, columns: Columns | None, rows: int) -> tuple[Columns, bool]:
+        """Return the caller's columns, or fresh ones for so many rows; and whether they are fresh."""
+        return (cls._fresh(rows), True) if columns is None else (instance("columns", columns, cls), False)
 
     def _first(
         self,
@@ -573,6 +582,27 @@ class Registers:
         registers = Registers.__new__(Registers)
         registers._set(self._held, fields, self.array)
         return registers
+
+    def with_preset(self, name: str) -> Registers:
+        """Return a set that took over one of `PRESETS`, with as many lines as the array has.
+
+        A preset says neither which version of the wire the board speaks nor whether a recording runs: these stay, as
+        do the channels, which are the board's build.
+
+        Raises
+        ------
+        ProblemError : no such preset (names those that there are)
+        DeviceError : the board could not hold it (names the rule)
+
+        Examples
+        --------
+        >>> slow = Registers(wire_version=2).with_preset("2 kHz")
+        >>> slow.line_period, slow.noise_floor, slow.wire_version
+        (7.81, 10, 2)
+        """
+        named = text("preset", name)
+        held = json.loads(_core.registers_with_preset(self._json(), named, self.array._parts()))
+        return self._of(held, self.array)
 
     @property
     def frame_us(self) -> float:

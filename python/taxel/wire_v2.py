@@ -170,7 +170,7 @@ class Decoder:
         return f"Decoder({self.array.rows} x {self.array.columns} taxels, {c.intact} datagrams, {c.missing} missing)"
 
 
-def decode(data: Any, *, array: Array | None = None) -> tuple[Events, Counts, int]:
+def decode(data: Any, *, array: Array | None = None, columns: Columns | None = None) -> tuple[Events, Counts, int]:
     """Decode a whole stream of one board's datagrams, each of which has its length before it (16 bits, little-endian).
 
     Parameters
@@ -178,6 +178,9 @@ def decode(data: Any, *, array: Array | None = None) -> tuple[Events, Counts, in
     data : bytes, or anything with a contiguous buffer
     array : Array, optional
         The sensor; the thesis' 64 x 64 where it is left out.
+    columns : taxel.wire.Columns, optional
+        Memory that is used again, with room for ``len(data) // 2 + 32`` events: the events are views of it, good until
+        it is filled again. Where it is left out they have memory of their own.
 
     Returns
     -------
@@ -185,7 +188,7 @@ def decode(data: Any, *, array: Array | None = None) -> tuple[Events, Counts, in
 
     Raises
     ------
-    ProblemError : `data` is not bytes
+    ProblemError : `data` is not bytes, or `columns` have too little room
 
     Examples
     --------
@@ -198,10 +201,11 @@ def decode(data: Any, *, array: Array | None = None) -> tuple[Events, Counts, in
     """
     sensor = Array._of(array)
     stream = _bytes(data)
-    columns = Columns._fresh(_core.datagram_rows(len(stream)))
-    told = _core.decode_datagrams(stream, sensor._parts(), columns._parts())
+    room, own = Columns._asked_for(columns, _core.datagram_rows(len(stream)))
+    told = _core.decode_datagrams(stream, sensor._parts(), room._parts())
     rows, paired, repaired, markers, counts, skipped = told
-    return columns._given(sensor, rows, paired, repaired, markers), Counts(**json.loads(counts)), skipped
+    events = (room._given if own else room._first)(sensor, rows, paired, repaired, markers)
+    return events, Counts(**json.loads(counts)), skipped
 
 
 class StreamReader:

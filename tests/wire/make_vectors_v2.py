@@ -13,8 +13,10 @@ from .oracle_v2 import datagram, decode, markers, word, words
 DATA = Path(__file__).parent.parent / "data" / "wire_v2"
 
 
-def one(kind, events, *, base=0, stride=6, **rest):
-    return datagram(kind, words(kind, events, base=base, stride=stride), base=base, stride=stride, **rest)
+def one(kind, events, *, base=0, stride=6, line=None, **rest):
+    line = min(events[0][1] if events else 0, 127) if line is None else line
+    body = words(kind, events, base=base, stride=stride, line=line)
+    return datagram(kind, body, base=base, stride=stride, line=line, **rest)
 
 
 CORNERS = [(0, 0, 0, 1, 9), (0, 0, 63, 0, 255), (0, 63, 0, 1, 0), (0, 63, 63, 0, 77)]
@@ -74,6 +76,29 @@ VECTORS = {
                 sequence=kind,
             )
             for kind in (0, 1, 2)
+        ],
+    ),
+    "lines": (
+        "Positions that begin in the first event's line, before it, and in the last one that a header names.",
+        256,
+        256,
+        [
+            one(kind, [(0, x, y, 1, 3) for x, y in places], stride=8, line=line, sequence=sequence)
+            for sequence, (kind, line, places) in enumerate(
+                [
+                    (1, None, [(40, 126), (40, 200)]),
+                    (1, None, [(40, 127), (41, 0)]),
+                    (1, 17, [(40, 126), (255, 255)]),
+                    (0, 127, [(127, 0), (255, 255)]),
+                    (2, None, [(200, 9), (255, 255)]),
+                    (6, None, [(40, 126), (90, 0)]),
+                    (7, 100, [(100, 0), (227, 255)]),
+                ]
+            )
+        ]
+        + [
+            one(1, [(0, 90, 5, 1, 4), (100, 3, 5, 1, 5)], stride=8, sequence=7),
+            datagram(1, word(1, 0, 0, 9), stride=20, line=127, sequence=8),
         ],
     ),
     "times": (
@@ -175,7 +200,7 @@ VECTORS = {
         [
             datagram(5, b"\x01\x02\x03"),
             datagram(15, b"", sequence=1),
-            one(1, CORNERS, sequence=2, flags=0x81),
+            one(1, CORNERS, sequence=2, flags=9),
             datagram(1, word(1, 1, 3, 9) + b"\x07", sequence=3),
             datagram(3, markers((5, 77, 1)), sequence=4),
         ],

@@ -16,9 +16,10 @@ def crc32c(data):
 LAYOUT = {0: (2, 15, 0), 1: (2, 7, 8), 2: (4, 15, 16), 6: (2, 7, 8), 7: (4, 15, 16)}
 
 
-def datagram(kind, body, *, sequence=0, base=0, session=1, board=0, stride=6, flags=1, span=0):
+def datagram(kind, body, *, sequence=0, base=0, session=1, board=0, stride=6, line=0, flags=1, span=0):
     head = struct.pack("<BBHI", 0x54, 0x20 | kind, board, sequence) + base.to_bytes(6, "little")
-    data = head + struct.pack("<HBB", session, stride, flags) + body + struct.pack("<H", span)
+    places = bytes([line % 8 << 5 | stride, line // 8 << 4 | flags])
+    data = head + struct.pack("<H", session) + places + body + struct.pack("<H", span)
     return data + struct.pack("<I", crc32c(data))
 
 
@@ -27,10 +28,13 @@ def word(kind, p, skip, value):
     return (int(p) << (s + v) | skip << v | value).to_bytes(size, "little")
 
 
-def words(kind, events, *, base, stride):
-    """Write (t, x, y, p, value) as words; rows ascend within a line, a position that does not begins again."""
+def words(kind, events, *, base, stride, line=0):
+    """Write (t, x, y, p, value) as words; rows ascend within a line, a position that does not begins again.
+
+    Positions begin in `line`, in which the first event lies or before.
+    """
     size, s, v = LAYOUT[kind]
-    control, out, at, position = 2**s - 1, b"", base, -1
+    control, out, at, position = 2**s - 1, b"", base, (line << stride) - 1
     for t, x, y, p, value in events:
         target = (x << stride) + y
         if t != at or target <= position:
@@ -87,7 +91,8 @@ class Reader:
             self.counts[cause] += 1
             return
         sequence, base = int.from_bytes(data[4:8], "little"), int.from_bytes(data[8:14], "little")
-        session, flags, span = int.from_bytes(data[14:16], "little"), data[17], int.from_bytes(data[-6:-4], "little")
+        session, span = (int.from_bytes(data[a:b], "little") for a, b in ((14, 16), (-6, -4)))
+        stride, line, flags = data[16] % 32, data[16] // 32 + 8 * (data[17] // 16), data[17] % 16
         if session not in self.seen:
             self.offset[session] = self.latest - base if self.seen else 0
             self.counts["resets"] += bool(self.seen)
@@ -103,10 +108,10 @@ class Reader:
         self.counts["unknown_flags"] += flags > 7
         base += self.offset[session]
         self.latest = max(self.latest, base)
-        self.body(data[1] & 15, data[18:-6], base, data[16], flags)
+        self.body(data[1] & 15, data[18:-6], base, stride, line, flags)
         self.latest = max(self.latest, base + span if span else 0)
 
-    def body(self, kind, body, base, stride, flags):
+    def body(self, kind, body, base, stride, line, flags):
         if kind == 3:
             for k in range(0, len(body), 8):
                 late, code, _ = struct.unpack("<IHH", body[k : k + 8])
@@ -116,7 +121,7 @@ class Reader:
             size, s, v = LAYOUT[kind]
             self.counts["malformed"] += len(body) % size > 0
             given = iter(int.from_bytes(body[k : k + size], "little") for k in range(0, len(body) - size + 1, size))
-            t, position = base, -1
+            t, position = base, (line << stride) - 1
             for bits in given:
                 p, skip, value = bits >> (s + v), bits >> v & (2**s - 1), bits & (2**v - 1)
                 if skip < 2**s - 1:

@@ -212,6 +212,11 @@ def test_datagrams_one_behind_the_other_are_heard_each_by_itself(data, cuts):
         parts += [decoder.push(piece), decoder.end_of_datagram()]
     parts.append(decoder.finish())
     heard = wire.decode(data, lengths=[len(piece) for piece in pieces])
+    room = wire.Columns(len(data) // 5 + 2)
+    assert wire.decode(data, lengths=[len(piece) for piece in pieces], columns=room) == heard
+    alone = wire.decode(data)
+    assert wire.decode(data, columns=room) == alone
+    assert wire.decode(data, pairing="taxel", columns=room) == wire.decode(data, pairing="taxel")
     assert rows(heard) == [row for part in parts for row in rows(part)]
     assert heard.markers == tuple(marker for part in parts for marker in part.markers)
     with pytest.raises(taxel.ProblemError, match="lengths: must be 0 or more each"):

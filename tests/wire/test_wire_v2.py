@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel.simulate import Board
-from taxel.wire import Registers
+from taxel.wire import Columns, Registers
 from taxel.wire_v2 import Decoder, StreamReader, decode
 
 from .oracle_v2 import Reader, datagram, markers, words
@@ -59,7 +59,9 @@ def test_any_words_of_the_slow_writer_are_read(seed, kind, stride):
         t, x = base + draw.choice([0, 0, 1, 192, 32_511]), draw.randrange(columns)
         rows_ = sorted(draw.sample(range(2**stride), draw.randrange(min(2**stride, 8) + 1)))
         events += [(t, x, y, draw.random() < 0.5, draw.randrange(top + 1)) for y in rows_]
-    data = datagram(kind, words(kind, events, base=base, stride=stride), base=base, stride=stride, flags=0)
+    line = draw.randrange(min(events[0][1], 127) + 1) if events else draw.randrange(128)
+    body = words(kind, events, base=base, stride=stride, line=line)
+    data = datagram(kind, body, base=base, stride=stride, line=line, flags=0)
     decoder, reader = Decoder(array=taxel.Array(2**stride, columns)), Reader(2**stride, columns)
     reader.push(data)
     assert list(rows([decoder.push(data)])) == reader.events
@@ -101,13 +103,22 @@ def test_a_whole_stream_says_what_the_slow_reader_hears(seed, valued_from, state
     assert (events.repaired is None) == (not marked.any())
     with pytest.raises(ValueError, match="read-only"):
         events.t[:] = 0
+    room = Columns(len(stream) // 2 + 32)
+    again, counts_again, _ = decode(stream, array=taxel.Array(16, 16), columns=room)
+    assert again == events
+    assert counts_again == counts
+    assert np.shares_memory(again.t, room.t) == (len(again) > 0)
+    with pytest.raises(taxel.ProblemError, match=f"bytes may need {len(room)}"):
+        decode(stream, array=taxel.Array(16, 16), columns=Columns(len(room) - 1))
 
 
 @given(data=st.binary(max_size=80), sealed=st.booleans())
 def test_any_bytes_are_survived_and_counted(data, sealed):
     if sealed and len(data) >= 20:
         base = int.from_bytes(data[1:7], "little")
-        data = datagram(data[0] & 15, data[20:], base=base, stride=data[8], flags=data[9])
+        data = datagram(
+            data[0] & 15, data[20:], base=base, stride=data[8] & 31, line=data[10] & 127, flags=data[9] & 15
+        )
     decoder = Decoder()
     heard = decoder.push(data)
     c = decoder.counts

@@ -3,9 +3,9 @@
 use rand::{Rng, SeedableRng, rngs::StdRng, seq::SliceRandom};
 use taxel_core::board::{Board, IntensityWord, Version2};
 use taxel_core::vectors::Instructions;
-use taxel_core::wire::v2::{Decoder, Header, Heard, MAGIC};
-use taxel_core::wire::{Decoder as Decoder1, Registers};
-use taxel_core::{Array, Events};
+use taxel_core::wire::v2::{self, Counts, Decoder, Header, Heard, Kind, MAGIC, Packer, Settings, StreamReader};
+use taxel_core::wire::{Decoder as Decoder1, Registers, Room};
+use taxel_core::{Array, Events, Stop};
 
 /// A scene on an array: blobs that come and go, noise, now and then everything at once.
 fn scene(random: &mut StdRng, array: &Array, frames: usize, ramp: u16) -> Vec<Vec<u16>> {
@@ -359,6 +359,7 @@ fn unknown_kinds_and_flags_are_counted_and_anything_is_survived() {
             base: random.random_range(0..1 << 48),
             session: random.random_range(0..40),
             stride: random.random(),
+            line: random.random(),
             flags: random.random(),
             span: random.random(),
         };
@@ -378,7 +379,8 @@ fn a_stream_is_cut_anywhere_and_found_again_after_damage() {
         let (mut stream, mut sent, mut junk) = (vec![], vec![], 0);
         for sequence in 0..random.random_range(1..30) {
             let body: Vec<u8> = (0..random.random_range(0..200)).map(|_| random.random()).collect();
-            let header = Header { kind: 1, board: 1, sequence, base: 0, session: 1, stride: 6, flags: 0, span: 0 };
+            let header =
+                Header { kind: 1, board: 1, sequence, base: 0, session: 1, stride: 6, line: 0, flags: 0, span: 0 };
             let mut bytes = vec![];
             header.write(&body, &mut bytes);
             let mut framed = [&(bytes.len() as u16).to_le_bytes()[..], &bytes].concat();
@@ -490,7 +492,9 @@ fn every_set_of_instructions_hears_the_same() {
                 time = if random.random_bool(0.8) { time + 192 } else { random.random_range(0..1 << 21) };
                 let stride = if random.random_bool(0.9) { own } else { random.random() };
                 let flags = if random.random_bool(0.9) { 1 } else { random.random() };
-                let header = Header { kind, board: 1, sequence, base: time, session: 1, stride, flags, span: 192 };
+                let line = if random.random_bool(0.5) { 0 } else { random.random() };
+                let header =
+                    Header { kind, board: 1, sequence, base: time, session: 1, stride, line, flags, span: 192 };
                 let mut datagram = vec![];
                 header.write(&words(&mut random, kind), &mut datagram);
                 datagram
@@ -509,6 +513,167 @@ fn every_set_of_instructions_hears_the_same() {
             assert!(*first == heard, "seed {seed}: {set:?} hears otherwise than {:?}", Instructions::ALL[0]);
         }
     }
+}
+
+/// Words of a few events on the array, or nearly, behind a line in which they begin.
+fn few_words(random: &mut StdRng, kind: u8, array: &Array, stride: u8) -> (u8, Vec<u8>) {
+    let (bytes, skip_bits, value_bits) = [(2, 15, 0), (2, 7, 8), (4, 15, 16)][kind as usize];
+    let control = (1_u64 << skip_bits) - 1;
+    let many = [3, 9, 24][random.random_range(0..3)];
+    let mut place = || {
+        let beyond = [(); 2].map(|()| u64::from(random.random_bool(0.01)));
+        let x = random.random_range(0..u64::from(array.columns) + beyond[0]);
+        x << stride | random.random_range(0..u64::from(array.rows) + beyond[1])
+    };
+    let mut places: Vec<u64> = (0..many).map(|_| place()).collect();
+    places.truncate(random.random_range(0..=places.len()));
+    places.sort_unstable();
+    places.dedup();
+    let line = places.first().map_or(0, |place| (place >> stride).min(127));
+    let line = if random.random_bool(0.8) { line } else { random.random_range(0..=line) };
+    let (mut body, mut next) = (vec![], line << stride);
+    for place in places {
+        let mut gap = place - next;
+        while gap >= control {
+            let step = (gap >> (skip_bits - 1)).min(1 << value_bits);
+            body.extend(&(control << value_bits | (step - 1)).to_le_bytes()[..bytes]);
+            gap -= step << (skip_bits - 1);
+        }
+        let (p, value) = (random.random::<bool>(), random.random_range(0..1_u64 << value_bits));
+        body.extend(&(u64::from(p) << (skip_bits + value_bits) | gap << value_bits | value).to_le_bytes()[..bytes]);
+        next = place + 1;
+    }
+    (line as u8, body)
+}
+
+/// What is known of a stream: its events, what was counted, and how many bytes were none of its datagrams.
+type Told = (Events, Counts, u64);
+
+fn one_by_one(stream: &[u8], array: &Array, set: Instructions) -> Told {
+    let (mut reader, mut datagrams) = (StreamReader::default(), vec![]);
+    reader.push(stream, |datagram| datagrams.push(datagram.to_vec()));
+    reader.finish(|datagram| datagrams.push(datagram.to_vec()));
+    let mut decoder = Decoder::new(array.clone()).instructions(set).unwrap();
+    let mut events = Events::empty(array.clone());
+    for datagram in datagrams {
+        decoder.push(&datagram, None, &mut events);
+    }
+    (events, decoder.counts(), reader.skipped())
+}
+
+fn in_one_go(stream: &[u8], array: &Array) -> Told {
+    let rows = v2::stream_rows(stream.len());
+    let (mut t, mut x, mut y, mut ticks) = (vec![0; rows], vec![0; rows], vec![0; rows], vec![0; rows]);
+    let (mut p, mut present) = (vec![0; rows], vec![0; rows]);
+    let room = Room::new(&mut t, [&mut x, &mut y, &mut ticks], [&mut p, &mut present]).unwrap();
+    let told = v2::decode(stream, array.clone(), room, Stop::never()).unwrap();
+    let n = told.filled.rows;
+    let bools = |column: &[u8]| column[..n].iter().map(|&byte| byte == 1).collect::<Vec<bool>>();
+    let mut events = Events::empty(array.clone());
+    (events.t, events.x, events.y, events.p) = (t[..n].to_vec(), x[..n].to_vec(), y[..n].to_vec(), bools(&p));
+    events.intensity =
+        told.filled.paired.then(|| taxel_core::Intensities { ticks: ticks[..n].to_vec(), present: bools(&present) });
+    (events.repaired, events.markers) = (told.repaired, told.markers);
+    (events, told.counts, told.skipped)
+}
+
+/// Scenes of short datagrams, with all that ends a run of them: other kinds, states, differences, times, taxels outside, numbers
+/// that are missing, resets, another board, noise.
+#[test]
+fn a_stream_in_one_go_says_what_its_datagrams_say_one_by_one() {
+    let mut events = 0;
+    for seed in 0..400 {
+        let mut random = StdRng::seed_from_u64(seed);
+        let tall = Array::new(1024, 16, 1.0, "tall").unwrap();
+        let array = if random.random_bool(0.1) { tall } else { arrays(&mut random) };
+        let own = v2::stride(array.rows);
+        let (kind, rare) = (random.random_range(0..3), [0.0, 0.05, 0.3][random.random_range(0..3)]);
+        let (mut time, mut session, mut sequence) = (1_u64 << 20, 1, random.random());
+        let datagrams: Vec<Vec<u8>> = (0..120)
+            .map(|_| {
+                let mut odd = |share: f64| random.random_bool(rare * share);
+                let (other, long, lost, late, reset) = (odd(1.0), odd(0.5), odd(1.0), odd(0.3), odd(0.2));
+                let (strange, foreign, wide, far) = (odd(0.5), odd(0.1), odd(0.1), odd(0.2));
+                let kind = if other { [0, 1, 2, 3, 4, 6, 7][random.random_range(0..7)] } else { kind };
+                let (line, body) = match kind {
+                    3 | 4 => (0, (0..random.random_range(0..48)).map(|_| random.random_range(0..3)).collect()),
+                    0..3 if !long => few_words(&mut random, kind, &array, own),
+                    _ => (random.random_range(0..4), words(&mut random, kind)),
+                };
+                time = if late { random.random_range(0..1 << 21) } else { time + 192 };
+                if reset {
+                    (session, sequence, time) = (random.random_range(1..4), random.random_range(0..3), 0);
+                }
+                let header = Header {
+                    kind,
+                    board: u16::from(foreign),
+                    sequence,
+                    base: time,
+                    session,
+                    stride: if wide { random.random() } else { own },
+                    line: if far { random.random() } else { line },
+                    flags: if strange { random.random() } else { 1 },
+                    span: [0, 192, u16::MAX][random.random_range(0..3)],
+                };
+                sequence = sequence.wrapping_add(if lost {
+                    [2, 3, 70, 65_536, 200_000][random.random_range(0..5)]
+                } else {
+                    1
+                });
+                let mut datagram = vec![];
+                header.write(&body, &mut datagram);
+                datagram
+            })
+            .collect();
+        let datagrams = if seed % 2 == 0 { datagrams } else { as_a_network(&mut random, &datagrams) };
+        let mut stream = vec![];
+        for datagram in &datagrams {
+            if random.random_bool(rare * 0.2) {
+                stream.extend((0..random.random_range(1..40)).map(|_| random.random::<u8>()));
+            }
+            stream.extend((datagram.len() as u16).to_le_bytes());
+            stream.extend(datagram);
+        }
+        let told = in_one_go(&stream, &array);
+        told.0.view().check().unwrap();
+        events += told.0.len();
+        for set in [Instructions::Plain, Instructions::best()] {
+            assert!(told == one_by_one(&stream, &array, set), "seed {seed}, {set:?}");
+        }
+    }
+    assert!(events > 200_000, "streams that say little: {events} events");
+}
+
+#[test]
+fn a_datagram_of_one_event_is_one_word_wherever_it_lies_in_the_first_128_lines() {
+    let array = Array::new(64, 256, 1.0, "wide").unwrap();
+    let settings = Settings {
+        board: 1,
+        session: 1,
+        kind: Kind::Small,
+        frame_sync: true,
+        differences: false,
+        hold_us: 0,
+        heartbeat_us: 10_000,
+    };
+    let mut packer = Packer::new(settings, &array).unwrap();
+    let (mut decoder, mut events) = (Decoder::new(array.clone()), Events::empty(array.clone()));
+    let mut expected = vec![];
+    for x in 0..256 {
+        for y in 0..64 {
+            let t = 1000 * (u64::from(x) * 64 + u64::from(y));
+            let mut sink = |datagram: &[u8], n| {
+                let far = x > 127 && (x - 127) * 64 + y >= 127;
+                assert_eq!((datagram.len(), n), (if far { 28 } else { 26 }, 1), "line {x}, row {y}");
+                decoder.push(datagram, None, &mut events);
+            };
+            packer.event(t, (x, y), true, y, &mut sink);
+            packer.over(t + 192, t + 384, &mut sink);
+            expected.push((t as i64, x, y));
+        }
+    }
+    let heard: Vec<_> = (0..events.len()).map(|k| (events.t[k], events.x[k], events.y[k])).collect();
+    assert_eq!(heard, expected);
 }
 
 type Meant = (i64, u16, u16, bool, Option<u16>, bool);
@@ -566,7 +731,7 @@ fn a_number_drawn_twice_is_a_reset_once() {
     let mut events = Events::empty(Array::thesis());
     let mut datagram = Vec::new();
     let mut hear = |sequence, base| {
-        let header = Header { kind: 1, board: 1, sequence, base, session: 9, stride: 6, flags: 0, span: 192 };
+        let header = Header { kind: 1, board: 1, sequence, base, session: 9, stride: 6, line: 0, flags: 0, span: 192 };
         header.write(&[0x05, 0x80], &mut datagram);
         decoder.push(&datagram, None, &mut events)
     };

@@ -126,6 +126,14 @@ fn registers_preset(name: &str) -> PyResult<String> {
     to_json(&Registers::preset(name).map_err(core)?)
 }
 
+/// What a board of an array that holds these registers holds after a preset, as JSON.
+#[pyfunction]
+fn registers_with_preset(registers: &str, name: &str, array: ArrayParts) -> PyResult<String> {
+    let held: Registers = parsed("registers", registers)?;
+    let preset = Registers::preset(name).map_err(core)?;
+    to_json(&held.with_preset(&preset, &to_array(array)?))
+}
+
 /// What a board of an array and so many channels holds at reset, as JSON.
 #[pyfunction]
 fn registers_at_reset(array: ArrayParts, channels: u8) -> PyResult<String> {
@@ -281,6 +289,7 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(registers_at_reset, module)?)?;
     module.add_function(wrap_pyfunction!(registers_of_source, module)?)?;
     module.add_function(wrap_pyfunction!(registers_preset, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_with_preset, module)?)?;
     module.add_function(wrap_pyfunction!(registers_with, module)?)?;
     module.add_function(wrap_pyfunction!(registers_check, module)?)?;
     module.add_function(wrap_pyfunction!(registers_words, module)?)?;

@@ -183,6 +183,11 @@ impl<'a> Laid<'a> {
         Self { room, filled: Filled { rows: 0, paired: false }, repaired: vec![], markers: vec![] }
     }
 
+    /// Whether the columns of intensities are written.
+    pub(in crate::wire) fn paired(&self) -> bool {
+        self.filled.paired
+    }
+
     /// What was written, which rows states gave (none where no row is of that kind), and the markers.
     pub(in crate::wire) fn end(self) -> (Filled, Option<Vec<bool>>, Vec<Marker>) {
         let mask = (!self.repaired.is_empty()).then(|| {

@@ -232,6 +232,7 @@ mod tests {
                 base: 0,
                 session: session as u16,
                 stride: v2::stride(64),
+                line: 0,
                 flags: 0,
                 span: 1,
             };

@@ -76,15 +76,34 @@ impl Registers {
         Ok(Self { lines: preset.lines.min(array.columns), ..preset })
     }
 
+    /// These registers with a preset taken over, as a board of that array takes it: which version of the wire it speaks, and
+    /// whether a recording runs, no preset says; channels are the board's build, and a smaller array has fewer lines.
+    #[must_use]
+    pub fn with_preset(&self, preset: &Self, array: &Array) -> Self {
+        Self {
+            lines: preset.lines.min(array.columns),
+            wire_version: self.wire_version,
+            record: self.record,
+            channels: self.channels,
+            ..*preset
+        }
+    }
+
+    /// The presets that are made for boards of that array's size and so many channels.
+    pub fn presets(array: &Array, channels: u8) -> impl Iterator<Item = &'static Preset> + use<> {
+        let large = is_large(array);
+        PRESETS
+            .iter()
+            .filter(move |preset| (preset.sense_lines > SENSE_LINES) == large && preset.registers.channels == channels)
+    }
+
     /// What a board of that array and so many channels holds at reset.
     ///
     /// Up to 64 lines the first preset; beyond, version 2 and a preset of 128 lines, its lines and steps fitted to the array.
     #[must_use]
     pub fn at_reset(array: &Array, channels: u8) -> Self {
-        let large = sense_lines(array) > SENSE_LINES || array.columns > SENSE_LINES;
-        let fits =
-            |preset: &&Preset| (preset.sense_lines > SENSE_LINES) == large && preset.registers.channels == channels;
-        let mut registers = PRESETS.iter().find(fits).map_or_else(Self::default, |preset| preset.registers);
+        let large = is_large(array);
+        let mut registers = Self::presets(array, channels).next().map_or_else(Self::default, |preset| preset.registers);
         registers.channels = channels;
         registers.lines = array.columns.min(if large { 256 } else { SENSE_LINES });
         if large {
@@ -326,6 +345,11 @@ impl Registers {
     }
 }
 
+/// Whether an array has more lines than version 1 can name.
+fn is_large(array: &Array) -> bool {
+    array.rows.max(array.columns) > SENSE_LINES
+}
+
 /// The sense lines that a board for this array converts.
 pub(crate) fn sense_lines(array: &Array) -> u16 {
     array.rows.max(SENSE_LINES)
@@ -353,6 +377,30 @@ mod tests {
 
     fn thesis() -> Array {
         Array::thesis()
+    }
+
+    #[test]
+    fn a_preset_leaves_what_it_does_not_say() {
+        let array = Array::new(16, 8, 1.0, "small").unwrap();
+        for (wire_version, record, channels) in [(1, false, 16), (2, true, 64)] {
+            let held = Registers { wire_version, record, channels, ..Registers::at_reset(&array, channels) };
+            for preset in &PRESETS {
+                let then = held.with_preset(&preset.registers, &array);
+                assert_eq!(
+                    (then.wire_version, then.record, then.channels, then.lines),
+                    (wire_version, record, channels, 8)
+                );
+                let said = Registers { wire_version, record, channels, lines: 8, ..preset.registers };
+                assert_eq!(then, said, "{}", preset.name);
+            }
+        }
+        let of = |lines, channels| {
+            let array = Array::new(lines, lines, 1.0, "any").unwrap();
+            Registers::presets(&array, channels).map(|preset| preset.name).collect::<Vec<_>>()
+        };
+        assert_eq!(of(8, 16), ["5.2 kHz", "2 kHz", "5.2 kHz, FA-1"]);
+        assert_eq!(of(64, 64), ["20.8 kHz"]);
+        assert_eq!(of(128, 16), ["128 x 128, 1.3 kHz"]);
     }
 
     #[test]

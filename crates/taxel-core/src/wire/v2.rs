@@ -11,8 +11,8 @@
 //! | 4-7 | sequence: one more a datagram, 0 at reset |
 //! | 8-13 | base time, us since reset |
 //! | 14-15 | session: a number that each reset draws anew |
-//! | 16 | stride: position = line << stride \| row |
-//! | 17 | flags: 0 frame sync, 1 values are differences, 2 events were dropped since the last datagram |
+//! | 16 | 5 bits of stride: position = line << stride \| row; 3 low bits of the first event's line, from where positions count |
+//! | 17 | 4 bits of flags: 0 frame sync, 1 values are differences, 2 events were dropped since the last datagram; that line's 4 high bits |
 //! | 18 ... | body |
 //! | n-6, n-5 | span: no datagram of a higher sequence holds anything before base + span us; 0 = unknown |
 //! | n-4 ... | CRC-32C of all bytes before |
@@ -28,6 +28,8 @@ pub use decoder::{Decoder, Heard};
 pub use packer::{Packer, Settings};
 pub use stream::{Decoded, StreamReader, decode, stream_rows};
 
+use crate::{Array, problem};
+
 /// The first byte of a datagram.
 pub const MAGIC: u8 = 0x54;
 
@@ -40,9 +42,20 @@ pub const TRAILER_BYTES: usize = 6;
 /// Bytes of a datagram at most: what an Ethernet frame carries over UDP, with room to spare.
 pub const DATAGRAM_BYTES: usize = 1400;
 
+/// Bytes of the length that stands before a datagram in files and on streams.
+const LENGTH_BYTES: usize = 2;
+
 /// The latest offset from the base that a word says, us: later times begin a new datagram. Its words could otherwise be taken
 /// for a control word by a reader that looks at all words alike.
 pub const LATEST_OFFSET: u64 = 32_511;
+
+/// The last line that a header names: from there on positions count where the first event lies in a later one.
+pub const LAST_LINE: u16 = 127;
+
+/// Bits of a header's stride and of its flags, in a byte each; above them lie the low and the high bits of the first line.
+const STRIDE_BITS: u32 = 5;
+const FLAG_BITS: u32 = 4;
+const LOW_LINE_BITS: u32 = u8::BITS - STRIDE_BITS;
 
 /// The base time has 48 bits: 8.9 years.
 const BASE_BITS: u32 = 48;
@@ -146,9 +159,11 @@ pub struct Header {
     pub base: u64,
     /// Which reset.
     pub session: u16,
-    /// position = line << stride | row.
+    /// position = line << stride | row; 5 bits.
     pub stride: u8,
-    /// Bit 0 frame sync, 1 differences, 2 dropped; others mean nothing yet.
+    /// The line that the body's positions begin in; 7 bits.
+    pub line: u8,
+    /// Bit 0 frame sync, 1 differences, 2 dropped, 3 means nothing yet.
     pub flags: u8,
     /// us; 0 promises nothing.
     pub span: u16,
@@ -192,25 +207,38 @@ impl Header {
         if checksum::crc32c(rest).to_le_bytes() != sum {
             return Err(Refused::Checksum);
         }
-        let (header, rest) = rest.split_at(HEADER_BYTES);
-        let (body, span) = rest.split_at(rest.len() - 2);
+        Ok(Self::fields(datagram))
+    }
+
+    /// Whether bytes begin as a datagram does.
+    #[inline(always)]
+    fn likely(bytes: &[u8]) -> bool {
+        bytes.first() == Some(&MAGIC) && bytes.get(1).is_some_and(|byte| byte >> 4 == 2)
+    }
+
+    /// The header and the body of a datagram that is long enough to have them.
+    #[inline(always)]
+    fn fields(datagram: &[u8]) -> (Self, &[u8]) {
+        let (header, rest) = datagram.split_at(HEADER_BYTES);
+        let (body, trailer) = rest.split_at(rest.len() - TRAILER_BYTES);
         let eight = |at: usize| {
             let mut word = [0; 8];
             word.copy_from_slice(&header[at..at + 8]);
             u64::from_le_bytes(word)
         };
-        let (which, when) = (eight(0), eight(8));
+        let (which, when, stride, flags) = (eight(0), eight(8), header[16], header[17]);
         let header = Self {
             kind: header[1] & 0xf,
             board: (which >> 16) as u16,
             sequence: (which >> 32) as u32,
             base: when & ((1 << BASE_BITS) - 1),
             session: (when >> BASE_BITS) as u16,
-            stride: header[16],
-            flags: header[17],
-            span: u16::from_le_bytes([span[0], span[1]]),
+            stride: stride & ((1 << STRIDE_BITS) - 1),
+            line: stride >> STRIDE_BITS | flags >> FLAG_BITS << LOW_LINE_BITS,
+            flags: flags & ((1 << FLAG_BITS) - 1),
+            span: u16::from_le_bytes([trailer[0], trailer[1]]),
         };
-        Ok((header, body))
+        (header, body)
     }
 
     /// Writes a datagram.
@@ -221,12 +249,19 @@ impl Header {
         out.extend(self.sequence.to_le_bytes());
         out.extend(&(self.base & ((1 << BASE_BITS) - 1)).to_le_bytes()[..6]);
         out.extend(self.session.to_le_bytes());
-        out.extend([self.stride, self.flags]);
+        let (stride, flags) = (self.stride & ((1 << STRIDE_BITS) - 1), self.flags & ((1 << FLAG_BITS) - 1));
+        out.extend([self.line << STRIDE_BITS | stride, self.line >> LOW_LINE_BITS << FLAG_BITS | flags]);
         out.extend(body);
         out.extend(self.span.to_le_bytes());
         let sum = checksum::crc32c(out);
         out.extend(sum.to_le_bytes());
     }
+}
+
+/// The position before the first word of a body, whose positions begin in a line.
+#[must_use]
+pub(crate) fn before(line: u8, stride: u8) -> i64 {
+    (i64::from(line) << stride.min(31)) - 1
 }
 
 /// Whether bytes begin with an intact datagram of version 2, of whatever length, with its length before it or without.
@@ -246,6 +281,22 @@ pub fn stride(rows: u16) -> u8 {
     (u16::BITS - rows.saturating_sub(1).leading_zeros()) as u8
 }
 
+/// The stride of an array that a board can have.
+///
+/// # Errors
+///
+/// `Problem` where its positions need more than 16 bits.
+pub fn checked_stride(array: &Array) -> crate::Result<u8> {
+    let stride = stride(array.rows);
+    if u32::from(array.columns) << stride > 1 << 16 {
+        let (rows, columns) = (array.rows, array.columns);
+        return Err(problem!(
+            "array of {rows} x {columns} taxels: has more than 65536 positions (columns times rows, these up to a power of 2)"
+        ));
+    }
+    Ok(stride)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -258,7 +309,8 @@ mod tests {
             sequence: 0xfedc_ba98,
             base: 0x1234_5678_9abc,
             session: 0x4321,
-            stride: 7,
+            stride: 17,
+            line: 101,
             flags: 5,
             span: 192,
         };

@@ -6,7 +6,7 @@ const LONG: usize = 192;
 
 /// No more bytes are summed without a branch, which lengths of a scene's datagrams would make the processor guess wrong.
 #[cfg(target_arch = "x86_64")]
-const EVEN: usize = 64;
+pub(super) const EVEN: usize = 64;
 
 /// The CRC-32C of bytes.
 #[inline]
@@ -30,8 +30,9 @@ pub(super) fn crc32c(bytes: &[u8]) -> u32 {
 ///
 /// There must be 4 to [`EVEN`] bytes.
 #[cfg(target_arch = "x86_64")]
+#[inline]
 #[target_feature(enable = "avx512f,avx512bw,sse4.2")]
-unsafe fn even(bytes: &[u8]) -> u32 {
+pub(super) unsafe fn even(bytes: &[u8]) -> u32 {
     use std::arch::x86_64::{
         _mm_crc32_u64, _mm512_maskz_loadu_epi8, _mm512_maskz_set1_epi8, _mm512_storeu_si512, _mm512_xor_si512,
     };

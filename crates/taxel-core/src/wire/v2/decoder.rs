@@ -1,20 +1,23 @@
 //! Datagrams of version 2 to events: each intact one exactly once, whatever was lost, repeated, reordered or damaged.
 
 mod held;
+#[cfg(target_arch = "x86_64")]
+mod run;
+mod session;
 mod words;
 
 use super::counts::{Counts, Status};
 use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Layout, Refused, START, STOP};
 use crate::vectors::Instructions;
-use crate::wire::columns::Table;
+use crate::wire::columns::{Laid, Table};
 use crate::wire::silence::silence;
 use crate::{Array, Events, Marker, Result};
 use held::Held;
+#[cfg(target_arch = "x86_64")]
+use run::Run;
+use session::{Session, WINDOW};
 pub(in crate::wire::v2) use words::most_rows;
 use words::{Body, Meaning};
-
-/// How far behind the highest sequence number a datagram may come and still be told from a repeated one.
-const WINDOW: usize = 65_536;
 
 /// Sessions that are remembered, for datagrams that come behind a reset.
 const SESSIONS: usize = 4;
@@ -38,94 +41,6 @@ pub enum Heard {
     Repeated,
     /// No datagram of this board.
     Refused(Refused),
-}
-
-#[derive(Debug, Clone)]
-struct Session {
-    number: u16,
-    lowest: i64,
-    highest: i64,
-    received: u64,
-    /// By number modulo the window: whether it came.
-    seen: Vec<u64>,
-    /// What is added to the board's times.
-    offset: i64,
-    /// The latest base time.
-    latest: u64,
-}
-
-impl Session {
-    fn new(header: &Header, offset: i64) -> Self {
-        let first = i64::from(header.sequence);
-        Self {
-            number: header.session,
-            lowest: first,
-            highest: first,
-            received: 0,
-            seen: vec![0; WINDOW / 64],
-            offset,
-            latest: header.base,
-        }
-    }
-
-    fn number_of(&self, sequence: u32) -> i64 {
-        self.highest + i64::from(sequence.wrapping_sub(self.highest as u32) as i32)
-    }
-
-    /// Whether a datagram is the one that comes next.
-    #[inline]
-    fn is_next(&self, header: &Header) -> bool {
-        self.number == header.session && header.sequence == (self.highest as u32).wrapping_add(1)
-    }
-
-    #[inline]
-    fn missing(&self) -> u64 {
-        (self.highest - self.lowest + 1) as u64 - self.received
-    }
-
-    /// Notes a number; none where it is too old, else whether it is new.
-    #[inline]
-    fn note(&mut self, number: i64) -> Option<bool> {
-        if number == self.highest + 1 {
-            // As nearly all come: the place is free for it, whatever came a window ago.
-            let (word, bit) = place(number);
-            self.seen[word] |= bit;
-            (self.highest, self.received) = (number, self.received + 1);
-            return Some(true);
-        }
-        self.note_out_of_turn(number)
-    }
-
-    fn note_out_of_turn(&mut self, number: i64) -> Option<bool> {
-        if number <= self.highest - WINDOW as i64 {
-            return None;
-        }
-        if number > self.highest {
-            self.clear((self.highest + 1).max(number + 1 - WINDOW as i64), number);
-            self.highest = number;
-        }
-        self.lowest = self.lowest.min(number);
-        let (word, bit) = place(number);
-        let new = self.seen[word] & bit == 0;
-        self.seen[word] |= bit;
-        self.received += u64::from(new);
-        Some(new)
-    }
-
-    /// From `first` to `last`, at most a window of them, none has come; by words, as many may be missing.
-    fn clear(&mut self, mut first: i64, last: i64) {
-        while first <= last {
-            let (word, bit) = place(first);
-            let numbers = (64 - i64::from(bit.trailing_zeros())).min(last + 1 - first);
-            self.seen[word] &= !(bit.wrapping_mul(u64::MAX >> (64 - numbers)));
-            first += numbers;
-        }
-    }
-}
-
-fn place(number: i64) -> (usize, u64) {
-    let at = number.rem_euclid(WINDOW as i64) as usize;
-    (at / 64, 1 << (at % 64))
 }
 
 /// Turns one board's datagrams into events, in the order in which they come.
@@ -299,6 +214,34 @@ impl Decoder {
         Heard::Intact { until, missing, reset }
     }
 
+    /// Takes plain datagrams of a few words that lie one behind the other, each behind its length, as far as they go; gives how many
+    /// bytes they have. As [`Self::push_read`] of each, without arrivals.
+    #[inline]
+    pub(in crate::wire::v2) fn run(&mut self, bytes: &[u8], out: &mut Laid<'_>) -> usize {
+        #[cfg(target_arch = "x86_64")]
+        if self.instructions == Instructions::Avx512Bytes
+            && let Some(first) = run::first(bytes)
+            && let Some(layout) = first.layout()
+            && (layout.value == 0 || out.paired())
+            && let (Some(board), Some(session)) = (self.board, self.sessions.last_mut())
+            && run::fits(&self.held)
+        {
+            let Self { held, counts, latest, .. } = self;
+            let mut run = Run { kind: first, board, session, held, latest, counts, done: 0 };
+            // SAFETY: the machine has this set, as `instructions` and `best` see to; the held places are few enough, as was just
+            // asked. A run writes each row that it counts, and with `paired` its ticks and present.
+            unsafe {
+                out.rows(most_rows(bytes.len()), false, false, |room, row, paired| match layout.value {
+                    0 => run.take::<0>(bytes, room, row, paired),
+                    8 => run.take::<8>(bytes, room, row, paired),
+                    _ => run.take::<16>(bytes, room, row, paired),
+                });
+            }
+            return run.done;
+        }
+        0
+    }
+
     /// Which session a datagram belongs to, and whether it begins one.
     fn session(&mut self, header: &Header, arrived: Option<i64>) -> (usize, bool) {
         // The latest of a number, should two have drawn it.
@@ -379,7 +322,7 @@ impl Decoder {
             false if header.flags & DIFFERENCES != 0 && layout.value > 0 => Meaning::Differences,
             false => Meaning::Changes,
         };
-        let mut body = Body::new(layout, meaning, header.stride, base, body);
+        let mut body = Body::new(layout, meaning, header, base, body);
         let Self { instructions, held, counts, latest, .. } = self;
         // SAFETY: `words::decode` writes each row that it counts, and with `paired` its ticks and present.
         unsafe {
@@ -395,40 +338,14 @@ impl Decoder {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
-    use rand::{Rng, SeedableRng, rngs::StdRng};
-
     use super::*;
     use crate::board::Board;
     use crate::wire::Registers;
 
-    #[test]
-    fn a_number_is_new_once_however_far_apart_they_come() {
-        let mut random = StdRng::seed_from_u64(1);
-        for begin in [0, 7, u32::MAX - 40_000] {
-            let mut bytes = vec![];
-            let header =
-                Header { kind: 1, board: 0, sequence: begin, base: 0, session: 1, stride: 6, flags: 0, span: 0 };
-            header.write(&[], &mut bytes);
-            let mut session = Session::new(&header, 0);
-            let (mut seen, mut highest) = (BTreeSet::from([i64::from(begin)]), i64::from(begin));
-            assert_eq!(session.note(highest), Some(true));
-            for _ in 0..20_000 {
-                let far = [1, 3, 63, 64, 65, 700, 65_535, 65_536, 65_537, 200_000][random.random_range(0..10)];
-                let number = highest + if random.random() { 1 } else { random.random_range(-far..=far) };
-                let expected = (number > highest - WINDOW as i64).then(|| seen.insert(number));
-                assert_eq!(session.note(number), expected, "{number} of {highest}");
-                highest = highest.max(number);
-            }
-            assert_eq!(session.missing(), (highest + 1 - seen.first().unwrap()) as u64 - seen.len() as u64);
-        }
-    }
-
     /// A datagram with its checksum.
     fn datagram(kind: Kind, session: u16, sequence: u32, base: u64, body: &[u8]) -> Vec<u8> {
         let (kind, stride) = (kind as u8, crate::wire::v2::stride(64));
-        let header = Header { kind, board: 0, sequence, base, session, stride, flags: 0, span: 0 };
+        let header = Header { kind, board: 0, sequence, base, session, stride, line: 0, flags: 0, span: 0 };
         let mut bytes = vec![];
         header.write(body, &mut bytes);
         bytes

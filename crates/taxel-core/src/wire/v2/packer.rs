@@ -1,8 +1,8 @@
 //! Events to datagrams of version 2, as the board sends them.
 
 use super::{
-    DATAGRAM_BYTES, DIFFERENCES, DROPPED, FRAME_SYNC, HEADER_BYTES, Header, Kind, LATEST_OFFSET, Layout, START, STOP,
-    Status, TRAILER_BYTES, stride,
+    DATAGRAM_BYTES, DIFFERENCES, DROPPED, FRAME_SYNC, HEADER_BYTES, Header, Kind, LAST_LINE, LATEST_OFFSET, Layout,
+    START, STOP, Status, TRAILER_BYTES, before, checked_stride,
 };
 use crate::{Array, Result, problem};
 
@@ -45,6 +45,8 @@ pub struct Packer {
     events: usize,
     base: u64,
     at: u64,
+    /// From where the positions of the datagram that fills count.
+    line: u8,
     position: i64,
     /// Nothing before this comes any more.
     promised: u64,
@@ -59,13 +61,7 @@ impl Packer {
     ///
     /// `Problem` where the array's positions need more than 16 bits, or the kind is none of events.
     pub fn new(settings: Settings, array: &Array) -> Result<Self> {
-        let stride = stride(array.rows);
-        if u32::from(array.columns) << stride > 1 << 16 {
-            let (rows, columns) = (array.rows, array.columns);
-            return Err(problem!(
-                "array of {rows} x {columns} taxels: has more than 65536 positions (columns times rows, these up to a power of 2)"
-            ));
-        }
+        let stride = checked_stride(array)?;
         let word = layout(settings.kind)?;
         Ok(Self {
             settings,
@@ -77,6 +73,7 @@ impl Packer {
             events: 0,
             base: 0,
             at: 0,
+            line: 0,
             position: -1,
             promised: 0,
             last_event: None,
@@ -111,7 +108,8 @@ impl Packer {
             self.send(t, sink);
         }
         if self.events == 0 {
-            (self.base, self.at, self.position) = (t, t, -1);
+            (self.base, self.at, self.line) = (t, t, first_line(x));
+            self.position = before(self.line, self.stride);
         }
         let word = self.word;
         if t != self.at || position <= self.position {
@@ -156,7 +154,7 @@ impl Packer {
         body.extend((if start { START } else { STOP }).to_le_bytes());
         body.extend([0, 0]);
         self.base = t;
-        self.write(Kind::Markers, &body, 0, 0, sink);
+        self.write(Kind::Markers, &body, (0, 0), 0, sink);
     }
 
     /// Sends the board's totals; how many datagrams went before is known here.
@@ -165,7 +163,7 @@ impl Packer {
         let totals = [status.frames, status.events, status.dropped, self.sequence.into(), status.faults];
         let body: Vec<u8> = totals.iter().flat_map(|total| total.to_le_bytes()).collect();
         self.base = t;
-        self.write(Kind::Status, &body, 0, 0, sink);
+        self.write(Kind::Status, &body, (0, 0), 0, sink);
     }
 
     /// Tells values again: taxels by ascending position, each with the value that the board compares with.
@@ -180,20 +178,23 @@ impl Packer {
             Kind::Small => (Kind::SmallStates, Layout { bytes: 2, skip: 7, value: 8 }),
             _ => (Kind::LargeStates, Layout { bytes: 4, skip: 15, value: 16 }),
         };
-        let (mut body, mut last) = (Vec::with_capacity(BODY_BYTES), -1);
+        let (mut body, mut line, mut last) = (Vec::with_capacity(BODY_BYTES), 0, -1);
         self.base = t;
         for ((x, y), value) in taxels {
             let position = i64::from(x) << self.stride | i64::from(y);
             if body.len() + steps(word, position - last - 1) * word.bytes > BODY_BYTES {
-                self.write(kind, &body, 0, 0, sink);
+                self.write(kind, &body, (line, 0), 0, sink);
                 body.clear();
-                last = -1;
+            }
+            if body.is_empty() {
+                line = first_line(x);
+                last = before(line, self.stride);
             }
             add(&mut body, word, position - last - 1, false, value);
             last = position;
         }
         if !body.is_empty() {
-            self.write(kind, &body, 0, 0, sink);
+            self.write(kind, &body, (line, 0), 0, sink);
         }
     }
 
@@ -208,7 +209,8 @@ impl Packer {
     fn send(&mut self, now: u64, sink: &mut impl FnMut(&[u8], usize)) {
         let body = std::mem::take(&mut self.body);
         let span = now - self.base;
-        self.write(self.settings.kind, &body, span.min(u64::from(u16::MAX)) as u16, self.events, sink);
+        let line = if self.events > 0 { self.line } else { 0 };
+        self.write(self.settings.kind, &body, (line, span.min(u64::from(u16::MAX)) as u16), self.events, sink);
         self.promised = self.promised.max(self.base + span.min(u64::from(u16::MAX)));
         self.body = body;
         self.body.clear();
@@ -216,12 +218,20 @@ impl Packer {
         if span > u64::from(u16::MAX) {
             // A promise longer than 16 bits is an empty datagram with a later base.
             self.base = now - u64::from(u16::MAX);
-            self.write(self.settings.kind, &[], u16::MAX, 0, sink);
+            self.write(self.settings.kind, &[], (0, u16::MAX), 0, sink);
             self.promised = now;
         }
     }
 
-    fn write(&mut self, kind: Kind, body: &[u8], span: u16, events: usize, sink: &mut impl FnMut(&[u8], usize)) {
+    /// Sends a body whose positions begin in a line, with its span.
+    fn write(
+        &mut self,
+        kind: Kind,
+        body: &[u8],
+        (line, span): (u8, u16),
+        events: usize,
+        sink: &mut impl FnMut(&[u8], usize),
+    ) {
         let Settings { board, session, frame_sync, differences, .. } = self.settings;
         let flag = |on: bool, bit: u8| if on { bit } else { 0 };
         let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
@@ -232,6 +242,7 @@ impl Packer {
             base: self.base,
             session,
             stride: self.stride,
+            line,
             flags: flag(frame_sync, FRAME_SYNC)
                 | flag(differences && !states, DIFFERENCES)
                 | flag(std::mem::take(&mut self.dropped), DROPPED),
@@ -241,6 +252,11 @@ impl Packer {
         header.write(body, &mut self.datagram);
         sink(&self.datagram, events);
     }
+}
+
+/// The line that positions begin in where the first event lies in a column.
+fn first_line(x: u16) -> u8 {
+    x.min(LAST_LINE) as u8
 }
 
 /// How the words of a kind of events are laid out.

@@ -2,12 +2,9 @@
 
 use super::counts::Counts;
 use super::decoder::{Decoder, most_rows};
-use super::{DATAGRAM_BYTES, HEADER_BYTES, Header, MAGIC, TRAILER_BYTES};
+use super::{DATAGRAM_BYTES, HEADER_BYTES, Header, LENGTH_BYTES, TRAILER_BYTES};
 use crate::wire::columns::{Filled, Laid, Room};
 use crate::{Array, Marker, Result, Stop, problem};
-
-/// Bytes of a length.
-const LENGTH_BYTES: usize = 2;
 
 /// Bytes of the shortest word.
 const WORD_BYTES: usize = 2;
@@ -25,7 +22,7 @@ impl StreamReader {
     /// Takes the next bytes; gives each whole datagram to `take`.
     pub fn push(&mut self, bytes: &[u8], mut take: impl FnMut(&[u8])) {
         self.rest.extend_from_slice(bytes);
-        let done = cut(&self.rest, false, &mut self.skipped, |datagram, _, _| take(datagram));
+        let done = cut(&self.rest, false, &mut self.skipped, &mut take);
         self.rest.drain(..done);
     }
 
@@ -37,27 +34,47 @@ impl StreamReader {
 
     /// Ends the stream: what waited for more is no datagram, but one that lies within it is given to `take`.
     pub fn finish(&mut self, mut take: impl FnMut(&[u8])) {
-        cut(&self.rest, true, &mut self.skipped, |datagram, _, _| take(datagram));
+        cut(&self.rest, true, &mut self.skipped, &mut take);
         self.rest.clear();
     }
 }
 
-/// Gives each whole datagram that begins in `bytes` to `take`, with its header and body; gives how many bytes are done with:
-/// all of them where the stream ends there.
-fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, mut take: impl FnMut(&[u8], &Header, &[u8])) -> usize {
+/// Who takes the datagrams of a stream.
+trait Listener {
+    /// Takes those that lie ahead, as many as it likes; gives how many bytes they have, with their lengths.
+    fn run(&mut self, ahead: &[u8]) -> usize;
+
+    /// Takes one that was found intact.
+    fn take(&mut self, datagram: &[u8], header: &Header, body: &[u8]);
+}
+
+impl<F: FnMut(&[u8])> Listener for F {
+    fn run(&mut self, _: &[u8]) -> usize {
+        0
+    }
+
+    fn take(&mut self, datagram: &[u8], _: &Header, _: &[u8]) {
+        self(datagram);
+    }
+}
+
+/// Gives each whole datagram that begins in `bytes` to a listener; gives how many bytes are done with: all of them where the
+/// stream ends there.
+fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, listener: &mut impl Listener) -> usize {
     let mut at = 0;
-    while let Some(rest) = bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) {
+    loop {
+        at += listener.run(&bytes[at..]);
+        let Some(rest) = bytes.get(at..).filter(|rest| rest.len() >= LENGTH_BYTES + 2) else { break };
         let length = usize::from(u16::from_le_bytes([rest[0], rest[1]]));
-        let likely = (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES).contains(&length)
-            && rest[LENGTH_BYTES] == MAGIC
-            && rest[LENGTH_BYTES + 1] >> 4 == 2;
+        let likely =
+            (HEADER_BYTES + TRAILER_BYTES..=DATAGRAM_BYTES).contains(&length) && Header::likely(&rest[LENGTH_BYTES..]);
         if likely {
             let whole = rest.get(LENGTH_BYTES..LENGTH_BYTES + length);
             if whole.is_none() && !ends {
                 return at;
             }
             if let Some((datagram, (header, body))) = whole.and_then(|bytes| Some((bytes, Header::read(bytes).ok()?))) {
-                take(datagram, &header, body);
+                listener.take(datagram, &header, body);
                 at += LENGTH_BYTES + length;
                 continue;
             }
@@ -93,6 +110,19 @@ pub fn stream_rows(bytes: usize) -> usize {
     most_rows(bytes / WORD_BYTES)
 }
 
+/// A decoder and the columns that it fills.
+struct Filling<'a>(Decoder, Laid<'a>);
+
+impl Listener for Filling<'_> {
+    fn run(&mut self, ahead: &[u8]) -> usize {
+        self.0.run(ahead, &mut self.1)
+    }
+
+    fn take(&mut self, _: &[u8], header: &Header, body: &[u8]) {
+        self.0.push_read(header, body, None, &mut self.1);
+    }
+}
+
 /// Decodes a whole stream of one board's datagrams into columns that the caller laid out, from their first row on.
 ///
 /// # Errors
@@ -106,15 +136,14 @@ pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Res
     if room.len() < most {
         return Err(problem!("columns have room for {} rows: {} bytes may need {most}", room.len(), bytes.len()));
     }
-    let (mut decoder, mut laid, mut skipped, mut rest) = (Decoder::new(array), Laid::new(room), 0, bytes);
+    let (mut filling, mut skipped, mut rest) = (Filling(Decoder::new(array), Laid::new(room)), 0, bytes);
     while !rest.is_empty() {
         stop.check()?;
         let piece = &rest[..rest.len().min(PIECE)];
-        let done = cut(piece, piece.len() == rest.len(), &mut skipped, |_, header, body| {
-            decoder.push_read(header, body, None, &mut laid);
-        });
+        let done = cut(piece, piece.len() == rest.len(), &mut skipped, &mut filling);
         rest = &rest[done..];
     }
+    let Filling(decoder, laid) = filling;
     let (filled, repaired, markers) = laid.end();
     Ok(Decoded { filled, repaired, markers, counts: decoder.counts(), skipped })
 }

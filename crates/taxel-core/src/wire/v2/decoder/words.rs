@@ -9,6 +9,8 @@ mod avx512;
 mod body;
 mod single;
 
+#[cfg(target_arch = "x86_64")]
+pub(super) use avx512::{Constants, FULL};
 pub(super) use body::{Body, Meaning};
 
 use super::held::Held;

@@ -1,4 +1,6 @@
 //! Blocks of up to 32 words with AVX-512 (F, BW, VL, VBMI2) and BMI2; the last one of a body is shorter.
+//!
+//! [`blocks`] takes them from one body; its parts are also those of runs of datagrams.
 
 use std::arch::x86_64::*;
 
@@ -12,7 +14,7 @@ const WORDS: usize = 32;
 const FEW: usize = 8;
 
 /// Positions are counted from 1 in 16 bits, and sums stop here: what comes to it is left to the one by one.
-const FULL: u16 = u16::MAX;
+pub(crate) const FULL: u16 = u16::MAX;
 
 /// For each 16-bit lane the last lane of the 128 bits before it, and the 16th lane.
 static LAST_BEFORE: [u16; WORDS] = lanes(false);
@@ -49,41 +51,79 @@ const fn every(step: u16, first: u16) -> [u16; WORDS] {
 #[repr(align(64))]
 struct Lanes([u16; WORDS]);
 
-/// Takes plain words of so many bits of value.
-///
-/// # Safety
-///
-/// The machine must have the features below; each column of `room` must have 32 entries more than the rows so far and the
-/// words that are left; `body.stride` must be that of `held`, which has no more than 65 536 places.
-#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut Held, room: &mut Room<'_>, paired: bool) {
-    let bytes = if VALUE == 16 { 4 } else { 2 };
-    let control = if VALUE == 8 { 0x7f } else { 0x7fff };
-    // SAFETY: each table is 64 bytes long.
-    let table = |t: &[u16; WORDS]| unsafe { _mm512_loadu_si512(t.as_ptr().cast()) };
-    let (last_before, sixteenth) = (table(&LAST_BEFORE), table(&SIXTEENTH));
-    let (low_halves, high_halves) = (table(&LOW_HALVES), table(&HIGH_HALVES));
-    let lane = table(&LANE);
-    let (one, zero) = (_mm512_set1_epi16(1), _mm512_setzero_si512());
-    let stride = _mm_cvtsi32_si128(i32::from(body.stride));
-    let row_mask = _mm512_set1_epi16(((1_u32 << body.stride) - 1) as i16);
-    let (columns, rows) = (_mm512_set1_epi16(held.columns as i16), _mm512_set1_epi16(held.rows as i16));
+/// What every block needs, in registers.
+#[derive(Clone, Copy)]
+pub(crate) struct Constants {
+    last_before: __m512i,
+    sixteenth: __m512i,
+    low_halves: __m512i,
+    high_halves: __m512i,
+    lane: __m512i,
+    stride: __m128i,
+    row_mask: __m512i,
+    columns: __m512i,
+    rows: __m512i,
+}
 
-    while body.bytes.len() - body.at >= bytes {
-        if VALUE > 0 && body.t < held.newest || body.position >= i64::from(FULL) - 1 {
-            return;
+/// The words of a block, a lane each.
+#[derive(Clone, Copy)]
+pub(crate) struct Words {
+    pub(crate) polarity: u32,
+    skip: __m512i,
+    value: __m512i,
+    /// Advances and times.
+    pub(crate) controls: u32,
+}
+
+/// The events of a block, the first ones in the first lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Found {
+    pub(crate) n: usize,
+    /// The lanes of `n`.
+    given: u32,
+    position: __m512i,
+    x: __m512i,
+    y: __m512i,
+    ticks: __m512i,
+    p: u32,
+}
+
+impl Constants {
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+    pub(crate) fn new(stride: u8, held: &Held) -> Self {
+        // SAFETY: each table is 64 bytes long.
+        let table = |t: &[u16; WORDS]| unsafe { _mm512_loadu_si512(t.as_ptr().cast()) };
+        Self {
+            last_before: table(&LAST_BEFORE),
+            sixteenth: table(&SIXTEENTH),
+            low_halves: table(&LOW_HALVES),
+            high_halves: table(&HIGH_HALVES),
+            lane: table(&LANE),
+            stride: _mm_cvtsi32_si128(i32::from(stride)),
+            row_mask: _mm512_set1_epi16(((1_u32 << stride) - 1) as i16),
+            columns: _mm512_set1_epi16(held.columns as i16),
+            rows: _mm512_set1_epi16(held.rows as i16),
         }
-        let count = ((body.bytes.len() - body.at) / bytes).min(WORDS);
-        let lanes = u32::MAX >> (WORDS - count);
-        // SAFETY: only the lanes of `count` words are read, which lie in the body.
+    }
+
+    /// The words that begin at a place, as many as `lanes` has.
+    ///
+    /// # Safety
+    ///
+    /// That many words, of 4 bytes each where `VALUE` is 16 and of 2 else, must lie there.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+    pub(crate) unsafe fn words<const VALUE: u32>(&self, block: *const u8, lanes: u32) -> Words {
+        let control = if VALUE == 8 { 0x7f } else { 0x7fff };
+        // SAFETY: only the lanes of those words are read.
         let (head, value) = unsafe {
-            let block = body.bytes.as_ptr().add(body.at);
             if VALUE == 16 {
                 let a = _mm512_maskz_loadu_epi32(lanes as u16, block.cast());
                 let b = _mm512_maskz_loadu_epi32((lanes >> 16) as u16, block.wrapping_add(64).cast());
-                (_mm512_permutex2var_epi16(a, high_halves, b), _mm512_permutex2var_epi16(a, low_halves, b))
+                (_mm512_permutex2var_epi16(a, self.high_halves, b), _mm512_permutex2var_epi16(a, self.low_halves, b))
             } else {
-                (_mm512_maskz_loadu_epi16(lanes, block.cast()), zero)
+                (_mm512_maskz_loadu_epi16(lanes, block.cast()), _mm512_setzero_si512())
             }
         };
         let polarity = _mm512_movepi16_mask(head);
@@ -94,23 +134,16 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
             (_mm512_and_si512(head, _mm512_set1_epi16(0x7fff)), value)
         };
         let controls = _mm512_cmpeq_epi16_mask(skip, _mm512_set1_epi16(control)) & lanes;
-        let times = controls & polarity;
-        if times & 1 != 0 {
-            let after = body.at + bytes;
-            if body.bytes.len() - after < bytes {
-                return;
-            }
-            let offset = if VALUE == 16 { word::<4>(body.bytes, after) } else { word::<2>(body.bytes, after) };
-            (body.t, body.position) = (body.base + i64::from(offset), -1);
-            body.at = after + bytes;
-            continue;
-        }
-        // Up to the next word of time, behind which the position begins anew; where there is none, as mostly, nothing waits for it.
-        let taken = if times == 0 { lanes } else { lanes & (times & times.wrapping_neg()).wrapping_sub(1) };
-        let advances = controls & taken;
-        let events = taken & !controls;
+        Words { polarity, skip, value, controls }
+    }
 
-        // Steps of the position, added up; a sum that is too large stays too large.
+    /// The steps of the position, added up within the `taken` lanes, of which some are `advances`; a sum that is too large stays
+    /// too large. With `few` there are no more than 8 lanes.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+    pub(crate) fn sums<const VALUE: u32>(&self, words: &Words, taken: u32, advances: u32, few: bool) -> __m512i {
+        let Words { skip, value, .. } = *words;
+        let one = _mm512_set1_epi16(1);
         let mut steps = _mm512_maskz_add_epi16(taken, skip, one);
         // Of small words without a branch: in a scene nobody guesses which block has one.
         if VALUE == 8 || advances != 0 {
@@ -126,12 +159,170 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
         steps = _mm512_adds_epu16(steps, _mm512_bslli_epi128::<2>(steps));
         steps = _mm512_adds_epu16(steps, _mm512_bslli_epi128::<4>(steps));
         steps = _mm512_adds_epu16(steps, _mm512_bslli_epi128::<8>(steps));
-        if count > 8 {
-            let carried = _mm512_maskz_permutexvar_epi16(0xff00_ff00, last_before, steps);
+        if !few {
+            let carried = _mm512_maskz_permutexvar_epi16(0xff00_ff00, self.last_before, steps);
             steps = _mm512_adds_epu16(steps, carried);
-            let carried = _mm512_maskz_permutexvar_epi16(0xffff_0000, sixteenth, steps);
+            let carried = _mm512_maskz_permutexvar_epi16(0xffff_0000, self.sixteenth, steps);
             steps = _mm512_adds_epu16(steps, carried);
         }
+        steps
+    }
+
+    /// The events among words, whose positions, counted from 1, are given; none where one lies outside the array.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+    pub(crate) fn found(&self, words: &Words, events: u32, from_1: __m512i) -> Option<Found> {
+        let n = events.count_ones() as usize;
+        let position = _mm512_maskz_compress_epi16(events, _mm512_sub_epi16(from_1, _mm512_set1_epi16(1)));
+        let ticks = _mm512_maskz_compress_epi16(events, words.value);
+        let p = _pext_u32(words.polarity, events);
+        let given = _bzhi_u32(u32::MAX, n as u32);
+        let (x, y) = (_mm512_srl_epi16(position, self.stride), _mm512_and_si512(position, self.row_mask));
+        let outside = _mm512_cmpge_epu16_mask(x, self.columns) | _mm512_cmpge_epu16_mask(y, self.rows);
+        (outside & given == 0).then_some(Found { n, given, position, x, y, ticks, p })
+    }
+
+    /// Notes what the taxels of events, one or more, hold from `t` on.
+    ///
+    /// # Safety
+    ///
+    /// `found` must come from [`Self::found`], with positions in `held`.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+    pub(crate) unsafe fn hold(&self, found: &Found, t: i64, held: &mut Held) {
+        held.newest = t;
+        // Lanes without an event repeat the last one, so that the loop has one of two lengths: a processor guesses these.
+        let repeated = _mm512_min_epu16(_mm512_set1_epi16(found.n as i16 - 1), self.lane);
+        let places = _mm512_permutexvar_epi16(repeated, found.position);
+        let values = _mm512_permutexvar_epi16(repeated, found.ticks);
+        if found.n > FEW {
+            let (mut at, mut told) = (Lanes([0; WORDS]), Lanes([0; WORDS]));
+            // SAFETY: both are 64 bytes long, and begin where a line of the cache does; the places are those of events.
+            unsafe {
+                _mm512_store_si512(at.0.as_mut_ptr().cast(), places);
+                _mm512_store_si512(told.0.as_mut_ptr().cast(), values);
+                hold_many(&at, &told, t, held);
+            }
+            return;
+        }
+        // Not by way of memory, for which the loads would wait.
+        let halves = |lanes| {
+            let eight = _mm512_castsi512_si128(lanes);
+            [_mm_cvtsi128_si64(eight) as u64, _mm_extract_epi64::<1>(eight) as u64]
+        };
+        for (places, values) in halves(places).into_iter().zip(halves(values)) {
+            for shift in [0, 16, 32, 48] {
+                let place = usize::from((places >> shift) as u16);
+                // SAFETY: it is the place of an event, and so in `held`.
+                unsafe {
+                    *held.values.get_unchecked_mut(place) = (values >> shift) as u16;
+                    *held.since.get_unchecked_mut(place) = t;
+                }
+            }
+        }
+    }
+}
+
+/// # Safety
+///
+/// The places must be in `held`.
+#[inline(never)]
+unsafe fn hold_many(places: &Lanes, values: &Lanes, t: i64, held: &mut Held) {
+    for (&place, &value) in places.0.iter().zip(&values.0) {
+        // SAFETY: the caller's promise.
+        unsafe {
+            *held.values.get_unchecked_mut(usize::from(place)) = value;
+            *held.since.get_unchecked_mut(usize::from(place)) = t;
+        }
+    }
+}
+
+/// Notes what neighbours hold from `t` on, which lie in `held` as they came.
+///
+/// # Safety
+///
+/// The places from `begin` on, as many as `given` has lanes, must be in `held`.
+#[inline]
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+unsafe fn hold_neighbours(begin: usize, given: u32, ticks: __m512i, t: i64, held: &mut Held) {
+    held.newest = t;
+    let times = _mm512_set1_epi64(t);
+    // SAFETY: the caller's promise.
+    unsafe {
+        _mm512_mask_storeu_epi16(held.values.as_mut_ptr().add(begin).cast(), given, ticks);
+        let since = held.since.as_mut_ptr().add(begin);
+        _mm512_mask_storeu_epi64(since, given as u8, times);
+        _mm512_mask_storeu_epi64(since.wrapping_add(8), (given >> 8) as u8, times);
+        _mm512_mask_storeu_epi64(since.wrapping_add(16), (given >> 16) as u8, times);
+        _mm512_mask_storeu_epi64(since.wrapping_add(24), (given >> 24) as u8, times);
+    }
+}
+
+impl Found {
+    /// Writes the events from a row on.
+    ///
+    /// # Safety
+    ///
+    /// 32 rows must fit behind `first`: what lies beyond the events is written again by later rows, or never read.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+    pub(crate) unsafe fn write<const VALUE: u32>(&self, t: i64, room: &mut Room<'_>, first: usize, paired: bool) {
+        let times = _mm512_set1_epi64(t);
+        // SAFETY: the caller's promise.
+        unsafe {
+            let to = room.t.as_mut_ptr().add(first).cast::<i64>();
+            _mm512_storeu_si512(to.cast(), times);
+            if self.n > FEW {
+                _mm512_storeu_si512(to.add(8).cast(), times);
+                _mm512_storeu_si512(to.add(16).cast(), times);
+                _mm512_storeu_si512(to.add(24).cast(), times);
+            }
+            _mm512_storeu_si512(room.x.as_mut_ptr().add(first).cast(), self.x);
+            _mm512_storeu_si512(room.y.as_mut_ptr().add(first).cast(), self.y);
+            _mm256_storeu_si256(room.p.as_mut_ptr().add(first).cast(), _mm256_maskz_set1_epi8(self.p & self.given, 1));
+            if paired {
+                let present = _mm256_set1_epi8(i8::from(VALUE > 0));
+                let ticks = if VALUE > 0 { self.ticks } else { _mm512_setzero_si512() };
+                _mm512_storeu_si512(room.ticks.as_mut_ptr().add(first).cast(), ticks);
+                _mm256_storeu_si256(room.present.as_mut_ptr().add(first).cast(), present);
+            }
+        }
+    }
+}
+
+/// Takes plain words of so many bits of value.
+///
+/// # Safety
+///
+/// The machine must have the features below; each column of `room` must have 32 entries more than the rows so far and the
+/// words that are left; `body.stride` must be that of `held`, which has no more than 65 536 places.
+#[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
+pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut Held, room: &mut Room<'_>, paired: bool) {
+    let bytes = if VALUE == 16 { 4 } else { 2 };
+    let constants = Constants::new(body.stride, held);
+    while body.bytes.len() - body.at >= bytes {
+        if VALUE > 0 && body.t < held.newest || body.position >= i64::from(FULL) - 1 {
+            return;
+        }
+        let count = ((body.bytes.len() - body.at) / bytes).min(WORDS);
+        let lanes = u32::MAX >> (WORDS - count);
+        // SAFETY: `count` words lie in the body from there on.
+        let words = unsafe { constants.words::<VALUE>(body.bytes.as_ptr().add(body.at), lanes) };
+        let times = words.controls & words.polarity;
+        if times & 1 != 0 {
+            let after = body.at + bytes;
+            if body.bytes.len() - after < bytes {
+                return;
+            }
+            let offset = if VALUE == 16 { word::<4>(body.bytes, after) } else { word::<2>(body.bytes, after) };
+            (body.t, body.position) = (body.base + i64::from(offset), -1);
+            body.at = after + bytes;
+            continue;
+        }
+        // Up to the next word of time, behind which the position begins anew; where there is none, as mostly, nothing waits for it.
+        let taken = if times == 0 { lanes } else { lanes & (times & times.wrapping_neg()).wrapping_sub(1) };
+        let advances = words.controls & taken;
+        let steps = constants.sums::<VALUE>(&words, taken, advances, count <= 8);
         let from_1 = _mm512_adds_epu16(steps, _mm512_set1_epi16((body.position + 1) as i16));
         // No step is below 0, and lanes that are not taken add none: the last one has the sum.
         let end = if count > 8 { _mm512_extracti32x4_epi32::<3>(from_1) } else { _mm512_castsi512_si128(from_1) };
@@ -139,88 +330,24 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
         if last == FULL {
             return;
         }
-
-        let n = events.count_ones() as usize;
-        let position = _mm512_maskz_compress_epi16(events, _mm512_sub_epi16(from_1, one));
-        let ticks = _mm512_maskz_compress_epi16(events, value);
-        let p = _pext_u32(polarity, events);
-        let given = if n == 0 { 0 } else { u32::MAX >> (WORDS - n) };
-        let (x, y) = (_mm512_srl_epi16(position, stride), _mm512_and_si512(position, row_mask));
-        if (_mm512_cmpge_epu16_mask(x, columns) | _mm512_cmpge_epu16_mask(y, rows)) & given != 0 {
-            return;
-        }
-
-        let first = body.rows;
-        let t = _mm512_set1_epi64(body.t);
-        // SAFETY: the caller's promise: 32 rows fit behind `first`. What lies beyond the block's events is written again by later
-        // rows, or never read.
-        unsafe {
-            let to = room.t.as_mut_ptr().add(first).cast::<i64>();
-            _mm512_storeu_si512(to.cast(), t);
-            if n > FEW {
-                _mm512_storeu_si512(to.add(8).cast(), t);
-                _mm512_storeu_si512(to.add(16).cast(), t);
-                _mm512_storeu_si512(to.add(24).cast(), t);
-            }
-            _mm512_storeu_si512(room.x.as_mut_ptr().add(first).cast(), x);
-            _mm512_storeu_si512(room.y.as_mut_ptr().add(first).cast(), y);
-            _mm256_storeu_si256(room.p.as_mut_ptr().add(first).cast(), _mm256_maskz_set1_epi8(p & given, 1));
-            if paired {
-                let present = _mm256_set1_epi8(i8::from(VALUE > 0));
-                _mm512_storeu_si512(room.ticks.as_mut_ptr().add(first).cast(), if VALUE > 0 { ticks } else { zero });
-                _mm256_storeu_si256(room.present.as_mut_ptr().add(first).cast(), present);
-            }
-        }
-        if VALUE > 0 && n > 0 {
-            let begin = (_mm_cvtsi128_si32(_mm512_castsi512_si128(position)) & 0xffff) as usize;
-            if n > FEW && advances == 0 && usize::from(last) == begin + n {
-                // Neighbours: they lie in `held` as they came.
-                // SAFETY: the places of the events, from `begin` on, are on the array, as was seen above, and so in `held`.
-                unsafe {
-                    _mm512_mask_storeu_epi16(held.values.as_mut_ptr().add(begin).cast(), given, ticks);
-                    let since = held.since.as_mut_ptr().add(begin);
-                    _mm512_mask_storeu_epi64(since, given as u8, t);
-                    _mm512_mask_storeu_epi64(since.wrapping_add(8), (given >> 8) as u8, t);
-                    _mm512_mask_storeu_epi64(since.wrapping_add(16), (given >> 16) as u8, t);
-                    _mm512_mask_storeu_epi64(since.wrapping_add(24), (given >> 24) as u8, t);
-                }
-            } else {
-                // Lanes without an event repeat the last one, so that the loop has one of two lengths: a processor guesses these.
-                let repeated = _mm512_min_epu16(_mm512_set1_epi16(n as i16 - 1), lane);
-                let places = _mm512_permutexvar_epi16(repeated, position);
-                let values = _mm512_permutexvar_epi16(repeated, ticks);
-                // SAFETY: the places of the first `n` events are on the array, as was seen above, and so in `held`.
-                let mut hold = |place: u16, value: u16| unsafe {
-                    *held.values.get_unchecked_mut(usize::from(place)) = value;
-                    *held.since.get_unchecked_mut(usize::from(place)) = body.t;
-                };
-                if n > FEW {
-                    let (mut at, mut told) = (Lanes([0; WORDS]), Lanes([0; WORDS]));
-                    // SAFETY: both are 64 bytes long, and begin where a line of the cache does.
-                    unsafe {
-                        _mm512_store_si512(at.0.as_mut_ptr().cast(), places);
-                        _mm512_store_si512(told.0.as_mut_ptr().cast(), values);
-                    }
-                    at.0.iter().zip(&told.0).for_each(|(&place, &value)| hold(place, value));
+        let Some(found) = constants.found(&words, taken & !words.controls, from_1) else { return };
+        // SAFETY: the caller's promise: 32 rows fit behind the rows so far.
+        unsafe { found.write::<VALUE>(body.t, room, body.rows, paired) };
+        if VALUE > 0 && found.n > 0 {
+            let begin = (_mm_cvtsi128_si32(_mm512_castsi512_si128(found.position)) & 0xffff) as usize;
+            // SAFETY: the events lie on the array, and so in `held`.
+            unsafe {
+                if found.n > FEW && advances == 0 && usize::from(last) == begin + found.n {
+                    hold_neighbours(begin, found.given, found.ticks, body.t, held);
                 } else {
-                    // Not by way of memory, for which the loads would wait.
-                    let halves = |lanes| {
-                        let eight = _mm512_castsi512_si128(lanes);
-                        [_mm_cvtsi128_si64(eight) as u64, _mm_extract_epi64::<1>(eight) as u64]
-                    };
-                    for (places, values) in halves(places).into_iter().zip(halves(values)) {
-                        for shift in [0, 16, 32, 48] {
-                            hold((places >> shift) as u16, (values >> shift) as u16);
-                        }
-                    }
+                    constants.hold(&found, body.t, held);
                 }
             }
-            held.newest = body.t;
         }
-        if n > 0 {
+        if found.n > 0 {
             body.latest = body.latest.max(body.t);
         }
-        body.rows = first + n;
+        body.rows += found.n;
         body.position = i64::from(last) - 1;
         body.at += bytes * taken.count_ones() as usize;
     }

@@ -1,6 +1,6 @@
 //! A datagram's body as it is read, which is what its loops carry.
 
-use crate::wire::v2::Layout;
+use crate::wire::v2::{Header, Layout, before};
 
 /// What a body's words mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,10 +38,10 @@ pub(crate) struct Body<'a> {
 }
 
 impl<'a> Body<'a> {
-    /// A body whose times count from `base`, us, and of which nothing was read yet.
-    pub(crate) fn new(layout: Layout, meaning: Meaning, stride: u8, base: i64, bytes: &'a [u8]) -> Self {
-        let (at, rows) = (0, 0);
-        Self { layout, meaning, stride, base, bytes, at, t: base, position: -1, cut: false, latest: i64::MIN, rows }
+    /// A header's body whose times count from `base`, us, and of which nothing was read yet.
+    pub(crate) fn new(layout: Layout, meaning: Meaning, header: &Header, base: i64, bytes: &'a [u8]) -> Self {
+        let (at, rows, stride, position) = (0, 0, header.stride, before(header.line, header.stride));
+        Self { layout, meaning, stride, base, bytes, at, t: base, position, cut: false, latest: i64::MIN, rows }
     }
 
     /// Whole words that are left.

@@ -1,0 +1,147 @@
+//! Which numbers of a board's session have come.
+
+use crate::wire::v2::Header;
+
+/// How far behind the highest sequence number a datagram may come and still be told from a repeated one.
+pub(super) const WINDOW: usize = 65_536;
+
+/// What is known of the datagrams between two resets.
+#[derive(Debug, Clone)]
+pub(super) struct Session {
+    pub(super) number: u16,
+    lowest: i64,
+    pub(super) highest: i64,
+    received: u64,
+    /// By number modulo the window: whether it came.
+    seen: Vec<u64>,
+    /// What is added to the board's times.
+    pub(super) offset: i64,
+    /// The latest base time.
+    pub(super) latest: u64,
+}
+
+impl Session {
+    pub(super) fn new(header: &Header, offset: i64) -> Self {
+        let first = i64::from(header.sequence);
+        Self {
+            number: header.session,
+            lowest: first,
+            highest: first,
+            received: 0,
+            seen: vec![0; WINDOW / 64],
+            offset,
+            latest: header.base,
+        }
+    }
+
+    pub(super) fn number_of(&self, sequence: u32) -> i64 {
+        self.highest + i64::from(sequence.wrapping_sub(self.highest as u32) as i32)
+    }
+
+    /// Whether a datagram is the one that comes next.
+    #[inline]
+    pub(super) fn is_next(&self, header: &Header) -> bool {
+        self.number == header.session && header.sequence == (self.highest as u32).wrapping_add(1)
+    }
+
+    #[inline]
+    pub(super) fn missing(&self) -> u64 {
+        (self.highest - self.lowest + 1) as u64 - self.received
+    }
+
+    /// Notes a number; none where it is too old, else whether it is new.
+    #[inline]
+    pub(super) fn note(&mut self, number: i64) -> Option<bool> {
+        if (1..=64).contains(&(number - self.highest)) {
+            self.note_ahead(number);
+            return Some(true);
+        }
+        self.note_out_of_turn(number)
+    }
+
+    /// Notes a number at most 64 ahead, as nearly all are: what came a window ago in the places of those between is forgotten.
+    /// Without a branch, as nobody guesses in a scene which datagram comes behind a gap.
+    #[inline(always)]
+    fn note_ahead(&mut self, number: i64) {
+        let (word, bit) = place(number);
+        let between = (number - self.highest - 1) as u32;
+        let here = between.min(bit.trailing_zeros());
+        // Those just below the number's bit, and at the top of the word before.
+        let below = bit - (bit >> here);
+        let before = (u64::MAX << 1) << (63 - (between - here));
+        self.seen[(word + WINDOW / 64 - 1) % (WINDOW / 64)] &= !before;
+        self.seen[word] = self.seen[word] & !below | bit;
+        (self.highest, self.received) = (number, self.received + 1);
+    }
+
+    fn note_out_of_turn(&mut self, number: i64) -> Option<bool> {
+        if number <= self.highest - WINDOW as i64 {
+            return None;
+        }
+        if number > self.highest {
+            self.clear((self.highest + 1).max(number + 1 - WINDOW as i64), number);
+            self.highest = number;
+        }
+        self.lowest = self.lowest.min(number);
+        let (word, bit) = place(number);
+        let new = self.seen[word] & bit == 0;
+        self.seen[word] |= bit;
+        self.received += u64::from(new);
+        Some(new)
+    }
+
+    /// From `first` to `last`, at most a window of them, none has come; by words, as many may be missing.
+    fn clear(&mut self, mut first: i64, last: i64) {
+        while first <= last {
+            let (word, bit) = place(first);
+            let numbers = (64 - i64::from(bit.trailing_zeros())).min(last + 1 - first);
+            self.seen[word] &= !(bit.wrapping_mul(u64::MAX >> (64 - numbers)));
+            first += numbers;
+        }
+    }
+}
+
+fn place(number: i64) -> (usize, u64) {
+    let at = number.rem_euclid(WINDOW as i64) as usize;
+    (at / 64, 1 << (at % 64))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use rand::{Rng, SeedableRng, rngs::StdRng};
+
+    use super::*;
+
+    #[test]
+    fn a_number_is_new_once_however_far_apart_they_come() {
+        let mut random = StdRng::seed_from_u64(1);
+        for begin in [0, 7, u32::MAX - 40_000] {
+            let mut bytes = vec![];
+            let header = Header {
+                kind: 1,
+                board: 0,
+                sequence: begin,
+                base: 0,
+                session: 1,
+                stride: 6,
+                line: 0,
+                flags: 0,
+                span: 0,
+            };
+            header.write(&[], &mut bytes);
+            let mut session = Session::new(&header, 0);
+            let (mut seen, mut highest) = (BTreeSet::from([i64::from(begin)]), i64::from(begin));
+            assert_eq!(session.note(highest), Some(true));
+            for _ in 0..20_000 {
+                let far = [1, 3, 63, 64, 65, 700, 65_535, 65_536, 65_537, 200_000][random.random_range(0..10)];
+                let number = highest + if random.random() { 1 } else { random.random_range(-far..=far) };
+                let expected = (number > highest - WINDOW as i64).then(|| seen.insert(number));
+                assert_eq!(session.note(number), expected, "{number} of {highest}");
+                highest = highest.max(number);
+            }
+            assert_eq!(session.missing(), (highest + 1 - seen.first().unwrap()) as u64 - seen.len() as u64);
+        }
+    }
+}
