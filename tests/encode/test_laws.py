@@ -7,6 +7,7 @@ has a place of its own, `places(encoder, array)`, one (x, y) in mm a train.
 """
 
 import json
+from copy import copy
 from importlib import import_module
 from itertools import pairwise
 from pathlib import Path
@@ -339,7 +340,9 @@ def test_an_encoder_comes_back_from_json(encoder):
 
 def test_a_tare_given_later_is_as_good_as_one_given_at_once():
     for encoder in ENCODERS.values():
-        assert encoder.with_tare(rest(ARRAY)) == encoder
+        given = encoder.with_tare(rest(ARRAY))
+        # Those that feel held pressure count it from 0 without one.
+        assert given == (copy(encoder).set_params(tare=rest(ARRAY)) if "tare" in encoder.get_params() else encoder)
     assert ContactArea(levels=[1, 2, 4, 8]).with_tare(rest(ARRAY)) == ENCODERS["area"]
 
 

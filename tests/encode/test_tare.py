@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 import taxel
 from taxel import Array, Events, Frames, Tare
+from taxel.cli import app
+from taxel.encode import SA1, SA2, Skin
 
-from .scenes import touch
+from .scenes import spikes_of, touch
 
 
 @settings(max_examples=50, deadline=None)
@@ -102,3 +105,59 @@ def test_a_file_that_is_no_tare_is_named(tmp_path):
         Tare.load(place)
     with pytest.raises(FileNotFoundError):
         Tare.load(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize("encoder", [SA1(period_ms=0.5, threshold=0.01), SA2(threshold=0.01), Skin(period_ms=0.5)])
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_held_pressure_counts_from_rest(encoder, seed):
+    """As if the rest had been taken off the pictures; of events, pieces, and of a taxel whose rest is not known."""
+    rng = np.random.default_rng(seed)
+    array = Array(4, 5, 2.67, rng.random((4, 5)) < 0.9)
+    events = touch(rng, array, 400)
+    stop = int(events.t[0]) + 1 + rng.integers(0, int(events.t[-1] - events.t[0]))
+    tare = Tare.take(events, stop_us=stop)
+    period_us = round(1000 * encoder.period_ms)
+    frames = Frames.from_events(events, period_us)
+    plain = encoder.encode(tare.off(frames))
+    spikes = encoder.with_tare(tare).encode(frames)
+    assert spikes == plain
+    of_events = encoder.with_tare(tare).encode(events)
+    for train in range(len(plain)):
+        until = frames.t[-1] / 1000
+        assert np.array_equal(of_events[train][of_events[train] <= until], plain[train][plain[train] <= until])
+    cut = rng.integers(0, len(events))
+    stream = encoder.with_tare(tare).stream(array)
+    pieces = [stream.push(events[:cut]), stream.push(events[cut:]), stream.finish()]
+    assert sorted(spike for piece in pieces for spike in spikes_of(piece)) == spikes_of(of_events)
+
+
+@pytest.mark.parametrize("encoder", ["sa1", "sa2", "skin"])
+def test_the_command_takes_the_rest_from_afferents_that_feel_held_pressure(encoder, tmp_path):
+    """Two boards that differ in the rest of their taxels alone fire alike; with nothing on it, SA-1 is silent."""
+    t = np.repeat(np.arange(0, 1_000_000, 2000), 4)
+    x = np.tile([0, 1, 0, 1], 500)
+    y = np.tile([0, 0, 1, 1], 500)
+    pressed = np.where((t >= 600_000) & (t < 900_000) & (x == 0), 60, 0)
+    spikes = []
+    for name, rest in (("flat", 0), ("rest", 50)):
+        level = rest + pressed
+        events = Events(t, x, y, level > 0, array=Array(2, 2, pitch_mm=2.67), intensity=level)
+        taxel.convert(events, tmp_path / f"{name}.npz")
+        said = [
+            "encode",
+            tmp_path / f"{name}.npz",
+            tmp_path / f"{name}-spikes.npz",
+            "--encoder",
+            encoder,
+            "--tare",
+            "0.2",
+        ]
+        done = CliRunner().invoke(app, [str(word) for word in said])
+        assert done.exit_code == 0, done.output
+        spikes.append(taxel.SpikeTrains.load(tmp_path / f"{name}-spikes.npz"))
+    flat, rested = ([list(trains[k]) for k in range(len(trains))] for trains in spikes)
+    assert rested == flat
+    assert sum(map(len, flat)) > 5
+    if encoder == "sa1":
+        assert all(time >= 600 for train in flat for time in train)

@@ -1,6 +1,7 @@
 //! Events or frames to spikes, live or whole: the same spikes either way.
 
 mod bracket;
+mod fields;
 mod law;
 mod loaded;
 mod periods;

@@ -9,6 +9,7 @@ mod eight;
 mod fetch;
 mod instructions;
 mod products;
+mod windows;
 
 pub(crate) use aligned::Aligned;
 pub(crate) use eight::{LANES, Vector, lines, lines_mut};
@@ -18,3 +19,4 @@ pub(crate) use fetch::fetch;
 pub use instructions::Instructions;
 pub(crate) use instructions::{by_width, kernel, wide};
 pub(crate) use products::{add, add_lines, dot, times};
+pub(crate) use windows::Windows;

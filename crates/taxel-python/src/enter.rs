@@ -52,7 +52,11 @@ where
     E: IntoPyErr + Send,
 {
     match guarded(py, max_seconds, work) {
-        (Ok(value), raised) => Ok((value, raised.map(|r| r.into_value(py).into_any()))),
+        (Ok(value), raised) => {
+            // A Ctrl-C since the last look would be raised before the caller has kept the result.
+            let raised = raised.or_else(|| py.check_signals().err());
+            Ok((value, raised.map(|r| r.into_value(py).into_any())))
+        }
         (Err(_), Some(raised)) => Err(raised),
         (Err(error), None) => Err(error),
     }

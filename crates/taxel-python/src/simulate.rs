@@ -207,6 +207,14 @@ impl Touch for Felt {
         }
     }
 
+    fn is_there(&mut self) -> taxel_live::Result<bool> {
+        match self {
+            // They are made ready while those before them are played.
+            Self::Scenes(_) => Ok(true),
+            Self::Other(touch) => touch.is_there(),
+        }
+    }
+
     fn is_last(&mut self, stop: Stop<'_>) -> taxel_live::Result<bool> {
         match self {
             Self::Scenes(scenes) => scenes.is_last(stop),
@@ -259,7 +267,7 @@ fn emulate(
         TouchIn::Pipe(descriptor, ahead, shift, most) => {
             // SAFETY: Python has the descriptor open as long as this call lasts; the copy is ours.
             let from = unsafe { BorrowedFd::borrow_raw(descriptor) }.try_clone_to_owned()?;
-            Felt::Other(Box::new(Feed::new(from.into(), ahead, shift, most)))
+            Felt::Other(Box::new(Feed::new(array.len(), from.into(), ahead, shift, most)))
         }
     };
     enter_telling(py, |stop, teller| {

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from taxel._parameters import defaults
-from taxel.encode._encoder import Encoder
+from taxel.encode._tared import Tared
+from taxel.tare import Tare
 
 __all__ = ["SA1"]
 
@@ -14,7 +15,7 @@ _DEFAULT = defaults("sa1")
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class SA1(Encoder):
+class SA1(Tared):
     """Fire while a taxel is pressed: fastest when it is pressed anew, ever more slowly as that lasts (Merkel).
 
     Spikes have no sign; one train a taxel. It begins as if the first sample had always been.
@@ -43,10 +44,13 @@ class SA1(Encoder):
         How long after a spike none can come.
     period_ms : float, ms, whole us
         How often events are sampled; frames must come at it, give or take half.
+    tare : Tare, or float, s, optional
+        The taxels' rest, or how long each recording begins with it: pressure is what stands above it (0 where a rest is
+        not known). Without one it counts from 0. It belongs to a board and a day, so a saved readout has none.
 
     Raises
     ------
-    ProblemError : a parameter that makes no sense
+    ProblemError : a parameter that makes no sense; encoding with another array's tare
 
     Notes
     -----
@@ -90,3 +94,4 @@ class SA1(Encoder):
     recovery_ms: float = _DEFAULT.recovery_ms
     refractory_ms: float = _DEFAULT.refractory_ms
     period_ms: float = _DEFAULT.period_ms
+    tare: Tare | float | None = _DEFAULT.tare

@@ -12,7 +12,8 @@ from taxel._arguments import instance, shown
 from taxel._core import ProblemError
 from taxel._parameters import defaults
 from taxel.array import Array
-from taxel.encode._encoder import Encoder
+from taxel.encode._tared import Tared
+from taxel.tare import Tare
 
 __all__ = ["Afferents", "Skin"]
 
@@ -54,7 +55,7 @@ class Afferents:
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
-class Skin(Encoder):
+class Skin(Tared):
     """Give an array the afferents of a fingertip: all four types in places that a seed draws, each with a field.
 
     Trains have no sign, as a nerve's spikes have none: all SA-1, then FA-1, SA-2, FA-2, each from the first taxel to
@@ -74,6 +75,9 @@ class Skin(Encoder):
         What draws the places.
     period_ms : float, ms, whole us, at most 1
         How often events are sampled; frames must come at it, give or take half.
+    tare : Tare, or float, s, optional
+        The taxels' rest, or how long each recording begins with it: pressure is what stands above it (0 where a rest is
+        not known). Without one it counts from 0. It belongs to a board and a day, so a saved readout has none.
 
     Raises
     ------
@@ -111,6 +115,7 @@ class Skin(Encoder):
     range: float = _DEFAULT.range
     seed: int = _DEFAULT.seed
     period_ms: float = _DEFAULT.period_ms
+    tare: Tare | float | None = _DEFAULT.tare
 
     def afferents(self, array: Array) -> Afferents:
         """Return what each train is, and where, on an array.

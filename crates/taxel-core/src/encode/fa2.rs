@@ -128,26 +128,24 @@ impl Filter for Fast {
     }
 
     #[inline(always)]
-    fn step(&self, state: &mut FastState, x: &Lanes, u: &mut Lanes) -> bool {
-        let mut moved = 0;
-        for lane in 0..BLOCK {
-            let first = self.corner.step(state.first[lane], state.x[lane], x[lane]);
-            let once = x[lane] - first;
-            let second = self.corner.step(state.second[lane], state.once[lane], once);
-            let twice = once - second;
-            let potential = self.membrane.step(u[lane], state.twice[lane], twice);
-            moved |= (state.x[lane].to_bits() ^ x[lane].to_bits())
-                | (state.first[lane].to_bits() ^ first.to_bits())
-                | (state.second[lane].to_bits() ^ second.to_bits())
-                | (u[lane].to_bits() ^ potential.to_bits());
-            state.x[lane] = x[lane];
-            state.first[lane] = first;
-            state.once[lane] = once;
-            state.second[lane] = second;
-            state.twice[lane] = twice;
-            u[lane] = potential;
+    fn step<const SEE: bool>(&self, state: &mut FastState, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64 {
+        let (before, slow, slower) = (state.x[lane], state.first[lane], state.second[lane]);
+        let first = self.corner.step(slow, before, x);
+        let once = x - first;
+        let second = self.corner.step(slower, state.once[lane], once);
+        let twice = once - second;
+        let potential = self.membrane.step(u, state.twice[lane], twice);
+        if SEE {
+            *moved |= (before.to_bits() ^ x.to_bits())
+                | (slow.to_bits() ^ first.to_bits())
+                | (slower.to_bits() ^ second.to_bits());
         }
-        moved != 0
+        state.x[lane] = x;
+        state.first[lane] = first;
+        state.once[lane] = once;
+        state.second[lane] = second;
+        state.twice[lane] = twice;
+        potential
     }
 
     fn shift(&self, state: &mut FastState, lane: usize, by: f64) {

@@ -49,16 +49,7 @@ impl Loaded {
         let Some(tare) = tare else {
             return Err(problem!("{what} without a tare: take one at rest and give it to the encoder"));
         };
-        if (tare.array.rows, tare.array.columns) != (array.rows, array.columns) {
-            let (of, to) = (&tare.array, array);
-            return Err(problem!(
-                "tare of {} x {} taxels: the array has {} x {}",
-                of.rows,
-                of.columns,
-                to.rows,
-                to.columns
-            ));
-        }
+        let rests = tare.rests(array)?;
         let n = blocks(array.len());
         let mut fresh = Self {
             rows: usize::from(array.rows),
@@ -70,11 +61,8 @@ impl Loaded {
             neighbours: vec![0; array.len()],
             area: 0,
         };
-        let exists = |place: usize| array.exists.as_ref().is_none_or(|e| e[place]);
-        for (place, rest) in tare.rest.iter().enumerate().filter(|&(place, _)| exists(place)) {
-            if let Some(rest) = rest {
-                fresh.set_rest(place, *rest);
-            }
+        for (place, &rest) in rests.iter().enumerate() {
+            fresh.set_rest(place, rest);
         }
         Ok(fresh)
     }

@@ -45,8 +45,9 @@ pub(super) trait Filter: Send + Clone + 'static {
     /// The state in which `x` has always been, and the potential then.
     fn settled(&self, x: &Lanes) -> (Self::State, Lanes);
 
-    /// Takes the next sample; `u` becomes the potential. Says whether anything moved.
-    fn step(&self, state: &mut Self::State, x: &Lanes, u: &mut Lanes) -> bool;
+    /// Takes the next sample of a channel whose potential was `u`; gives the potential. With `SEE`, sets bits of `moved`
+    /// where anything that it holds did.
+    fn step<const SEE: bool>(&self, state: &mut Self::State, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64;
 
     /// Whether it tells what is, and not only changes: then a value that a state repaired counts as any other.
     const TELLS_VALUES: bool = false;
@@ -125,41 +126,51 @@ impl<F: Filter> Afferents<F> {
         self.blocks.iter().all(|b| b.still)
     }
 
-    /// Takes a block's next sample; tells `fired` the lanes that fire.
+    /// Takes a block's next sample, `x` of each lane; tells `fired` the lanes that fire. With `SEE`, sees whether it is
+    /// still from here on; else it counts as moved, which is safe.
     #[inline(always)]
-    pub(super) fn sample(&mut self, block: usize, x: &Lanes, mut fired: impl FnMut(usize)) {
+    pub(super) fn sample<const SEE: bool>(
+        &mut self,
+        block: usize,
+        x: impl Fn(usize) -> f64,
+        mut fired: impl FnMut(usize),
+    ) {
         let Firing { threshold, jump, recovery_ms, refractory_ms, period_ms } = self.firing;
         let afferent = &mut self.blocks[block];
-        let last = afferent.u;
-        let moved = self.filter.step(&mut afferent.state, x, &mut afferent.u);
-        let (mut any, mut busy) = (0_u64, 0_u64);
-        let mut fires = [0_u64; BLOCK];
+        let mut moved = u64::from(!SEE);
         let (mut below, mut waited) = ([0.0; BLOCK], [0.0; BLOCK]);
-        for lane in 0..BLOCK {
-            let (u, before, wait) = (afferent.u[lane], afferent.raised[lane], afferent.wait[lane]);
-            let kept = before * self.keep;
-            let raised = if kept < RECOVERED { 0.0 } else { kept };
-            below[lane] = threshold + before - last[lane];
-            waited[lane] = wait;
-            let fire = u64::from(u >= threshold + raised) & u64::from(wait < period_ms);
-            afferent.raised[lane] = raised;
-            afferent.wait[lane] = if wait > period_ms { wait - period_ms } else { 0.0 };
-            fires[lane] = fire;
-            any |= fire;
-            busy |= before.to_bits() | wait.to_bits();
-        }
-        if any != 0 {
-            for lane in (0..BLOCK).filter(|&lane| fires[lane] != 0) {
-                // Where on the straight line from below to above the threshold, or as soon as it may fire again.
-                let above = afferent.u[lane] - threshold - afferent.raised[lane];
-                let crossed = if below[lane] > 0.0 { period_ms * below[lane] / (below[lane] + above) } else { 0.0 };
-                let since = period_ms - crossed.max(waited[lane]);
-                afferent.raised[lane] += jump * (-since / recovery_ms).exp();
-                afferent.wait[lane] = (refractory_ms - since).max(0.0);
-                fired(lane);
+        let mut fires = [0_u32; 2];
+        for (half, fires) in fires.iter_mut().enumerate() {
+            for k in 0..BLOCK / 2 {
+                let lane = half * BLOCK / 2 + k;
+                let (last, before, wait) = (afferent.u[lane], afferent.raised[lane], afferent.wait[lane]);
+                let u = self.filter.step::<SEE>(&mut afferent.state, lane, x(lane), last, &mut moved);
+                let kept = before * self.keep;
+                let raised = if kept < RECOVERED { 0.0 } else { kept };
+                afferent.u[lane] = u;
+                afferent.raised[lane] = raised;
+                afferent.wait[lane] = if wait > period_ms { wait - period_ms } else { 0.0 };
+                below[lane] = threshold + before - last;
+                waited[lane] = wait;
+                *fires |= if (u >= threshold + raised) & (wait < period_ms) { 1 << k } else { 0 };
+                if SEE {
+                    moved |= before.to_bits() | wait.to_bits() | (u.to_bits() ^ last.to_bits());
+                }
             }
         }
-        afferent.still = any | busy == 0 && !moved;
+        let mut left = u64::from(fires[1]) << 32 | u64::from(fires[0]);
+        afferent.still = left | moved == 0;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize;
+            left &= left - 1;
+            // Where on the straight line from below to above the threshold, or as soon as it may fire again.
+            let above = afferent.u[lane] - threshold - afferent.raised[lane];
+            let crossed = if below[lane] > 0.0 { period_ms * below[lane] / (below[lane] + above) } else { 0.0 };
+            let since = period_ms - crossed.max(waited[lane]);
+            afferent.raised[lane] += jump * (-since / recovery_ms).exp();
+            afferent.wait[lane] = (refractory_ms - since).max(0.0);
+            fired(lane);
+        }
     }
 }
 
@@ -178,10 +189,10 @@ impl<F: Filter> ByTaxel<F> {
     }
 }
 
-/// Pressures in shares of the range; what lies below 0 counts as 0.
+/// A pressure in shares of the range; what lies below 0 counts as 0.
 #[inline(always)]
-fn shares(scale: f64, values: &Block) -> Lanes {
-    std::array::from_fn(|lane| f64::from(values[lane].max(0.0)) * scale)
+fn share(scale: f64, pressure: f32) -> f64 {
+    f64::from(pressure.max(0.0)) * scale
 }
 
 impl<F: Filter> Rule for ByTaxel<F> {
@@ -195,18 +206,19 @@ impl<F: Filter> Rule for ByTaxel<F> {
 
     fn begin(&mut self, _t: i64, held: &[Block], _out: &mut Vec<Spike>) {
         debug_assert_eq!(held.len(), blocks(self.channels));
-        let x: Vec<Lanes> = held.iter().map(|values| shares(self.scale, values)).collect();
+        let x: Vec<Lanes> = held.iter().map(|values| values.map(|value| share(self.scale, value))).collect();
         self.afferents.begin(x.iter());
     }
 
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
-            if changed[block] || !self.afferents.is_still(block) {
-                let x = shares(self.scale, values);
-                self.afferents.sample(block, &x, |lane| {
-                    out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value: 1.0 });
-                });
+            let x = |lane: usize| share(self.scale, values[lane]);
+            let fired = |lane| out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value: 1.0 });
+            if changed[block] {
+                self.afferents.sample::<false>(block, x, fired);
+            } else if !self.afferents.is_still(block) {
+                self.afferents.sample::<true>(block, x, fired);
             }
         }
     }
@@ -214,11 +226,116 @@ impl<F: Filter> Rule for ByTaxel<F> {
     const HEARS_REPAIRED: bool = F::TELLS_VALUES;
 
     fn repair(&mut self, channel: usize, from: f32, to: f32) {
-        let by = f64::from(to.max(0.0)) * self.scale - f64::from(from.max(0.0)) * self.scale;
+        let by = share(self.scale, to) - share(self.scale, from);
         self.afferents.shift(channel, by);
     }
 
     fn idle(&self) -> bool {
         self.afferents.all_still()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::rngs::StdRng;
+    use rand::{Rng, SeedableRng};
+
+    use super::*;
+    use crate::encode::fa2::Fa2;
+    use crate::encode::slow::Slow;
+
+    /// Each channel by itself, at every sample, whether anything changed or not.
+    fn plainly<F: Filter>(filter: &F, firing: Firing, pictures: &[Vec<f64>]) -> Vec<Spike> {
+        let Firing { threshold, jump, recovery_ms, refractory_ms, period_ms } = firing;
+        let mut out = vec![];
+        for channel in 0..pictures[0].len() {
+            let (mut state, u) = filter.settled(&[pictures[0][channel]; BLOCK]);
+            let (mut u, mut wait) = (u[0], 0.0);
+            let mut raised = f64::max(u - threshold, 0.0);
+            for (t, picture) in (1..).zip(&pictures[1..]) {
+                let (below, waited) = (threshold + raised - u, wait);
+                u = filter.step::<true>(&mut state, 0, picture[channel], u, &mut 0);
+                raised *= (-period_ms / recovery_ms).exp();
+                raised = if raised < RECOVERED { 0.0 } else { raised };
+                wait = f64::max(wait - period_ms, 0.0);
+                if u >= threshold + raised && waited < period_ms {
+                    let above = u - threshold - raised;
+                    let crossed = if below > 0.0 { period_ms * below / (below + above) } else { 0.0 };
+                    let since = period_ms - crossed.max(waited);
+                    raised += jump * (-since / recovery_ms).exp();
+                    wait = f64::max(refractory_ms - since, 0.0);
+                    out.push(Spike { t: ms(t), train: channel as u32, value: 1.0 });
+                }
+            }
+        }
+        out.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.train.cmp(&b.train)));
+        out
+    }
+
+    /// Holds blocks, of which only those at work are looked at, against channels one by one; says how many spikes came, and
+    /// how often a block was left out.
+    fn holds<F: Filter>(filter: &F, firing: Firing, rng: &mut StdRng) -> [usize; 2] {
+        let (channels, range) = (rng.random_range(1..150), 150.0);
+        let (noise, changing) = (10_f64.powf(rng.random_range(-6.0..2.5)), rng.random_range(0.0..1.0));
+        let mut held: Vec<f64> = (0..channels).map(|_| rng.random_range(-10.0..160.0)).collect();
+        let (mut left, mut moving) = (0, true);
+        let pictures: Vec<Vec<Block>> = (0..800)
+            .map(|_| {
+                // Stretches in which all, some or none of the channels move.
+                if left == 0 {
+                    (left, moving) = (rng.random_range(1..500), rng.random_bool(0.5));
+                }
+                left -= 1;
+                for held in &mut held {
+                    if moving && rng.random_bool(changing) {
+                        *held = (*held + noise * rng.random_range(-1.0..1.0)).clamp(-10.0, 1e6);
+                    }
+                }
+                let block = |values: &[f64]| std::array::from_fn(|lane| values.get(lane).map_or(0.0, |&v| v as f32));
+                held.chunks(BLOCK).map(block).collect()
+            })
+            .collect();
+        let mut rule = ByTaxel::new(filter.clone(), firing, range, channels);
+        let (mut out, mut left_out) = (vec![], 0);
+        rule.begin(0, &pictures[0], &mut out);
+        for (t, pair) in (1..).zip(pictures.windows(2)) {
+            let changed: Vec<bool> = pair[0].iter().zip(&pair[1]).map(|(a, b)| a != b).collect();
+            left_out += (0..changed.len()).filter(|&block| !changed[block] && rule.afferents.is_still(block)).count();
+            rule.sample(t, &pair[1], &changed, &mut out);
+        }
+        let shares = |picture: &Vec<Block>| -> Vec<f64> {
+            picture.as_flattened()[..channels].iter().map(|&value| share(rule.scale, value)).collect()
+        };
+        let wanted = plainly(filter, firing, &pictures.iter().map(shares).collect::<Vec<_>>());
+        assert!(out == wanted, "{firing:?}: {} spikes, by themselves {}", out.len(), wanted.len());
+        [out.len(), left_out]
+    }
+
+    #[test]
+    fn blocks_fire_as_each_channel_would_by_itself() {
+        let mut rng = StdRng::seed_from_u64(7);
+        let mut seen = [[0; 2]; 2];
+        for round in 0..120 {
+            let mut exponent = |least: f64, most: f64| 10_f64.powf(rng.random_range(least..most));
+            let period_ms = exponent(-1.3, 0.0);
+            let firing = Firing {
+                threshold: exponent(-4.0, 0.3),
+                jump: exponent(-4.0, 0.5),
+                recovery_ms: exponent(-1.0, 2.0),
+                refractory_ms: if round % 3 == 0 { 0.0 } else { exponent(-1.5, 1.5) },
+                period_ms,
+            };
+            let (one, other, membrane_ms) = (exponent(-1.5, 2.0), exponent(-1.5, 2.0), exponent(-1.5, 1.5));
+            let [spikes, left_out] = if round % 2 == 0 {
+                let [onset, loss] = [rng.random_range(0.0..3.0), rng.random_range(0.0..1.0)];
+                holds(&Slow::new([onset, one], [loss, other], membrane_ms, period_ms), firing, &mut rng)
+            } else {
+                let fa2 = Fa2 { corner_ms: one, membrane_ms, period_ms, ..Fa2::default() };
+                holds(&fa2.filter(), firing, &mut rng)
+            };
+            seen[round % 2][0] += spikes;
+            seen[round % 2][1] += left_out;
+        }
+        assert!(seen.as_flattened().iter().all(|&n| n > 1000), "{seen:?}");
     }
 }

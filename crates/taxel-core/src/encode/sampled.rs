@@ -5,6 +5,7 @@
 
 use super::periods::micros;
 use super::stream::Stream;
+use super::tare::Tare;
 use crate::events::FARTHEST_BACK_US;
 use crate::spikes::{ms, us};
 use crate::vectors::{fetch, wide};
@@ -132,8 +133,9 @@ impl Channels {
         usize::from(self.rows) * usize::from(self.columns)
     }
 
-    pub(super) fn of(&self, x: u16, y: u16) -> Option<usize> {
-        self.of_place(usize::from(y) * usize::from(self.columns) + usize::from(x))
+    /// The place of a column and a row.
+    fn place(&self, x: u16, y: u16) -> usize {
+        usize::from(y) * usize::from(self.columns) + usize::from(x)
     }
 
     /// The channel of a place; `None` where no taxel exists.
@@ -270,6 +272,24 @@ pub(super) struct Sampled<R> {
     last: i64,
     begun: bool,
     steady: bool,
+    above: Option<Above>,
+}
+
+/// What stands above rest, for a rule that feels held pressure: 0 where a taxel reads less, or where its rest is not known.
+#[derive(Clone)]
+struct Above {
+    /// Of each place; infinite where it is not known.
+    rests: Vec<f64>,
+    /// What each place reads.
+    read: Vec<f32>,
+    /// A picture of what stands above.
+    picture: Vec<f32>,
+}
+
+impl Above {
+    fn of(&self, place: usize) -> f32 {
+        (f64::from(self.read[place]) - self.rests[place]).max(0.0) as f32
+    }
 }
 
 impl<R: Rule> Sampled<R> {
@@ -289,7 +309,17 @@ impl<R: Rule> Sampled<R> {
             last: 0,
             begun: false,
             steady: false,
+            above: None,
         })
+    }
+
+    /// The rule is told what stands above rest, where there is a tare.
+    pub(super) fn above(mut self, tare: Option<&Tare>, array: &Array) -> Result<Self> {
+        if let Some(tare) = tare {
+            let blank = vec![0.0; array.len()];
+            self.above = Some(Above { rests: tare.rests(array)?, read: blank.clone(), picture: blank });
+        }
+        Ok(self)
     }
 
     /// Frames must come at the period, give or take half of it.
@@ -362,10 +392,16 @@ impl<R: Rule> Stream for Sampled<R> {
                     self.sample_until(present, out);
                 }
             }
+            let place = self.channels.place(events.x[k], events.y[k]);
             if intensity.present[k]
-                && let Some(channel) = self.channels.of(events.x[k], events.y[k])
+                && let Some(channel) = self.channels.of_place(place)
             {
-                let (held, value) = (&mut self.held[channel / BLOCK][channel % BLOCK], f32::from(intensity.ticks[k]));
+                let read = f32::from(intensity.ticks[k]);
+                let value = self.above.as_mut().map_or(read, |above| {
+                    above.read[place] = read;
+                    above.of(place)
+                });
+                let held = &mut self.held[channel / BLOCK][channel % BLOCK];
                 if self.begun && events.is_repaired(k) {
                     self.rule.repair(channel, *held, value);
                 }
@@ -394,12 +430,18 @@ impl<R: Rule> Stream for Sampled<R> {
             pass(&mut self.rule, t, out);
         }
         self.rule.set_rest(channel, rest);
+        if let Some(above) = &mut self.above {
+            above.rests[place] = rest;
+            self.held[channel / BLOCK][channel % BLOCK] = above.of(place);
+        }
         self.changed[channel / BLOCK] = true;
         self.quiet = false;
     }
 
     fn rest(&self, place: usize) -> Option<f64> {
-        self.channels.of_place(place).and_then(|channel| self.rule.rest(channel))
+        let channel = self.channels.of_place(place)?;
+        let above = self.above.as_ref().map(|above| above.rests[place]).filter(|rest| rest.is_finite());
+        above.or_else(|| self.rule.rest(channel))
     }
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
@@ -408,6 +450,17 @@ impl<R: Rule> Stream for Sampled<R> {
             let (since, period) = (ms(t - self.last), ms(self.period));
             return Err(problem!("frame at {t} us, {since} ms after the last: must come every period_ms, {period}"));
         }
+        let values = match &mut self.above {
+            Some(above) if values.len() == above.read.len() => {
+                above.read.copy_from_slice(values);
+                for (place, &read) in values.iter().enumerate() {
+                    // What is not finite stays so, and is refused.
+                    above.picture[place] = if read.is_finite() { above.of(place) } else { read };
+                }
+                &above.picture
+            }
+            _ => values,
+        };
         self.channels.load(t, values, &mut self.held, &mut self.changed)?;
         self.sample(t, out);
         Ok(())

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::fa1::{self, Decay, Fa1};
 use super::fa2::{Fa2, Fast};
+use super::fields::Fields;
 use super::law::Law;
 use super::receptor::ByTaxel;
 use super::sa1::Sa1;
@@ -13,6 +14,7 @@ use super::sa2::Sa2;
 use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
 use super::slow::Slow;
 use super::stream::{Stream, sort_from};
+use super::tare::Tare;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
 use crate::{Array, Result, Spike, problem};
@@ -53,6 +55,10 @@ pub struct Skin {
     pub seed: u64,
     /// How often events are sampled, ms, at most 1; frames must come at it, give or take half.
     pub period_ms: f64,
+    /// The taxels' rest, from which pressure counts; from 0 where there is none. It belongs to a board and a day: a saved
+    /// readout has none and is given one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tare: Option<Tare>,
 }
 
 impl Default for Skin {
@@ -69,6 +75,7 @@ impl Default for Skin {
             range: 150.0,
             seed: 1,
             period_ms: 0.2,
+            tare: None,
         }
     }
 }
@@ -189,16 +196,18 @@ fn places(array: &Array) -> Vec<[f64; 2]> {
 
 impl Law for Skin {
     fn described() -> Described {
-        Described::by(&Self::default(), &[], Self::RANGES)
+        Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
     }
 
     fn check(&self) -> Result<()> {
-        self.check_ranges()
+        self.check_ranges()?;
+        self.tare.as_ref().map_or(Ok(()), Tare::check)
     }
 
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
         let placed = self.afferents(array)?;
-        Ok(Box::new(Sampled::new(Afferents::new(self, array, &placed), array, self.period_ms, 0.0)?.steady()))
+        let sampled = Sampled::new(Afferents::new(self, array, &placed), array, self.period_ms, 0.0)?;
+        Ok(Box::new(sampled.steady().above(self.tare.as_ref(), array)?))
     }
 
     fn trains(&self, array: &Array) -> usize {
@@ -208,6 +217,45 @@ impl Law for Skin {
     fn signed(&self) -> bool {
         false
     }
+
+    fn set_tare(&mut self, tare: &Tare) {
+        self.tare = Some(tare.clone());
+    }
+}
+
+/// The channels that each afferent feels, with their weights.
+fn felt(array: &Array, placed: &[&Placed], field_mm2: f64) -> Vec<Vec<(u32, f32)>> {
+    let taxels = places(array);
+    let (pitch, edge) = (array.pitch_mm, (field_mm2 / std::f64::consts::PI).sqrt());
+    // Rows of the array are runs of channels: a field is looked for only in those that it can reach.
+    let rows: Vec<usize> =
+        (0..=usize::from(array.rows)).map(|row| taxels.partition_point(|at| at[1] < row as f64)).collect();
+    let of = |at: &&Placed| {
+        let (x, y) = (at.x_mm / pitch, at.y_mm / pitch);
+        let reach = edge / pitch;
+        let row = |y: f64| (y.max(0.0) as usize).min(rows.len() - 1);
+        let near = rows[row((y - reach).ceil())]..rows[row((y + reach).floor() + 1.0)];
+        let (mut field, mut sum) = (vec![], 0.0);
+        for channel in near {
+            let [column, line] = taxels[channel];
+            let away = ((column - x).powi(2) + (line - y).powi(2)) * pitch * pitch;
+            if away <= edge * edge {
+                // The edge is the second standard deviation.
+                let weight = (-2.0 * away / (edge * edge)).exp();
+                field.push((channel as u32, weight as f32));
+                sum += weight;
+            }
+        }
+        if field.is_empty() {
+            let on = [x.round(), y.round()];
+            let channel = taxels.iter().position(|taxel| *taxel == on).unwrap_or(0);
+            field.push((channel as u32, 1.0));
+            sum = 1.0;
+        }
+        field.iter_mut().for_each(|(_, weight)| *weight /= sum as f32);
+        field
+    };
+    placed.iter().map(of).collect()
 }
 
 /// The afferents of one type with their fields.
@@ -216,12 +264,7 @@ struct Type<R> {
     rule: R,
     /// Number of its first train.
     first: usize,
-    /// Where in `felt` each afferent's field begins, and where the last one's ends.
-    fields: Vec<usize>,
-    /// Channels with their weights, field by field.
-    felt: Vec<(u32, f32)>,
-    /// The blocks of channels that each block of afferents feels, from one to before another.
-    feels: Vec<[usize; 2]>,
+    fields: Fields,
     /// What each afferent feels.
     held: Vec<Block>,
     changed: Vec<bool>,
@@ -229,71 +272,17 @@ struct Type<R> {
 
 impl<R: Rule> Type<R> {
     fn new(rule: R, array: &Array, first: usize, placed: &[&Placed], field_mm2: f64) -> Self {
-        let taxels = places(array);
-        let (pitch, edge) = (array.pitch_mm, (field_mm2 / std::f64::consts::PI).sqrt());
-        // Rows of the array are runs of channels: a field is looked for only in those that it can reach.
-        let rows: Vec<usize> =
-            (0..=usize::from(array.rows)).map(|row| taxels.partition_point(|at| at[1] < row as f64)).collect();
-        let (mut fields, mut felt) = (vec![0], vec![]);
-        for at in placed {
-            let (x, y) = (at.x_mm / pitch, at.y_mm / pitch);
-            let reach = edge / pitch;
-            let row = |y: f64| (y.max(0.0) as usize).min(rows.len() - 1);
-            let near = rows[row((y - reach).ceil())]..rows[row((y + reach).floor() + 1.0)];
-            let from = felt.len();
-            let mut sum = 0.0;
-            for channel in near {
-                let [column, line] = taxels[channel];
-                let away = ((column - x).powi(2) + (line - y).powi(2)) * pitch * pitch;
-                if away <= edge * edge {
-                    // The edge is the second standard deviation.
-                    let weight = (-2.0 * away / (edge * edge)).exp();
-                    felt.push((channel as u32, weight as f32));
-                    sum += weight;
-                }
-            }
-            if felt.len() == from {
-                let on = [x.round(), y.round()];
-                let channel = taxels.iter().position(|taxel| *taxel == on).unwrap_or(0);
-                felt.push((channel as u32, 1.0));
-                sum = 1.0;
-            }
-            felt[from..].iter_mut().for_each(|(_, weight)| *weight /= sum as f32);
-            fields.push(felt.len());
-        }
-        let feels = (0..blocks(placed.len()))
-            .map(|block| {
-                let of = fields[block * BLOCK]..fields[placed.len().min((block + 1) * BLOCK)];
-                let channels = felt[of].iter().map(|&(channel, _)| channel as usize / BLOCK);
-                [channels.clone().min().unwrap_or(0), channels.max().unwrap_or(0) + 1]
-            })
-            .collect();
+        let fields = Fields::new(&felt(array, placed, field_mm2), Channels::new(array).len());
         let n = blocks(placed.len());
-        Self { rule, first, fields, felt, feels, held: vec![[0.0; BLOCK]; n], changed: vec![true; n] }
-    }
-
-    fn len(&self) -> usize {
-        self.fields.len() - 1
-    }
-
-    /// What an afferent feels of these pressures.
-    #[inline(always)]
-    fn feel(&self, afferent: usize, held: &[Block]) -> f32 {
-        self.felt[self.fields[afferent]..self.fields[afferent + 1]]
-            .iter()
-            .map(|&(channel, weight)| held[channel as usize / BLOCK][channel as usize % BLOCK] * weight)
-            .sum()
+        Self { rule, first, fields, held: vec![[0.0; BLOCK]; n], changed: vec![true; n] }
     }
 
     #[inline(always)]
     fn take(&mut self, held: &[Block], changed: &[bool]) {
-        for block in 0..self.held.len() {
-            let [from, to] = self.feels[block];
-            self.changed[block] = changed[from..to].contains(&true);
+        for (block, felt) in self.held.iter_mut().enumerate() {
+            self.changed[block] = self.fields.any(block, changed);
             if self.changed[block] {
-                for afferent in block * BLOCK..self.len().min((block + 1) * BLOCK) {
-                    self.held[block][afferent % BLOCK] = self.feel(afferent, held);
-                }
+                *felt = self.fields.feel(block, held);
             }
         }
     }
@@ -320,17 +309,11 @@ impl<R: Rule> Type<R> {
         if R::HEARS_REPAIRED {
             return;
         }
-        let block = channel / BLOCK;
-        for afferents in (0..self.held.len()).filter(|&b| (self.feels[b][0]..self.feels[b][1]).contains(&block)) {
-            for afferent in afferents * BLOCK..self.len().min((afferents + 1) * BLOCK) {
-                let field = &self.felt[self.fields[afferent]..self.fields[afferent + 1]];
-                if let Some(&(_, weight)) = field.iter().find(|&&(felt, _)| felt as usize == channel) {
-                    let before = self.held[afferents][afferent % BLOCK];
-                    let now = before + weight * (to - from);
-                    self.rule.repair(afferent, before, now);
-                    self.held[afferents][afferent % BLOCK] = now;
-                }
-            }
+        for (afferent, weight) in self.fields.feeling(channel) {
+            let felt = &mut self.held[afferent / BLOCK][afferent % BLOCK];
+            let before = *felt;
+            *felt += weight * (to - from);
+            self.rule.repair(afferent, before, *felt);
         }
     }
 }

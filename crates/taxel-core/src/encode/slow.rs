@@ -1,7 +1,6 @@
 //! The filter of slowly adapting afferents, and how SA-1 and SA-2 are declared by it.
 
 use super::receptor::{Filter, Lanes, LowPass};
-use super::sampled::BLOCK;
 
 /// `u = lowpass((1 + onset) x - onset y - loss z)`: pressure x, what it was within the last `onset_ms` (y) and within the
 /// last `loss_ms` (z), all low passes; the outer one has `membrane_ms`.
@@ -45,25 +44,22 @@ impl Filter for Slow {
     }
 
     #[inline(always)]
-    fn step(&self, state: &mut SlowState, x: &Lanes, u: &mut Lanes) -> bool {
-        let mut moved = 0;
-        for lane in 0..BLOCK {
-            let (before, now) = (state.x[lane], x[lane]);
-            let recent = self.recent.step(state.recent[lane], before, now);
-            let long = self.long.step(state.long[lane], before, now);
-            let drive = (1.0 + self.onset) * now - self.onset * recent - self.loss * long;
-            let potential = self.membrane.step(u[lane], state.drive[lane], drive);
-            moved |= (before.to_bits() ^ now.to_bits())
-                | (state.recent[lane].to_bits() ^ recent.to_bits())
-                | (state.long[lane].to_bits() ^ long.to_bits())
-                | (u[lane].to_bits() ^ potential.to_bits());
-            state.x[lane] = now;
-            state.recent[lane] = recent;
-            state.long[lane] = long;
-            state.drive[lane] = drive;
-            u[lane] = potential;
+    fn step<const SEE: bool>(&self, state: &mut SlowState, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64 {
+        let (before, last, lost) = (state.x[lane], state.recent[lane], state.long[lane]);
+        let recent = self.recent.step(last, before, x);
+        let long = self.long.step(lost, before, x);
+        if SEE {
+            *moved |= (before.to_bits() ^ x.to_bits())
+                | (last.to_bits() ^ recent.to_bits())
+                | (lost.to_bits() ^ long.to_bits());
         }
-        moved != 0
+        let drive = (1.0 + self.onset) * x - self.onset * recent - self.loss * long;
+        let potential = self.membrane.step(u, state.drive[lane], drive);
+        state.x[lane] = x;
+        state.recent[lane] = recent;
+        state.long[lane] = long;
+        state.drive[lane] = drive;
+        potential
     }
 }
 
@@ -75,6 +71,7 @@ macro_rules! slowly_adapting {
         use super::sampled::{Channels, Sampled};
         use super::slow::Slow;
         use super::stream::Stream;
+        use super::tare::Tare;
         use $crate::allowed::{Range, ranges};
         use $crate::parameters::Described;
         use $crate::{Array, Result};
@@ -105,6 +102,10 @@ macro_rules! slowly_adapting {
             pub refractory_ms: f64,
             /// How often events are sampled, ms; frames must come at it, give or take half.
             pub period_ms: f64,
+            /// The taxels' rest, from which pressure counts; from 0 where there is none. It belongs to a board and a day: a
+            /// saved readout has none and is given one.
+            #[serde(skip_serializing_if = "Option::is_none")]
+            pub tare: Option<Tare>,
         }
 
         impl Default for $Kind {
@@ -121,6 +122,7 @@ macro_rules! slowly_adapting {
                     recovery_ms: 30.0,
                     refractory_ms: 2.0,
                     period_ms: 1.0,
+                    tare: None,
                 }
             }
         }
@@ -162,21 +164,27 @@ macro_rules! slowly_adapting {
 
         impl Law for $Kind {
             fn described() -> Described {
-                Described::by(&Self::default(), &[], Self::RANGES)
+                Described::by(&Self::default(), &[], Self::RANGES).or_nothing("tare")
             }
 
             fn check(&self) -> Result<()> {
-                self.check_ranges()
+                self.check_ranges()?;
+                self.tare.as_ref().map_or(Ok(()), Tare::check)
             }
 
             fn stream(&self, array: &Array) -> Result<Box<dyn Stream>> {
                 let channels = Channels::new(array).len();
                 let afferents = ByTaxel::new(self.filter(), self.firing(), self.range, channels);
-                Ok(Box::new(Sampled::new(afferents, array, self.period_ms, 0.0)?.steady()))
+                let sampled = Sampled::new(afferents, array, self.period_ms, 0.0)?;
+                Ok(Box::new(sampled.steady().above(self.tare.as_ref(), array)?))
             }
 
             fn signed(&self) -> bool {
                 false
+            }
+
+            fn set_tare(&mut self, tare: &Tare) {
+                self.tare = Some(tare.clone());
             }
         }
     };

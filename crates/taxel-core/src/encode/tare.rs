@@ -47,6 +47,27 @@ impl Tare {
         }
     }
 
+    /// What each place of an array rests at; infinite where no taxel exists or its rest is not known.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where the tare is of an array of another shape.
+    pub(super) fn rests(&self, array: &Array) -> Result<Vec<f64>> {
+        let (of, to) = (&self.array, array);
+        if (of.rows, of.columns) != (to.rows, to.columns) {
+            return Err(problem!(
+                "tare of {} x {} taxels: the array has {} x {}",
+                of.rows,
+                of.columns,
+                to.rows,
+                to.columns
+            ));
+        }
+        let exists = |place: usize| array.exists.as_ref().is_none_or(|exists| exists[place]);
+        let of_place = |(place, rest): (usize, &Option<f64>)| rest.filter(|_| exists(place)).unwrap_or(f64::INFINITY);
+        Ok(self.rest.iter().enumerate().map(of_place).collect())
+    }
+
     /// Takes a tare from events in order of time: of `start` to `stop` us, or of all of them.
     ///
     /// # Errors
