@@ -62,10 +62,17 @@ fn circuit_volts<'py>(
     let (lines, (rows, columns)) = (Lines::of(kind, json)?, shape);
     let frames = slice("conductance", &conductance_us)?;
     let out = enter(py, |stop| -> Result<Vec<f64>> {
-        let mut out = Vec::with_capacity(frames.len());
+        let mut out = vec![];
         for frame in frames.chunks((rows * columns).max(1)) {
             stop.check()?;
-            out.extend(lines.volts(rows, columns, frame, stop)?);
+            let volts = lines.volts(rows, columns, frame, stop)?;
+            if out.is_empty() {
+                // One frame alone is handed on as it is.
+                out = volts;
+                out.reserve_exact(frames.len() - out.len());
+            } else {
+                out.extend(volts);
+            }
         }
         Ok(out)
     })?;

@@ -38,6 +38,14 @@ impl Matrix {
         }
     }
 
+    /// Writes a column, from its first row on.
+    pub(super) fn set_column(&mut self, column: usize, values: impl Iterator<Item = f64>) {
+        let from = column / LANES * self.rows;
+        for (lanes, value) in self.lanes[from..from + self.rows].iter_mut().zip(values) {
+            lanes[column % LANES] = value;
+        }
+    }
+
     /// Reads a row, from its first column on.
     pub(super) fn copy_row(&self, row: usize, values: &mut [f64]) {
         for (block, values) in values.chunks_mut(LANES).enumerate() {

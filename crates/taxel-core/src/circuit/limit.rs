@@ -52,7 +52,8 @@ impl Limit {
             [least, _] if current < least - 1e-12 * least.abs() => End::Least,
             _ => End::Within,
         };
-        if (0..currents.len()).all(|at| past(at / columns, currents[at]) == End::Within) {
+        let within = |(row, own): (usize, &[f64])| own.iter().all(|&current| past(row, current) == End::Within);
+        if currents.chunks_exact(columns.max(1)).enumerate().all(within) {
             return Ok(());
         }
         let response = response()?;

@@ -121,12 +121,14 @@ impl VirtualGround {
         let mut normal = || -> f64 { StandardNormal.sample(&mut draw) };
         let offsets = (0..rows).map(|_| 1e-3 * self.offset_mv * normal());
         let source: Vec<f64> = offsets.map(|offset| offset * (1.0 - share) - self.v_trans * share).collect();
-        let currents = grid.currents_ua(conductance_us, -self.v_trans, &source, stop)?;
-        let volts = currents.iter().enumerate().map(|(k, current)| {
-            let volts = self.v_trans + source[k / columns] + 1e-6 * (feedback_ohm - grid.sense_ohm) * current;
-            volts.clamp(0.0, self.rail_v)
-        });
-        Ok(volts.collect())
+        let mut volts = grid.currents_ua(conductance_us, -self.v_trans, &source, stop)?;
+        let per_ua = 1e-6 * (feedback_ohm - grid.sense_ohm);
+        for (row, source) in volts.chunks_exact_mut(columns.max(1)).zip(&source) {
+            for volts in row {
+                *volts = (self.v_trans + source + per_ua * *volts).clamp(0.0, self.rail_v);
+            }
+        }
+        Ok(volts)
     }
 }
 
