@@ -319,3 +319,61 @@ def test_recordings_show_their_own_period():
         for t in ([200, 400, 1000], [800])
     ]
     assert finest_us(stamps) == 200
+
+
+def pulsed(touches):
+    """Make trials of (label, group, ((ms, taxel), ...)): each taxel is touched there, for 3 ms."""
+    changes, rows = [], []
+    for k, (label, group, pulses) in enumerate(touches):
+        begin = 100_000 + 200_000 * k
+        rows.append((label, group, begin - 500))
+        for ms, taxel_ in pulses:
+            at = begin + round(1000 * ms)
+            changes += [(at, taxel_, 100), (at + 3000, taxel_, 0)]
+    t, x, level = (np.array(column) for column in zip(*sorted(changes), strict=True))
+    events = taxel.Events(t, x, np.zeros(len(t), int), level > 0, array=taxel.Array(1, 16), intensity=level)
+    return [LabelledTrial(events, label, start, stop_us=start + 60_000, group=group) for label, group, start in rows]
+
+
+def asked(trials, **what):
+    few = {"periods_ms": [1, 5], "windows_ms": [20], "taxels": [3], "pools": [], "draws": 1, "shuffles": 19}
+    return answer(trials, **(few | what))
+
+
+def test_bits_that_shuffled_labels_reach_are_told_from_nothing_nowhere():
+    # A taxel a session and mostly one label a session: what is left out is unlike all else, and is taken for the label
+    # that more of the other sessions have. Its answers are wrong nine times in ten, which a confusion matrix counts as
+    # much as right ones.
+    random = np.random.default_rng(2)
+    touches = []
+    for session in range(6):
+        for _ in range(20):
+            label = "pq"[session % 2 ^ (random.random() < 0.1)]
+            touches.append((label, f"session {session}", ((0, session), (random.uniform(1, 5), 15))))
+    found = asked(pulsed(touches))
+    assert found.full.found.bits > 0.2
+    assert found.full.found.right < 0.25
+    assert found.empty
+    assert [point.verdict.says for point in (*found.by_period[1:], *found.taxels)] == ["nothing"] * 2
+    assert any(text.startswith("not told from nothing") for text in found.warnings)
+    assert any("guessing gives 50 %" in text for text in found.warnings)
+
+
+def test_a_control_that_tells_as_much_is_warned_of():
+    random = np.random.default_rng(3)
+    touches = [
+        (["three", "five"][k % 2], "", tuple((8 * j + random.uniform(0, 4), 0) for j in range(3 + 2 * (k % 2))))
+        for k in range(80)
+    ]
+    warnings = asked(pulsed(touches), taxels=[]).warnings
+    assert [text for text in warnings if text.startswith("event count alone tells")]
+    assert not [text for text in warnings if text.startswith(("before contact", "length", "not told"))]
+
+
+def test_what_is_told_plainly_bears_no_warning():
+    random = np.random.default_rng(4)
+    touches = [(f"taxel {k % 2}", "", ((0, k % 2), (random.uniform(1, 9), 7))) for k in range(80)]
+    found = asked(pulsed(touches), taxels=[])
+    assert found.full.found.bits == 1.0
+    assert found.warnings == ()
+    assert str(found.zero).endswith("0 of 19 reach what was found")

@@ -250,3 +250,34 @@ def test_a_recording_that_the_table_does_not_name_is_said(tmp_path):
         recording, tmp_path / "forgotten.npz", "--labels", labels, "--window-ms", "20", "--report", tmp_path / "p.html"
     )
     assert "says nothing of" in str(done.exception)
+
+
+def test_a_label_that_tables_write_for_what_is_missing_is_refused(tmp_path):
+    recording, labels = folder(tmp_path, 20)
+    labels.write_text(labels.read_text().replace("left first", "NaN"))
+    done = run(recording, "--labels", labels, *QUICK, "--report", tmp_path / "page.html")
+    assert "line 3: label is 'NaN', as tables write what is missing" in str(done.exception)
+
+
+def test_a_sensor_that_a_table_of_events_does_not_hold_is_said(tmp_path):
+    events, rows = ordered(40)
+    taxel.convert(events, tmp_path / "touches.csv")
+    labels = tmp_path / "labels.csv"
+    labels.write_text("\n".join(["t_us,label", *(f"{t},{label}" for t, label in rows)]) + "\n")
+    page = tmp_path / "page.html"
+    asked = [tmp_path / "touches.csv", "--labels", labels, *QUICK, "--pools", "2", "--report", page, "--overwrite"]
+    pooled = {}
+    for said in ((), ("--array", "4x4x5")):
+        done = run(*asked, *said, "--json")
+        assert done.exit_code == 0, done.output
+        pooled[said] = [p["taxels"] for p in json.loads(done.stdout)["taxels"] if p["kind"] == "pooled"]
+    assert list(pooled.values()) == [[32 * 32], [2 * 2]]
+
+
+def test_folders_of_labels_are_named_where_their_folder_is_given(tmp_path):
+    events, _ = ordered(4)
+    for label in ("left", "right"):
+        (tmp_path / "trials" / label).mkdir(parents=True)
+        taxel.convert(events, tmp_path / "trials" / label / "one.npz")
+    done = run(tmp_path / "trials", "--window-ms", "60", "--report", tmp_path / "page.html")
+    assert str(done.exception).endswith("trials: holds no recording; its folders left, right do: name them")

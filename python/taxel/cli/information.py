@@ -11,6 +11,7 @@ import typer
 from taxel._arguments import whole
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._array import FileArrayOption
 from taxel.cli._listening import SET_HELP, open_all, told
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ def information(
     recordings: Annotated[
         list[Path], typer.Argument(help="Recordings, or folders of them: .mcap, .lsa, .npz, .csv, other makers' files.")
     ],
+    array: FileArrayOption = None,
     labels: Annotated[
         Path | None,
         typer.Option(
@@ -67,7 +69,7 @@ def information(
         opened = []
         for path in recordings:
             tell(f"reading {path}")
-            opened += open_all([path])
+            opened += open_all([path], array)
         trials = (
             recordings_as_trials(opened, window_ms=window_ms)
             if labels is None
@@ -121,17 +123,17 @@ def lines(found: Answer) -> list[str]:
     sizes = sorted(set(found.labels.values()))
     each = f"{sizes[0]}" if len(sizes) == 1 else f"{sizes[0]} to {sizes[-1]}"
     groups = f"{found.groups} groups" if found.groups else "no groups"
-    zero = found.zero
     full = found.full
     said = [
-        f"{sum(found.labels.values())} trials, {len(found.labels)} labels x {each}, {groups}; labels shuffled: 95 % "
-        f"below {zero.level:.2f} bits, p {zero.p:.2f}",
+        f"{sum(found.labels.values())} trials, {len(found.labels)} labels x {each}, {groups}",
+        f"labels shuffled: {found.zero}",
         "controls: " + " | ".join(f"{c.name} {_bits(c.found)} ({c.about})" for c in found.controls),
-        f"full: {full.period_ms:g} ms, {full.taxels} taxels, to {full.window_ms:g} ms {_interval(full.found)}"
+        f"full: {full.period_ms:g} ms, {full.taxels} taxels, to {full.window_ms:g} ms {_interval(full.found)}, "
+        f"{100 * full.found.right:.0f} % right"
         + "".join(f"; pictures {e.bits:.2f}" for p, e in found.frames.items() if p == full.period_ms)
         + "".join(f"; {name} {e.bits:.2f}" for name, e in found.classifiers.items()),
     ]
-    said += [f"warning: {text}" for text in full.found.warnings]
+    said += [f"warning: {text}" for text in found.warnings]
     said += ["", _row("period", "bits", "events", "mb/event", "kb/s", "silent", "95 % of the full?")]
     said += [_told(f"{p.period_ms:g} ms", p, found) for p in found.by_period]
     if found.taxels:
@@ -154,8 +156,8 @@ def lines(found: Answer) -> list[str]:
         )
     if len(found.training) > 1:
         (n, less), (most, bits) = found.training[-2:]
-        rises = "still rising with trials" if bits - less > 0.02 else "hardly rising with trials"
-        said.append(f"{rises}: {n} -> {most} training trials a label {bits - less:+.2f}: what is said is a floor")
+        rises, then = ("still", "more would tell more") if bits - less > 0.02 else ("hardly", "more would add little")
+        said.append(f"{rises} rising with trials: {n} -> {most} training trials a label {bits - less:+.2f}; {then}")
     said += [f"note: {note}" for note in found.notes]
     said.append(f"rates are of {found.wire}")
     return said

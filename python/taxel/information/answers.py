@@ -44,6 +44,8 @@ NEIGHBOURS = (1, 3, 5, 9, 15)
 SMOOTHINGS = (1.0, 0.3, 0.1, 0.03, 0.0)
 #: From so many trials on their matrices are worth more than one thread.
 _WORTH_THREADS = 1000
+#: A control that tells this share of the answer comes near it.
+_NEAR = 0.8
 #: The steps of a default series of periods or windows.
 _STEPS = (1, 2, 5)
 #: Pictures are held against events where they fit in so many values.
@@ -176,7 +178,33 @@ class Answer:
     @property
     def empty(self) -> bool:
         """Whether the full setting's bits are not above 0, so that no other has anything to keep."""
-        return any(p.verdict is not None and p.verdict.says == "nothing" for p in (*self.by_period, *self.taxels))
+        return not _is_told(self.full.found, self.zero) or any(
+            p.verdict is not None and p.verdict.says == "nothing" for p in (*self.by_period, *self.taxels)
+        )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What to know before the full setting's bits are believed: nothing told, wrong answers, a control as good."""
+        found = self.full.found
+        said = []
+        if found.bits <= self.zero.level:
+            said.append(
+                "not told from nothing: labels shuffled before training give as much "
+                f"(95 % below {self.zero.level:.2f})"
+            )
+        guessed, least = _guessing(found)
+        if found.right < least:
+            said.append(
+                f"{100 * found.right:.0f} % are named rightly, guessing gives {100 * guessed:.0f} %: the bits are "
+                "those of wrong answers" + (", as where a group has mostly one label" if self.groups else "")
+            )
+        if not self.empty:
+            said += [
+                f"{c.name} alone tells {c.found.bits:.2f} bits: the answer may be about that"
+                for c in self.controls
+                if c.found is not None and c.found.interval[0] > 0 and c.found.bits >= _NEAR * found.bits
+            ]
+        return (*said, *found.warnings)
 
     @property
     def cheapest(self) -> Point:
@@ -207,6 +235,7 @@ class Answer:
             "classifiers": {name: found.to_dict() for name, found in self.classifiers.items()},
             "parameters": {name: [p.to_dict() for p in points] for name, points in self.parameters.items()},
             "cheapest": self.cheapest.to_dict(),
+            "warnings": list(self.warnings),
             "confusion": {
                 "labels": [str(c) for c in self.full.found.classes],
                 "counts": self.full.found.counts.mean(0).round(2).tolist(),
@@ -508,13 +537,17 @@ class _Asked:
             seed=self.seed,
         )
         self._warn(missing)
+        taxels = self._by_taxels(full, values)
+        if not _is_told(full.found, zero):
+            points = [_with_nothing(p) if p.window_ms == full.window_ms else p for p in points]
+            taxels = tuple(map(_with_nothing, taxels))
         return Answer(
             labels={str(name): int(n) for name, n in zip(*np.unique(self.labels, return_counts=True), strict=True)},
             groups=0 if self.groups is None else len(np.unique(self.groups)),
             encoder=repr(self.encoder),
             full=full,
             points=tuple(points),
-            taxels=self._by_taxels(full, values),
+            taxels=taxels,
             frames={to_ms(period): self.estimate(responses) for period, responses in frames.items()},
             controls=self._controls(),
             zero=zero,
@@ -630,7 +663,7 @@ class _Asked:
         found = self.estimate(self.nested(grams, [features(spikes, length)] * len(grams)).responses)
         without = int((room < length).sum())
         about = f"{to_ms(length):g} ms before it" + (
-            f", {without} trials have less and count as silent" if without else ""
+            f", {without} of {len(room)} have less and count as silent" if without else ""
         )
         return Control("before contact", found, about)
 
@@ -692,7 +725,9 @@ class _Asked:
                 "no groups are named: what trials of one person, session or pose share counts as the label's"
             )
         runs = 1 + int(np.count_nonzero(self.labels[1:] != self.labels[:-1]))
-        if runs == len(np.unique(self.labels)) and len(self.labels) > 2 * runs:
+        # Recordings of a trial each may stand in any order.
+        ordered = len({id(one.source) for one in self.trials}) < len(self.trials)
+        if ordered and runs == len(np.unique(self.labels)) and len(self.labels) > 2 * runs:
             self.notes.append("each label's trials lie together: a drift of the sensor would count as the label's")
         if not self.ended:
             self.notes.append("trials have no end of their own: how long a touch lasts is known within the window only")
@@ -708,6 +743,23 @@ def _point(
 ) -> Point:
     events, silent, kbps = np.mean(about, axis=0)
     return Point(to_ms(period), to_ms(window), taxels, kind, found, float(events), float(silent), float(kbps), verdict)
+
+
+def _guessing(found: Estimate) -> tuple[float, float]:
+    """Return the share that guessing names rightly, and the least that chance would let it (three deviations)."""
+    trials = found.counts[0].sum(1)
+    guessed = float(((trials / trials.sum()) ** 2).sum())
+    return guessed, guessed - 3.0 * float(np.sqrt(guessed * (1 - guessed) / trials.sum()))
+
+
+def _is_told(found: Estimate, zero: ZeroTest) -> bool:
+    """Whether bits are more than shuffled labels give, and not those of answers that are wrong as a rule."""
+    return found.bits > zero.level and found.right >= _guessing(found)[1]
+
+
+def _with_nothing(point: Point) -> Point:
+    """Return a setting that is held against one whose bits are not told from nothing."""
+    return point if point.verdict is None else replace(point, verdict=replace(point.verdict, says="nothing"))
 
 
 def _series(least: float, most: float) -> list[int]:

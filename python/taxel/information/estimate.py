@@ -110,6 +110,10 @@ class ZeroTest:
     level: float
     p: float
 
+    def __str__(self) -> str:
+        n = len(self.shuffled)
+        return f"95 % below {self.level:.2f} bits; {round(self.p * (n + 1)) - 1} of {n} reach what was found"
+
 
 def estimate(
     labels: ArrayLike,

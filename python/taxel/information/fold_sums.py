@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from threadpoolctl import threadpool_limits
 
 from taxel._arguments import callback, instance, numbers, text, whole
 from taxel._core import ProblemError
@@ -15,6 +16,10 @@ from taxel.information._labels import words
 from taxel.information.lda import LDA, ClassMoments, blocks, feature_table, is_exact
 
 __all__ = ["FoldSums", "fold_predictions"]
+
+#: Features from which on threads are worth it: NumPy and SciPy bring a pool each, and while one is at work the other's
+#: threads wait busily. At 1000 features two threads take twice as long as one.
+_WORTH_THREADS = 2500
 
 
 class FoldSums:
@@ -78,16 +83,20 @@ class FoldSums:
         self._shift = None if self._dtype == np.float32 else self._table.mean(0, dtype=np.float64)
         self._kept: dict[int, ClassMoments] = {}
         total: ClassMoments | None = None
-        for k, name in enumerate(self._names):
-            one = self._summed(name)
-            total = one if total is None else total + one
-            if keep == "folds":
-                self._kept[int(name)] = one
-            del one
-            if progress is not None:
-                progress(k + 1, len(self._names))
+        with self._threads():
+            for k, name in enumerate(self._names):
+                one = self._summed(name)
+                total = one if total is None else total + one
+                if keep == "folds":
+                    self._kept[int(name)] = one
+                del one
+                if progress is not None:
+                    progress(k + 1, len(self._names))
         assert total is not None  # there are two folds at least
         self._total = total
+
+    def _threads(self) -> threadpool_limits:
+        return threadpool_limits(1 if self._table.shape[1] < _WORTH_THREADS else None)
 
     def _summed(self, name: np.int64) -> ClassMoments:
         if int(name) in self._kept:
@@ -144,15 +153,16 @@ class FoldSums:
         model.classes_ = classes
         shift = None if self._shift is None else self._shift[:used]
         found = np.empty(len(self._table), classes.dtype)
-        for k, name in enumerate(self._names):
-            training = self._total - self._summed(name)
-            if into is not None:
-                training = training.merged(into, len(classes))
-            model.from_moments(training if used == count else training.first(used), shift)
-            for block, mine in blocks(self._table[:, :used], np.flatnonzero(self.folds == name), np.float64, None):
-                found[mine] = classes[(block @ model.coef_.T + model.intercept_).argmax(1)]
-            if progress is not None:
-                progress(k + 1, len(self._names))
+        with self._threads():
+            for k, name in enumerate(self._names):
+                training = self._total - self._summed(name)
+                if into is not None:
+                    training = training.merged(into, len(classes))
+                model.from_moments(training if used == count else training.first(used), shift)
+                for block, mine in blocks(self._table[:, :used], np.flatnonzero(self.folds == name), np.float64, None):
+                    found[mine] = classes[(block @ model.coef_.T + model.intercept_).argmax(1)]
+                if progress is not None:
+                    progress(k + 1, len(self._names))
         return found
 
 

@@ -143,6 +143,8 @@ def read_trials(
             raise ProblemError(f"{where}: has no stop_us; give it, or the trials' length by --window-ms")
         if not row["label"]:
             raise FormatError(f"{where}: label is empty")
+        if row["label"].lower() == "nan":
+            raise FormatError(f"{where}: label is {row['label']!r}, as tables write what is missing; name it otherwise")
         more = {name: cell for name, cell in row.items() if name not in _KNOWN}
         found.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
         end = start + round(to_us(window_ms or 0.0)) if stop is None else stop
