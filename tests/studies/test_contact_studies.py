@@ -136,7 +136,7 @@ def test_alpha_is_searched_at_long_periods_then_around_the_best_at_short_ones(tm
     assert len(search) == 13 * 4
     assert {t.params["alpha"] for t in short} == {0.3, 0.4, 0.5, 0.7}
     assert {t.params["period_ms"] for t in short} == {0.5, 1.0}
-    assert sorted(t.params["ask"] for t in last) == ["bits"] * 6 + ["detail"] * 6
+    assert sorted(t.params["ask"] for t in last) == ["bits"] * 6 + ["detail"] * 6 + ["part"]
     assert {t.params["alpha"] for t in last} == {0.4}
 
 
@@ -158,6 +158,17 @@ def test_fig5_7_with_one_bit_an_event_is_fig5_5(courses):
     for period, task in mine.items():
         other = theirs[period]
         assert fig5_7.realise(task.params, task.seed, courses) == fig5_5.realise(other.params, other.seed, courses)
+
+
+def test_the_beginning_of_a_contact_is_told_as_of_the_whole_one(courses):
+    """Sampled until 20 ms only, or all along and looked at until then: bits are the same."""
+    p = fig5_5.STUDY.set("toy")
+    shared = indented.shared(p, rows_of(fig5_5.STUDY, p, courses))
+    asked = {**shared, "period_ms": 5.0, "alpha": 0.7, "even_ms": 0.0, "samples": 12, "times_ms": [10.0, 20.0]}
+    whole = fig5_5.realise({**asked, "ask": "detail"}, 1, courses)
+    part = fig5_5.realise({**asked, "ask": "part", "until_ms": 20.0}, 1, courses)
+    assert part["times"] == whole["times"]
+    assert part["times"][-1][1] > 0.5
 
 
 def test_contact_choices_begins_with_fig5_5_and_every_choice_changes_something(courses):

@@ -24,7 +24,7 @@ __all__ = ["STUDY"]
 PARAMETERS: dict[str, Any] = {
     **indented.TABLE,
     "samples": 500,
-    "periods_ms": [1.0, 2.0, 5.0, 10.0, 20.0],
+    "periods_ms": [0.5, 1.0, 2.0, 5.0, 10.0, 20.0],
     "event_bits": [1, 2, 4, 6, 8, 10],
     "alpha": 0.7,
     "seed": 1,

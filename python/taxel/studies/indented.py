@@ -101,10 +101,14 @@ def rasters(
     encoder: FA1,
     samples: int,
     seed: int,
+    until_ms: float | None = None,
 ) -> NDArray[np.int8] | NDArray[np.int16]:
-    """Return what the afferents say of each condition's samples, (conditions * samples, steps * taxels), by step."""
+    """Return what the afferents say of each condition's samples, (conditions * samples, steps * taxels), by step.
+
+    Of the whole contact, or of its beginning until a time.
+    """
     kept = KeptCourses(courses)
-    steps = grid.steps(encoder.period_ms)
+    steps = grid.steps(encoder.period_ms) if until_ms is None else round(until_ms / encoder.period_ms)
     found = np.zeros((len(conditions), samples, steps, grid.taxels), np.int8 if encoder.bits < 8 else np.int16)
     t = np.round(np.arange(steps + 1) * encoder.period_ms * 1000).astype(np.int64)
     loaded: dict[tuple[float, float, float], Course] = {}
@@ -113,6 +117,7 @@ def rasters(
         if way not in loaded:
             loaded[way] = kept.made(asked[way])
         values = grid.draw(loaded[way], c.depth_mm, encoder.period_ms, samples, seed=seed * len(conditions) + k)
+        values = values[:, : steps + 1]
         spikes = encoder.encode(Frames(values.transpose(1, 0, 2), t, unit="kPa"))
         assert spikes.values is not None  # FA-1's spikes have signs
         train = np.repeat(np.arange(len(spikes)), np.diff(spikes.offsets))

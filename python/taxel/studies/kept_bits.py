@@ -33,7 +33,7 @@ def by_period_parameter_and_time(
 
     Parameters
     ----------
-    said : what a study found
+    said : what a study found; what was sampled in part (``said["part"]``) is in the third
     figures : the thesis' numbers of the three
     curves : of the first figure, what each curve of bits is called
     named : of the second, what each parameter is called
@@ -57,7 +57,7 @@ def by_period_parameter_and_time(
             for name in lines[0]["by"]:
                 ax.plot(periods, shares(lines, name), "o-", label=named[name])
         else:
-            for line in lines:
+            for line in (*([said["part"]] if "part" in said else []), *lines):
                 ax.plot(*zip(*line["times"], strict=True), ".-", label=f"{line['period_ms']:g} ms")
         logarithmic(ax, x=times_ms if k == 2 else periods)
         ax.set_xlabel(f"ms since {since}" if k == 2 else "sampling period, ms")
