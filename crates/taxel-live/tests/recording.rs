@@ -129,6 +129,18 @@ fn a_file_cut_anywhere_gives_its_whole_chunks() {
     assert_eq!(before, 2000);
 }
 
+/// The first chunk: its place and the size of what it holds, packed; where chunks end hangs on the writer's clock.
+fn first_chunk(file: &[u8]) -> (usize, usize) {
+    // By the lengths that agree: opcode 6, and the record's length less the packed size is 40 without a name.
+    (5000..file.len())
+        .find_map(|k| {
+            let word = |at: usize| Some(u64::from_le_bytes(file.get(at..at + 8)?.try_into().unwrap()));
+            let (length, packed) = (word(k + 1)?, word(k + 41)?);
+            (file[k] == 6 && length > 1000 && packed + 40 == length).then(|| (k, usize::try_from(packed).unwrap()))
+        })
+        .unwrap()
+}
+
 #[test]
 fn a_damaged_chunk_is_skipped_and_counted() {
     let folder = Folder::new("damage");
@@ -136,8 +148,8 @@ fn a_damaged_chunk_is_skipped_and_counted() {
     record(&path, 3000, Compression::None);
     let mut bytes = std::fs::read(&path).unwrap();
     let (all, _) = datagrams(&Reader::open(&path).unwrap());
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 0x40;
+    let (chunk, packed) = first_chunk(&bytes);
+    bytes[chunk + 49 + packed / 2] ^= 0x40;
     std::fs::write(&path, &bytes).unwrap();
     let (left, bad) = datagrams(&Reader::open(&path).unwrap());
     assert_eq!(bad, 1);
@@ -146,18 +158,37 @@ fn a_damaged_chunk_is_skipped_and_counted() {
 }
 
 #[test]
+fn a_byte_damaged_anywhere_loses_nothing_unsaid() {
+    let folder = Folder::new("anywhere");
+    let path = folder.0.join("whole.mcap");
+    record(&path, 3000, Compression::None);
+    let whole = std::fs::read(&path).unwrap();
+    let (all, _) = datagrams(&Reader::open(&path).unwrap());
+    for k in 0..60 {
+        // Over the whole file, and byte by byte through what follows the last chunk: indices and the summary.
+        let place = if k % 2 == 0 { whole.len() * k / 60 } else { whole.len() - 1 - 7 * k };
+        let mut bytes = whole.clone();
+        bytes[place] ^= 0x40;
+        std::fs::write(&path, &bytes).unwrap();
+        let Ok(reader) = Reader::open(&path) else {
+            assert!(place < 2000, "nothing read for byte {place}");
+            continue;
+        };
+        let (left, bad) = datagrams(&reader);
+        let counted = reader.rebuilt().gaps + reader.rebuilt().large_chunks + bad;
+        assert!(left.len() == all.len() || counted > 0, "byte {place}: {} of {} unsaid", left.len(), all.len());
+        let mut rest = all.iter();
+        assert!(left.iter().all(|d| rest.any(|other| other == d)), "byte {place}: not what was written");
+    }
+}
+
+#[test]
 fn a_damaged_length_loses_no_more_than_its_chunk() {
     let folder = Folder::new("length");
     let path = folder.0.join("whole.mcap");
     record(&path, 3000, Compression::None);
     let whole = std::fs::read(&path).unwrap();
-    // Chunks by the lengths that agree: opcode 6, and the record's length less the packed size is 40 without a name.
-    let chunk = (5000..whole.len())
-        .find(|&k| {
-            let word = |at: usize| whole.get(at..at + 8).map(|b| u64::from_le_bytes(b.try_into().unwrap()));
-            whole[k] == 6 && word(k + 1).is_some_and(|n| n > 1000 && word(k + 41).is_some_and(|m| m + 40 == n))
-        })
-        .unwrap();
+    let (chunk, _) = first_chunk(&whole);
     let opcodes = (0..8).map(|bit| (chunk, 1 << bit));
     for (place, flip) in opcodes.chain([(chunk + 3, 1), (chunk + 8, 0x80), (chunk + 30, 0xFF), (chunk + 37, 2)]) {
         let mut bytes = whole.clone();
