@@ -23,7 +23,6 @@ def run(*, quick: bool) -> dict[str, Any]:
             data=None,
             readout=None,
             folder=Path(place) / "demo",
-            result=None,
         )
     ratios = {}
     for touch in ("first impact", "bounce, 0.4 m/s and more"):

@@ -589,7 +589,7 @@ SOUND: dict[str, Sound] = {
     "taxel.live.Source.push": method(
         taxel.live.Source(ARRAY, 100.0, to="127.0.0.1:9"), "push", frame=np.zeros((4, 4), np.int64)
     ),
-    "taxel.wire_v2.decode": plain(taxel.wire_v2.decode, data=b"", array=ARRAY),
+    "taxel.wire_v2.decode": plain(taxel.wire_v2.decode, data=b"", array=ARRAY, columns=taxel.wire.Columns(100)),
     "taxel.wire.described": plain(taxel.wire.described, registers=REGISTERS),
     "taxel.wire.Registers.from_words": plain(
         taxel.wire.Registers.from_words, words=list(REGISTERS.words), array=None, channels=16
@@ -612,8 +612,15 @@ SOUND: dict[str, Sound] = {
     "taxel.wire.Registers.commands_to": method(REGISTERS, "commands_to", target=REGISTERS),
     "taxel.wire.Registers.preset": plain(taxel.wire.Registers.preset, name="2 kHz", array=None),
     "taxel.wire.Registers.replace": method(REGISTERS, "replace", noise_floor=4, frame_sync=True, nrows=63),
+    "taxel.wire.Registers.with_preset": plain(REGISTERS.with_preset, name="2 kHz"),
     "taxel.wire.decode": plain(
-        taxel.wire.decode, data=BYTES, array=ARRAY, pairing="direct", differences=False, lengths=[len(BYTES)]
+        taxel.wire.decode,
+        data=BYTES,
+        array=ARRAY,
+        pairing="direct",
+        differences=False,
+        lengths=[len(BYTES)],
+        columns=taxel.wire.Columns(100),
     ),
     "taxel.wire.encode": plain(taxel.wire.encode, events=EVENTS),
     "taxel.live.Live": plain(

@@ -80,6 +80,10 @@ def mapping(name: str, value: object) -> dict[str, Any]:
 
 #: So deep lists may lie in lists: more than NumPy's dimensions.
 DEPTH = 65
+#: Classes that most arguments are of, which have no unit and hold nothing else: to ask them would take longest of all.
+_PLAIN: frozenset[type[Any]] = frozenset(
+    {bool, int, float, str, type(None), np.float64, np.float32, np.int64, np.bool_}
+)
 
 
 def bare(name: str, values: Any, unit: str | None = None) -> Any:
@@ -91,6 +95,9 @@ def bare(name: str, values: Any, unit: str | None = None) -> Any:
     ------
     ProblemError : a quantity that does not convert to `unit`, or quantities among plain numbers
     """
+    kind = type(values)
+    if kind in _PLAIN or (kind is np.ndarray and values.dtype != object):
+        return values
     level = [values]
     for _ in range(DEPTH):
         kinds = set(map(type, level))
@@ -104,7 +111,7 @@ def bare(name: str, values: Any, unit: str | None = None) -> Any:
 
 def _has_unit(kind: type[Any]) -> bool:
     """Tell whether values of a class say what they are in; `dimensions` is Brian's word."""
-    return any(hasattr(kind, word) for word in ("units", "unit", "dimensions"))
+    return kind not in _PLAIN and any(hasattr(kind, word) for word in ("units", "unit", "dimensions"))
 
 
 def _may_nest(kind: type[Any]) -> bool:
@@ -286,17 +293,18 @@ def parameters(values: Mapping[str, object]) -> str:
 
     def plain(name: str, value: object) -> object:
         value = bare(name, value)
-        if isinstance(value, Mapping):
-            return {str(key): plain(f"{name}.{key}", entry) for key, entry in value.items()}
-        if isinstance(value, list | tuple | np.ndarray):
-            return [
-                plain(f"{name}[{k}]", entry)
-                for k, entry in enumerate(np.atleast_1d(value) if isinstance(value, np.ndarray) else value)
-            ]
-        if value is None or isinstance(value, str | bool | np.bool_):
-            return bool(value) if isinstance(value, np.bool_) else value
-        if isinstance(value, int | np.integer):
-            return whole(name, value)
+        if not isinstance(value, float):
+            if value is None or isinstance(value, str | bool | np.bool_):
+                return bool(value) if isinstance(value, np.bool_) else value
+            if isinstance(value, int | np.integer):
+                return whole(name, value)
+            if isinstance(value, Mapping):
+                return {str(key): plain(f"{name}.{key}", entry) for key, entry in value.items()}
+            if isinstance(value, list | tuple | np.ndarray):
+                return [
+                    plain(f"{name}[{k}]", entry)
+                    for k, entry in enumerate(np.atleast_1d(value) if isinstance(value, np.ndarray) else value)
+                ]
         real = number(name, value)
         if not math.isfinite(real):
             raise ProblemError(f"{name} is {real}: must be finite")

@@ -92,7 +92,10 @@ def _folder(folder: Path, how: dict[str, Any]) -> list[Recording]:
         names = _formats(folder)
         if len(names) != 1:
             said = "no recording" if not names else f"several formats ({', '.join(names)}): say taxel.formats.trials"
-            raise FormatError(f"{folder}: holds {said}; there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}")
+            deeper = sorted(inner.name for inner in folder.iterdir() if _holds_own(inner))
+            hint = f"its folders {', '.join(deeper[:5])}{' ...' * (len(deeper) > 5)} do: name them" if deeper else ""
+            there = f"there are {', '.join(ENDINGS)}, {', '.join(formats.FORMATS)}"
+            raise FormatError(f"{folder}: holds {said}; {hint or there}")
         trials = sorted(formats.trials(folder, names[0]), key=lambda trial: _order(Path(trial.name)))
         named = [(Path(trial.name), _of(trial, folder, names[0])) for trial in trials]
     return _labelled(folder / LABELS, named)
@@ -145,6 +148,11 @@ def _of(trial: Trial, place: Path, kind: str) -> Recording:
 
 def _formats(place: Path) -> list[str]:
     return [name for name, kind in formats.FORMATS.items() if kind.files(place)]
+
+
+def _holds_own(folder: Path) -> bool:
+    there = folder.is_dir() and os.access(folder, os.R_OK | os.X_OK)
+    return there and any(file.is_file() and _is_own(file) for file in folder.iterdir())
 
 
 def _is_own(file: Path) -> bool:

@@ -37,6 +37,9 @@ _KEPT = 256
 #: Where the noise floor stands: REG5[15:8] (Table 5.5).
 _FLOOR_REGISTER, _FLOOR_MASK = 5, 0xFF00
 
+#: What a board says at its reset, and where it is asked what it is.
+_GREETING = re.compile(r"taxel-board v(\d) (\d+)x(\d+) (\d+)ch")
+
 _SPEEDS = {
     9600: termios.B9600,
     57_600: termios.B57600,
@@ -115,6 +118,13 @@ class Cable:
     timeout : float, s
         How long the board may take to answer.
 
+    Attributes
+    ----------
+    faults : dict
+        How often each fault has come, as far as it was heard.
+    resets : int
+        How often the board greeted without being asked, as far as it was heard: at a reset, and where one connects.
+
     Raises
     ------
     OSError : the device or the server cannot be opened
@@ -135,6 +145,7 @@ class Cable:
         if whole("baud", baud) not in _SPEEDS:
             raise ProblemError(f"baud is {baud}: must be one of {', '.join(map(str, _SPEEDS))}")
         self.faults: dict[str, int] = {}
+        self.resets = 0
         self._said: deque[str] = deque(maxlen=_KEPT)
         self.baud, self._file = baud, -1
         self._open()
@@ -190,8 +201,10 @@ class Cable:
         DeviceError : the board does not answer
         """
         for line in self._answers(Command(6, 8)):
-            said = re.fullmatch(r"taxel-board v(\d) (\d+)x(\d+) (\d+)ch", line)
+            said = _GREETING.fullmatch(line)
             if said:
+                # It was asked for.
+                self.resets -= 1
                 return Greeting(*(int(part) for part in said.groups()))
         raise self._silence()
 
@@ -307,6 +320,7 @@ class Cable:
                 self._waiting = rest
                 said = line.decode("ascii", "replace").strip()
                 self._said.append(said)
+                self.resets += _GREETING.fullmatch(said) is not None
                 fault = re.fullmatch(r"fault (\w+) (\d+)", said)
                 if fault:
                     self.faults[fault[1]] = int(fault[2])
@@ -389,16 +403,17 @@ class Device:
     def apply(self, registers: Registers | str) -> Registers:
         """Set all registers but `record`, or a preset by its name; return what the board holds then.
 
-        Each write on the way leaves the board with a set that keeps the rules.
+        Each write on the way leaves the board with a set that keeps the rules. A preset leaves the version of the wire
+        that the board speaks (`Registers.with_preset`).
 
         Raises
         ------
         DeviceError : a rule is broken, the board refuses, does not answer, or holds something else afterwards
         """
-        target = registers
-        if not isinstance(target, Registers):
-            target = self._preset(text("registers", target))
-        return self._try(lambda: self._write(target))
+        if isinstance(registers, Registers):
+            return self._try(lambda: self._write(registers))
+        preset = text("registers", registers)
+        return self._try(lambda: self._write(self._read().with_preset(preset)))
 
     def set(self, **fields: float) -> Registers:
         """Set some registers by name, times in us; return what the board holds then.
@@ -469,11 +484,6 @@ class Device:
         if self._set is not None:
             self._write(self._set)
         return work()
-
-    def _preset(self, name: str) -> Registers:
-        held = Registers.preset(name, array=None)
-        lines = min(held.lines, self.array.columns)
-        return Registers.preset(name).replace(lines=lines) if held.lines != lines else held
 
     def _read(self) -> Registers:
         words = [0 if n == 6 else self.cable.read(n) for n in range(8)]

@@ -88,6 +88,12 @@ def test_what_is_no_recipe_is_refused(recipe: object, error: type[Exception], te
         Recipe.load(recipe)  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("key", ["fits", "other", "fits.unit"])
+def test_a_change_that_would_do_nothing_is_refused(key: str) -> None:
+    with pytest.raises(ProblemError, match=f"{key}: .* does nothing"):
+        Recipe.load("touch", {key: "x"})
+
+
 def test_another_label_has_to_be_one_of_the_recipe(tmp_path: Path) -> None:
     (tmp_path / "odd.toml").write_text('other = "lift"\n[encoder]\nname = "fa1"\n[neurons.contact]\ntau = 2.0\n')
     with pytest.raises(ProblemError, match="recipe: other is 'lift': must be one of 'contact'"):

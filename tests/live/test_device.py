@@ -128,7 +128,9 @@ def test_registers_are_set_by_name_in_an_order_that_keeps_the_rules(line: tuple[
         assert not device.set(record=False).record
         with pytest.raises(DeviceError, match="rule 1"):
             device.set(line_read=1e6)
-        assert device.registers == Registers.preset("5.2 kHz")
+        assert device.registers == Registers(wire_version=2), "a preset leaves the version of the wire"
+        assert device.apply("2 kHz") == Registers(wire_version=2).with_preset("2 kHz")
+        assert device.apply(Registers.preset("2 kHz")).wire_version == 1, "registers say every one"
         with pytest.raises(ProblemError, match="no_such"):
             device.set(no_such=3)
 
@@ -161,6 +163,34 @@ def test_a_board_of_another_size_is_refused() -> None:
     with Device(os.ttyname(theirs), timeout=30) as device:
         assert device.array.shape == (16, 8)
         assert device.apply("2 kHz").lines == 8
+    os.close(theirs)
+
+
+@pytest.mark.parametrize("channels", [16, 64])
+def test_a_large_board_takes_its_presets_by_name(channels: int) -> None:
+    array, name = taxel.Array(100, 128), {16: "128 x 128, 1.3 kHz", 64: "128 x 128, 2 kHz"}[channels]
+    ours, theirs = pty.openpty()
+    serve(Board(Registers(array=array, channels=channels), array), ours, ours)
+    with Device(os.ttyname(theirs), timeout=30) as device:
+        held = device.apply(name)
+        assert (held.wire_version, held.channels, held.lines) == (2, channels, 128)
+        with pytest.raises(DeviceError, match="rule"):
+            device.apply("20.8 kHz" if channels == 16 else "128 x 128, 1.3 kHz").replace(step_period=0.1)
+    os.close(theirs)
+
+
+def test_a_greeting_that_nobody_asked_for_tells_of_a_reset() -> None:
+    ours, theirs = pty.openpty()
+    board = Board()
+    serve(board, ours, ours, greets=False)
+    with Cable(os.ttyname(theirs), timeout=30) as cable:
+        for asked in range(3):
+            assert (cable.greeting().channels, cable.resets) == (16, asked)
+            os.write(ours, board.greeting.encode())
+            until = time.monotonic() + 30
+            while cable.resets == asked:
+                cable.listen()
+                assert time.monotonic() < until
     os.close(theirs)
 
 

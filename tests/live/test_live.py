@@ -275,6 +275,20 @@ def test_registers_that_break_a_rule_for_the_array_are_refused() -> None:
         Live(0, host=LOOPBACK, array=Array(64, 32), registers=wire.Registers.preset("5.2 kHz"))
 
 
+@pytest.mark.parametrize(("rows", "columns"), [(300, 300), (300, 200), (65_535, 2)])
+def test_an_array_that_no_board_can_name_is_refused(rows: int, columns: int) -> None:
+    """65 536 positions are all, rows counted up to a power of 2."""
+    with pytest.raises(ProblemError, match=f"{rows} x {columns} taxels: has more than 65536 positions"):
+        Live(0, host=LOOPBACK, array=Array(rows, columns))
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 65_535), (256, 256), (65_535, 1)])
+def test_the_largest_arrays_that_a_board_can_name_are_heard(rows: int, columns: int) -> None:
+    with Live(0, host=LOOPBACK, array=Array(rows, columns)) as live:
+        pass
+    assert live.stop().lost == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

@@ -9,6 +9,7 @@ import socket
 import struct
 import threading
 import time
+from contextlib import contextmanager
 from types import SimpleNamespace
 from urllib.parse import urlsplit
 
@@ -481,25 +482,43 @@ def test_the_command_stays_while_a_page_begins_its_board_anew(tmp_path):
         assert server.end() == 3, "".join([*server.said, *iter(server.lines.get, "")])
 
 
-def test_registers_are_read_again_when_the_board_was_reset(tmp_path):
+@contextmanager
+def page_of_a_board(folder, *options):
+    """A client of the command's panel, which hears an emulated board and holds its serial line."""
     port = str(free_port())
-    board = ("emulate", "--port", port, "--wire", "2", "--control", "0", "--reset-every", "3")
-    with running(*board, folder=tmp_path) as emulated:
+    with running("emulate", "--port", port, "--control", "0", *options, folder=folder) as emulated:
         control = emulated.wait_for(r"commands are taken at (\S+)")
         panel = ("live", "--panel", "--port", port, "--host", "127.0.0.1", "--control", control)
-        with running(*panel, folder=tmp_path) as server:
+        with running(*panel, folder=folder) as server:
             url = urlsplit(server.wait_for(r"(http://127\.0\.0\.1:\d+/#\S+)"))
             door = SimpleNamespace(address=(url.hostname, url.port), token=url.fragment.removeprefix("token="))
             with Client(door) as page:
-                page.send(type="credit", n=1)
-                page.until("registers", known=True)
-                while page.ask("set", values={"noise_floor": 9})["type"] != "done":
-                    pass  # it is being reset just now
-                floors = []
-                while not floors or floors[-1] != 3:
-                    said = page.until("registers", known=True)
-                    floors.append(said["values"]["noise_floor"])
-                assert set(floors) <= {3, 9}
+                yield page
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_registers_are_read_again_when_the_board_was_reset(tmp_path, version):
+    # Version 2 tells of it by a new session, version 1 by nothing but the greeting on the board's line.
+    with page_of_a_board(tmp_path, "--wire", str(version), "--reset-every", "3") as page:
+        page.send(type="credit", n=1)
+        page.until("registers", known=True)
+        while page.ask("set", values={"noise_floor": 9})["type"] != "done":
+            pass  # it is being reset just now
+        floors = []
+        while not floors or floors[-1] != 3:
+            said = page.until("registers", known=True)
+            floors.append(said["values"]["noise_floor"])
+        assert set(floors) <= {3, 9}
+
+
+@pytest.mark.parametrize("version", [1, 2])
+def test_a_preset_by_name_leaves_the_version_of_the_wire(tmp_path, version):
+    with page_of_a_board(tmp_path, "--wire", str(version)) as page:
+        page.send(type="credit", n=1)
+        for name, floor in (("2 kHz", 10), ("5.2 kHz", 3)):
+            assert page.ask("preset_apply", name=name)["type"] == "done"
+            said = page.since_asked("registers", known=True, preset=name)
+            assert (said["values"]["noise_floor"], said["values"]["wire_version"]) == (floor, version)
 
 
 def spikes_of(page, columns):

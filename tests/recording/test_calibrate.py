@@ -69,6 +69,8 @@ def test_a_table_and_the_law_need_no_load(tmp_path: Path) -> None:
     assert run("calibrate", path, "--table", table, "--unit", "kPa").returncode == 0
     pressure = json.loads(run("info", path, "--json").stdout)["pressure"]
     assert (pressure["unit"], pressure["peak"]["most"]) == ("kPa", 4.0)
+    newtons = 1e-3 * taxel.open(path).array.pitch_mm ** 2 * pressure["sum"]["most"]
+    assert f"  force               at most {newtons:g} N, at " in run("info", path).stdout
     assert run("calibrate", path, "--law", "--set", "exponent=1.0", "--overwrite").returncode == 0
     peak = taxel.open(path).calibrated().peak().max()
     # From 50 to 80 ticks of a ramp of 150 that charges towards 5 V; 1.3 V x 47 kOhm x 1.64 uS a 0.02 N.

@@ -99,6 +99,9 @@ def test_convert_writes_and_says_what_the_target_cannot_hold(walk: Path, tmp_pat
         (("info", "."), ".: holds no recording; there are .mcap"),
         (("convert", "WALK", "walk.xyz"), "must be .mcap, .lsa, .npz, .csv"),
         (("convert", "WALK", "WALK"), "exists already"),
+        (("convert", "WALK", "a.npz", "--array", "6x6"), "holds its own sensor, Array("),
+        (("info", "WALK", "--array", "6x6"), "holds its own sensor, Array("),
+        (("info", "WALK", "--array", "6 by 6"), "--array 6 by 6: must be rows x columns, as 64x64, or with the pitch"),
         (("convert", "WALK", "nowhere/a.csv"), "nowhere: no such folder"),
         (("convert", "WALK", "a.mcap", "--compression", "gzip"), "compression is 'gzip'"),
         (("convert", "WALK", "a.csv", "--frames", "-3"), "rate_hz is -3.0"),
@@ -118,3 +121,16 @@ def test_wrong_input_ends_in_one_line_and_exit_code_2(
 @pytest.mark.parametrize("command", ["info", "convert"])
 def test_help_shows_an_example(command: str) -> None:
     assert "Example: taxel" in run(command, "--help").stdout
+
+
+def test_the_sensor_of_a_table_of_events_is_said_once_and_kept(walk: Path, tmp_path: Path) -> None:
+    table, kept = tmp_path / "walk.csv", tmp_path / "walk.npz"
+    assert run("convert", walk, table).returncode == 0
+    assumed = run("info", table).stdout
+    assert "64 x 64 taxels, 2.67 mm, thesis 64x64; a .csv does not hold it: --array" in assumed
+    assert "70 x 65 taxels, 5 mm, 70x65x5\n" in run("info", table, "--array", "70x65x5").stdout
+    assert run("convert", table, kept, "--array", "70x65x5").returncode == 0
+    assert taxel.open(kept).array == taxel.Array(70, 65, pitch_mm=5.0, name="70x65x5")
+    assert np.array_equal(taxel.open(kept).events.t, taxel.open(walk).events.t)
+    assert json.loads(run("info", table, "--json").stdout)["array_assumed"]
+    assert not json.loads(run("info", kept, "--json").stdout)["array_assumed"]

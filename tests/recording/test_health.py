@@ -7,6 +7,7 @@ import pytest
 
 import taxel
 from taxel._core import ProblemError
+from taxel._health import _around
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 
@@ -74,6 +75,97 @@ def test_what_a_state_tells_of_a_dead_taxel_does_not_make_it_alive() -> None:
     assert counts.repaired == 1
     assert told.repaired[of_it].tolist() == [True]
     assert taxel.health(told).named() == {"dead": [dead], "stuck": [], "noisy": []}
+
+
+def noisy_board(version: int, seed: int, dead: np.ndarray, stuck: np.ndarray, noise: float = 0.85) -> list[bytes]:
+    """Datagrams of a board in noise near its floor: at rest, pressed as a whole (40 frames), at rest again."""
+    rng = np.random.default_rng(seed)
+    board = Board(Registers(wire_version=version), version_2=Version2(states_us=20_000))
+    rest = 48 + rng.normal(0, 0.5, board.array.shape)
+    sent = []
+    for frame in range(1600):
+        pressed = 3.0 * np.clip([frame - 800, 840 - frame], 0, 20).min()
+        ticks = np.rint(rest + pressed + rng.normal(0, noise, rest.shape))
+        ticks[dead], ticks[stuck] = 0, 77
+        sent.append(b"".join(len(d).to_bytes(2, "little") + d for d in board.frame(ticks.astype(np.uint16))))
+    return sent
+
+
+def heard(version: int, sent: list[bytes]) -> taxel.Events:
+    stream = b"".join(sent)
+    if version == 2:
+        return taxel.wire_v2.decode(stream)[0]
+    datagrams, at = [], 0
+    while at < len(stream):
+        size = int.from_bytes(stream[at : at + 2], "little")
+        datagrams.append(stream[at + 2 : at + 2 + size])
+        at += 2 + size
+    return taxel.wire.decode(b"".join(datagrams))
+
+
+@pytest.mark.parametrize(("version", "seed"), [(1, 1), (2, 2)])
+def test_silence_in_noise_at_the_floor_is_no_death(version: int, seed: int) -> None:
+    rng = np.random.default_rng(100 + seed)
+    dead, stuck = rng.random((2, 64, 64)) < 0.003
+    stuck &= ~dead
+    sent = noisy_board(version, seed, dead, stuck)
+    # Joined in mid-stream, some live taxels are as silent as dead ones while all around them speak.
+    quiet = heard(version, sent[300:780])
+    spoke = np.zeros((64, 64), bool)
+    own = np.ones(len(quiet), bool) if quiet.repaired is None else ~quiet.repaired
+    spoke[quiet.y[own], quiet.x[own]] = True
+    assert np.sum(~spoke & ~dead & ~stuck) > 50
+    found = taxel.health(quiet)
+    if version == 1:
+        assert not found.dead.any(), "nothing shows which"
+    else:
+        # The board told what each holds.
+        assert (found.dead == dead).all()
+    # A touch shows it; of version 1 one that shows one value for ever is as silent as a dead one.
+    found = taxel.health(heard(version, sent[300:]))
+    assert (found.dead == (dead | stuck if version == 1 else dead)).all()
+    assert (found.stuck == (stuck & (version == 2))).all()
+    # From the start on each live one spoke.
+    found = taxel.health(heard(version, sent))
+    assert (found.dead == dead).all()
+    assert not found.noisy.any()
+
+
+def test_noise_that_no_live_taxel_is_silent_in_shows_the_dead_ones() -> None:
+    dead = np.random.default_rng(8).random((64, 64)) < 0.003
+    sent = noisy_board(1, 8, dead, np.zeros((64, 64), bool), noise=2.5)
+    found = taxel.health(heard(1, sent[300:780]))
+    assert found.activity[~dead].min() > 10
+    assert (found.dead == dead).all()
+
+
+@pytest.mark.parametrize(("reach", "share"), [(1, 0.5), (2, 0.8), (2, 0.0), (1, 1.0)])
+def test_what_lies_around_is_numpys_quantile(reach: int, share: float) -> None:
+    rng = np.random.default_rng(7)
+    grid = np.where(rng.random((9, 13)) < 0.6, np.nan, rng.integers(0, 50, (9, 13)))
+    found = _around(grid, reach, share)
+    for y, x in np.ndindex(grid.shape):
+        near = grid[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1].ravel().tolist()
+        own = grid[y, x]
+        near = [v for v in near if not np.isnan(v)]
+        if not np.isnan(own):
+            near.remove(own)
+        assert found[y, x] == pytest.approx(np.quantile(near, share) if near else 0.0)
+
+
+def test_two_loose_lines_do_not_kill_the_one_between_them() -> None:
+    rng, board = np.random.default_rng(5), Board()
+    rest = np.rint(48 + rng.normal(0, 2, board.array.shape))
+    sent = []
+    for frame in range(120):
+        ticks = rest.copy()
+        if frame % 5 == 0:
+            ticks[30], ticks[32] = 0, 0
+        sent += board.frame(ticks.astype(np.uint16))[: None if frame else 0]
+    found = taxel.health(taxel.wire.decode(b"".join(sent)))
+    assert (found.activity[31] == 0).all()
+    assert (found.activity[[30, 32]] > 40).all()
+    assert not found.dead.any()
 
 
 def test_a_taxel_that_shows_one_value_only_is_stuck() -> None:

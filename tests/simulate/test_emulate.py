@@ -15,6 +15,7 @@ import pytest
 import taxel
 from taxel import ProblemError, wire
 from taxel.demo.script import endless, script
+from taxel.device import Device
 from taxel.simulate import Board, Faults, Flaws, Pipe, Replay, Silence, Version2, emulate, play, truth
 from taxel.simulate.circuit import Circuit, Converter, VirtualGround
 from taxel.wire import Registers
@@ -240,6 +241,35 @@ def test_another_sensors_frames_come_through_a_pipe(listener, tmp_path):
         sink.write(json.dumps(about).encode() + b"\n" + frames.tobytes()[:-3])
     with path.open("rb") as source, pytest.raises(taxel.FormatError, match="frame 29: ends after 27 bytes, must be 30"):
         emulate(heard.to, Pipe(source))
+
+
+def test_commands_are_answered_while_a_pipe_brings_nothing(tmp_path):
+    line = tmp_path / "line"
+    emulate = [sys.executable, "-m", "taxel", "emulate", "--pipe", "--port", "9", "--control", "0", "--line", str(line)]
+    board = subprocess.Popen(emulate, stdin=subprocess.PIPE, stderr=subprocess.PIPE, stdout=subprocess.PIPE)
+    try:
+        board.stdin.write(b'{"rows": 5, "columns": 3, "rate": 100, "bits": 12}\n')
+        board.stdin.flush()
+        said = iter(board.stderr.readline, b"")
+        control = next(words.split()[-1].decode() for words in said if words.startswith(b"commands are taken"))
+        places = (control, str(line))
+        for place in places:
+            with Device(place, timeout=60) as device:
+                assert device.array.shape == (5, 3)
+                assert device.set(noise_floor=7).noise_floor == 7
+        # Half a frame is none, and the second is a pause like any other.
+        for piece in (bytes(20), bytes(10 + 7)):
+            board.stdin.write(piece)
+            board.stdin.flush()
+            with Device(control, timeout=60) as device:
+                assert device.registers.noise_floor == 7
+        board.stdin.write(bytes(30 - 7))
+        board.stdin.close()
+        assert board.wait(60) == 0
+        assert b"0 events" in board.stdout.read()
+    finally:
+        board.kill()
+        board.wait()
 
 
 def test_the_sync_line_says_its_edges(listener, tmp_path):

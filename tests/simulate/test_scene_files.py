@@ -270,3 +270,10 @@ def test_an_array_of_any_size_feels_a_scene(tmp_path, rows, columns, preset):
     # Noise, of as long a time.
     assert len(before) / 10 < 0.05 * len(after)
     assert near.mean() > 0.9
+
+
+def test_a_file_that_begins_with_a_byte_order_mark_is_read(tmp_path):
+    text = "[[bodies]]\nshape.sphere.radius_mm = 25\nx_mm = 80\ny_mm = 80\nmass_g = 36\nmotion.dropped.height_mm = 50\n"
+    for name, encoding in (("plain.toml", "utf-8"), ("marked.toml", "utf-8-sig")):
+        (tmp_path / name).write_text(text, encoding=encoding)
+    assert repr(SceneFile.open(tmp_path / "marked.toml")) == repr(SceneFile.open(tmp_path / "plain.toml"))

@@ -42,6 +42,16 @@ pub trait Touch: Send {
     /// Where what is played cannot be; then the board stops too.
     fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool>;
 
+    /// Whether the next frame can be written now, or there is none any more; waits for it some milliseconds at most, so
+    /// that a board which is shown nothing yet hears its commands.
+    ///
+    /// # Errors
+    ///
+    /// As [`Touch::frame`].
+    fn is_there(&mut self) -> Result<bool> {
+        Ok(true)
+    }
+
     /// Whether the frame that was written last is the last one, where that is known.
     ///
     /// # Errors
@@ -222,6 +232,9 @@ impl Emulator {
         let (mut looked, mut told) = (begun, begun);
         let mut last = false;
         while !last {
+            while !stop.asked() && !touch.is_there()? {
+                self.control.serve(&mut self.board);
+            }
             last = stop.asked() || !touch.frame(&mut ticks, stop)? || stop.asked();
             if last && !(self.options.marks_stop && self.board.registers().record) {
                 break;

@@ -131,6 +131,7 @@ impl Live {
         if options.readout_events == 0 {
             return Err(taxel_core::problem!("readout_events is 0: must be 1 or more").into());
         }
+        wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
         if let (Ear::Deaf, Some(to)) = (&ear, options.send.first()) {
             return Err(taxel_core::problem!("send to {to} without a readout: nothing would be said").into());

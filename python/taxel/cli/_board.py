@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import re
 import signal
 import threading
 from collections.abc import Iterator
@@ -28,7 +27,6 @@ __all__ = [
     "asked_to_end",
     "counters_table",
     "exit_code",
-    "geometry",
     "outside",
     "remote",
     "rest_of",
@@ -37,7 +35,11 @@ __all__ = [
 PortOption = Annotated[int, typer.Option(min=0, max=65_535, help="The UDP port that the board sends to.")]
 HostOption = Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: every one.")]
 ArrayOption = Annotated[
-    str | None, typer.Option(help="Rows x columns of the sensor; 64x64 where left out, or what is told with --from.")
+    str | None,
+    typer.Option(
+        metavar="ROWSxCOLUMNS[xMM]",
+        help="The sensor and its pitch, as 24x20x5; 64x64x2.67 where left out, or what is told with --from.",
+    ),
 ]
 PresetOption = Annotated[
     str | None,
@@ -72,16 +74,6 @@ def remote(
             raise ProblemError("--congestion belongs to a board of another computer: give --from ADDRESS")
         return contextlib.nullcontext()
     return Remote(address, congestion=congestion or ("block" if keeps else "drop"))
-
-
-def geometry(said: str) -> Array:
-    """Return the array of `said` rows x columns, at the thesis' pitch."""
-    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", said)
-    if match is None:
-        raise ProblemError(f"--array {said}: must be rows x columns, as 64x64")
-    thesis = Array.thesis()
-    rows, columns = int(match[1]), int(match[2])
-    return thesis if thesis.shape == (rows, columns) else Array(rows, columns, pitch_mm=thesis.pitch_mm, name=said)
 
 
 def rest_of(said: str | None) -> Tare | float | None:

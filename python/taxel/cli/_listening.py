@@ -13,6 +13,7 @@ import numpy as np
 import typer
 
 from taxel._core import ProblemError
+from taxel.cli._array import geometry, of_array
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:
@@ -214,11 +215,11 @@ def told(quiet: bool) -> Iterator[Callable[[str], None]]:
             typer.echo(f"taxel: warning: {warning.message}", err=True)
 
 
-def open_recording(path: Path) -> Recording:
-    """Open a file of ours; imported late."""
+def open_recording(path: Path, array: str | None = None) -> Recording:
+    """Open a file of ours, of the sensor that ``--array`` says; imported late."""
     from taxel import recording  # noqa: PLC0415  the command line starts quickly
 
-    return recording.open_recording(path)
+    return of_array(recording.open_recording(path, array=None if array is None else geometry(array)), array)
 
 
 def of_source(recording: Recording, name: str | None) -> Recording:
@@ -231,9 +232,9 @@ def of_source(recording: Recording, name: str | None) -> Recording:
     return sources[name]
 
 
-def open_all(paths: Sequence[Path]) -> list[Recording]:
+def open_all(paths: Sequence[Path], array: str | None = None) -> list[Recording]:
     """Open recordings one after the other; of a folder, or of another maker's file, all trials in it."""
     from taxel._opening import open_any  # noqa: PLC0415  the command line starts quickly
 
-    opened = (open_any(path) for path in paths)
-    return [one for each in opened for one in (each if isinstance(each, list) else [each])]
+    opened = (open_any(path, array=None if array is None else geometry(array)) for path in paths)
+    return [of_array(one, array) for each in opened for one in (each if isinstance(each, list) else [each])]

@@ -16,6 +16,7 @@ from rich.text import Text
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._array import geometry
 from taxel.cli._board import (
     ArrayOption,
     HostOption,
@@ -23,7 +24,6 @@ from taxel.cli._board import (
     PresetOption,
     counters_table,
     exit_code,
-    geometry,
     rest_of,
 )
 from taxel.detect import Readout

@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 
 from taxel.cli._app import app
+from taxel.cli._array import FileArrayOption
 from taxel.cli._listening import of_source, open_recording
 
 __all__ = ["convert"]
@@ -19,6 +20,7 @@ __all__ = ["convert"]
 def convert(
     source: Annotated[Path, typer.Argument(help="A recording: .mcap, .lsa, .npz, .csv or .h5.")],
     target: Annotated[Path, typer.Argument(help="The new file; its ending says the kind.")],
+    array: FileArrayOption = None,
     frames: Annotated[
         float | None,
         typer.Option(metavar="HZ", help="Write pictures at this rate (.npz, .csv, .h5), not events."),
@@ -40,7 +42,7 @@ def convert(
     try_whole(target, overwrite=overwrite)
     # Shown on a terminal only, and gone when done.
     with Console(stderr=True).status(f"{source} to {target}"):
-        recording = of_source(open_recording(source), part)
+        recording = of_source(open_recording(source, array), part)
         lost = taxel.convert(recording, target, frames_hz=frames, compression=compression, overwrite=overwrite)
     if as_json:
         typer.echo(json.dumps({"source": str(source), "target": str(target), "lost": lost}))

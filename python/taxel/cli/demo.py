@@ -25,7 +25,6 @@ def demo(
     data: Annotated[Path | None, typer.Option(help="Recordings: footfalls of DATA/plate are played as well.")] = None,
     readout: Annotated[Path | None, typer.Option(help="Another readout than the one that comes with taxel.")] = None,
     folder: Annotated[Path | None, typer.Option(help="A new folder for the report.")] = None,
-    result: Annotated[Path | None, typer.Option("--result", "-o", help="Write the figures there as well.")] = None,
     train_to: Annotated[
         Path | None, typer.Option("--train", help="Train the readout, write it there, and end.")
     ] = None,
@@ -41,12 +40,12 @@ def demo(
     report.json.
 
     Example: taxel demo --seed 1
-    Example: taxel demo --scenes 100 --no-clock -o benchmarks/results/demo.json
+    Example: taxel demo --scenes 100 --no-clock --folder demo
     """
     console = Console(quiet=as_json)
-    for place, replaced in ((train_to, False), (drops_to, False), (result, True)):
+    for place in (train_to, drops_to):
         if place is not None:
-            try_whole(place, overwrite=replaced)
+            try_whole(place)
     if train_to is not None:
         _train(console, train_to)
         typer.echo(json.dumps({"readout": str(train_to)}) if as_json else f"readout: {train_to.resolve()}")
@@ -69,7 +68,6 @@ def demo(
         data=data,
         readout=readout,
         folder=folder,
-        result=result,
     )
     # Not wrapped: a path is to be copied.
     typer.echo(json.dumps(values | {"report": str(page)}) if as_json else f"report: {page.resolve()}")

@@ -86,7 +86,7 @@ def apply(
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:
-    """Set a board to a preset, and read it back.
+    """Set a board to a preset, and read it back; it goes on speaking the version of the wire that it speaks.
 
     Example: taxel device apply /dev/ttyUSB0 "2 kHz"
     """

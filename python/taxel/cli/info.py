@@ -13,6 +13,7 @@ from rich.console import Console
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._array import FileArrayOption, geometry, of_array
 
 if TYPE_CHECKING:
     from taxel.frames import Frames
@@ -32,6 +33,7 @@ def info(
         Path,
         typer.Argument(help="A recording, other people's file, or a folder."),
     ],
+    array: FileArrayOption = None,
     picture: Annotated[
         Path | None,
         typer.Option(help="Write rates, a map of the taxels and the pressure over time to this .png, .svg or .pdf."),
@@ -47,7 +49,6 @@ def info(
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     """
-    import taxel  # noqa: PLC0415  the command line starts quickly
     from taxel._files import try_whole, write_whole  # noqa: PLC0415
     from taxel._pressure import above_rest  # noqa: PLC0415
 
@@ -60,9 +61,7 @@ def info(
             try_whole(place, overwrite=overwrite)
     # Shown on a terminal only, and gone when done.
     with Console(stderr=True).status(f"reading {file}"):
-        opened = taxel.open(file)
-        # Many files of other people's hold one recording.
-        opened = opened[0] if isinstance(opened, list) and len(opened) == 1 else opened
+        opened = _opened(file, array)
         if isinstance(opened, list):
             if picture is not None or table is not None:
                 raise ProblemError(f"{file}: holds {len(opened)} recordings; a picture or a table is of one")
@@ -76,6 +75,7 @@ def info(
         recording = opened
         pressed = above_rest(recording)
         said = about(recording, pressed)
+        said["array_assumed"] &= array is None
     if table is not None:
         if pressed is None:
             raise ProblemError(f"{file}: holds events without intensities, so there is no pressure to write")
@@ -139,6 +139,18 @@ def _pages(several: dict[str, Any]) -> str:
     return "\n".join(f"{name}: {_page(said)}" for name, said in several["sources"].items())
 
 
+def _opened(file: Path, array: str | None) -> Recording | list[Recording]:
+    import taxel  # noqa: PLC0415  the command line starts quickly
+
+    opened = taxel.open(file, array=None if array is None else geometry(array))
+    if not isinstance(opened, list):
+        return of_array(opened, array)
+    for one in opened:
+        of_array(one, array)
+    # Many files of other people's hold one recording.
+    return opened[0] if len(opened) == 1 else opened
+
+
 def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[str, Any]:
     """Return all that `taxel info` says, as JSON holds it."""
     from taxel._health import health  # noqa: PLC0415
@@ -152,6 +164,7 @@ def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[st
         "kind": recording.kind,
         "source": recording.source,
         "array": {name: value for name, value in array._geometry().items() if name != "exists"},
+        "array_assumed": recording.kind in ("csv", "lsa") and recording.has_events,
         "from_us": span[0] if span else None,
         "to_us": span[1] if span else None,
         "seconds": seconds,
@@ -243,8 +256,11 @@ def _page(said: dict[str, Any]) -> str:
 
 
 def _contents(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    from taxel._curves import N_PER_KPA_MM2  # noqa: PLC0415  the command line starts quickly
+
     array = said["array"]
-    yield "array", f"{array['rows']} x {array['columns']} taxels, {array['pitch_mm']:g} mm, {array['name']}"
+    size = f"{array['rows']} x {array['columns']} taxels, {array['pitch_mm']:g} mm, {array['name']}"
+    yield "array", size + (f"; a .{said['kind']} does not hold it: --array" if said["array_assumed"] else "")
     if said["from_us"] is not None:
         yield "board time", f"{said['from_us']} to {said['to_us']} us ({said['seconds']:.3f} s)"
     if "events" in said:
@@ -261,12 +277,15 @@ def _contents(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
         yield "calibration", said["calibration"]
     pressed = said["pressure"]
     if pressed is not None:
-        for name, words, unit in (
-            ("area_mm2", "contact area", "mm2"),
-            ("peak", "peak", pressed["unit"]),
-            ("sum", "sum", pressed["unit"]),
+        # A calibration's kPa stand for the pitch's squares; of other files taxels may have any size.
+        newtons = array["pitch_mm"] ** 2 * N_PER_KPA_MM2
+        force = said["calibration"] is not None and pressed["unit"] == "kPa"
+        for name, words, unit, factor in (
+            ("area_mm2", "contact area", "mm2", 1.0),
+            ("peak", "peak", pressed["unit"], 1.0),
+            ("sum", "force", "N", newtons) if force else ("sum", "sum", pressed["unit"], 1.0),
         ):
-            yield words, f"at most {pressed[name]['most']:g} {unit}, at {pressed[name]['t_us']} us"
+            yield words, f"at most {factor * pressed[name]['most']:g} {unit}, at {pressed[name]['t_us']} us"
         if pressed["centre_mm"] is not None:
             x, y = pressed["centre_mm"]["x"], pressed["centre_mm"]["y"]
             yield "centre of pressure", f"x {x[0]:.1f} to {x[1]:.1f} mm, y {y[0]:.1f} to {y[1]:.1f} mm"

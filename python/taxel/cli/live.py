@@ -17,6 +17,7 @@ from rich.text import Text
 from taxel._core import ProblemError
 from taxel._files import try_whole
 from taxel.cli._app import app
+from taxel.cli._array import geometry
 from taxel.cli._board import (
     CongestionOption,
     FromOption,
@@ -26,7 +27,6 @@ from taxel.cli._board import (
     asked_to_end,
     counters_table,
     exit_code,
-    geometry,
     outside,
     remote,
     rest_of,
@@ -53,7 +53,10 @@ def live(
     ] = None,
     port: PortOption = 5208,
     host: HostOption = "0.0.0.0",
-    array: Annotated[str | None, typer.Option(help="Rows x columns; the readout's own where left out.")] = None,
+    array: Annotated[
+        str | None,
+        typer.Option(metavar="ROWSxCOLUMNS[xMM]", help="The sensor and its pitch; the readout's where left out."),
+    ] = None,
     preset: PresetOption = None,
     address: FromOption = None,
     congestion: CongestionOption = None,
@@ -198,7 +201,10 @@ def _say(summary: Summary, guard_frames: float) -> None:
     if counters["wrong"]:
         typer.echo(f"{counters['wrong']} were said too early: events came more than {guard_frames:g} frames late")
     if counters["late"]:
-        typer.echo(f"{counters['late']} events came out of order, or more than 0.1 s late")
+        typer.echo(
+            f"{counters['late']} events came out of order, or more than 0.1 s later than the board's clock said (as "
+            "from an emulated board on a machine too busy for its rate): they were heard when they came, and recorded"
+        )
     if counters["events_dropped"]:
         typer.echo(f"{counters['events_dropped']} events were dropped because the readout was too slow")
     if summary.path is not None:

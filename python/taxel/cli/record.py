@@ -17,6 +17,7 @@ from rich.live import Live as Display
 from taxel import _core
 from taxel._core import ProblemError
 from taxel.cli._app import OUTSIDE, app
+from taxel.cli._array import geometry
 from taxel.cli._board import (
     ArrayOption,
     FromOption,
@@ -25,7 +26,6 @@ from taxel.cli._board import (
     PresetOption,
     counters_table,
     exit_code,
-    geometry,
     outside,
     remote,
 )

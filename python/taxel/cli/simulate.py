@@ -19,8 +19,8 @@ __all__ = ["simulate"]
 @app.command()
 def simulate(
     scene: Annotated[Path, typer.Argument(help="A scene: a .toml; the page *Scenes* says what may stand in it.")],
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="Write what a host hears: .mcap, .lsa, .npz, .csv or .h5.")
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Write what a host hears: .mcap, .lsa, .npz, .csv or .h5.")
     ] = None,
     movie: Annotated[
         Path | None, typer.Option(help="Draw a film: .gif, or another that matplotlib's writers know, as .mp4.")
@@ -44,9 +44,9 @@ def simulate(
 
     said = SceneFile.open(scene)
     seed = said.seed if seed is None else seed
-    wanted = [path for path in (output, movie, labels) if path is not None]
+    wanted = [path for path in (out, movie, labels) if path is not None]
     if len({path.resolve() for path in wanted}) < len(wanted):
-        raise ProblemError("--output, --movie and --truth: must be different files")
+        raise ProblemError("--out, --movie and --truth: must be different files")
     if movie is not None:
         writer_of(movie)
     for path in wanted:
@@ -57,15 +57,15 @@ def simulate(
     lines = [f"{scene}: {len(contacts)} touch(es), at most {force.max():.3g} N"]
     bar = Progress(console=Console(stderr=True, quiet=as_json), transient=True)
     with bar:
-        if output is not None or movie is not None:
+        if out is not None or movie is not None:
             task = bar.add_task("playing", total=1.0)
             played = play(said.acts(), seed=seed, watch=lambda share: bar.update(task, completed=share), **said.options)
             bar.update(task, completed=1.0)
             about["events"] = len(played.events)
-        if output is not None:
-            lost = taxel.convert(played.events, output, overwrite=overwrite)
-            lines.append(f"{len(played.events)} events written to {output}")
-            lines += [f"  a {output.suffix} cannot hold: {what}" for what in lost]
+        if out is not None:
+            lost = taxel.convert(played.events, out, overwrite=overwrite)
+            lines.append(f"{len(played.events)} events written to {out}")
+            lines += [f"  a {out.suffix} cannot hold: {what}" for what in lost]
         if movie is not None:
             task = bar.add_task("drawing", total=1.0)
             film(played.events, movie, force, frame_us=said.registers.frame_us, slower=slower, overwrite=overwrite,

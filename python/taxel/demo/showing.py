@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import secrets
 import time
 from collections.abc import Sequence
@@ -17,7 +16,6 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from taxel._core import ProblemError
-from taxel._files import write_whole
 from taxel.demo.footfalls import NOTE, footfalls
 from taxel.demo.hearing import Hearing, hear
 from taxel.demo.playing import play_live
@@ -44,7 +42,6 @@ def show(
     data: Path | None = None,
     readout: Path | None = None,
     folder: Path | None = None,
-    result: Path | None = None,
 ) -> tuple[dict[str, Any], Path]:
     """Play, hear, judge, write the report; return its figures and its page.
 
@@ -65,8 +62,6 @@ def show(
         Another readout than the shipped one.
     folder : Path, optional
         A new folder for the report; named by time and seed where it is left out.
-    result : Path, optional
-        Where the figures go as well; replaced if it is there.
 
     Raises
     ------
@@ -75,8 +70,6 @@ def show(
     """
     if noise_s is not None and not 0.5 <= noise_s <= 86_400:
         raise ProblemError(f"noise is {noise_s} s: must be 0.5 to 86400")
-    if result is not None and not result.parent.is_dir():
-        raise ProblemError(f"{result}: there is no folder {result.parent}")
     heard_by = shipped() if readout is None else Readout.load(readout)
     laid = None if data is None else footfalls(data)
     seed = secrets.randbelow(TRAINING_SEED) if seed is None else seed
@@ -124,13 +117,9 @@ def show(
         )
         page = write(folder, material)
     values = figures(material)
-    if result is not None:
-        write_whole(result, lambda file: file.write(json.dumps(values, indent=1).encode() + b"\n"), overwrite=True)
     _say(console, hearing, quiet)
     _say_which(console, values["which_drop"])
     console.print(f"[dim]{time.monotonic() - began:.0f} s in all[/dim]")
-    if result is not None:
-        console.print(f"figures: {result}")
     return values, page
 
 

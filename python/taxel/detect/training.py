@@ -33,6 +33,9 @@ __all__ = ["Example", "Recipe", "train"]
 #: How long after its last event something may still happen in an example, ms: a readout listens as long.
 SILENCE_MS = 1000.0
 
+#: What a recipe's file says and a recipe does not hold: for which recordings it is, whose parameters other labels take.
+_OF_THE_FILE = ("fits", "other")
+
 
 class Example(NamedTuple):
     """Something to learn from: events, frames or a recording, when what happened in it (us, by label), taxels' rest."""
@@ -124,7 +127,7 @@ class Recipe:
             raise ProblemError(f"recipe is {shown(values)}: must be values by name")
         known = tuple(inspect.signature(cls).parameters)
         for key in values:
-            if key not in (*known, "fits", "other"):
+            if key not in (*known, *_OF_THE_FILE):
                 raise ProblemError(f"recipe: no key {shown(key)}: there are {', '.join(known)}")
         encoder = values.get("encoder")
         if not isinstance(encoder, Mapping):
@@ -165,6 +168,12 @@ class Recipe:
         >>> recipe.learner_of("foot off")[1], sorted(recipe.neurons)
         (8.0, ['contact', 'foot off'])
         """
+        for key in changes if isinstance(changes, Mapping) else ():
+            if text("key", key).partition(".")[0] in _OF_THE_FILE:
+                raise ProblemError(
+                    f"{key}: says for what a recipe's file is chosen, so a change of it does nothing: change learner "
+                    "or neurons, or write a recipe of your own"
+                )
         values = recipes.read(recipe)
         if labels is not None:
             values = recipes.for_labels(values, several("labels", labels))

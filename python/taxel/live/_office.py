@@ -20,7 +20,7 @@ import numpy as np
 from taxel._convert import convert
 from taxel._core import ProblemError
 from taxel._files import whole_file
-from taxel._health import judged
+from taxel._health import Told, judged
 from taxel._parts import cut
 from taxel._remarks import array_of
 from taxel.device import Cable, ports
@@ -100,7 +100,8 @@ class Office:
 
     def _lines(self, _: Mapping[str, Any]) -> object:
         with self._at_cable:
-            return [] if self._cable is None else self._cable.said()
+            said = [] if self._cable is None else self._cable.said()
+            return {"said": said, "resets": 0 if self._cable is None else self._cable.resets}
 
     def _control(self, asked: Mapping[str, Any]) -> object:
         self.close()
@@ -129,10 +130,10 @@ class Office:
         if said.get("exists") is not None:
             said["exists"] = [digit == "1" for digit in said["exists"]]
         array = array_of(said)
-        values = asked["values"]
-        activity = np.array(asked["activity"], np.int64).reshape(array.shape)
-        shown = None if values is None else np.array(values, np.int64).reshape(array.shape)
-        return judged(array, activity, shown).named()
+        # Without intensities nothing is known of what was held.
+        names = ("activity", "moved") if asked["values"] is None else Told._fields
+        told = Told(*(np.array(asked[name], np.int64).reshape(array.shape) for name in names))
+        return judged(array, told).named()
 
     def _cut(self, asked: Mapping[str, Any]) -> object:
         recording = open_recording(asked["path"])

@@ -97,7 +97,7 @@ class SceneFile:
         """
         place = Path(checked_path("path", path))
         try:
-            said = tomllib.loads(place.read_text(encoding="utf-8"))
+            said = tomllib.loads(place.read_text(encoding="utf-8-sig"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise SceneError(f"{place}: not TOML: {error}") from None
         try:

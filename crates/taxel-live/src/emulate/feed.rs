@@ -9,8 +9,8 @@ use taxel_core::Stop;
 use super::Touch;
 use crate::{Error, Result};
 
-/// How long to wait for more before looking whether to stop, ms.
-const LOOK_EVERY_MS: i32 = 50;
+/// How long to wait for more before the board looks for commands again, ms.
+const LOOK_EVERY_MS: i32 = 10;
 
 /// A pipe as a touch. The board's time is the pipe's: a frame a frame.
 #[derive(Debug)]
@@ -21,47 +21,61 @@ pub struct Feed {
     /// A value is divided by 2 so often, so that it fits the ramp.
     shift: u32,
     most: u16,
+    /// Bytes of a frame.
+    wanted: usize,
     frames: u64,
+    ended: bool,
 }
 
 impl Feed {
-    /// Reads frames from a file or pipe, after some bytes of theirs that were read already. Values are shifted right by
-    /// `shift` and end at `most`.
+    /// Reads frames of so many taxels from a file or pipe, after some bytes of theirs that were read already. Values are
+    /// shifted right by `shift` and end at `most`.
     #[must_use]
-    pub fn new(from: File, ahead: Vec<u8>, shift: u32, most: u16) -> Self {
-        Self { from, bytes: ahead, shift, most, frames: 0 }
+    pub fn new(taxels: usize, from: File, ahead: Vec<u8>, shift: u32, most: u16) -> Self {
+        Self { from, bytes: ahead, shift, most, wanted: 2 * taxels, frames: 0, ended: false }
     }
 }
 
 impl Touch for Feed {
-    fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool> {
-        let (wanted, mut piece) = (2 * ticks.len(), [0; 1 << 16]);
-        while self.bytes.len() < wanted {
-            if stop.asked() {
-                return Ok(false);
-            }
+    fn is_there(&mut self) -> Result<bool> {
+        let mut piece = [0; 1 << 16];
+        while !self.ended && self.bytes.len() < self.wanted {
             let mut poll = libc::pollfd { fd: self.from.as_raw_fd(), events: libc::POLLIN, revents: 0 };
             // SAFETY: one entry, on our stack, of a descriptor that is ours.
             if unsafe { libc::poll(&raw mut poll, 1, LOOK_EVERY_MS) } == 0 {
-                continue;
+                return Ok(false);
             }
-            let room = (wanted - self.bytes.len()).min(piece.len());
+            let room = (self.wanted - self.bytes.len()).min(piece.len());
             match self.from.read(&mut piece[..room]) {
-                Ok(0) if self.bytes.is_empty() => return Ok(false),
-                Ok(0) => {
-                    let (n, frame) = (self.bytes.len(), self.frames);
-                    let said = format!("frame {frame}: ends after {n} bytes, must be {wanted}");
-                    return Err(taxel_core::Error::Format(format!("standard input, {said}")).into());
-                }
+                Ok(0) => self.ended = true,
                 Ok(n) => self.bytes.extend_from_slice(&piece[..n]),
-                Err(error) if matches!(error.kind(), ErrorKind::Interrupted | ErrorKind::WouldBlock) => {}
+                Err(error) if matches!(error.kind(), ErrorKind::Interrupted | ErrorKind::WouldBlock) => {
+                    return Ok(false);
+                }
                 Err(error) => return Err(Error::socket("standard input")(error)),
             }
+        }
+        Ok(true)
+    }
+
+    fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool> {
+        while !self.is_there()? {
+            if stop.asked() {
+                return Ok(false);
+            }
+        }
+        if self.bytes.len() < self.wanted {
+            let (n, wanted, frame) = (self.bytes.len(), self.wanted, self.frames);
+            if n == 0 {
+                return Ok(false);
+            }
+            let said = format!("frame {frame}: ends after {n} bytes, must be {wanted}");
+            return Err(taxel_core::Error::Format(format!("standard input, {said}")).into());
         }
         for (value, bytes) in ticks.iter_mut().zip(self.bytes.chunks_exact(2)) {
             *value = (u16::from_le_bytes([bytes[0], bytes[1]]) >> self.shift).min(self.most);
         }
-        self.bytes.drain(..wanted);
+        self.bytes.drain(..self.wanted);
         self.frames += 1;
         Ok(true)
     }

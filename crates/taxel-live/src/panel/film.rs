@@ -343,29 +343,46 @@ impl Rate {
     }
 }
 
-/// What each taxel did: events, and whether it showed more than one value.
+/// What each taxel did, and what it is known to have held.
 #[derive(Debug, Clone)]
 pub struct Activity {
     /// Events at each taxel.
     pub events: Vec<u32>,
-    /// Different values that it showed: 0, 1, or 2 for more.
+    /// Events that went the way of the taxel's event before: a touch makes such, noise at the floor next to none.
+    pub moved: Vec<u32>,
+    /// Different values that its events showed: 0, 1, or 2 for more.
     pub values: Vec<u8>,
+    /// The least and the greatest that it held, ticks; [`UNKNOWN`] and 0 where it was not heard of.
+    pub range: Vec<(u16, u16)>,
     first: Vec<u16>,
+    up: Vec<bool>,
 }
 
 impl Activity {
     /// Of so many taxels that have done nothing.
     #[must_use]
     pub fn new(taxels: usize) -> Self {
-        Self { events: vec![0; taxels], values: vec![0; taxels], first: vec![UNKNOWN; taxels] }
+        Self {
+            events: vec![0; taxels],
+            moved: vec![0; taxels],
+            values: vec![0; taxels],
+            range: vec![(UNKNOWN, 0); taxels],
+            first: vec![UNKNOWN; taxels],
+            up: vec![false; taxels],
+        }
     }
 
     /// Takes a change; one that a state told is none of the taxel's own, as a dead one is told of too.
     pub fn take(&mut self, change: &Change) {
+        let taxel = change.taxel as usize;
+        self.hold(taxel, change.ticks);
         if change.repaired {
             return;
         }
-        let taxel = change.taxel as usize;
+        if self.events[taxel] > 0 && self.up[taxel] == change.up {
+            self.moved[taxel] = self.moved[taxel].saturating_add(1);
+        }
+        self.up[taxel] = change.up;
         self.events[taxel] = self.events[taxel].saturating_add(1);
         if change.ticks == UNKNOWN {
             return;
@@ -374,6 +391,14 @@ impl Activity {
             (self.values[taxel], self.first[taxel]) = (1, change.ticks);
         } else if self.first[taxel] != change.ticks {
             self.values[taxel] = 2;
+        }
+    }
+
+    /// A taxel holds so much, as far as it is known.
+    fn hold(&mut self, taxel: usize, ticks: u16) {
+        if ticks != UNKNOWN {
+            let (least, greatest) = self.range[taxel];
+            self.range[taxel] = (least.min(ticks), greatest.max(ticks));
         }
     }
 }
@@ -636,6 +661,8 @@ impl FileFilm {
             since = since.saturating_add(self.block(k, &mut place, &mut ear, &mut events, Some(&mut heard.remarks))?);
             if !told {
                 piece.held = heard.remarks.held.clone().filter(|held| held.len() == taxels);
+                let known = piece.held.iter().flatten().enumerate();
+                known.for_each(|(taxel, &ticks)| heard.activity.hold(taxel, ticks));
             }
             self.changes(&events, &mut piece.changes);
             for change in &piece.changes {

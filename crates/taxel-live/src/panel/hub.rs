@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::{Duration, Instant, UNIX_EPOCH};
 
@@ -10,8 +10,8 @@ use crossbeam_channel as channel;
 use serde_json::{Map, Value, json};
 use taxel_core::encode::Zeroing;
 use taxel_core::wire::Registers;
-use taxel_core::wire::registers::PRESETS;
-use taxel_core::{encode, problem};
+use taxel_core::wire::registers::{PRESETS, Preset};
+use taxel_core::{Array, encode, problem};
 use tokio::sync::{Notify, broadcast, watch};
 
 use super::film::{Activity, FileFilm, Film, REACH_US, RingFilm};
@@ -108,6 +108,8 @@ pub(super) struct Hub {
     pub(super) recorder: Recorder,
     /// The board was reset: its registers are to be read again.
     pub(super) unknown: Notify,
+    /// How often it greeted on its serial line, as it was told last.
+    resets: AtomicI64,
     viewers: AtomicUsize,
 }
 
@@ -133,6 +135,7 @@ impl Hub {
             films: Mutex::default(),
             recorder: Recorder::default(),
             unknown: Notify::new(),
+            resets: AtomicI64::new(0),
             viewers: AtomicUsize::new(0),
         });
         if let Some(live) = live {
@@ -317,8 +320,13 @@ impl Hub {
     /// What the board said on its serial line since it was asked last.
     async fn listen_to_board(&self) {
         if let Ok(lines) = self.ask("lines", json!({})).await {
-            for line in lines.as_array().into_iter().flatten() {
+            for line in lines["said"].as_array().into_iter().flatten() {
                 self.tell_all(&json!({ "type": "board_line", "at_ns": now_ns(), "text": line }));
+            }
+            // Of version 1 the line alone tells of a reset.
+            let resets = lines["resets"].as_i64().unwrap_or(0);
+            if self.resets.swap(resets, Ordering::Relaxed) != resets && resets > 0 {
+                self.is_unknown();
             }
         }
     }
@@ -399,9 +407,14 @@ impl Hub {
     }
 
     pub(super) fn registers(&self) -> Value {
+        let array = self.live().map(|live| live.handle.options().array.clone());
         let state = self.state();
         let held = Registers { record: false, ..state.registers };
-        let built_in = PRESETS.iter().find(|preset| preset.registers == held).map(|preset| preset.name.to_owned());
+        let same = |preset: &&Preset| match &array {
+            Some(array) => held.with_preset(&preset.registers, array) == held,
+            None => preset.registers == held,
+        };
+        let built_in = offered(&held, array.as_ref()).into_iter().find(same).map(|preset| preset.name.to_owned());
         let values = json!(held);
         let own = || state.presets.iter().find(|(_, preset)| values == json!(preset)).map(|(name, _)| name.clone());
         json!({
@@ -417,13 +430,8 @@ impl Hub {
     pub(super) fn presets(&self) -> Value {
         let array = self.live().map(|live| live.handle.options().array.clone());
         let state = self.state();
-        // Those that the board in hand could hold.
-        let fits = |registers: &Registers| {
-            array
-                .as_ref()
-                .is_none_or(|array| registers.channels == state.registers.channels && registers.check(array).is_ok())
-        };
-        let built_in: Vec<_> = PRESETS.iter().filter(|p| fits(&p.registers)).map(|p| p.name).collect();
+        let built_in: Vec<_> =
+            offered(&state.registers, array.as_ref()).into_iter().map(|preset| preset.name).collect();
         json!({ "type": "presets", "built_in": built_in, "own": state.presets, "path": state.presets_path })
     }
 
@@ -557,7 +565,7 @@ impl Hub {
 }
 
 /// A sensor, as clients are told.
-pub(super) fn said_of(array: &taxel_core::Array) -> Value {
+pub(super) fn said_of(array: &Array) -> Value {
     let exists = array.exists.as_ref();
     let exists = exists.map(|all| all.iter().map(|&there| if there { '1' } else { '0' }).collect::<String>());
     json!({ "rows": array.rows, "columns": array.columns, "pitch_mm": array.pitch_mm, "name": array.name, "exists": exists })
@@ -567,6 +575,13 @@ pub(super) fn said_of(array: &taxel_core::Array) -> Value {
 pub(super) fn said_of_zeroing(zeroing: &Zeroing) -> Value {
     let Zeroing { t, x, y, rest, before } = zeroing;
     json!({ "taxel": [x, y], "t_us": t, "rest": rest, "before": before })
+}
+
+/// The built-in presets that the board in hand could hold; all where there is none.
+fn offered(held: &Registers, array: Option<&Array>) -> Vec<&'static Preset> {
+    let Some(array) = array else { return PRESETS.iter().collect() };
+    let fits = |preset: &&Preset| held.with_preset(&preset.registers, array).check(array).is_ok();
+    Registers::presets(array, held.channels).filter(fits).collect()
 }
 
 fn detection(said: &Said) -> Value {

@@ -219,16 +219,22 @@ async fn preset(hub: &Hub, what: &str, name: &str) -> Answer {
     let own = hub.state().presets.get(name).cloned();
     match what {
         "preset_apply" => {
-            let registers = match (built_in, own) {
-                (Some(preset), _) => preset.registers,
-                (None, Some(own)) => serde_json::from_value(Value::Object(own))
-                    .map_err(|error| Refused::of("name", format!("preset {name}: {error}")))?,
+            let live = hub.live().ok_or("no board is listened to")?;
+            let array = &live.handle.options().array;
+            if hub.state().control.is_some() && !hub.state().known {
+                read(hub).await?;
+            }
+            let target = match (built_in, own) {
+                (Some(preset), _) => hub.state().registers.with_preset(&preset.registers, array),
+                // One's own says every register, the version of the wire too.
+                (None, Some(own)) => {
+                    let own: Registers = serde_json::from_value(Value::Object(own))
+                        .map_err(|error| Refused::of("name", format!("preset {name}: {error}")))?;
+                    Registers { lines: own.lines.min(array.columns), ..own }
+                }
                 (None, None) => return Err(Refused::of("name", format!("there is no preset {name}"))),
             };
-            let array = hub.live().map(|live| live.handle.options().array.clone());
-            // A smaller array has fewer lines to drive.
-            let lines = array.map_or(registers.lines, |array| registers.lines.min(array.columns));
-            write(hub, Registers { lines, ..registers }, false).await
+            write(hub, target, false).await
         }
         "preset_save" => {
             if built_in.is_some() || own.is_some() {
@@ -320,8 +326,17 @@ async fn health(hub: &Hub, name: Option<&str>) -> Answer<Value> {
             (live.handle.options().array.clone(), activity)
         }
     };
-    let values = activity.values.iter().any(|&n| n > 0).then_some(&activity.values);
-    let with = json!({ "array": said_of(&array), "activity": activity.events, "values": values });
+    let values = activity.range.iter().any(|&(least, _)| least != UNKNOWN).then_some(&activity.values);
+    let known = |(least, greatest)| if least == UNKNOWN { (-1, -1) } else { (i32::from(least), i32::from(greatest)) };
+    let (least, greatest): (Vec<_>, Vec<_>) = activity.range.iter().map(|&range| known(range)).unzip();
+    let with = json!({
+        "array": said_of(&array),
+        "activity": activity.events,
+        "moved": activity.moved,
+        "values": values,
+        "least": least,
+        "greatest": greatest,
+    });
     let mut said = hub.ask("health", with).await?;
     let heard = activity.events.iter().filter(|&&n| n > 0).count();
     if let Some(said) = said.as_object_mut() {

@@ -73,7 +73,7 @@ def read(recipe: str | os.PathLike[str]) -> dict[str, Any]:
             )
         place = Path(__file__).parent / f"{recipe}.toml"
     try:
-        said = place.read_text(encoding="utf-8")
+        said = place.read_text(encoding="utf-8-sig")
         values = json.loads(said) if place.suffix.lower() == ".json" else tomllib.loads(said)
     except (UnicodeDecodeError, json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
         kind = "JSON" if place.suffix.lower() == ".json" else "TOML"

@@ -1,0 +1,47 @@
+"""The sensor that ``--array`` describes."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from taxel._core import ProblemError
+
+if TYPE_CHECKING:
+    from taxel.array import Array
+    from taxel.recording import Recording
+
+__all__ = ["FileArrayOption", "geometry", "of_array"]
+
+#: Of commands that read files; those that listen have `taxel.cli._board.ArrayOption`.
+FileArrayOption = Annotated[
+    str | None,
+    typer.Option(
+        "--array",
+        metavar="ROWSxCOLUMNS[xMM]",
+        help="The sensor and its pitch, as 24x20x5, where the file does not hold it (events as .csv, .lsa): 64x64x2.67 "
+        "where left out, a larger one where events lie outside it.",
+    ),
+]
+
+
+def geometry(said: str) -> Array:
+    """Return the array of `said` rows x columns [x pitch in mm]; left out, the pitch is the thesis'."""
+    from taxel.array import Array  # noqa: PLC0415  the command line starts quickly
+
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})(?:x(\d{1,4}(?:\.\d{1,6})?))?", said)
+    if match is None:
+        raise ProblemError(f"--array {said}: must be rows x columns, as 64x64, or with the pitch in mm, as 64x64x2.67")
+    thesis = Array.thesis()
+    rows, columns, pitch = int(match[1]), int(match[2]), float(match[3] or thesis.pitch_mm)
+    same = (rows, columns, pitch) == (*thesis.shape, thesis.pitch_mm)
+    return thesis if same else Array(rows, columns, pitch_mm=pitch, name=said)
+
+
+def of_array(recording: Recording, said: str | None) -> Recording:
+    """Return the recording; refuse an ``--array`` that it does not take, as it holds its own."""
+    if said is not None and recording.array != geometry(said):
+        raise ProblemError(f"--array {said}: {recording.path} holds its own sensor, {recording.array!r}; leave it out")
+    return recording
