@@ -82,10 +82,11 @@ def test_features_that_never_vary_or_tell_each_other_are_as_in_scikit_learn():
 
 
 @pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize(("noise", "within"), [(None, 1e-9), (3e-4, 1e-3)])
+@pytest.mark.parametrize(("noise", "within"), [(None, 1e-9), (8e-4, 5e-3)])
 def test_directions_in_which_no_class_varies_are_left_out_as_by_scikit_learn(seed, noise, within):
     """Of spikes, their sums, and of features that tell each other but for the class; by pivots, or by eigenvectors
-    where a feature is neither clearly told nor clearly not (and rounding weighs more)."""
+    where a feature is neither clearly told nor clearly not: there rounding grows by the noise's fourth power, and is
+    the processor's (3e-4 at the worst of 100 seeds on one)."""
     random = np.random.default_rng(seed)
     y = np.arange(600) % 5
     spikes = random.random((600, 14)) < random.uniform(0.1, 0.5, (5, 14))[y]
