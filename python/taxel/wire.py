@@ -591,7 +591,7 @@ class Registers:
 
         Raises
         ------
-        ProblemError : no such preset (names those that there are)
+        ProblemError : no such preset for boards of that size (names those that there are)
         DeviceError : the board could not hold it (names the rule)
 
         Examples

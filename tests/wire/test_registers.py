@@ -120,6 +120,14 @@ def test_the_manuals_names_are_aliases_in_its_own_units():
         (lambda: Registers(array=3), "array is 3: must be a taxel.Array"),
         (lambda: Registers.preset("fast"), 'preset "fast": there are "5.2 kHz", "2 kHz", "20.8 kHz"'),
         (lambda: Registers.preset(5), "preset is 5: must be a text"),
+        (
+            lambda: Registers().with_preset("128 x 128, 1 kHz"),
+            'preset "128 x 128, 1 kHz" is not made for a board of 64 x 64 taxels: there are "5.2 kHz", "2 kHz", ',
+        ),
+        (
+            lambda: Registers(array=taxel.Array(128, 128)).with_preset("2 kHz"),
+            'preset "2 kHz" is not made for a board of 128 x 128 taxels: there are "128 x 128, 1 kHz", ',
+        ),
         (lambda: Registers().commands_to(None), "target is None: must be a taxel.Registers"),
         (lambda: Command(8, 0), "register is 8: must be a whole number from 0 to 7"),
         (lambda: Command(0, -1), "value is -1"),

@@ -120,18 +120,24 @@ fn registers_fields() -> PyResult<String> {
     to_json(&wire::registers::fields())
 }
 
-/// A preset, as JSON.
+/// A preset, as JSON: as it is written, or on a board of an array.
 #[pyfunction]
-fn registers_preset(name: &str) -> PyResult<String> {
-    to_json(&Registers::preset(name).map_err(core)?)
+#[pyo3(signature = (name, array = None))]
+fn registers_preset(name: &str, array: Option<ArrayParts>) -> PyResult<String> {
+    let preset = match array {
+        None => Registers::preset(name),
+        Some(array) => Registers::preset_on(name, &to_array(array)?),
+    };
+    to_json(&preset.map_err(core)?)
 }
 
 /// What a board of an array that holds these registers holds after a preset, as JSON.
 #[pyfunction]
 fn registers_with_preset(registers: &str, name: &str, array: ArrayParts) -> PyResult<String> {
     let held: Registers = parsed("registers", registers)?;
-    let preset = Registers::preset(name).map_err(core)?;
-    to_json(&held.with_preset(&preset, &to_array(array)?))
+    let array = to_array(array)?;
+    let preset = Registers::preset_on(name, &array).map_err(core)?;
+    to_json(&held.with_preset(&preset, &array))
 }
 
 /// What a board of an array and so many channels holds at reset, as JSON.

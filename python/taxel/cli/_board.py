@@ -38,7 +38,8 @@ ArrayOption = Annotated[
     str | None,
     typer.Option(
         metavar="ROWSxCOLUMNS[xMM]",
-        help="The sensor and its pitch, as 24x20x5; 64x64x2.67 where left out, or what is told with --from.",
+        help="The sensor and its pitch, as 24x20x5 (2.67 mm where it is left out); without it 64x64x2.67, or what is "
+        "told with --from.",
     ),
 ]
 PresetOption = Annotated[

@@ -237,16 +237,16 @@ def fitting(preset: str | None, array: Array) -> Registers:
 
     Raises
     ------
-    ProblemError : no such preset
+    ProblemError : no such preset for an array of that size
     DeviceError : the array has more lines than the preset reads
     """
     if preset is None:
         if max(array.shape) > _THESIS_LINES:
             return Registers(array=array)
         preset = "5.2 kHz"
-    held = json.loads(_core.registers_preset(text("preset", preset)))
+    held = json.loads(_core.registers_preset(text("preset", preset), array._parts()))
     try:
-        return Registers._of({**held, "lines": min(held["lines"], array.columns)}, array)
+        return Registers._of(held, array)
     except DeviceError as error:
         size = f"{array.rows} x {array.columns} taxels"
         raise DeviceError(f'preset "{preset}" does not read {size}: {error}') from None

@@ -59,10 +59,7 @@ impl Registers {
     pub fn preset(name: &str) -> Result<Self> {
         match PRESETS.iter().find(|preset| preset.name == name) {
             Some(preset) => Ok(preset.registers),
-            None => {
-                let names: Vec<_> = PRESETS.iter().map(|preset| format!("{:?}", preset.name)).collect();
-                Err(problem!("preset {name:?}: there are {}", names.join(", ")))
-            }
+            None => Err(problem!("preset {name:?}: there are {}", named(&PRESETS))),
         }
     }
 
@@ -70,9 +67,18 @@ impl Registers {
     ///
     /// # Errors
     ///
-    /// As [`Registers::preset`].
+    /// `Problem` where there is none, or where it is made for boards of more lines than version 1 names and the array
+    /// has no more than these, or the other way round; with the names that there are.
     pub fn preset_on(name: &str, array: &Array) -> Result<Self> {
         let preset = Self::preset(name)?;
+        let fitting = || PRESETS.iter().filter(|preset| preset.is_of_size(array));
+        if !fitting().any(|preset| preset.name == name) {
+            let Array { rows, columns, .. } = array;
+            return Err(problem!(
+                "preset {name:?} is not made for a board of {rows} x {columns} taxels: there are {}",
+                named(fitting())
+            ));
+        }
         Ok(Self { lines: preset.lines.min(array.columns), ..preset })
     }
 
@@ -90,11 +96,8 @@ impl Registers {
     }
 
     /// The presets that are made for boards of that array's size and so many channels.
-    pub fn presets(array: &Array, channels: u8) -> impl Iterator<Item = &'static Preset> + use<> {
-        let large = is_large(array);
-        PRESETS
-            .iter()
-            .filter(move |preset| (preset.sense_lines > SENSE_LINES) == large && preset.registers.channels == channels)
+    pub fn presets(array: &Array, channels: u8) -> impl Iterator<Item = &'static Preset> + use<'_> {
+        PRESETS.iter().filter(move |preset| preset.is_of_size(array) && preset.registers.channels == channels)
     }
 
     /// What a board of that array and so many channels holds at reset.
@@ -343,6 +346,19 @@ impl Registers {
             _ => format!("REG{register}=0x{:08X}", self.word(register)),
         }
     }
+}
+
+impl Preset {
+    /// Whether it is made for boards of the array's size: beyond the lines that version 1 can name, or within.
+    fn is_of_size(&self, array: &Array) -> bool {
+        (self.sense_lines > SENSE_LINES) == is_large(array)
+    }
+}
+
+/// Presets' names, as an error lists them.
+fn named<'a>(presets: impl IntoIterator<Item = &'a Preset>) -> String {
+    let names: Vec<_> = presets.into_iter().map(|preset| format!("{:?}", preset.name)).collect();
+    names.join(", ")
 }
 
 /// Whether an array has more lines than version 1 can name.

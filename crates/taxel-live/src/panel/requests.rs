@@ -225,7 +225,11 @@ async fn preset(hub: &Hub, what: &str, name: &str) -> Answer {
                 read(hub).await?;
             }
             let target = match (built_in, own) {
-                (Some(preset), _) => hub.state().registers.with_preset(&preset.registers, array),
+                (Some(_), _) => {
+                    let preset =
+                        Registers::preset_on(name, array).map_err(|error| Refused::of("name", error.to_string()))?;
+                    hub.state().registers.with_preset(&preset, array)
+                }
                 // One's own says every register, the version of the wire too.
                 (None, Some(own)) => {
                     let own: Registers = serde_json::from_value(Value::Object(own))
