@@ -892,6 +892,10 @@ SOUND: dict[str, Sound] = {
         taxel.information.read_trials,
         {"table": "here_trials.csv", "recordings": [taxel.open("here_events.npz")], "window_ms": 0.1},
     ),
+    "taxel.information.notes_as_trials": lambda: (
+        taxel.information.notes_as_trials,
+        {"recordings": [taxel.open("here_events.npz").with_notes([taxel.Note("ball", 0, 0)])], "window_ms": 0.1},
+    ),
     "taxel.information.recordings_as_trials": lambda: (
         taxel.information.recordings_as_trials,
         {"recordings": [taxel.open("here_events.npz")], "window_ms": 0.1},

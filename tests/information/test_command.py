@@ -7,8 +7,10 @@ import pytest
 from typer.testing import CliRunner
 
 import taxel
+from taxel import ProblemError
 from taxel.cli import app
 from taxel.information import read_trials
+from taxel.labels import beside, write_labels
 
 from .touches import folder, ordered
 
@@ -60,6 +62,25 @@ def test_json_holds_all_figures(tmp_path):
     assert {(p["period_ms"], p["window_ms"]) for p in said["points"]} == {(1, 10), (1, 60), (10, 10), (10, 60)}
     assert said["cheapest"]["kbps"] <= said["full"]["kbps"]
     assert said["report"].endswith("page.html")
+
+
+def test_notes_are_trials_as_rows_of_a_table_are(tmp_path):
+    recording, labels = folder(tmp_path, 40)
+    rows = [line.split(",")[1:] for line in labels.read_text().splitlines()[1:]]
+    asked = [*QUICK, "--json", "--report", tmp_path / "page.html", "--overwrite"]
+    expected = json.loads(run(recording, "--labels", labels, *asked).stdout)
+    done = run(recording, "--labels", "notes", *asked)
+    assert isinstance(done.exception, ProblemError)
+    assert str(done.exception) == f"{recording}: has no notes; leave it out, or give a table of trials"
+    write_labels(beside(recording), [(label, int(t)) for t, label in rows])
+    assert json.loads(run(recording, "--labels", "notes", *asked).stdout) == expected
+    done = run(recording, "--labels", "notes", "--report", tmp_path / "other.html")
+    assert "--labels notes: give the trials' length by --window-ms" in str(done.exception)
+    write_labels(beside(recording), [("left first", int(rows[0][0])), ("right first", int(rows[0][0]) + 100)])
+    done = run(recording, "--labels", "notes", *asked)
+    assert f"note at {int(rows[0][0]) + 100} us: begins 0.1 ms after note at {rows[0][0]} us" in str(done.exception)
+    write_labels(beside(recording), [("left first", 10**12), ("right first", 100_000)])
+    assert "lies outside touches.npz" in str(run(recording, "--labels", "notes", *asked).exception)
 
 
 def test_without_labels_a_recording_is_a_trial_and_its_folder_the_label(tmp_path):

@@ -16,6 +16,7 @@ from taxel.cli._listening import SET_HELP, open_all, told
 
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, LabelledTrial, Point
+    from taxel.recording import Recording
 
 __all__ = ["information"]
 
@@ -27,10 +28,11 @@ def information(
     ],
     array: FileArrayOption = None,
     labels: Annotated[
-        Path | None,
+        str | None,
         typer.Option(
             help="A CSV recording,t_us,label[,stop_us][,group] and columns of parameters: a row is a trial; of one "
-            "recording the first may be absent. Without a table each recording is one, and its folder's name the label."
+            "recording the first may be absent. notes: each note of the recordings is a trial from its time on, its "
+            "text the label. Without either each recording is one, and its folder's name the label."
         ),
     ] = None,
     window_ms: Annotated[
@@ -57,7 +59,7 @@ def information(
 
     Example: taxel information drops.mcap --labels drops.csv --window-ms 50
     """
-    from taxel.information import answer, read_trials, recordings_as_trials  # noqa: PLC0415  starts quickly
+    from taxel.information import answer  # noqa: PLC0415  the command line starts quickly
     from taxel.report.information import write_information  # noqa: PLC0415
 
     if report.suffix != ".html":
@@ -70,17 +72,13 @@ def information(
         for path in recordings:
             tell(f"reading {path}")
             opened += open_all([path], array)
-        trials = (
-            recordings_as_trials(opened, window_ms=window_ms)
-            if labels is None
-            else read_trials(labels, opened, window_ms=window_ms)
-        )
+        trials = _trials(labels, opened, window_ms)
         if labels is None and len({trial.label for trial in trials}) == 1:
             raise ProblemError(
                 f"{trials[0].name}: without a table each recording is a trial and its folder's name the label, here "
                 f"{trials[0].label!r} alone; give a table of trials (--labels), or each label's recordings a folder"
             )
-        _dealt(trials, labels or recordings[0], count=folds, seed=seed)
+        _dealt(trials, str(recordings[0]) if labels in (None, "notes") else labels, count=folds, seed=seed)
         found = answer(
             trials,
             encoder=chosen,
@@ -106,7 +104,19 @@ def information(
     typer.echo(f"written to {report}")
 
 
-def _dealt(trials: list[LabelledTrial], place: Path, *, count: int, seed: int) -> None:
+def _trials(labels: str | None, opened: list[Recording], window_ms: float | None) -> list[LabelledTrial]:
+    from taxel.information import notes_as_trials, read_trials, recordings_as_trials  # noqa: PLC0415  starts quickly
+
+    if labels is None:
+        return recordings_as_trials(opened, window_ms=window_ms)
+    if labels != "notes":
+        return read_trials(labels, opened, window_ms=window_ms)
+    if window_ms is None:
+        raise ProblemError("--labels notes: give the trials' length by --window-ms, as notes have no end")
+    return notes_as_trials(opened, window_ms=window_ms)
+
+
+def _dealt(trials: list[LabelledTrial], place: str, *, count: int, seed: int) -> None:
     """Refuse labels and groups that cannot be dealt out to folds, and say in which table they stand."""
     from taxel.information import folds  # noqa: PLC0415  starts quickly
 

@@ -27,7 +27,7 @@ from taxel.information.lda import LDA
 from taxel.information.neighbours import NearestNeighbours, distances_of
 from taxel.information.nested import Nested, nested_predictions, training_curve
 from taxel.information.spiking import ConeRReadout, TempotronReadout
-from taxel.information.trials import LabelledTrial, read_trials, recordings_as_trials
+from taxel.information.trials import LabelledTrial, notes_as_trials, read_trials, recordings_as_trials
 
 __all__ = [
     "LDA",
@@ -60,6 +60,7 @@ __all__ = [
     "label_entropy",
     "local_information",
     "nested_predictions",
+    "notes_as_trials",
     "panzeri_treves",
     "plug_in",
     "quadratic_extrapolation",

@@ -21,7 +21,7 @@ from taxel.labels import Label, ahead_us
 from taxel.recording import Recording
 from taxel.spikes import to_ms, to_us
 
-__all__ = ["LabelledTrial", "read_trials", "recordings_as_trials"]
+__all__ = ["LabelledTrial", "notes_as_trials", "read_trials", "recordings_as_trials"]
 
 _COLUMNS = ("recording", "t_us", "label")
 _KNOWN = (*_COLUMNS, "stop_us", "group", "host_ns")
@@ -108,8 +108,7 @@ def read_trials(
     """
     place = Path(path("table", table))
     opened = _once(recordings)
-    if window_ms is not None and not 0 < number("window_ms", window_ms) < 1e9:
-        raise ProblemError(f"window_ms is {shown(window_ms)}: must be above 0 and below 1e9")
+    window_us = 0 if window_ms is None else _window_us(window_ms)
     by_name = _named(opened)
     rows = _rows(place, opened)
     named = {row["recording"] for _, row in rows}
@@ -127,9 +126,9 @@ def read_trials(
     unsaid = [one.path for one in opened if not {str(one.path), one.name, _stem(one)} & named]
     if unsaid:
         raise ProblemError(f"{place}: says nothing of {unsaid[0]}; name it, or leave the recording out")
-    sources = {id(one): one.events if one.has_events else one.frames() for one in opened}
+    sources = {id(one): _source(one) for one in opened}
+    spans = {key: _span(source) for key, source in sources.items()}
     clocks = {id(one): one.clock for one in opened} if any(row.get("host_ns") for _, row in rows) else {}
-    spans = {key: (int(s.t.min()), int(s.t.max())) if len(s) else None for key, s in sources.items()}
     found = []
     for line, row in rows:
         one = by_name[row["recording"]]
@@ -147,16 +146,45 @@ def read_trials(
             raise FormatError(f"{where}: label is {row['label']!r}, as tables write what is missing; name it otherwise")
         more = {name: cell for name, cell in row.items() if name not in _KNOWN}
         found.append(LabelledTrial(source, row["label"], start, stop, row.get("group", ""), more, where))
-        end = start + round(to_us(window_ms or 0.0)) if stop is None else stop
-        # Silence before the first event is not recorded, and a touch may be waited for in it.
-        span = spans[id(one)]
-        if span is None or start > span[1] or end < span[0]:
-            held = "nothing" if span is None else f"{span[0]} to {span[1]} us"
-            raise ProblemError(f"{where}: t_us {start} lies outside {one.name}, which holds {held}")
+        _inside(found[-1], one.name, spans[id(one)], window_us)
     if any(trial.group for trial in found) and not all(trial.group for trial in found):
         nameless = next(trial for trial in found if not trial.group)
         raise ProblemError(f"{nameless.name}: group is empty; give every trial one, or none")
-    _apart(found, round(to_us(window_ms or 0.0)))
+    _apart(found, window_us)
+    return found
+
+
+def notes_as_trials(recordings: Sequence[Recording], *, window_ms: float) -> list[LabelledTrial]:
+    """Take each note of recordings as one trial from its time on; its text is the label.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Notes written while it was recorded, or set in the panel; those without the board's time are left out.
+    window_ms : float, ms, above 0
+        How long after the touch to look.
+
+    Returns
+    -------
+    list of LabelledTrial, in the order of time in each recording
+
+    Raises
+    ------
+    ProblemError : a recording without notes, or one that is there twice; an empty note, one outside its recording, or
+        one inside another's window
+    """
+    window_us = _window_us(window_ms)
+    found = []
+    for one in _once(recordings):
+        source = _source(one)
+        span = _span(source)
+        notes = sorted(((note.t, note.text) for note in one.notes if note.t is not None), key=lambda note: note[0])
+        if not notes:
+            raise ProblemError(f"{one.path}: has no notes; leave it out, or give a table of trials")
+        for start, label in notes:
+            found.append(LabelledTrial(source, label, start, name=f"{one.path}, note at {start} us"))
+            _inside(found[-1], one.name, span, window_us)
+    _apart(found, window_us)
     return found
 
 
@@ -179,10 +207,11 @@ def recordings_as_trials(recordings: Sequence[Recording], *, window_ms: float | 
     """
     found = []
     for one in _once(recordings):
-        source = one.events if one.has_events else one.frames()
-        if not len(source):
+        source = _source(one)
+        span = _span(source)
+        if span is None:
             raise ProblemError(f"{one.path}: holds nothing; leave it out")
-        start, stop = int(source.t.min()), int(source.t.max()) + 1
+        start, stop = span[0], span[1] + 1
         label = one.path.resolve().parent.name
         found.append(LabelledTrial(source, label, start, None if window_ms is not None else stop, name=str(one.path)))
     return found
@@ -198,6 +227,28 @@ def _once(recordings: Sequence[Recording]) -> list[Recording]:
             raise ProblemError(f"{one.path}: is named twice; name it once")
         seen.add(key)
     return opened
+
+
+def _source(recording: Recording) -> Events | Frames:
+    return recording.events if recording.has_events else recording.frames()
+
+
+def _window_us(window_ms: float) -> int:
+    if not 0 < number("window_ms", window_ms) < 1e9:
+        raise ProblemError(f"window_ms is {shown(window_ms)}: must be above 0 and below 1e9")
+    return round(to_us(window_ms))
+
+
+def _span(source: Events | Frames) -> tuple[int, int] | None:
+    return (int(source.t.min()), int(source.t.max())) if len(source) else None
+
+
+def _inside(trial: LabelledTrial, recording: str, span: tuple[int, int] | None, window_us: int) -> None:
+    """Refuse a trial outside its recording; silence before its first event may belong to a touch."""
+    end = trial.start_us + window_us if trial.stop_us is None else trial.stop_us
+    if span is None or trial.start_us > span[1] or end < span[0]:
+        held = "nothing" if span is None else f"{span[0]} to {span[1]} us"
+        raise ProblemError(f"{trial.name}: t_us {trial.start_us} lies outside {recording}, which holds {held}")
 
 
 def _apart(trials: list[LabelledTrial], window_us: int) -> None:
