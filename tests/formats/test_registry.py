@@ -33,6 +33,16 @@ def test_a_folder_of_no_or_of_several_formats_is_refused(tmp_path):
         list(formats.trials(tmp_path / "nothing"))
 
 
+@pytest.mark.parametrize("write", [making.write_pedar, making.write_emed, making.write_tekscan])
+def test_an_ending_in_capitals_is_the_same_ending(write, tmp_path):
+    """Programs of Windows and before write WALK.ASC."""
+    file = write(tmp_path)
+    plain = [trial.recorded for trial in formats.trials(file)]
+    file = file.rename(tmp_path / file.name.upper())
+    assert [trial.recorded for trial in formats.trials(file)] == plain
+    assert [trial.recorded for trial in formats.trials(tmp_path)] == plain
+
+
 @pytest.mark.parametrize(
     ("call", "said"),
     [

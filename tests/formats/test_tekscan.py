@@ -66,6 +66,13 @@ def test_line_ends_of_both_kinds_and_a_mark_at_the_beginning_read_the_same(tmp_p
     assert np.array_equal(other.series["raw_sum"], plain.frames.total())
 
 
+def test_rows_that_a_spreadsheet_filled_up_read_the_same(tmp_path):
+    """Rows of fewer cells than the frame's line has commas get the rest of them; more cells are still an error."""
+    (plain,) = tekscan.trials(write_tekscan(tmp_path))
+    (other,) = tekscan.trials(write_tekscan(tmp_path, lambda rows: [row + "," * (8 - row.count(",")) for row in rows]))
+    assert other.recorded == plain.recorded
+
+
 def swap(old, new):
     return lambda rows: "\n".join(rows).replace(old, new, 1).split("\n")
 

@@ -41,8 +41,8 @@ _NEWTON = {"kPa": 0.1, "N/cm2": 1.0}
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.lst`` whose head names the matrix and the time a picture."""
-    found = sorted(path.glob("*.lst")) if path.is_dir() else [path]
-    return [f for f in found if f.suffix == ".lst" and _is_export(f)]
+    found = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [f for f in found if f.suffix.lower() == ".lst" and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:

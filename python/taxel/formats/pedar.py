@@ -28,8 +28,8 @@ _SOURCE = "the insole's own sum, 10 % of its largest: no truth of its own"
 
 def files(path: Path) -> list[Path]:
     """Find the files of this format: ``.asc`` whose head names time in seconds."""
-    found = sorted(path.glob("*.asc")) if path.is_dir() else [path]
-    return [f for f in found if f.suffix == ".asc" and _is_export(f)]
+    found = sorted(path.iterdir()) if path.is_dir() else [path]
+    return [f for f in found if f.suffix.lower() == ".asc" and _is_export(f)]
 
 
 def _is_export(path: Path) -> bool:

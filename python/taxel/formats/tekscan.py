@@ -254,6 +254,9 @@ def _cells(file: Path, lines: Sequence[str], first_line: int, columns: int) -> N
     """Return the cells of one frame as they stand there, shape (rows, columns)."""
     rows = [[cell.strip() for cell in line.split(",")] for line in lines]
     for k, row in enumerate(rows):
+        # A spreadsheet that saves it again fills rows up to the widest line, which may be a frame's.
+        while len(row) > columns and not row[-1]:
+            row.pop()
         if len(row) != columns:
             raise FormatError(f"{file.name}, line {first_line + k}: {len(row)} cells, must have {columns}")
     return np.array(rows)
