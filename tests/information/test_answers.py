@@ -372,7 +372,7 @@ def test_a_control_that_tells_as_much_is_warned_of():
 
 def test_what_is_told_plainly_bears_no_warning():
     random = np.random.default_rng(4)
-    touches = [(f"taxel {k % 2}", "", ((0, k % 2), (random.uniform(1, 9), 7))) for k in range(80)]
+    touches = [(f"taxel {k % 2}", "", ((0, k % 2), (random.uniform(1, 9), 7))) for k in range(130)]
     found = asked(pulsed(touches), taxels=[])
     assert found.full.found.bits == 1.0
     assert found.warnings == ()

@@ -24,6 +24,25 @@ def test_the_interval_holds_the_truth_about_as_often_as_is_said_from_a_hundred_t
     assert 0.86 <= held / 80 <= 1.0  # 95 % is said; below a hundred trials a label it holds less often
 
 
+@pytest.mark.parametrize(("labels", "trials", "right"), [(3, 30, 0.99), (10, 20, 0.99), (2, 20, 0.97)])
+def test_few_or_no_errors_leave_room_for_some_that_did_not_come(labels, trials, right):
+    """Redraws of a table without errors have none: all of its intervals would have no width."""
+    p, true = channel(labels, right)
+    random = np.random.default_rng(8)
+    found = [estimate(*answers(p, trials, random), redraws=60, confidence=0.9, seed=k) for k in range(60)]
+    assert sum(one.interval[0] <= true <= one.interval[1] for one in found) >= 0.85 * 60
+    assert all(one.interval[0] < one.bits for one in found)
+    assert any(one.right == 1 for one in found)
+
+
+def test_a_perfect_answers_interval_ends_where_the_rule_of_three_says():
+    """None wrong of 300: at most 3.7 / 300 are, at 97.5 %, and Fano says what they may cost."""
+    labels = np.repeat([0, 1], 150)
+    wrong = 1 - 0.025 ** (1 / 300)
+    fano = 1 + wrong * np.log2(wrong) + (1 - wrong) * np.log2(1 - wrong)
+    assert estimate(labels, labels).interval == pytest.approx((fano, 1.0), abs=1e-6)
+
+
 def test_groups_that_answer_alike_widen_the_interval():
     labels = np.repeat([0, 1], 120)
     groups = np.tile(np.repeat(np.arange(6), 20), 2)
@@ -35,13 +54,13 @@ def test_groups_that_answer_alike_widen_the_interval():
 
 
 def test_a_perfect_answer_keeps_all_bits_and_warns_of_little_else_than_few_trials():
-    labels = np.repeat(["a", "b", "c"], 40)
+    labels = np.repeat(["a", "b", "c"], 60)
     found = estimate(labels, labels)
     assert found.bits == pytest.approx(np.log2(3))
     assert found.interval[1] == pytest.approx(np.log2(3))
     assert found.warnings == ()
     few = estimate(labels[::10], labels[::10])
-    assert "4 trials of a label" in few.warnings[0]
+    assert "6 trials of a label" in few.warnings[0]
 
 
 def test_several_draws_are_averaged():

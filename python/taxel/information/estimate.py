@@ -27,6 +27,10 @@ __all__ = ["Estimate", "ZeroTest", "estimate", "zero_test"]
 TRIALS_A_RESPONSE = 7
 #: Cells that are held at a time while trials are redrawn.
 _CELLS = 1 << 21
+#: Counts in which shares are told finely enough.
+_FINE = 1 << 36
+#: A tenth of a bit either way.
+_FIFTH = 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +43,9 @@ class Estimate:
         Corrected (`panzeri_treves`), the mean over draws.
     interval : (float, float)
         Where trials, or whole groups, redrawn put it, shifted onto `bits`. Where trials are few it holds the truth less
-        often than it says: of 95 % some 55 to 99 at 20 trials a label, 78 to 95 at 40.
+        often than it says: of 95 % some 55 to 99 at 20 trials a label, 78 to 95 at 40. Where fewer trials were named
+        wrongly than there are labels, redraws miss errors that did not come: then down to what Fano's inequality leaves
+        of the largest share of errors that so few allow (Clopper and Pearson, trial by trial).
     plug_in, extrapolated : float
         As counted, and by `quadratic_extrapolation`. That the three agree does not mean that they are right.
     most : float
@@ -181,6 +187,13 @@ def estimate(
     low, high = _interval(cells, row, belongs, len(classes), rounds, share, random)
     n = np.bincount(row)
     tenth = int(np.ceil(384.0 * np.var(local)))
+    prior, wrong = n[n > 0] / len(truth), int((row != counts.sum(0).argmax(0)[column]).any(0).sum())
+    if wrong <= len(prior):
+        # Too few errors to tell by redraws where others would lie.
+        low = min(low, most - bits - _left_open(prior, wrong, len(truth), share))
+        times = np.geomspace(1, 100, 400)
+        needed = (len(truth) * m for m in times if _left_open(prior, m * wrong, m * len(truth), 0.95) <= _FIFTH)
+        tenth = max(tenth, int(np.ceil(next(needed, 100 * len(truth)))))
     relevant = relevant_responses(counts)[:, np.unique(row)].mean()
     interval = max(0.0, bits + low), min(most, bits + high)
     return Estimate(
@@ -309,6 +322,19 @@ def _interval(
         wider = stdtrit(free, (1 + confidence) / 2) / ndtri((1 + confidence) / 2)
         ends *= wider * np.sqrt(len(owner) / free)
     return float(min(ends[0], 0.0)), float(max(ends[1], 0.0))
+
+
+def _left_open(prior: NDArray[np.float64], wrong: float, trials: float, confidence: float) -> float:
+    """Return how many bits the labels may lose where so few of the trials were named wrongly.
+
+    By Fano's inequality, with Clopper and Pearson's upper end for the share of errors.
+    """
+    from scipy.special import betaincinv  # noqa: PLC0415  loads slowly
+
+    share = float(betaincinv(wrong + 1, max(trials - wrong, 1e-9), (1 + confidence) / 2))
+    even = share * (1 - np.eye(len(prior))) / (len(prior) - 1) + (1 - share) * np.eye(len(prior))
+    table = np.rint(_FINE * prior[:, None] * even)
+    return float(label_entropy(table) - plug_in(table))
 
 
 def _warnings(least: int, relevant: float, interval: tuple[float, float], tenth: int) -> tuple[str, ...]:
