@@ -61,7 +61,8 @@ def test_a_lower_voltage_of_the_lines_trades_sensitivity_for_range(tmp_path):
 
 def test_the_input_settles_in_time_unless_the_capacitors_lie_across_the_amplifiers(tmp_path):
     said, statements = found(fig4_7.STUDY, tmp_path)
-    assert [s["holds"] for s in statements.values()] == [None, True, None]
+    # What is taken over, or chosen for it, is no test.
+    assert [s["holds"] for s in statements.values()] == [None, None, None]
     plain, slow = said["scans"]
     assert max(plain["settles_us"]) == pytest.approx(0.05 * np.log(50), abs=0.011)
     assert max(abs(t) for t in plain["left_ticks"]) < 0.05

@@ -227,3 +227,46 @@ def test_without_its_package_a_study_says_what_to_install(tmp_path, monkeypatch)
     monkeypatch.setitem(sys.modules, "sklearn", None)
     with pytest.raises(ProblemError, match=r'fig4.9: it needs sklearn: pip install "taxel\[studies\]"'):
         fig4_9.STUDY.run(tmp_path, size="toy", quiet=True)
+
+
+@pytest.mark.parametrize(
+    ("below", "height", "least", "radius"), [(0.002, 0.895, False, False), (0.05, 0.8, True, True)]
+)
+def test_a_difference_of_a_few_drops_is_none(below, height, least, radius):
+    """Bits and shares that differ by less than .02 do not make the best period, nor the parameter that suffers most."""
+
+    def line(period, bits, ball, tall):
+        by = {"ball_mm": (ball, 1.0), "height_mm": (tall, 1.585), "slant_deg": (0.5, 1.585)}
+        return {
+            "period_ms": period,
+            "bits": bits,
+            "by": {name: {"bits": share * most, "most": most} for name, (share, most) in by.items()},
+            "any_phase_bits": bits,
+            "absolute_bits": None,
+            "tau_ms": 0.4,
+            "sigma_mm": 2.0,
+            "searched": [],
+            "times": [[50.0, bits]],
+        }
+
+    lines = [line(0.5, 3.9 - below, 1.0, 1.0), line(1.0, 3.9, 1.0, 1.0), line(20.0, 0.5, 0.1, 1.0 - height)]
+    found = fig5_11.statements(fig5_11.STUDY.set("toy"), {"lines": lines, "conditions": 18})
+    holds = {
+        one.says.split(":")[0]: one.holds for one in found if one.says.startswith(("Figure 5.11: most", "Figure 5.12"))
+    }
+    assert holds == {"Figure 5.11": least, "Figure 5.12": radius}
+
+
+def test_the_gain_above_100_hz_is_told_from_100_hz_itself_too():
+    lines = [
+        {"period_ms": t, "bits": b, "any_phase_bits": a} for t, b, a in [(1, 1.8, 1.7), (10, 1.6, 0.4), (20, 0.1, 0.2)]
+    ]
+    said = {
+        "lines": lines,
+        "conditions": 4,
+        "sum": [[0.0, 0.0], [1.0, 9.0], [5.0, 0.0]],
+        "middle": [0.0, 0.0],
+        "full": 510,
+    }
+    *_, gain = fig4_8.statements(fig4_8.STUDY.set("toy"), said)
+    assert gain.ours.endswith("from 100 Hz itself on +0.20, begun at any phase +1.30")
