@@ -19,10 +19,11 @@ __all__ = ["Clock"]
 class Clock:
     """Tell a source's time, a board's or a stream's, from the host's.
 
-    A datagram comes late by whatever the way costs, never early. So the line below all points *arrival less own time*
-    is the offset between the clocks and the shortest way together; they cannot be told apart. Of all such lines it is
-    the edge of the lower convex hull above the mean time; its slope is the drift. Over more than 32 s it is drawn again
-    and again, each time of the last 64 s, and between the middles of two such stretches time passes evenly.
+    A datagram comes late by whatever the way costs, seldom early. So a line below the points *arrival less own time* is
+    the offset between the clocks and the quick way together; they cannot be told apart. One point in a hundred may lie
+    below it, as the very quickest are chance; of all such lines it is the one nearest to the points above, by quantile
+    regression. Its slope is the drift. Over more than 32 s it is drawn again and again, each time of the last 64 s, and
+    between the middles of two such stretches time passes evenly.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ class Clock:
 
     @property
     def delay_us(self) -> NDArray[np.float64]:
-        """How much later than the quickest each datagram came, us."""
+        """How much later than the quick ones each datagram came, us; one in a hundred may come before them."""
         late: NDArray[np.float64] = (self.arrived_ns - self.host_ns(self.board_us)) / 1000.0
         return late
 

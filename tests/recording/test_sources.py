@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import _core
+from taxel._clock import Clock
 from taxel.live import Live
 from taxel.simulate import Board
 
@@ -293,6 +294,25 @@ def test_times_go_from_one_clock_to_the_other_and_nothing_else_moves(
     assert abs(note.t - note.at_ns / 1000) < 60_000_000
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_arrivals_of_a_busy_machine_put_two_boards_on_one_clock(seed: int) -> None:
+    """Of two real processes at +50 and -30 ppm, 1 % of them 5 ms late: 10 us after 1 s, 5 us after 10 s."""
+    random, kept = np.random.default_rng(seed), np.load(Path(__file__).parents[1] / "data/clock/arrivals.npz")
+    off: dict[str, list[float]] = {}
+    for name, ppm in {"board": 50.0, "left": -30.0}.items():
+        own = np.cumsum(kept[f"{name}_step_us"].astype(np.int64))
+        late = (kept[f"{name}_late"].astype(np.int64) - 100) * 100
+        late += np.where(random.random(len(own)) < 0.01, 5_000_000, 0)
+        truth = 1_700_000_000_000_000_000 + np.rint(own * 1000 / (1 + ppm * 1e-6)).astype(np.int64)
+        for seconds in (1, 10):
+            until_now = own <= seconds * 1_000_000
+            clock = Clock(own[until_now], (truth + late)[until_now])
+            off.setdefault(name, []).append((clock.host_ns(own[until_now][-1]) - truth[until_now][-1]) / 1e3)
+    after_1_s, after_10_s = np.abs(np.subtract(off["board"], off["left"]))
+    assert after_1_s < 10, off
+    assert after_10_s < 5, off
+
+
 EMULATED = """
 import sys
 from taxel.simulate import Silence, Version2, emulate
@@ -304,7 +324,7 @@ print(report.began_ns)
 
 
 def test_two_boards_that_drift_are_put_on_one_clock(tmp_path: Path) -> None:
-    """Two processes on version 2, +50 and -30 ppm; how far off they come out is the machine's, so little is asked."""
+    """Two processes on version 2, +50 and -30 ppm; a machine may hold either up, so less is asked than it keeps."""
     drifts, began = {"board": 50.0, "left": -30.0}, {}
     sources = {"left": f"udp:{LOOPBACK}:0,preset=2 kHz"}
     with Live(0, host=LOOPBACK, registers="2 kHz", record=tmp_path / "two.mcap", sources=sources) as live:
@@ -325,15 +345,15 @@ def test_two_boards_that_drift_are_put_on_one_clock(tmp_path: Path) -> None:
         last = int(clock.board_us[-1])
         truth = began[name] + last * 1000 / (1 + drifts[name] * 1e-6)
         print(f"{name}: {clock.host_ns(last) - truth:.0f} ns, {clock.drift_ppm:+.2f} ppm")
-        assert abs(clock.host_ns(last) - truth) < 5e6
+        assert abs(clock.host_ns(last) - truth) < 1e6
         # The host's clock against the board's: the other way round.
-        assert abs(clock.drift_ppm + drifts[name]) < 250
+        assert abs(clock.drift_ppm + drifts[name]) < 50
     left = recording.sources["left"].clock
     at = int(left.board_us[-1])
     moved = int(recording.sources["board"].clock.board_us_at(int(left.host_ns(at))))
     truth = (began["left"] + at * 1000 / (1 - 30e-6) - began["board"]) / 1000 * (1 + 50e-6)
     print(f"left to board: {moved - truth:.1f} us")
-    assert abs(moved - truth) < 5000
+    assert abs(moved - truth) < 1000
 
 
 def test_differences_begun_in_mid_stream_add_up_from_what_the_taxels_held(tmp_path: Path) -> None:

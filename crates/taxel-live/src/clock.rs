@@ -1,9 +1,13 @@
 //! A board's clock as the host sees it: offset and drift, from arrival times alone.
 //!
-//! Something comes late by whatever the way costs, never early. So every point *arrival less own time* lies above the line
-//! that is the offset between the clocks (plus the shortest way, which cannot be told from it), and the points that came
-//! quickest lie on it: they are corners of the lower convex hull. The edge of that hull above the mean time is the line:
-//! of all lines below the points it is the one that lies nearest to them.
+//! Something comes late by whatever the way costs. So the points *arrival less own time* lie above the line that is the offset
+//! between the clocks (plus the shortest way, which cannot be told from it), and what came quickly lies near it.
+//!
+//! The very quickest are no measure: one in a thousand is stamped 10 to 20 us sooner than the others ever are, as a core was
+//! just awake or a timer just fired, and a line below all points hangs on two of those. So one in a hundred may lie below. Of
+//! all such lines it is the one that lies nearest to the points above it: the line of quantile regression, along which those
+//! below are balanced about the mean time. Of fewer than a hundred points none lies below, and it is the edge of the lower
+//! convex hull above the mean time.
 
 use std::collections::VecDeque;
 
@@ -14,8 +18,23 @@ use taxel_core::wire::{Took, WORD_BYTES};
 const STRETCH_US: i64 = 250_000;
 /// ... of which so many are looked at: 64 s, within which a quartz keeps its rate.
 const STRETCHES: usize = 256;
-/// Corners of a stretch that are kept at most; of points that came at random there are some ten.
-const CORNERS: usize = 64;
+/// Of each such part of a stretch the quickest points are kept, us: within it no drift of a quartz tilts what is quick ...
+const PART_US: i64 = 10_000;
+/// ... so many of them.
+const QUICK: usize = 2;
+/// Of stretches that are over longer than so many, only those are kept which a line can still pass near.
+const NEW: usize = 8;
+
+/// Which share of the points may lie below the line.
+const EARLY: f64 = 0.01;
+
+/// While a clock is new its line is drawn each stretch, later each so many: it hardly moves any more.
+const DRAWN_EACH: usize = 4;
+
+/// How well a slope is known when it is searched no further, ns/us.
+const FINE: f64 = 2e-6;
+/// How far from the last one a slope is looked for first, ns/us.
+const NEAR: f64 = 2e-3;
 
 /// A second of points that lie this far from what was expected is another clock: a board that was reset, a host whose clock
 /// was set; ns. A pause allows for more, as a drift was known no better than that.
@@ -28,7 +47,7 @@ const QUARTZ: f64 = 200.0;
 /// That of a clock that is no quartz, ppm: a ceramic resonator has 5000.
 const ANY: f64 = 20_000.0;
 /// From so long on more than [`QUARTZ`] is believed, us.
-const LONG_US: f64 = 10e6;
+const LONG_US: i64 = 10_000_000;
 
 /// The largest datagram of a board of version 1, which closes a frame with a shorter one: 280 events.
 const FULL: usize = 280 * WORD_BYTES;
@@ -76,74 +95,108 @@ impl Offset {
 /// Board time us, arrival less board time ns.
 type Point = (i64, i64);
 
-/// The lower convex hull of the points of a stretch, and their mean time.
+/// The quick points of a stretch, and the mean time of all.
 #[derive(Debug, Clone, Default)]
 struct Stretch {
-    corners: Vec<Point>,
+    /// Those of a part stand beside one another where they came in order.
+    quick: Vec<Point>,
     points: u64,
     /// Sum of board times since the first, us.
     sum: i64,
     first: i64,
+    last: i64,
 }
 
 impl Stretch {
     fn push(&mut self, point: Point) {
-        if self.points == 0 {
-            self.first = point.0;
-        }
-        self.points += 1;
-        self.sum += point.0 - self.first;
-        match self.corners.last() {
-            // Two at one time: the quicker one.
-            Some(&last) if last.0 == point.0 => {
-                if point.1 < last.1 {
-                    self.corners.pop();
-                    push_corner(&mut self.corners, point);
-                }
+        if self.points > 0 && point.0 == self.last {
+            // A train of datagrams that could leave at one time is one point: its quickest.
+            if let Some(same) = self.quick.iter_mut().rev().find(|quick| quick.0 == point.0) {
+                same.1 = same.1.min(point.1);
+                return;
             }
-            Some(&last) if last.0 < point.0 => push_corner(&mut self.corners, point),
-            // Out of order: seldom, and what came later came no quicker, most likely.
-            Some(_) => {
-                let at = self.corners.partition_point(|corner| corner.0 < point.0);
-                let mut all = std::mem::take(&mut self.corners);
-                all.insert(at, point);
-                all.dedup_by(|b, a| {
-                    a.0 == b.0 && {
-                        a.1 = a.1.min(b.1);
-                        true
-                    }
-                });
-                all.into_iter().for_each(|corner| push_corner(&mut self.corners, corner));
+        } else {
+            if self.points == 0 {
+                (self.first, self.last) = (point.0, point.0);
             }
-            None => self.corners.push(point),
+            self.points += 1;
+            self.sum += point.0 - self.first;
+            self.last = self.last.max(point.0);
         }
-        if self.corners.len() > CORNERS {
-            // Convex all along: the middle ones matter least to a line below all of them.
-            let mut k = 0;
-            self.corners.retain(|_| {
-                k += 1;
-                k % 2 == 1
-            });
+        let part = point.0.div_euclid(PART_US);
+        let (mut rivals, mut slowest) = (0, 0);
+        for (k, quick) in self.quick.iter().enumerate().rev().filter(|(_, quick)| quick.0.div_euclid(PART_US) == part) {
+            if rivals == 0 || quick.1 > self.quick[slowest].1 {
+                slowest = k;
+            }
+            rivals += 1;
+            if rivals == QUICK {
+                break;
+            }
+        }
+        if rivals < QUICK {
+            self.quick.push(point);
+        } else if point.1 < self.quick[slowest].1 {
+            self.quick[slowest] = point;
         }
     }
 
     /// The lowest point.
     fn lowest(&self) -> Option<Point> {
-        self.corners.iter().copied().min_by_key(|corner| corner.1)
+        self.quick.iter().copied().min_by_key(|quick| quick.1)
+    }
+
+    /// How many points may lie below the line: where so many came that few were kept, as many as can be told.
+    #[allow(clippy::cast_precision_loss)]
+    fn early(&self) -> f64 {
+        (EARLY * self.points as f64).min(self.quick.len() as f64 / 2.0)
+    }
+
+    /// Leaves out what lies far above a line.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn thin(&mut self, line: Offset) {
+        self.quick.sort_unstable_by_key(|&(t, late)| late + t * 1000 - line.host_ns(t));
+        self.quick.truncate((2.0 * self.early()).ceil() as usize);
     }
 }
 
-/// Adds a point to the right of a lower hull: what then lies on or above a line between two others is no corner.
-fn push_corner(corners: &mut Vec<Point>, point: Point) {
-    while let [.., a, b] = corners[..] {
-        let (ab, ap) =
-            ((i128::from(b.0 - a.0), i128::from(b.1 - a.1)), (i128::from(point.0 - a.0), i128::from(point.1 - a.1)));
-        if ab.0 * ap.1 - ab.1 * ap.0 > 0 {
-            break;
-        }
-        corners.pop();
+/// Points, times from their mean time on, of which so many may lie below a line.
+struct Points {
+    all: Vec<(f64, f64)>,
+    early: f64,
+}
+
+impl Points {
+    /// The line of a slope that so many points lie below: its height at the mean time, and to which side of that those below
+    /// it lie, the sum of their times.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    fn under(&self, slope: f64) -> (f64, f64) {
+        let mut above: Vec<(f64, f64)> = self.all.iter().map(|&(t, late)| (late - slope * t, t)).collect();
+        let whole = (self.early.floor() as usize).min(above.len() - 1);
+        let (below, &mut (height, at), _) = above.select_nth_unstable_by(whole, |a, b| a.0.total_cmp(&b.0));
+        let sum: f64 = below.iter().map(|point| point.1).sum();
+        (height, sum + self.early.fract() * at)
     }
-    corners.push(point);
+
+    /// The slope within `most` of 0 at which those below the line are balanced; `last` is where it was.
+    fn slope(&self, last: f64, most: f64) -> f64 {
+        let (mut low, mut high) = (-most, most);
+        let mut narrow = |slope: f64| {
+            if slope <= low || slope >= high {
+            } else if self.under(slope).1 > 0.0 {
+                high = slope;
+            } else {
+                low = slope;
+            }
+            (low, high)
+        };
+        narrow(last - NEAR);
+        let (mut low, mut high) = narrow(last + NEAR);
+        while high - low > FINE {
+            (low, high) = narrow(f64::midpoint(low, high));
+        }
+        f64::midpoint(low, high)
+    }
 }
 
 /// Estimates the [`Offset`] as datagrams come.
@@ -155,6 +208,8 @@ pub struct BoardClock {
     running: Stretch,
     /// Stretches in a row that lie far from what was expected.
     far: usize,
+    /// Stretches since the line was drawn.
+    undrawn: usize,
     offset: Option<Offset>,
 }
 
@@ -169,6 +224,7 @@ impl BoardClock {
                 since += 1;
                 if since == STRETCHES / 2 {
                     since = 0;
+                    clock.draw();
                     lines.extend(clock.offset().map(|offset| (clock.middle(), offset)));
                 }
             }
@@ -180,25 +236,26 @@ impl BoardClock {
     }
 
     /// Notes that something which could leave the board at `board_us` at the earliest arrived at `arrived_ns`; gives whether
-    /// the line was drawn anew.
+    /// a stretch ended.
     pub fn note(&mut self, board_us: i64, arrived_ns: i64) -> bool {
         let point = (board_us, arrived_ns - board_us * 1000);
-        let mut drawn = false;
-        if let Some(&last) = self.running.corners.last() {
-            let (now, then) = (board_us.div_euclid(STRETCH_US), last.0.div_euclid(STRETCH_US));
+        let mut ended = false;
+        if self.running.points > 0 {
+            let (now, then) = (board_us.div_euclid(STRETCH_US), self.running.last.div_euclid(STRETCH_US));
             if now < then {
                 // A step back over the edge of a stretch.
                 return false;
             }
             if now > then {
                 self.end_stretch();
-                drawn = true;
+                ended = true;
             }
         }
         self.running.push(point);
         match &mut self.offset {
             None => self.offset = Some(Offset { board_us, host_ns: arrived_ns, drift_ppm: 0.0 }),
-            Some(offset) => {
+            // Until there is a line nothing is known but the quickest.
+            Some(offset) if self.stretches.is_empty() => {
                 let early = (arrived_ns - offset.host_ns(board_us)).min(0);
                 // So early only where the host's clock was set: then more must say so.
                 #[allow(clippy::cast_precision_loss)]
@@ -206,8 +263,9 @@ impl BoardClock {
                     offset.host_ns += early;
                 }
             }
+            Some(_) => {}
         }
-        drawn
+        ended
     }
 
     /// The estimate, once something came.
@@ -221,6 +279,7 @@ impl BoardClock {
         if self.running.points > 0 {
             self.end_stretch();
         }
+        self.draw();
         self.offset
     }
 
@@ -243,7 +302,13 @@ impl BoardClock {
         while self.stretches.len() > STRETCHES {
             self.stretches.pop_front();
         }
-        self.draw();
+        self.undrawn += 1;
+        if self.stretches.len() < DRAWN_EACH * NEW || self.undrawn >= DRAWN_EACH {
+            self.draw();
+        }
+        if let (Some(k), Some(line)) = (self.stretches.len().checked_sub(NEW + 1), self.offset) {
+            self.stretches[k].thin(line);
+        }
     }
 
     /// The mean time of the points looked at, us.
@@ -256,31 +321,22 @@ impl BoardClock {
         origin + (sum / points.max(1) as f64) as i64
     }
 
-    /// Draws the line: the edge of the hull above the mean time; where that is too steep, the steepest believed line below all
-    /// points.
+    /// Draws the line that one in a hundred points may lie below; where it is too steep, the steepest believed one.
     #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
     fn draw(&mut self) {
-        let mut hull: Vec<Point> = vec![];
-        for &corner in self.stretches.iter().flat_map(|stretch| &stretch.corners) {
-            // Stretches follow one another in time; a board whose time was continued may touch the one before.
-            if hull.last().is_none_or(|last| last.0 < corner.0) {
-                push_corner(&mut hull, corner);
-            }
-        }
-        let (Some(&first), Some(&last)) = (hull.first(), hull.last()) else { return };
+        self.undrawn = 0;
+        let (Some(first), Some(last)) = (self.stretches.front(), self.stretches.back()) else { return };
+        let (Some(zero), origin) = (last.lowest(), last.last) else { return };
+        let most = if origin - first.first >= LONG_US { ANY } else { QUARTZ } * 1e-3;
         let middle = self.middle();
-        let right = hull.partition_point(|corner| corner.0 <= middle).clamp(1, hull.len().max(2) - 1);
-        let mut slope = 0.0;
-        if let (Some(a), Some(b)) = (hull.get(right - 1), hull.get(right)) {
-            let most = if (last.0 - first.0) as f64 >= LONG_US { ANY } else { QUARTZ } * 1e-3;
-            slope = ((b.1 - a.1) as f64 / (b.0 - a.0) as f64).clamp(-most, most);
-        }
-        let origin = last.0;
-        let lowest =
-            hull.iter().map(|&(t, y)| (y - last.1) as f64 - slope * (t - origin) as f64).min_by(f64::total_cmp);
-        let lowest = last.1 + lowest.unwrap_or(0.0) as i64;
+        let from_middle = |&(t, late): &Point| ((t - middle) as f64, (late - zero.1) as f64);
+        let all = self.stretches.iter().flat_map(|stretch| stretch.quick.iter().map(from_middle)).collect();
+        let points = Points { all, early: self.stretches.iter().map(Stretch::early).sum() };
+        let slope = points.slope(self.offset.map_or(0.0, |offset| offset.drift_ppm * 1e-3), most);
+        let height = points.under(slope).0 + slope * (origin - middle) as f64;
         // The slope is in ns a us: a thousandth.
-        self.offset = Some(Offset { board_us: origin, host_ns: origin * 1000 + lowest, drift_ppm: slope * 1e3 });
+        let host_ns = origin * 1000 + zero.1 + height as i64;
+        self.offset = Some(Offset { board_us: origin, host_ns, drift_ppm: slope * 1e3 });
     }
 }
 
@@ -361,6 +417,73 @@ mod tests {
         }
     }
 
+    /// How far two sources come out apart that send 2000 datagrams a second, after 1 s and after 10 s, us; `late_us` is by how
+    /// much a datagram comes late at a time, by chance.
+    fn apart(seed: u64, late_us: impl Fn(i64, &mut StdRng) -> f64) -> [f64; 2] {
+        let mut random = StdRng::seed_from_u64(seed);
+        let mut off = [[0.0; 2]; 2];
+        for (off, drift_ppm) in off.iter_mut().zip([-50.0, 30.0]) {
+            let (way, mut clock) = (Way::new(seed, drift_ppm, 500), BoardClock::default());
+            for board_us in (500..10_010_000).step_by(500) {
+                let mut late = late_us(board_us, &mut random);
+                if random.random_bool(0.01) {
+                    late += 5000.0;
+                }
+                clock.note(board_us, way.truth(board_us) + (late * 1e3) as i64);
+                match board_us {
+                    1_009_500 => off[0] = way.off(&clock, 1_000_000),
+                    10_009_500 => off[1] = way.off(&clock, 10_000_000),
+                    _ => {}
+                }
+            }
+        }
+        [0, 1].map(|k| (off[0][k] - off[1][k]).abs())
+    }
+
+    /// In the mean `mean` us, without memory.
+    fn tail(random: &mut StdRng, mean: f64) -> f64 {
+        -mean * random.random_range(1e-9..1.0_f64).ln()
+    }
+
+    #[test]
+    fn what_comes_sooner_than_is_usual_does_not_move_the_line() {
+        // As a sleeping sender's arrivals were recorded: 15 us and more, but one in a thousand sooner, down to 0.
+        for seed in 0..30 {
+            let [after_1_s, after_10_s] = apart(seed, |_, random| {
+                let early = if random.random_bool(0.001) { random.random_range(0.0..1.0) } else { 1.0 };
+                early * (15.0 + tail(random, 8.0))
+            });
+            assert!(after_1_s < 10.0, "{seed}: {after_1_s} us after 1 s");
+            assert!(after_10_s < 5.0, "{seed}: {after_10_s} us after 10 s");
+        }
+    }
+
+    #[test]
+    fn stretches_in_which_everything_was_late_do_not_move_the_line() {
+        // A sender that does not run for a third of the time, 50 ms at once; what it sends then is late by milliseconds.
+        for seed in 0..30 {
+            let [after_1_s, after_10_s] = apart(seed, |board_us, random| {
+                let waits = board_us / 50_000 % 3 == 1;
+                3.0 + tail(random, 8.0) + if waits { 300.0 + tail(random, 3000.0) } else { 0.0 }
+            });
+            assert!(after_1_s < 10.0, "{seed}: {after_1_s} us after 1 s");
+            assert!(after_10_s < 5.0, "{seed}: {after_10_s} us after 10 s");
+        }
+    }
+
+    #[test]
+    fn datagrams_that_leave_together_are_one_point() {
+        let (mut one, mut many) = (BoardClock::default(), BoardClock::default());
+        for k in 0..4000_i64 {
+            let arrived = k * 1_000_000 + (k * 7919 % 97) * 1000;
+            one.note(k * 1000, arrived);
+            for behind in [40_000, 0, 20_000, 60_000] {
+                many.note(k * 1000, arrived + behind);
+            }
+        }
+        assert_eq!(one.offset(), many.offset());
+    }
+
     #[test]
     fn a_few_datagrams_a_second_with_late_ones_among_them_do_not_look_like_a_drift() {
         for seed in 0..20 {
@@ -417,7 +540,7 @@ mod tests {
                 clock.note(k * 5000, start + k * 5_000_000);
             }
             let offset = clock.offset().expect("something came");
-            assert_eq!(offset.host_ns(to * 5000), start + to * 5_000_000);
+            assert!((offset.host_ns(to * 5000) - start - to * 5_000_000).abs() < 1000, "{offset:?}");
         }
     }
 
@@ -438,11 +561,13 @@ mod tests {
     }
 
     #[test]
-    fn a_convex_run_of_arrivals_stays_bounded() {
+    fn what_is_kept_stays_bounded() {
         let mut clock = BoardClock::default();
-        for k in 0..200_000_i64 {
-            clock.note(k, k * 1000 + k * k / 1000);
+        for k in 0..2_000_000_i64 {
+            clock.note(k * 50, k * 50_000 - k * k / 1000);
         }
-        assert!(clock.running.corners.len() <= CORNERS);
+        let most = usize::try_from(STRETCH_US / PART_US).expect("some") * QUICK;
+        assert!(clock.stretches.iter().chain([&clock.running]).all(|stretch| stretch.quick.len() <= most));
+        assert!(clock.stretches.len() <= STRETCHES);
     }
 }

@@ -32,6 +32,13 @@ use sync::Sync;
 const LOOK_EVERY: Duration = Duration::from_millis(1);
 const REPORT_EVERY: Duration = Duration::from_millis(100);
 
+/// Before a frame is due this is waited awake at most, and by so much that time is moved.
+const MOST_AWAKE: Duration = Duration::from_micros(30);
+const STEP: Duration = Duration::from_nanos(100);
+
+/// How often two clocks are read until both were read at once, as near as that comes.
+const READINGS: usize = 16;
+
 /// What an emulated board feels: a scene, a recording played again, noise.
 pub trait Touch: Send {
     /// Writes the next frame's trip times (ticks of 1/300 us, one a taxel, by taxel index); false where there is none
@@ -221,7 +228,8 @@ impl Emulator {
         if self.options.real_time {
             wake_sharply();
         }
-        let (begun, begun_ns) = (Instant::now(), now_ns());
+        let (begun, begun_ns) = now_by_both();
+        let mut pace = Pace::default();
         let started_us = self.board.time_us();
         let began_ns = begun_ns - (started_us * 1e3) as i64;
         let mut report = Report { began_ns, ..Report::default() };
@@ -288,7 +296,7 @@ impl Emulator {
             // The board knows how long its frame was: a command may have changed that.
             let before = due;
             due = begun + Duration::from_secs_f64((before_reset_us + self.board.time_us()) * host_s_per_us);
-            let now = if self.options.real_time { wait_until(due) } else { Instant::now() };
+            let now = if self.options.real_time { pace.wait_until(due) } else { Instant::now() };
             leaving.iter().try_for_each(|datagram| sender.push(datagram))?;
             self.sender.flush()?;
             if self.options.real_time {
@@ -361,15 +369,48 @@ impl Leaving {
     }
 }
 
-/// Sleeps until `due`, if it is not past; gives the time then.
-fn wait_until(due: Instant) -> Instant {
-    let now = Instant::now();
-    match due.checked_duration_since(now) {
-        Some(left) if !left.is_zero() => {
-            std::thread::sleep(left);
-            Instant::now()
+/// Now by the clock that paces frames, and by the one that arrivals are stamped with, ns since 1970. Where the thread was held
+/// up between the two, they are read again.
+fn now_by_both() -> (Instant, i64) {
+    let read = |_| {
+        let (before, now_ns) = (Instant::now(), now_ns());
+        (before.elapsed(), before, now_ns)
+    };
+    let (took, before, now_ns) =
+        (1..READINGS).map(read).fold(read(0), |best, next| if next.0 < best.0 { next } else { best });
+    (before + took / 2, now_ns)
+}
+
+/// Waits for frames to be due. A sleeper wakes some 10 us late, more on an idle core than on a busy one, and a board does not: so
+/// the sleep ends so much sooner, and what is left is waited for awake.
+#[derive(Debug, Default)]
+struct Pace {
+    sooner: Duration,
+}
+
+impl Pace {
+    /// Waits until `due`, if it is not past; gives the time then.
+    fn wait_until(&mut self, due: Instant) -> Instant {
+        let mut now = Instant::now();
+        let Some(left) = due.checked_duration_since(now) else { return now };
+        if let Some(sleep) = left.checked_sub(self.sooner)
+            && !sleep.is_zero()
+        {
+            std::thread::sleep(sleep);
+            let woken = Instant::now();
+            // Nine in ten wake in time; what takes longer is a core that was busy, which no waiting mends.
+            self.sooner = if woken.saturating_duration_since(now + sleep) > self.sooner {
+                (self.sooner + 9 * STEP).min(MOST_AWAKE)
+            } else {
+                self.sooner.saturating_sub(STEP)
+            };
+            now = woken;
         }
-        _ => now,
+        while now < due {
+            std::hint::spin_loop();
+            now = Instant::now();
+        }
+        now
     }
 }
 
@@ -377,4 +418,23 @@ fn wait_until(due: Instant) -> Instant {
 fn wake_sharply() {
     // SAFETY: PR_SET_TIMERSLACK takes one number and touches no memory of ours; where it fails, sleeps are coarser.
     unsafe { libc::prctl(libc::PR_SET_TIMERSLACK, 1_u64) };
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_is_never_sent_before_it_is_due_nor_waited_for_awake_for_long() {
+        let mut pace = Pace::default();
+        let mut due = Instant::now();
+        for _ in 0..300 {
+            due += Duration::from_micros(400);
+            assert!(pace.wait_until(due) >= due);
+            assert!(pace.sooner <= MOST_AWAKE);
+        }
+        // What is due already is not waited for.
+        let now = pace.wait_until(due);
+        assert!(now >= due);
+    }
 }
