@@ -32,7 +32,8 @@ def test_an_address_is_read_as_it_is_written(host, port, name):
 @pytest.mark.parametrize(
     "said",
     ["", "zenoh:", "udp:127.0.0.1", "127.0.0.1:7447", "zenoh:host:0", "zenoh:host:99999", "zenoh:host:7447/",
-     "zenoh:a/b/c", "zenoh:host/*", "zenoh:ho st", "zenoh:tcp/host:7447", "zenoh:host:7447/a\n"],
+     "zenoh:a/b/c", "zenoh:host/*", "zenoh:ho st", "zenoh:tcp/host:7447", "zenoh:host:7447/a\n",
+     "zenoh:[fe80::1%eth0]:7447"],
 )  # fmt: skip
 def test_what_is_no_address_is_refused_with_one_that_is(said):
     with pytest.raises(taxel.ProblemError, match=r"must be zenoh:HOST:PORT/NAME, as zenoh:192\.168\.1\.5:7447/left"):
@@ -62,6 +63,8 @@ def test_what_only_a_remote_board_takes_is_refused_without_one(capsys):
         pytest.raises(taxel.ProblemError, match="listen is '7447': must be HOST:PORT"),
     ):
         Bridge(live, listen="7447")
+    with Live(0, host="127.0.0.1") as live, pytest.raises(taxel.ProblemError, match="must be HOST:PORT"):
+        Bridge(live, listen="127.0.0.1:99999")
 
 
 def test_parcels_alone_carry_a_board_and_a_spoilt_one_is_refused(tmp_path):

@@ -83,13 +83,25 @@ def test_the_sensor_and_its_registers_are_told(place):
 
 
 def test_nobody_there_and_the_wrong_name_are_said(place):
-    with pytest.raises(taxel.DeviceError, match=f"zenoh:{place}: nobody publishes there; begin taxel bridge"):
+    with pytest.raises(
+        taxel.DeviceError, match=f"zenoh:{place}: that computer is reached, but nobody listens at this port; begin"
+    ):
         Remote(f"zenoh:{place}", timeout=0.2)
     with Live(0, host="127.0.0.1") as near, Bridge(near, name="left", listen=place):
         with pytest.raises(taxel.DeviceError, match="publishes left, not right"):
             Remote(f"zenoh:{place}/right", timeout=0.2)
-        with pytest.raises(taxel.DeviceError, match=r"bridge: .*ddress already in use"):
+        with pytest.raises(
+            taxel.DeviceError, match=f"listen {place}: address already in use; another program listens there"
+        ):
             Bridge(near, name="again", listen=place)
+        with pytest.raises(taxel.DeviceError, match=r"listen nowhere\.invalid:7447: no address of that name"):
+            Bridge(near, listen="nowhere.invalid:7447")
+    with pytest.raises(taxel.DeviceError, match="no computer of that name is known here"):
+        Remote("zenoh:nowhere.invalid", timeout=0.2)
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        there = other.getsockname()[1]
+        with pytest.raises(taxel.DeviceError, match="no board is published there; begin taxel bridge"):
+            Remote(f"zenoh:127.0.0.1:{there}", timeout=0.2)
 
 
 def test_pictures_and_detections_of_the_other_computer_are_heard(place):

@@ -131,6 +131,10 @@ def _announce(place: str, name: str, console: Console) -> None:
             "only on a network that you trust, or through a tunnel",
             soft_wrap=True,
         )
+    if host in ("0.0.0.0", "::"):
+        # That says all of this computer's addresses, and is none of them.
+        place = f"HOST:{place.rpartition(':')[2]}"
+        name += ", HOST being this computer's name or address"
     console.print(f"hear it with --from zenoh:{place}/{name}", soft_wrap=True, highlight=False)
 
 

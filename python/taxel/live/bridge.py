@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import json
 import re
+import socket
 import threading
 import time
 from collections.abc import Sequence
@@ -70,9 +72,13 @@ class Bridge:
         ahead_ns = round(number("clock_ahead_s", clock_ahead_s) * 1e9)
         drift = number("clock_drift_ppm", clock_drift_ppm)
         zenoh = wheel()
-        self._zenoh = told(
-            zenoh.Publisher, self.name, self.listen, _places("connect", connect), _about(live), ahead_ns, drift
-        )
+        routers = _places("connect", connect)
+        try:
+            self._zenoh = told(zenoh.Publisher, self.name, self.listen, routers, _about(live), ahead_ns, drift)
+        except DeviceError:
+            for place in self.listen:
+                _refused(place)
+            raise
         self._copies = live._core.copy()
         self._failed: BaseException | None = None
         self._ending = threading.Event()
@@ -135,9 +141,30 @@ class Bridge:
 def _places(name: str, said: str | Sequence[str]) -> list[str]:
     places = [said] if isinstance(said, str) else list(said)
     for place in places:
-        if not re.fullmatch(r"(\[[0-9a-fA-F:.%]+\]|[\w.-]+):\d{1,5}", text(name, place), re.ASCII):
+        found = re.fullmatch(r"(\[[0-9a-fA-F:.]+\]|[\w.-]+):(\d{1,5})", text(name, place), re.ASCII)
+        if not found or not 1 <= int(found[2]) <= 65_535:
             raise ProblemError(f"{name} is {place!r}: must be HOST:PORT, as {PLACE}")
     return places
+
+
+def _refused(place: str) -> None:
+    """Say why nothing can listen at a place of this computer, where that is so."""
+    host, _, port = place.rpartition(":")
+    try:
+        ((family, kind, _, _, address), *_) = socket.getaddrinfo(host.strip("[]"), int(port), type=socket.SOCK_STREAM)
+        with socket.socket(family, kind) as tried:
+            tried.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            tried.bind(address)
+            tried.listen()
+    except socket.gaierror:
+        raise DeviceError(f"listen {place}: no address of that name is known here") from None
+    except OSError as error:
+        right = {
+            errno.EADDRINUSE: "another program listens there: end it, or take another port",
+            errno.EADDRNOTAVAIL: "it must be an address of this computer, or 0.0.0.0 for all of them",
+        }.get(error.errno or 0)
+        why = (error.strerror or str(error)).lower()
+        raise DeviceError(f"listen {place}: {why}" + (f"; {right}" if right else "")) from None
 
 
 def _about(live: Live) -> str:

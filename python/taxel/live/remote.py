@@ -6,9 +6,11 @@ Zenoh carries what they send, by the wheel ``taxel-bridge``, which only those ne
 from __future__ import annotations
 
 import contextlib
+import errno
 import importlib
 import json
 import re
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -33,6 +35,9 @@ _AT_FIRST, _COMPARE_S = 8, 0.25
 
 #: Who answers is asked for so long, s.
 _ASK_S = 0.5
+
+#: So long it is tried to reach a computer on which nobody answered, to say why, s.
+_REACH_S = 2.0
 
 
 class Address(NamedTuple):
@@ -65,7 +70,7 @@ class Address(NamedTuple):
         Address(host='192.168.1.5', port=7447, name='left')
         """
         found = re.fullmatch(
-            r"zenoh:(?P<host>\[[0-9a-fA-F:.%]+\]|[\w.-]+)(:(?P<port>\d{1,5}))?(/(?P<name>[\w.-]{1,64}))?",
+            r"zenoh:(?P<host>\[[0-9a-fA-F:.]+\]|[\w.-]+)(:(?P<port>\d{1,5}))?(/(?P<name>[\w.-]{1,64}))?",
             text("address", said),
             re.ASCII,
         )
@@ -142,10 +147,26 @@ class Remote:
                 names = ", ".join(sorted(found))
                 raise DeviceError(f"{self.address}: publishes {names}; add /NAME")
             if time.monotonic() >= until:
-                there = f"publishes {', '.join(sorted(found))}, not {wanted}" if found else "nobody publishes there"
-                raise DeviceError(f"{self.address}: {there}; begin taxel bridge on that computer, with --listen")
+                if found:
+                    raise DeviceError(f"{self.address}: publishes {', '.join(sorted(found))}, not {wanted}")
+                raise DeviceError(f"{self.address}: {self._unheard()}")
             # A link that does not stand yet answers at once.
             time.sleep(_LOOK_S)
+
+    def _unheard(self) -> str:
+        """Return why nobody answers, as far as that can be seen from here."""
+        begin = "begin taxel bridge on that computer, with --listen and an address that others reach"
+        try:
+            with socket.create_connection((self.address.host.strip("[]"), self.address.port), timeout=_REACH_S):
+                return f"no board is published there; {begin}"
+        except socket.gaierror:
+            return "no computer of that name is known here; name it by its address"
+        except TimeoutError:
+            return f"does not answer; is the address right, does a firewall let port {self.address.port} (TCP) through?"
+        except OSError as error:
+            if error.errno == errno.ECONNREFUSED:
+                return f"that computer is reached, but nobody listens at this port; {begin}"
+            return f"{(error.strerror or str(error)).lower()}; is the address right, are both on one network?"
 
     @property
     def registers(self) -> dict[str, Any]:
