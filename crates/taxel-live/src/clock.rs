@@ -195,7 +195,8 @@ impl Points {
         while high - low > FINE {
             (low, high) = narrow(f64::midpoint(low, high));
         }
-        f64::midpoint(low, high)
+        // No finer than it was searched, and 0 where it is as good as that.
+        (f64::midpoint(low, high) / FINE).round() * FINE + 0.0
     }
 }
 
