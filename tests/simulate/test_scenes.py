@@ -64,6 +64,20 @@ def test_a_press_reaches_the_force_that_was_drawn():
     assert press["peak_n"] <= hand.peak_n < 1.3 * press["peak_n"]
 
 
+def test_a_touch_narrower_than_a_taxel_is_reckoned_too_soft_and_a_wider_one_rightly():
+    """As the page of scenes says, against taxels a quarter as far apart."""
+
+    def held(depth_mm, array):
+        motion = {"pressed": {"depth_mm": depth_mm, "speed_mm_s": 50.0, "hold_ms": 5.0}}
+        body = {"shape": {"sphere": {"radius_mm": 5.0}}, "x_mm": 13.0, "y_mm": 13.0, "motion": motion}
+        scene = Scene({"foam": {"dashpot_ms": 0.0, "damping_s_m": 0.0}, "bodies": [body]})
+        return scene.motion(array=array).force_n.max()
+
+    ours, fine = Array(12, 12, 2.67), Array(40, 40, 0.67)
+    assert held(0.5, ours) == pytest.approx(held(0.5, fine), rel=0.02)
+    assert held(0.1, ours) == pytest.approx(0.53 * held(0.1, fine), rel=0.1)
+
+
 def test_acts_follow_one_another_in_board_time():
     """Truth of a play is each scene's own, moved to where its first frame begins."""
     scenes = [Scene.draw(8, index) for index in range(2)]
