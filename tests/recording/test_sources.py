@@ -6,6 +6,7 @@ import pty
 import socket
 import subprocess
 import sys
+import threading
 import time
 import tty
 from collections.abc import Callable
@@ -231,6 +232,45 @@ def test_columns_are_learnt_from_the_first_line_of_a_pipe(tmp_path: Path) -> Non
     np.testing.assert_array_equal(imu.frames().values.ravel(), [2, 1, 3])
 
 
+@pytest.mark.parametrize("first", ["t_s,ax\n", ""])
+def test_what_comes_with_the_first_line_is_kept_and_its_writer_lives(tmp_path: Path, first: str) -> None:
+    pipe, said, done = tmp_path / "imu", threading.Event(), threading.Event()
+    os.mkfifo(pipe)
+
+    def write() -> None:
+        with pipe.open("w", buffering=1) as lines:
+            lines.write(first + "0.5,1\n0.75,2\n")
+            for k in range(200):
+                lines.write(f"{k + 1},{k}\n")
+                time.sleep(0.001)
+            said.set()
+            done.wait(60)
+
+    writer = threading.Thread(target=write, daemon=True)
+    writer.start()
+    with Live(0, host=LOOPBACK, array=SMALL, record=tmp_path / "imu.mcap", sources={"imu": f"pipe:{pipe}"}) as live:
+        until(lambda: lines(live, "imu") == 202)
+    done.set()
+    assert said.is_set()
+    imu = taxel.open(tmp_path / "imu.mcap").sources["imu"]
+    assert imu.columns == (["ax"] if first else ["column_0", "column_1"])
+    np.testing.assert_array_equal(imu.frames().values[:3, 0, -1], [1, 2, 0])
+
+
+def test_the_command_says_what_came_of_each_source(tmp_path: Path) -> None:
+    line = [sys.executable, "-m", "taxel", "record", str(tmp_path / "two.mcap"), "--port", "0", "--host", LOOPBACK]
+    line += ["--source", f"left=udp:{LOOPBACK}:0", "--source", "imu=pipe:-", "--seconds", "2"]
+    with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as command:
+        assert command.stdin is not None
+        assert command.stdout is not None
+        # More than is read at once.
+        command.stdin.write("t_us,ax\n" + "".join(f"{10_000 + k},0.25\n" for k in range(900)))
+        command.stdin.flush()
+        said = command.stdout.read()
+    assert "  left: 0 datagrams, 0 events\n" in said
+    assert "  imu: 900 lines\n" in said
+
+
 def mcap(path: Path, clocks: dict[str, tuple[float, int]], seconds: float, rate: float, seed: int) -> None:
     """Write streams whose clocks run by so many ppm and begin at so many us, 1 % of them 5 ms late."""
     random = np.random.default_rng(seed)
@@ -315,6 +355,7 @@ def test_arrivals_of_a_busy_machine_put_two_boards_on_one_clock(seed: int) -> No
 
 EMULATED = """
 import sys
+import threading
 from taxel.simulate import Silence, Version2, emulate
 to, drift, ms = sys.argv[1], float(sys.argv[2]), float(sys.argv[3])
 said = Version2(heartbeat_us=500)

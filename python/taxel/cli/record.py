@@ -263,5 +263,6 @@ def _say(summary: Summary, as_json: bool) -> None:
         what = (
             f"{came['decoded']} datagrams, {came['events']} events" if "capture" in came else f"{came['lines']} lines"
         )
-        typer.echo(f"  {name}: {what}" + f"; {came['trouble']}" * bool(came.get("trouble")))
+        trouble = came.get("trouble")  # of lines alone
+        typer.echo(f"  {name}: {what}" + (f"; {trouble}" if trouble else ""))
     typer.echo(summary.verdict)

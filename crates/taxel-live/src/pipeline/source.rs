@@ -5,16 +5,18 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::net::SocketAddr;
-use std::os::fd::{AsRawFd, RawFd};
+use std::os::fd::{AsFd, AsRawFd, RawFd};
 use std::os::unix::fs::OpenOptionsExt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 
 use super::sending::serial;
+use crate::locked::lock;
 use crate::recording::{Header, Stream, fields, now_ns};
 use crate::{Error, Result, address};
 
@@ -44,8 +46,8 @@ pub struct Source {
 pub enum SourceKind {
     /// A board that sends to this address of ours.
     Board(SocketAddr, Box<Array>, Registers),
-    /// Lines of numbers.
-    Lines(Place, Stream),
+    /// Lines of numbers; opened already where the first one had to tell what they hold.
+    Lines(Place, Stream, Opened),
     /// Numbers that a program gives ([`Live::sample`](super::Live::sample)).
     Given(Stream),
 }
@@ -57,6 +59,30 @@ pub enum Place {
     Serial(PathBuf, u32),
     /// A named pipe, or any file that is read to its end and then waited at; `-` is the standard input.
     Pipe(PathBuf),
+}
+
+/// Lines that were opened to see what they hold, with what came behind the first. Who reads them goes on there: what came is
+/// theirs, and the writer of a pipe that nobody reads any more is killed.
+#[derive(Clone, Default)]
+pub struct Opened(Arc<Mutex<Option<Tap>>>);
+
+impl Opened {
+    pub(super) fn take(&self) -> Option<Tap> {
+        lock(&self.0).take()
+    }
+}
+
+impl std::fmt::Debug for Opened {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("Opened")
+    }
+}
+
+/// What has come of a source is no part of what it is.
+impl PartialEq for Opened {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl std::fmt::Display for Place {
@@ -76,7 +102,7 @@ impl Source {
                 let board = Header::of_board((**array).clone(), Some(*registers), format!("udp {address}"), now_ns());
                 Ok(Header { name: self.name.clone(), ..board })
             }
-            SourceKind::Lines(place, stream) => {
+            SourceKind::Lines(place, stream, _) => {
                 Header::of_stream(&self.name, stream.clone(), place.to_string(), now_ns())
             }
             SourceKind::Given(stream) => {
@@ -116,13 +142,13 @@ impl FromStr for SourceKind {
                     },
                 };
                 let place = Place::Serial(path.into(), baud);
-                let stream = stream_of(text, &mut options)?.map_or_else(|| first_line(&place), Ok)?;
-                Self::Lines(place, stream)
+                let (stream, opened) = told_or_heard(stream_of(text, &mut options)?, &place)?;
+                Self::Lines(place, stream, opened)
             }
             Some(("pipe", place)) if !place.is_empty() => {
                 let place = Place::Pipe(place.into());
-                let stream = stream_of(text, &mut options)?.map_or_else(|| first_line(&place), Ok)?;
-                Self::Lines(place, stream)
+                let (stream, opened) = told_or_heard(stream_of(text, &mut options)?, &place)?;
+                Self::Lines(place, stream, opened)
             }
             None if what == "given" => match stream_of(text, &mut options)? {
                 Some(stream) => Self::Given(stream),
@@ -179,8 +205,13 @@ fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<St
     Ok(Some(stream))
 }
 
+/// What was said of lines, or what their first one tells.
+fn told_or_heard(told: Option<Stream>, place: &Place) -> Result<(Stream, Opened)> {
+    told.map_or_else(|| first_line(place), |stream| Ok((stream, Opened::default())))
+}
+
 /// Opens lines and waits for the first that tells the columns: a line of names, or of numbers, which are then called a, b, c ...
-fn first_line(place: &Place) -> Result<Stream> {
+fn first_line(place: &Place) -> Result<(Stream, Opened)> {
     let mut tap = Tap::open(place)?;
     let until = Instant::now() + FIRST_LINE;
     // Who opens a serial line in the middle of a line hears its end first.
@@ -198,16 +229,22 @@ fn first_line(place: &Place) -> Result<Stream> {
             }
             if found.iter().all(|field| field.parse::<f64>().is_ok()) {
                 numbers = Some(found.len());
+                // It is data, too.
+                tap.bytes.splice(0..0, format!("{line}\n").into_bytes());
                 break;
             }
-            return Ok(Stream::of_columns(found.into_iter().map(str::to_owned).collect()));
+            let stream = Stream::of_columns(found.into_iter().map(str::to_owned).collect());
+            return Ok((stream, Opened(Arc::new(Mutex::new(Some(tap))))));
         }
         if numbers.is_some() || ended {
             break;
         }
     }
     match numbers {
-        Some(n) => Ok(Stream::of_columns((0..n).map(|k| format!("column_{k}")).collect())),
+        Some(n) => {
+            let stream = Stream::of_columns((0..n).map(|k| format!("column_{k}")).collect());
+            Ok((stream, Opened(Arc::new(Mutex::new(Some(tap))))))
+        }
         None => {
             let waited = FIRST_LINE.as_secs();
             Err(problem!("{place}: no line within {waited} s; name its columns, as columns=t_us:ax:ay:az").into())
@@ -290,7 +327,11 @@ impl Tap {
 fn open(place: &Place) -> Result<Box<dyn ReadsAsItComes>> {
     match place {
         Place::Serial(path, baud) => Ok(Box::new(serial(path, *baud)?)),
-        Place::Pipe(path) if path == Path::new("-") => Ok(Box::new(io::stdin())),
+        Place::Pipe(path) if path == Path::new("-") => {
+            // Not through the program's own buffer: what lies in that is no sign that something came.
+            let input = io::stdin().as_fd().try_clone_to_owned().map_err(Error::file(path))?;
+            Ok(Box::new(File::from(input)))
+        }
         Place::Pipe(path) => {
             let file = File::options().read(true).custom_flags(libc::O_NONBLOCK).open(path);
             Ok(Box::new(file.map_err(Error::file(path))?))
@@ -316,7 +357,7 @@ mod tests {
         let SourceKind::Board(address, array, _) = &board else { panic!("{board:?}") };
         assert_eq!((address.port(), array.rows, array.columns), (5209, 16, 8));
         let imu: SourceKind = "serial:/dev/ttyACM0@9600,columns=n:ax:ay,time=n:ms".parse().unwrap();
-        let SourceKind::Lines(Place::Serial(path, 9600), stream) = &imu else { panic!("{imu:?}") };
+        let SourceKind::Lines(Place::Serial(path, 9600), stream, _) = &imu else { panic!("{imu:?}") };
         assert_eq!(path, Path::new("/dev/ttyACM0"));
         assert_eq!((stream.time.as_deref(), stream.unit_us), (Some("n"), 1e3));
         for text in [

@@ -114,13 +114,15 @@ impl Numbers {
         self.keep_in(None);
     }
 
-    /// Reads lines until the end, in a thread of its own; a line that breaks is opened again.
-    pub(super) fn read(self: &Arc<Self>, place: &Place) -> Result<JoinHandle<()>> {
-        let (numbers, mut tap) = (Arc::clone(self), Tap::open(place)?);
+    /// Reads lines until the end, in a thread of its own; a line that breaks is opened again. `begun`: they were opened before,
+    /// and read up to the beginning of a line.
+    pub(super) fn read(self: &Arc<Self>, place: &Place, begun: Option<Tap>) -> Result<JoinHandle<()>> {
+        let whole = begun.is_some();
+        let (numbers, mut tap) = (Arc::clone(self), begun.map_or_else(|| Tap::open(place), Ok)?);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
         let job = move || {
             // Who opens a serial line in the middle of a line hears its end first.
-            let mut first = true;
+            let mut first = !whole;
             while !numbers.ends.load(Ordering::Acquire) {
                 let ended = match tap.fill() {
                     Ok(ended) => ended,
@@ -183,11 +185,11 @@ impl<Board> Others<Board> {
                     others.boards.push((name.clone(), board));
                     continue;
                 }
-                SourceKind::Lines(_, stream) | SourceKind::Given(stream) => stream,
+                SourceKind::Lines(_, stream, _) | SourceKind::Given(stream) => stream,
             };
             let numbers = Arc::new(Numbers::new(part, stream.clone(), options.record.is_some()));
-            if let SourceKind::Lines(place, _) = kind {
-                others.threads.push(numbers.read(place)?);
+            if let SourceKind::Lines(place, _, opened) = kind {
+                others.threads.push(numbers.read(place, opened.take())?);
             }
             others.numbers.push((name.clone(), numbers));
         }
