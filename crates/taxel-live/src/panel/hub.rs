@@ -228,6 +228,8 @@ impl Hub {
     pub(super) async fn pump(self: Arc<Self>) {
         let (mut counted, mut listened) = (Instant::now(), None::<tokio::task::JoinHandle<()>>);
         let mut before = None;
+        // The newest that was heard, and when; how far that is behind what the host's clock made of it, where that is far.
+        let (mut newest, mut behind) = (None, 0);
         let mut ticks = tokio::time::interval(PUMP_EVERY);
         ticks.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
         loop {
@@ -249,6 +251,9 @@ impl Hub {
                     if heard < latest - STALLED_US {
                         lens.set_back(heard);
                     }
+                }
+                if let Some(last) = piece.changes.last() {
+                    newest = Some((now_ns(), last.t));
                 }
                 if piece.reset {
                     lens.forget();
@@ -288,10 +293,14 @@ impl Hub {
             if counted.elapsed() >= COUNT_EVERY {
                 let counters = live.handle.counters();
                 if let Some(offset) = counters.offset {
-                    // Time goes on where nothing comes.
+                    if let Some((at_ns, t)) = newest.take() {
+                        let late = offset.board_us(at_ns) - t;
+                        behind = if late > STALLED_US { late } else { 0 };
+                    }
+                    // Time goes on where nothing comes; of a source that stalled, from where it is.
                     let mut lens = lock(&live.lens);
                     if lens.latest().is_some() {
-                        lens.advance(offset.board_us(now_ns() - BEHIND_NS));
+                        lens.advance(offset.board_us(now_ns() - BEHIND_NS) - behind);
                     }
                 }
                 let seconds = counted.elapsed().as_secs_f64();
