@@ -185,7 +185,7 @@ class Control {
 /** @param {string} name @returns {string} */
 function shortUnit(name) {
   /** @type {Record<string, string>} */
-  const known = { ticks: "tk", lines: "", version: "", "1/256 theta_0": "/256 θ", "1/1024": "/1024", "1/1024 theta_0": "/1024 θ" };
+  const known = { lines: "", version: "", "1/256 theta_0": "/256 θ", "1/1024": "/1024", "1/1024 theta_0": "/1024 θ" };
   return known[name] ?? name;
 }
 

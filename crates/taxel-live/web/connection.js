@@ -76,7 +76,7 @@ class Way {
     const options = groups
       .filter(({ places }) => places.length)
       .map(({ label, places }) => make("optgroup", { label }, ...places.map(({ place, text }) => make("option", { value: place }, text))));
-    const first = options.length ? "choose, or type below" : this.none;
+    const first = options.length ? "choose or type" : this.none;
     this.choice.replaceChildren(make("option", { value: "" }, first), ...options);
     this.choice.value = [...this.choice.options].some(({ value }) => value === this.input.value) ? this.input.value : "";
   }

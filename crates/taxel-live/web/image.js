@@ -18,12 +18,13 @@ const heightOf = ({ canvas, inset }) => (canvas.clientHeight * WIDE) / (canvas.c
 
 /**
  * Draws what is shown into one picture and hands it to the browser to save.
- * @param {{ title: string, file: string, columns: number, rows: number, lanes: Lane[] }} what
+ * @param {{ title: string, file: string, lanes: Lane[] }} what
  * @returns {Promise<void>}
  */
-export async function savePicture({ title, file, columns, rows, lanes }) {
+export async function savePicture({ title, file, lanes }) {
   const side = (WIDE - 2 * EDGE - BETWEEN) / 2;
-  const high = (side * rows) / columns;
+  const map = part("pressure-map", HTMLCanvasElement);
+  const high = (side * map.clientHeight) / map.clientWidth;
   const top = EDGE + 40;
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [WIDE, Math.ceil(top + 24 + high + 50 + lanes.reduce((sum, lane) => sum + LANE + heightOf(lane), 0) + EDGE)];

@@ -89,7 +89,8 @@ export class Lanes {
           ...plan,
           width: Math.max(100, place.clientWidth),
           height: Math.max(40, place.clientHeight),
-          padding: [4, right, 4, 0],
+          // Half of the uppermost number's height.
+          padding: [7, right, 4, 0],
           legend: { show: false },
           cursor: { show: false },
           scales: { x: { time: false, range: [-SPAN, 0] }, ...scales },

@@ -433,7 +433,10 @@ function writeCounters() {
   const { lost, latency } = counters;
   put("events", number(counters.events_per_s, whole));
   put("data", number(counters.bytes_per_s, (bytes) => (bytes / 1e6).toFixed(2)));
-  put("frames", number(counters.frames_per_s, whole));
+  // By the registers: where nobody has read them, they are a preset's, and the board may be another one.
+  const assumed = registers?.known === false;
+  put("frames", number(counters.frames_per_s, whole) + (assumed ? "?" : ""));
+  part("frames", HTMLElement).title = assumed ? "assumed: nobody has read the board's registers yet" : "";
   // What only this page's curves lack is in every recording, and nothing that a detection needs.
   const all = Object.entries(lost).reduce((sum, [place, count]) => sum + (place === "panel" ? 0 : count), 0);
   put("lost", whole(all));
@@ -678,7 +681,7 @@ function picture() {
   }
   const of = player.transport.source ?? "live";
   const at = ((player.t_us ?? 0) / 1e6).toFixed(3);
-  savePicture({ title: `${of}, ${at} s`, file: `${of.replace(/\.[^.]+$/, "")}-${at}s.png`, columns: maps.columns, rows: maps.rows, lanes: shown }).then(
+  savePicture({ title: `${of}, ${at} s`, file: `${of.replace(/\.[^.]+$/, "")}-${at}s.png`, lanes: shown }).then(
     () => say("picture saved"),
     failed,
   );

@@ -49,9 +49,10 @@ class Map2D {
   /** @param {number} rows @param {number} columns */
   size(rows, columns) {
     [this.canvas.width, this.canvas.height] = [columns, rows];
-    this.frame.style.aspectRatio = `${columns} / ${rows}`;
-    // A sensor much longer than wide keeps within the page.
-    this.frame.parentElement?.style.setProperty("--aspect", String(Math.max(0.25, Math.min(3, columns / rows))));
+    // A sensor much longer than wide keeps within the page, and one of few rows can be pointed at: its taxels are no squares then.
+    const aspect = String(Math.max(1 / 3, Math.min(8, columns / rows)));
+    this.frame.style.aspectRatio = aspect;
+    this.frame.parentElement?.style.setProperty("--aspect", aspect);
     this.image = new ImageData(columns, rows);
     this.pixels = new Uint32Array(this.image.data.buffer);
   }
@@ -280,8 +281,9 @@ export class Maps {
       const put = (/** @type {[number, number]} */ taxel, /** @type {string} */ kind, more = "") => {
         const mark = make("span", { class: `unwell ${kind}`, title: `${kind}: row ${taxel[1]}, column ${taxel[0]}${more}` });
         const [left, top] = place(taxel);
-        mark.style.left = `${100 * left}%`;
-        mark.style.top = `${100 * top}%`;
+        // On the edge it is whole, too.
+        mark.style.left = `clamp(6px, ${100 * left}%, 100% - 6px)`;
+        mark.style.top = `clamp(6px, ${100 * top}%, 100% - 6px)`;
         map.marks.append(mark);
       };
       for (const kind of /** @type {const} */ (["dead", "stuck", "noisy"])) for (const taxel of this.health?.[kind] ?? []) put(taxel, kind);
