@@ -685,7 +685,15 @@ def _raw(name: str, value: object) -> int:
         return int(np.rint(units))
     if _MANUAL.get(name, name) in _FLAGS:
         return int(flag(name, bool(value) if isinstance(value, int) and value in (0, 1) else value))
-    return whole(name, value, 0, 2**32 - 1)
+    try:
+        return whole(name, value, 0, 2**32 - 1)
+    except ProblemError:
+        # A number that a register's word could hold is judged by the rules, others here.
+        field = _FIELDS.get(_MANUAL.get(name, name))
+        if field is None:
+            raise
+        least, most = (field[end] - (field["offset"] if name in _MANUAL else 0) for end in ("least", "greatest"))
+        raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {least} to {most}") from None
 
 
 #: The length of the board's frames at reset, us.

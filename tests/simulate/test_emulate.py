@@ -199,6 +199,21 @@ def test_a_recording_is_played_again_as_it_was(listener):
     assert again.duration_us == pytest.approx(first.duration_us / 2.0, abs=400)
 
 
+def test_a_recording_of_another_sensor_is_played_with_all_its_values(listener, tmp_path):
+    """Nobody knew its registers: they are a preset's, whose ramp ends below its values."""
+    values = np.tile(np.array([[100, 110], [400, 900], [103, 20], [1000, 500]]), (5, 1))
+    x, y = np.tile([0, 1], len(values)), np.zeros(2 * len(values), int)
+    events = taxel.Events(
+        np.repeat(5000 * np.arange(len(values)), 2), x, y, np.ones(len(x), bool), intensity=values.ravel(),
+        array=taxel.Array(1, 2),
+    )  # fmt: skip
+    taxel.convert(events, tmp_path / "other.npz")
+    heard = Heard(listener)
+    emulate(heard.to, Replay(taxel.open(tmp_path / "other.npz")))
+    again = wire.decode(b"".join(heard.all()), array=taxel.Array(1, 2))
+    assert again.intensity.tolist() == values.ravel().tolist()
+
+
 def test_pictures_are_played_by_the_boards_rules(listener):
     values = np.zeros((20, 64, 64), np.float32)
     values[5:, 3, 4], values[10:, 3, 4] = 5.0, 10.0
@@ -237,6 +252,9 @@ def test_another_sensors_frames_come_through_a_pipe(listener, tmp_path):
         path.write_bytes(bad)
         with path.open("rb") as source, pytest.raises(taxel.FormatError, match="standard input, line 1"):
             Pipe(source)
+    path.write_bytes(b'{"rows": 5, "columns": 300, "rate": 100, "bits": 12}\n')
+    with path.open("rb") as source, pytest.raises(taxel.ProblemError, match="line 1: 5 x 300 taxels: lines 300"):
+        Pipe(source)
     with path.open("wb") as sink:
         sink.write(json.dumps(about).encode() + b"\n" + frames.tobytes()[:-3])
     with path.open("rb") as source, pytest.raises(taxel.FormatError, match="frame 29: ends after 27 bytes, must be 30"):

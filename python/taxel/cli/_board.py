@@ -16,8 +16,10 @@ from taxel.array import Array
 from taxel.cli._app import OUTSIDE, WRONG_INPUT
 from taxel.live import Remote, Summary, delays
 from taxel.tare import Tare
+from taxel.wire import PRESETS
 
 __all__ = [
+    "QUOTED_PRESETS",
     "ArrayOption",
     "CongestionOption",
     "FromOption",
@@ -32,6 +34,9 @@ __all__ = [
     "rest_of",
 ]
 
+#: The names of all presets, for a text.
+QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
+
 PortOption = Annotated[int, typer.Option(min=0, max=65_535, help="The UDP port that the board sends to.")]
 HostOption = Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: every one.")]
 ArrayOption = Annotated[
@@ -45,7 +50,7 @@ ArrayOption = Annotated[
 PresetOption = Annotated[
     str | None,
     typer.Option(
-        help='The board\'s registers: "5.2 kHz" (where left out), "2 kHz", "20.8 kHz"; with --from it is told.'
+        help=f'The board\'s registers, "5.2 kHz" where left out: one of {QUOTED_PRESETS}. With --from they are told.'
     ),
 ]
 

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from taxel._core import ProblemError
 from taxel.cli._app import App, app
+from taxel.cli._board import QUOTED_PRESETS
 from taxel.device import Device, ports
 from taxel.wire import PRESETS, Registers, described
 
@@ -82,7 +83,7 @@ def set_registers(
 @_device.command()
 def apply(
     place: PlaceArgument,
-    preset: Annotated[str, typer.Argument(help='As "2 kHz"; --help names all.')],
+    preset: Annotated[str, typer.Argument(help=f"One of {QUOTED_PRESETS}.")],
     baud: BaudOption = 115_200,
     as_json: JsonOption = False,
 ) -> None:

@@ -20,6 +20,7 @@ from taxel._core import ProblemError
 from taxel._files import try_whole
 from taxel._opening import open_any
 from taxel.cli._app import app
+from taxel.cli._board import QUOTED_PRESETS
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
@@ -39,11 +40,14 @@ def emulate(
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, max=TRAINING_SEED - 1, help="Draws scenes, taxels, noise.")] = None,
     replay: Annotated[Path | None, typer.Option(help="Play a recording again instead of scenes.")] = None,
-    speed: Annotated[float, typer.Option(help="Of the replay: 2 in half the time.")] = 1.0,
+    speed: Annotated[float | None, typer.Option(help="Of the replay: 2 in half the time; 1 where left out.")] = None,
     pipe: Annotated[
         bool, typer.Option("--pipe", help="Scan frames of another sensor that come on standard input.")
     ] = False,
-    noise_floor: Annotated[int, typer.Option(min=0, max=255, help="Of a pipe: a change above it makes an event.")] = 3,
+    noise_floor: Annotated[
+        int | None,
+        typer.Option(min=0, max=255, help="Of a pipe: a change above it makes an event; 3 where left out."),
+    ] = None,
     tare: Annotated[
         float | None,
         typer.Option(
@@ -53,7 +57,7 @@ def emulate(
     preset: Annotated[
         str | None,
         typer.Option(
-            help='The registers: "5.2 kHz" (or the scene\'s, or those of a larger array at reset), "2 kHz", "20.8 kHz".'
+            help=f"The registers; where left out the scene's, or those of the array at reset. One of {QUOTED_PRESETS}.",
         ),
     ] = None,
     wire: Annotated[
@@ -98,7 +102,9 @@ def emulate(
         int | None, typer.Option(help="Take commands on this TCP port of loopback; 0 finds one.")
     ] = None,
     line: Annotated[Path | None, typer.Option(help="A serial line of this name: a link to a pseudo-terminal.")] = None,
-    baud: Annotated[int, typer.Option(min=300, max=4_000_000, help="Of the serial line.")] = 115_200,
+    baud: Annotated[
+        int | None, typer.Option(min=300, max=4_000_000, help="Of the serial line; 115200 where left out.")
+    ] = None,
     sync: Annotated[
         Path | None, typer.Option(help="The sync line as text, to a new file or a pipe: board us, 1 or 0, host ns.")
     ] = None,
@@ -124,6 +130,10 @@ def emulate(
     Example: taxel emulate --port 5208 --scenes 5 --seed 1 --truth labels.csv
     """
     _together(scene=scene, replay=replay, pipe=pipe, rest=rest, counted=scenes is not None or labels is not None)
+    _only_with(
+        ("--speed", speed, "--replay", replay), ("--noise-floor", noise_floor, "--pipe", pipe or None),
+        ("--baud", baud, "--line", line),
+    )  # fmt: skip
     if labels is not None:
         try_whole(labels, overwrite=overwrite)
     written = None if scene is None else SceneFile.open(scene)
@@ -133,9 +143,9 @@ def emulate(
     flaws, faults, lines = _flaws(flaw or [], seed), _faults(fault or [], seed), _circuit(circuit or [], seed)
     console = Console(stderr=True, quiet=as_json)
     if replay is not None:
-        touch, said = _again(replay, speed)
+        touch, said = _again(replay, 1.0 if speed is None else speed)
     elif pipe:
-        touch, said = _piped(noise_floor)
+        touch, said = _piped(3 if noise_floor is None else noise_floor)
     elif written is not None:
         touch, said = _written(written, scenes, 1e3 * tare), f"{scene}, seed {seed}"
     else:
@@ -181,7 +191,7 @@ def emulate(
                     drift_ppm=drift,
                     control=None if control is None else f"127.0.0.1:{control}",
                     line=line,
-                    baud=baud,
+                    baud=115_200 if baud is None else baud,
                     sync=sync,
                     overwrite=overwrite,
                     source_port=source_port,
@@ -222,6 +232,13 @@ def _together(*, scene: Path | None, replay: Path | None, pipe: bool, rest: bool
         raise ProblemError("--scene: leave out --replay, --pipe and --rest")
     if (replay is not None or pipe) and (counted or rest):
         raise ProblemError("--scenes, --truth and --rest are of scenes: leave them out with --replay or --pipe")
+
+
+def _only_with(*options: tuple[str, object, str, object]) -> None:
+    """Refuse an option that is given without the one that it says something of."""
+    for name, value, other, there in options:
+        if value is not None and there is None:
+            raise ProblemError(f"{name} without {other}")
 
 
 def _again(replay: Path, speed: float) -> tuple[Any, str]:

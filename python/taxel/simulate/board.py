@@ -165,9 +165,18 @@ class Replay:
     def registers(self, preset: str | None) -> Registers:
         """Return what the board holds that plays it: as it was recorded where that is known, else a preset."""
         known = None if self.recording is None else self.recording.registers
-        if known is not None:
-            return known.replace(record=False)
-        return fitting(preset, self.array)
+        held = fitting(preset, self.array) if known is None else known.replace(record=False)
+        values = self.source.intensity if isinstance(self.source, Events) else None
+        most = 0 if values is None else int(values.max())
+        # A converter sees nothing above its ramp: where that is a preset's and the sensor another, it is made longer.
+        rate_hz = 1e6 / held.frame_us
+        while most >= held.ramp:
+            fields, halved = _core.registers_of_source(self.array._parts(), rate_hz, (most + 1).bit_length())
+            rate_hz /= 2
+            if not halved:
+                longer = Registers._of(json.loads(fields), self.array)
+                held = longer.replace(noise_floor=held.noise_floor, wire_version=held.wire_version)
+        return held
 
     def _touch(self, registers: Registers) -> tuple[Any, ...]:
         if isinstance(self.source, Events):
@@ -212,7 +221,10 @@ class Pipe:
             raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be JSON like {wanted}") from None
         self.array = Array(rows, columns, pitch_mm=said.get("pitch_mm", 1.0), name=said.get("name", "pipe"))
         self.rate_hz, self._floor = number("rate", rate), whole("noise_floor", noise_floor, 0, 255)
-        held, self.shift = _core.registers_of_source(self.array._parts(), self.rate_hz, whole("bits", bits, 1, 16))
+        try:
+            held, self.shift = _core.registers_of_source(self.array._parts(), self.rate_hz, whole("bits", bits, 1, 16))
+        except DeviceError as error:
+            raise ProblemError(f"standard input, line 1: {rows} x {columns} taxels: {error}") from None
         self._held = json.loads(held)
 
     def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames say how fast they are
