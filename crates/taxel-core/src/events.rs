@@ -86,14 +86,18 @@ impl Events {
     }
 
     /// Sees to it that there is a column of intensities: none for the events so far.
+    #[inline]
     pub(crate) fn complete_intensities(&mut self) {
         let n = self.len();
         let column = self.intensity.get_or_insert_default();
-        column.ticks.resize(n, 0);
-        column.present.resize(n, false);
+        if column.ticks.len() != n || column.present.len() != n {
+            column.ticks.resize(n, 0);
+            column.present.resize(n, false);
+        }
     }
 
     /// Says of the events from place `from` on, which were added just now, whether states gave them.
+    #[inline]
     pub(crate) fn mark_repaired(&mut self, from: usize, repaired: bool) {
         let n = self.len();
         if repaired && from < n {

@@ -561,6 +561,32 @@ fn one_by_one(stream: &[u8], array: &Array, set: Instructions) -> Told {
     (events, decoder.counts(), reader.skipped())
 }
 
+/// What each datagram was and told, as a host hears it that hands its events on now and then, and what was held, missed and said
+/// of the board by then.
+fn as_they_arrive(
+    datagrams: &[Vec<u8>],
+    array: &Array,
+    set: Instructions,
+    every: usize,
+) -> Vec<impl PartialEq + use<>> {
+    let mut decoder = Decoder::new(array.clone()).instructions(set).unwrap();
+    let mut events = Events::empty(array.clone());
+    let mut told = vec![];
+    for (k, datagram) in datagrams.iter().enumerate() {
+        // Behind the board's clock, and every now and then nothing says when.
+        let arrived = (k % 7 > 0).then_some(5_000_000 + 211 * k as i64);
+        let heard = decoder.push(datagram, arrived, &mut events);
+        if (k + 1) % every == 0 || k + 1 == datagrams.len() {
+            events.view().check().unwrap();
+            told.push((heard, Some((events.clone(), decoder.held(), decoder.counts(), decoder.status().copied()))));
+            events.clear();
+        } else {
+            told.push((heard, None));
+        }
+    }
+    told
+}
+
 fn in_one_go(stream: &[u8], array: &Array) -> Told {
     let rows = v2::stream_rows(stream.len());
     let (mut t, mut x, mut y, mut ticks) = (vec![0; rows], vec![0; rows], vec![0; rows], vec![0; rows]);
@@ -580,7 +606,7 @@ fn in_one_go(stream: &[u8], array: &Array) -> Told {
 /// Scenes of short datagrams, with all that ends a run of them: other kinds, states, differences, times, taxels outside, numbers
 /// that are missing, resets, another board, noise.
 #[test]
-fn a_stream_in_one_go_says_what_its_datagrams_say_one_by_one() {
+fn a_stream_in_one_go_says_what_its_datagrams_say_one_by_one_with_vectors_or_without() {
     let mut events = 0;
     for seed in 0..400 {
         let mut random = StdRng::seed_from_u64(seed);
@@ -640,6 +666,10 @@ fn a_stream_in_one_go_says_what_its_datagrams_say_one_by_one() {
         for set in [Instructions::Plain, Instructions::best()] {
             assert!(told == one_by_one(&stream, &array, set), "seed {seed}, {set:?}");
         }
+        let every = random.random_range(1..20);
+        let [plain, best] =
+            [Instructions::Plain, Instructions::best()].map(|set| as_they_arrive(&datagrams, &array, set, every));
+        assert!(plain == best, "seed {seed}");
     }
     assert!(events > 200_000, "streams that say little: {events} events");
 }

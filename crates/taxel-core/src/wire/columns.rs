@@ -3,9 +3,9 @@
 use std::mem::MaybeUninit;
 use std::ops::Range;
 
-use crate::{Events, Marker, Result, problem};
+use crate::{Events, Intensities, Marker, Result, problem};
 
-/// Columns to be filled; all equally long.
+/// Columns to be filled; all equally long, but for `ticks` and `present` where rows have no intensities.
 #[derive(Debug)]
 pub struct Room<'a> {
     pub(in crate::wire) t: &'a mut [MaybeUninit<i64>],
@@ -133,6 +133,9 @@ pub(in crate::wire) trait Table {
     /// Takes a start or a stop.
     fn mark(&mut self, marker: Marker);
 
+    /// Whether each row has an intensity, or the mark that it has none.
+    fn paired(&self) -> bool;
+
     /// Takes rows: `fill` gets room, the row from which on there is some for `most` of them, and whether each has an intensity or the mark that it has none, as it
     /// must where they are `valued`; it says how many it wrote. States gave them where they are `repaired`.
     ///
@@ -153,6 +156,12 @@ impl Table for Events {
         self.markers.push(marker);
     }
 
+    #[inline]
+    fn paired(&self) -> bool {
+        self.intensity.is_some()
+    }
+
+    #[inline]
     unsafe fn rows(
         &mut self,
         most: usize,
@@ -160,14 +169,45 @@ impl Table for Events {
         repaired: bool,
         fill: impl FnOnce(&mut Room<'_>, usize, bool) -> usize,
     ) {
-        if valued {
+        if valued || self.paired() {
             self.complete_intensities();
         }
         let before = self.len();
-        // SAFETY: the caller's promise.
-        unsafe { append(self, most, |mut room, paired, _| Filled { rows: fill(&mut room, 0, paired), paired }) };
+        let Self { t, x, y, p, intensity, .. } = self;
+        let paired = intensity.is_some();
+        let mut none = Intensities::default();
+        let Intensities { ticks, present } = intensity.as_mut().unwrap_or(&mut none);
+        let valued = if paired { most } else { 0 };
+        let mut room = Room {
+            t: spare(t, most),
+            x: spare(x, most),
+            y: spare(y, most),
+            p: spare(p, most),
+            ticks: spare(ticks, valued),
+            present: spare(present, valued),
+        };
+        let rows = fill(&mut room, 0, paired);
+        assert!(rows <= most, "more rows than there was room for");
+        // SAFETY: the caller's promise: so many entries were written behind each column's own, into what was reserved.
+        unsafe {
+            t.set_len(t.len() + rows);
+            x.set_len(x.len() + rows);
+            y.set_len(y.len() + rows);
+            p.set_len(p.len() + rows);
+            if paired {
+                ticks.set_len(ticks.len() + rows);
+                present.set_len(present.len() + rows);
+            }
+        }
         self.mark_repaired(before, repaired);
     }
+}
+
+/// Room for so many entries behind a column's own.
+#[inline]
+fn spare<T>(column: &mut Vec<T>, entries: usize) -> &mut [MaybeUninit<T>] {
+    column.reserve(entries);
+    &mut column.spare_capacity_mut()[..entries]
 }
 
 /// Columns that were laid out, as they fill from their first row on.
@@ -181,11 +221,6 @@ pub(in crate::wire) struct Laid<'a> {
 impl<'a> Laid<'a> {
     pub(in crate::wire) fn new(room: Room<'a>) -> Self {
         Self { room, filled: Filled { rows: 0, paired: false }, repaired: vec![], markers: vec![] }
-    }
-
-    /// Whether the columns of intensities are written.
-    pub(in crate::wire) fn paired(&self) -> bool {
-        self.filled.paired
     }
 
     /// What was written, which rows states gave (none where no row is of that kind), and the markers.
@@ -202,6 +237,11 @@ impl<'a> Laid<'a> {
 impl Table for Laid<'_> {
     fn mark(&mut self, marker: Marker) {
         self.markers.push(marker);
+    }
+
+    #[inline]
+    fn paired(&self) -> bool {
+        self.filled.paired
     }
 
     #[inline]

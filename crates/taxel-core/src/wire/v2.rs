@@ -216,6 +216,26 @@ impl Header {
         bytes.first() == Some(&MAGIC) && bytes.get(1).is_some_and(|byte| byte >> 4 == 2)
     }
 
+    /// What a long enough datagram shares with all changes as they are of its kind, board, session and stride: its first four
+    /// bytes and the header's last four, without the line and frame sync.
+    #[inline(always)]
+    fn common(datagram: &[u8]) -> u64 {
+        let four = |at: usize| {
+            let mut word = [0; 4];
+            word.copy_from_slice(&datagram[at..at + 4]);
+            u64::from(u32::from_le_bytes(word))
+        };
+        let flags = ((1 << FLAG_BITS) - 1) & !u64::from(FRAME_SYNC);
+        (four(0) | four(HEADER_BYTES - 4) << 32) & (flags << 56 | ((1 << STRIDE_BITS) - 1) << 48 | 0xffff_ffff_ffff)
+    }
+
+    /// As [`Self::common`] gives it of changes as they are.
+    #[inline(always)]
+    fn common_of(kind: Kind, board: u16, session: u16, stride: u8) -> u64 {
+        let [board, session, stride] = [u64::from(board), u64::from(session), u64::from(stride)];
+        u64::from(MAGIC) | u64::from(2 << 4 | kind.number()) << 8 | board << 16 | session << 32 | stride << 48
+    }
+
     /// The header and the body of a datagram that is long enough to have them.
     #[inline(always)]
     fn fields(datagram: &[u8]) -> (Self, &[u8]) {

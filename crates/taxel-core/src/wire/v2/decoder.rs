@@ -7,9 +7,10 @@ mod session;
 mod words;
 
 use super::counts::{Counts, Status};
+use super::stream::stream_rows;
 use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Layout, Refused, START, STOP};
 use crate::vectors::Instructions;
-use crate::wire::columns::{Laid, Table};
+use crate::wire::columns::Table;
 use crate::wire::silence::silence;
 use crate::{Array, Events, Marker, Result};
 use held::Held;
@@ -41,6 +42,18 @@ pub enum Heard {
     Repeated,
     /// No datagram of this board.
     Refused(Refused),
+}
+
+/// Plain datagrams that were taken.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::wire::v2) struct Taken {
+    pub(in crate::wire::v2) datagrams: usize,
+    /// Their own.
+    pub(in crate::wire::v2) bytes: usize,
+    /// When the last one began, us.
+    base: i64,
+    /// What it promises, us.
+    span: u16,
 }
 
 /// Turns one board's datagrams into events, in the order in which they come.
@@ -145,7 +158,22 @@ impl Decoder {
     ///
     /// `arrived` is the host's clock in us. After a reset it says how much time has passed, else time goes on from the latest
     /// that was heard.
+    #[inline]
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
+        let latest = self.latest;
+        let taken = self.plain(std::iter::once(datagram), stream_rows(datagram.len()), out);
+        match self.sessions.last() {
+            Some(session) if taken.datagrams > 0 => {
+                let Taken { base, span, .. } = taken;
+                self.heard = arrived.map(|now| (now, latest.max(base))).or(self.heard);
+                let until = (span > 0).then(|| base + i64::from(span));
+                Heard::Intact { until, missing: session.missing(), reset: false }
+            }
+            _ => self.push_any(datagram, arrived, out),
+        }
+    }
+
+    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
         match Header::read(datagram) {
             Ok((header, body)) => self.push_read(&header, body, arrived, out),
             Err(refused) => {
@@ -214,32 +242,36 @@ impl Decoder {
         Heard::Intact { until, missing, reset }
     }
 
-    /// Takes plain datagrams of a few words that lie one behind the other, each behind its length, as far as they go; gives how many
-    /// bytes they have. As [`Self::push_read`] of each, without arrivals.
+    /// Takes datagrams as far as they are plain and of a few words, where the machine has the instructions; `out` has room for
+    /// `most` rows. As [`Self::push_read`] of each, without arrivals.
     #[inline]
-    pub(in crate::wire::v2) fn run(&mut self, bytes: &[u8], out: &mut Laid<'_>) -> usize {
+    #[cfg_attr(not(target_arch = "x86_64"), allow(unused_variables))]
+    pub(in crate::wire::v2) fn plain<'d>(
+        &mut self,
+        datagrams: impl Iterator<Item = &'d [u8]> + Clone,
+        most: usize,
+        out: &mut impl Table,
+    ) -> Taken {
         #[cfg(target_arch = "x86_64")]
         if self.instructions == Instructions::Avx512Bytes
-            && let Some(first) = run::first(bytes)
-            && let Some(layout) = first.layout()
-            && (layout.value == 0 || out.paired())
-            && let (Some(board), Some(session)) = (self.board, self.sessions.last_mut())
-            && run::fits(&self.held)
+            && let (Some(first), Some(board), Some(session)) =
+                (datagrams.clone().next(), self.board, self.sessions.last_mut())
+            && let Self { held, counts, latest, .. } = self
+            && let Some((mut run, value)) = Run::new(first, board, session, held, latest, counts)
+            && (value == 0 || out.paired())
         {
-            let Self { held, counts, latest, .. } = self;
-            let mut run = Run { kind: first, board, session, held, latest, counts, done: 0 };
-            // SAFETY: the machine has this set, as `instructions` and `best` see to; the held places are few enough, as was just
-            // asked. A run writes each row that it counts, and with `paired` its ticks and present.
+            // SAFETY: the machine has this set, as `instructions` and `best` see to. A run writes each row that it counts, and
+            // with `paired` its ticks and present.
             unsafe {
-                out.rows(most_rows(bytes.len()), false, false, |room, row, paired| match layout.value {
-                    0 => run.take::<0>(bytes, room, row, paired),
-                    8 => run.take::<8>(bytes, room, row, paired),
-                    _ => run.take::<16>(bytes, room, row, paired),
+                out.rows(most, false, false, |room, row, paired| match value {
+                    0 => run.take::<0>(datagrams, room, row, paired),
+                    8 => run.take::<8>(datagrams, room, row, paired),
+                    _ => run.take::<16>(datagrams, room, row, paired),
                 });
             }
-            return run.done;
+            return run.taken;
         }
-        0
+        Taken::default()
     }
 
     /// Which session a datagram belongs to, and whether it begins one.
@@ -349,6 +381,38 @@ mod tests {
         let mut bytes = vec![];
         header.write(body, &mut bytes);
         bytes
+    }
+
+    #[test]
+    fn changes_as_they_are_go_the_short_way_where_the_machine_has_it() {
+        let short = usize::from(Instructions::best() == Instructions::Avx512Bytes);
+        for (kind, body, flags, taken) in [
+            (Kind::Small, vec![], 0, short),
+            (Kind::Small, vec![5, 0x80, 7, 0x03], FRAME_SYNC, short),
+            // Advances, and more words than eight.
+            (Kind::Small, [1, 0x7f, 5, 0x83].repeat(6), 0, short),
+            (Kind::Changes, vec![5, 0x80], 0, short),
+            (Kind::Large, vec![5, 1, 0, 0x80], 0, short),
+            // A time, differences, what the board dropped, states, a part of a word, a place beyond the array, a long one.
+            (Kind::Small, vec![0, 0xff, 9, 0, 5, 0x83], 0, 0),
+            (Kind::Small, vec![5, 0x80], DIFFERENCES, 0),
+            (Kind::Small, vec![5, 0x80], DROPPED, 0),
+            (Kind::SmallStates, vec![5, 0x80], 0, 0),
+            (Kind::Small, vec![5, 0x80, 7], 0, 0),
+            (Kind::Small, vec![63, 0x7f, 0, 0], 0, 0),
+            (Kind::Small, [5, 0x80].repeat(30), 0, 0),
+        ] {
+            let mut decoder = Decoder::new(Array::thesis());
+            let mut events = Events::empty(Array::thesis());
+            decoder.push(&datagram(Kind::Small, 1, 0, 0, &[9, 0]), None, &mut events);
+            let mut bytes = datagram(kind, 1, 1, 192, &body);
+            bytes[17] |= flags;
+            let sum = bytes.len() - 4;
+            let sealed = crc32c::crc32c(&bytes[..sum]).to_le_bytes();
+            bytes[sum..].copy_from_slice(&sealed);
+            let plain = decoder.plain(std::iter::once(&bytes[..]), stream_rows(bytes.len()), &mut events);
+            assert_eq!(plain.datagrams, taken, "{kind:?}, flags {flags}, {body:?}");
+        }
     }
 
     #[test]

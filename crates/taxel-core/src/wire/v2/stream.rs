@@ -110,12 +110,23 @@ pub fn stream_rows(bytes: usize) -> usize {
     most_rows(bytes / WORD_BYTES)
 }
 
+/// What lies one behind the other, each behind its length.
+fn ahead(mut bytes: &[u8]) -> impl Iterator<Item = &[u8]> + Clone {
+    std::iter::from_fn(move || {
+        let (length, rest) = bytes.split_first_chunk::<LENGTH_BYTES>()?;
+        let (datagram, rest) = rest.split_at_checked(usize::from(u16::from_le_bytes(*length)))?;
+        bytes = rest;
+        Some(datagram)
+    })
+}
+
 /// A decoder and the columns that it fills.
 struct Filling<'a>(Decoder, Laid<'a>);
 
 impl Listener for Filling<'_> {
-    fn run(&mut self, ahead: &[u8]) -> usize {
-        self.0.run(ahead, &mut self.1)
+    fn run(&mut self, bytes: &[u8]) -> usize {
+        let taken = self.0.plain(ahead(bytes), stream_rows(bytes.len()), &mut self.1);
+        taken.bytes + LENGTH_BYTES * taken.datagrams
     }
 
     fn take(&mut self, _: &[u8], header: &Header, body: &[u8]) {

@@ -1,124 +1,147 @@
-//! Runs of plain datagrams of a few words, as a scene's are: many in one go, with AVX-512.
+//! Plain datagrams of a few words, as a scene's are: one, or many in one go, with AVX-512.
 //!
 //! Plain is a datagram ahead in the latest session, with changes as they are (no differences, no time of their own), no
-//! earlier than what is held and all on the array. Anything else ends the run, untouched: the decoder takes it by itself,
-//! which alone says what a datagram means. So both ways give the same rows, held values and counts.
+//! earlier than what is held and all on the array. Anything else ends the run, and the decoder takes it by itself, which alone
+//! says what a datagram means. So both ways give the same rows, held values and counts.
 
-use std::arch::x86_64::{_bzhi_u32, _mm512_adds_epu16, _mm512_set1_epi16};
-
+use super::Taken;
 use super::held::Held;
 use super::session::Session;
-use super::words::{Constants, FULL};
+use super::words::{EIGHT, Eight, FULL};
 use crate::wire::columns::Room;
 use crate::wire::v2::checksum::{EVEN, even};
 use crate::wire::v2::counts::Counts;
-use crate::wire::v2::{FRAME_SYNC, HEADER_BYTES, Header, Kind, LENGTH_BYTES, TRAILER_BYTES};
+use crate::wire::v2::{HEADER_BYTES, Header, Kind, TRAILER_BYTES};
 
 /// Bytes of the longest datagram of a run: all but the checksum in one register.
 const LONGEST: usize = EVEN + 4;
 
-/// Rows that a datagram's stores may touch.
-const ROWS: usize = 32;
+/// Rows that a datagram's stores may touch: a whole eight for each that is begun.
+const ROWS: usize = ((LONGEST - HEADER_BYTES - TRAILER_BYTES) / 2).next_multiple_of(EIGHT);
 
 /// What the decoder knows, as a run goes on with it.
 pub(super) struct Run<'a> {
-    pub(super) kind: Kind,
-    pub(super) board: u16,
+    /// What its datagrams have in common, as [`Header::common`] says it of plain ones.
+    common: u64,
     /// The latest one.
-    pub(super) session: &'a mut Session,
-    pub(super) held: &'a mut Held,
-    pub(super) latest: &'a mut i64,
-    pub(super) counts: &'a mut Counts,
-    /// Bytes.
-    pub(super) done: usize,
+    session: &'a mut Session,
+    held: &'a mut Held,
+    latest: &'a mut i64,
+    counts: &'a mut Counts,
+    pub(super) taken: Taken,
 }
 
-/// The datagram that lies ahead behind its length, where it may be one of a run.
+/// Whether a datagram's length is that of one of a run.
 #[inline(always)]
-fn ahead(bytes: &[u8]) -> Option<&[u8]> {
-    let (length, rest) = bytes.split_first_chunk::<LENGTH_BYTES>()?;
-    let length = usize::from(u16::from_le_bytes(*length));
-    if !(HEADER_BYTES + TRAILER_BYTES..=LONGEST).contains(&length) {
-        return None;
+fn short(datagram: &[u8]) -> bool {
+    (HEADER_BYTES + TRAILER_BYTES..=LONGEST).contains(&datagram.len())
+}
+
+impl<'a> Run<'a> {
+    /// A run that may begin with a datagram, and how many bits of value its words have; none where it surely does not.
+    #[inline]
+    pub(super) fn new(
+        datagram: &[u8],
+        board: u16,
+        session: &'a mut Session,
+        held: &'a mut Held,
+        latest: &'a mut i64,
+        counts: &'a mut Counts,
+    ) -> Option<(Self, u32)> {
+        let kind = Kind::of(short(datagram).then(|| Header::fields(datagram).0.kind)?)?;
+        if !matches!(kind, Kind::Changes | Kind::Small | Kind::Large) {
+            return None;
+        }
+        let value = kind.layout()?.value;
+        // Positions, and sums that are too large, must be told apart in 16 bits.
+        if held.values.len() >= usize::from(FULL) {
+            return None;
+        }
+        let common = Header::common_of(kind, board, session.number, held.stride);
+        Some((Self { common, session, held, latest, counts, taken: Taken::default() }, value))
     }
-    rest.get(..length).filter(|datagram| Header::likely(datagram))
-}
 
-/// The kind of the datagram that lies ahead, where it may begin a run.
-pub(super) fn first(bytes: &[u8]) -> Option<Kind> {
-    let kind = Kind::of(Header::fields(ahead(bytes)?).0.kind)?;
-    matches!(kind, Kind::Changes | Kind::Small | Kind::Large).then_some(kind)
-}
-
-/// Whether an array's positions, and sums that are too large, are told apart in 16 bits.
-pub(super) fn fits(held: &Held) -> bool {
-    held.values.len() < usize::from(FULL)
-}
-
-impl Run<'_> {
-    /// Takes datagrams of words with so many bits of value into `room`, from a row on; gives how many rows they are.
+    /// Takes datagrams of words with so many bits of value into `room`, from a row on, as far as they are plain; gives how many rows they
+    /// are.
     ///
     /// # Safety
     ///
-    /// The machine must have the features below, [`fits`] must hold, and `VALUE` be that of the kind.
-    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    pub(super) unsafe fn take<const VALUE: u32>(
+    /// The machine must have the features below, and `VALUE` be that which [`Self::new`] gave.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,bmi2,popcnt,sse4.2")]
+    pub(super) unsafe fn take<'d, const VALUE: u32>(
         &mut self,
-        bytes: &[u8],
+        datagrams: impl Iterator<Item = &'d [u8]>,
         room: &mut Room<'_>,
         first: usize,
         paired: bool,
     ) -> usize {
-        let word = if VALUE == 16 { 4 } else { 2 };
-        let constants = Constants::new(self.held.stride, self.held);
-        let (kind, mut row, mut datagrams) = (self.kind.number(), first, 0);
-        while let Some(datagram) = ahead(&bytes[self.done..]) {
+        let (mut row, mut taken) = (first, Taken::default());
+        for datagram in datagrams {
+            if !short(datagram) || Header::common(datagram) != self.common {
+                break;
+            }
             let (header, body) = Header::fields(datagram);
             let number = self.session.number_of(header.sequence);
             let t = self.session.offset + header.base as i64;
             let start = u32::from(header.line) << header.stride;
-            let plain = header.kind == kind
-                && header.board == self.board
-                && header.session == self.session.number
-                && number > self.session.highest
-                && header.stride == self.held.stride
-                && header.flags & !FRAME_SYNC == 0
+            let plain = number > self.session.highest
                 && start < u32::from(FULL)
                 && (VALUE == 0 || t >= self.held.newest)
-                && body.len().is_multiple_of(word)
+                && body.len().is_multiple_of(if VALUE == 16 { 4 } else { 2 })
                 && room.len() - row >= ROWS;
             let (summed, sum) = datagram.split_at(datagram.len() - 4);
-            // SAFETY: 20 to 64 bytes, as `ahead` has seen to.
+            // SAFETY: 20 to 64 bytes, as `short` has seen to.
             if !plain || unsafe { even(summed) }.to_le_bytes() != sum {
                 break;
             }
-            let lanes = _bzhi_u32(u32::MAX, (body.len() / word) as u32);
-            // SAFETY: so many words lie in the body.
-            let words = unsafe { constants.words::<VALUE>(body.as_ptr(), lanes) };
-            if words.controls & words.polarity != 0 {
-                break;
-            }
-            let steps = constants.sums::<VALUE>(&words, lanes, words.controls, false);
-            // A sum that is too large is the position of none of these arrays.
-            let from_1 = _mm512_adds_epu16(steps, _mm512_set1_epi16(start as i16));
-            let Some(found) = constants.found(&words, lanes & !words.controls, from_1) else { break };
-            // SAFETY: 32 rows fit behind `row`, as was seen above; the events lie on the array, and so in `held`.
-            unsafe {
-                found.write::<VALUE>(t, room, row, paired);
-                if VALUE > 0 && found.n > 0 {
-                    constants.hold(&found, t, self.held);
-                }
-            }
+            // SAFETY: the machine has the features, `new` has seen to the array, and so many rows fit behind `row`, as was seen above.
+            let Some(rows) = (unsafe { self.words::<VALUE>(body, start as u16, t, room, row, paired) }) else { break };
             self.session.note(number);
             self.session.latest = self.session.latest.max(header.base);
             *self.latest = (*self.latest).max(t + i64::from(header.span));
-            row += found.n;
-            datagrams += 1;
-            self.done += LENGTH_BYTES + datagram.len();
+            row += rows;
+            let (datagrams, bytes) = (taken.datagrams + 1, taken.bytes + datagram.len());
+            taken = Taken { datagrams, bytes, base: t, span: header.span };
         }
-        self.counts.datagrams += datagrams;
-        self.counts.intact += datagrams;
+        self.counts.datagrams += taken.datagrams as u64;
+        self.counts.intact += taken.datagrams as u64;
         self.counts.events += (row - first) as u64;
+        self.taken = taken;
         row - first
+    }
+
+    /// Takes a body's whole words, which begin at a position and are of one time; gives how many rows they are. None where one
+    /// is not plain: of those before it, eight by eight, some may be held by then, as the decoder will hold them again.
+    ///
+    /// # Safety
+    ///
+    /// As [`Self::take`]'s; [`ROWS`] must fit behind `first`.
+    #[inline]
+    #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi2,bmi2,popcnt,sse4.2")]
+    unsafe fn words<const VALUE: u32>(
+        &mut self,
+        body: &[u8],
+        mut passed: u16,
+        t: i64,
+        room: &mut Room<'_>,
+        first: usize,
+        paired: bool,
+    ) -> Option<usize> {
+        let bytes = if VALUE == 16 { 4 } else { 2 };
+        let mut row = first;
+        for words in body.chunks(bytes * EIGHT) {
+            // SAFETY: so many words lie there; with the caller's promises the events lie on the array, and so in `held`, and 8 rows
+            // fit behind those so far.
+            unsafe {
+                let eight = Eight::read::<VALUE>(words.as_ptr(), words.len() / bytes, passed, self.held)?;
+                eight.write::<VALUE>(t, room, row, paired);
+                if VALUE > 0 && eight.n > 0 {
+                    eight.hold(t, self.held);
+                }
+                (row, passed) = (row + eight.n, eight.passed);
+            }
+        }
+        Some(row - first)
     }
 }

@@ -50,7 +50,7 @@ impl Session {
     }
 
     /// Notes a number; none where it is too old, else whether it is new.
-    #[inline]
+    #[inline(always)]
     pub(super) fn note(&mut self, number: i64) -> Option<bool> {
         if (1..=64).contains(&(number - self.highest)) {
             self.note_ahead(number);
@@ -74,6 +74,7 @@ impl Session {
         (self.highest, self.received) = (number, self.received + 1);
     }
 
+    #[cold]
     fn note_out_of_turn(&mut self, number: i64) -> Option<bool> {
         if number <= self.highest - WINDOW as i64 {
             return None;

@@ -7,11 +7,15 @@
 #[cfg(target_arch = "x86_64")]
 mod avx512;
 mod body;
+#[cfg(target_arch = "x86_64")]
+mod eight;
 mod single;
 
 #[cfg(target_arch = "x86_64")]
-pub(super) use avx512::{Constants, FULL};
+pub(super) use avx512::FULL;
 pub(super) use body::{Body, Meaning};
+#[cfg(target_arch = "x86_64")]
+pub(super) use eight::{EIGHT, Eight};
 
 use super::held::Held;
 use crate::vectors::Instructions;

@@ -1,17 +1,13 @@
 //! Blocks of up to 32 words with AVX-512 (F, BW, VL, VBMI2) and BMI2; the last one of a body is shorter.
-//!
-//! [`blocks`] takes them from one body; its parts are also those of runs of datagrams.
 
 use std::arch::x86_64::*;
 
 use super::body::{Body, word};
+use super::eight::{EIGHT, hold_eight};
 use crate::wire::columns::Room;
 use crate::wire::v2::decoder::held::Held;
 
 const WORDS: usize = 32;
-
-/// So many events, or fewer, are a block of a scene.
-const FEW: usize = 8;
 
 /// Positions are counted from 1 in 16 bits, and sums stop here: what comes to it is left to the one by one.
 pub(crate) const FULL: u16 = u16::MAX;
@@ -53,7 +49,7 @@ struct Lanes([u16; WORDS]);
 
 /// What every block needs, in registers.
 #[derive(Clone, Copy)]
-pub(crate) struct Constants {
+struct Constants {
     last_before: __m512i,
     sixteenth: __m512i,
     low_halves: __m512i,
@@ -67,18 +63,18 @@ pub(crate) struct Constants {
 
 /// The words of a block, a lane each.
 #[derive(Clone, Copy)]
-pub(crate) struct Words {
-    pub(crate) polarity: u32,
+struct Words {
+    polarity: u32,
     skip: __m512i,
     value: __m512i,
     /// Advances and times.
-    pub(crate) controls: u32,
+    controls: u32,
 }
 
 /// The events of a block, the first ones in the first lanes.
 #[derive(Clone, Copy)]
-pub(crate) struct Found {
-    pub(crate) n: usize,
+struct Found {
+    n: usize,
     /// The lanes of `n`.
     given: u32,
     position: __m512i,
@@ -91,7 +87,7 @@ pub(crate) struct Found {
 impl Constants {
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    pub(crate) fn new(stride: u8, held: &Held) -> Self {
+    fn new(stride: u8, held: &Held) -> Self {
         // SAFETY: each table is 64 bytes long.
         let table = |t: &[u16; WORDS]| unsafe { _mm512_loadu_si512(t.as_ptr().cast()) };
         Self {
@@ -114,7 +110,7 @@ impl Constants {
     /// That many words, of 4 bytes each where `VALUE` is 16 and of 2 else, must lie there.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    pub(crate) unsafe fn words<const VALUE: u32>(&self, block: *const u8, lanes: u32) -> Words {
+    unsafe fn words<const VALUE: u32>(&self, block: *const u8, lanes: u32) -> Words {
         let control = if VALUE == 8 { 0x7f } else { 0x7fff };
         // SAFETY: only the lanes of those words are read.
         let (head, value) = unsafe {
@@ -141,7 +137,7 @@ impl Constants {
     /// too large. With `few` there are no more than 8 lanes.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    pub(crate) fn sums<const VALUE: u32>(&self, words: &Words, taken: u32, advances: u32, few: bool) -> __m512i {
+    fn sums<const VALUE: u32>(&self, words: &Words, taken: u32, advances: u32, few: bool) -> __m512i {
         let Words { skip, value, .. } = *words;
         let one = _mm512_set1_epi16(1);
         let mut steps = _mm512_maskz_add_epi16(taken, skip, one);
@@ -171,7 +167,7 @@ impl Constants {
     /// The events among words, whose positions, counted from 1, are given; none where one lies outside the array.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    pub(crate) fn found(&self, words: &Words, events: u32, from_1: __m512i) -> Option<Found> {
+    fn found(&self, words: &Words, events: u32, from_1: __m512i) -> Option<Found> {
         let n = events.count_ones() as usize;
         let position = _mm512_maskz_compress_epi16(events, _mm512_sub_epi16(from_1, _mm512_set1_epi16(1)));
         let ticks = _mm512_maskz_compress_epi16(events, words.value);
@@ -189,13 +185,13 @@ impl Constants {
     /// `found` must come from [`Self::found`], with positions in `held`.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    pub(crate) unsafe fn hold(&self, found: &Found, t: i64, held: &mut Held) {
+    unsafe fn hold(&self, found: &Found, t: i64, held: &mut Held) {
         held.newest = t;
         // Lanes without an event repeat the last one, so that the loop has one of two lengths: a processor guesses these.
         let repeated = _mm512_min_epu16(_mm512_set1_epi16(found.n as i16 - 1), self.lane);
         let places = _mm512_permutexvar_epi16(repeated, found.position);
         let values = _mm512_permutexvar_epi16(repeated, found.ticks);
-        if found.n > FEW {
+        if found.n > EIGHT {
             let (mut at, mut told) = (Lanes([0; WORDS]), Lanes([0; WORDS]));
             // SAFETY: both are 64 bytes long, and begin where a line of the cache does; the places are those of events.
             unsafe {
@@ -205,21 +201,8 @@ impl Constants {
             }
             return;
         }
-        // Not by way of memory, for which the loads would wait.
-        let halves = |lanes| {
-            let eight = _mm512_castsi512_si128(lanes);
-            [_mm_cvtsi128_si64(eight) as u64, _mm_extract_epi64::<1>(eight) as u64]
-        };
-        for (places, values) in halves(places).into_iter().zip(halves(values)) {
-            for shift in [0, 16, 32, 48] {
-                let place = usize::from((places >> shift) as u16);
-                // SAFETY: it is the place of an event, and so in `held`.
-                unsafe {
-                    *held.values.get_unchecked_mut(place) = (values >> shift) as u16;
-                    *held.since.get_unchecked_mut(place) = t;
-                }
-            }
-        }
+        // SAFETY: the places are those of events.
+        unsafe { hold_eight(_mm512_castsi512_si128(places), _mm512_castsi512_si128(values), t, held) }
     }
 }
 
@@ -266,13 +249,13 @@ impl Found {
     /// 32 rows must fit behind `first`: what lies beyond the events is written again by later rows, or never read.
     #[inline]
     #[target_feature(enable = "avx512f,avx512bw,avx512vl,avx512vbmi,avx512vbmi2,bmi2,lzcnt,popcnt")]
-    pub(crate) unsafe fn write<const VALUE: u32>(&self, t: i64, room: &mut Room<'_>, first: usize, paired: bool) {
+    unsafe fn write<const VALUE: u32>(&self, t: i64, room: &mut Room<'_>, first: usize, paired: bool) {
         let times = _mm512_set1_epi64(t);
         // SAFETY: the caller's promise.
         unsafe {
             let to = room.t.as_mut_ptr().add(first).cast::<i64>();
             _mm512_storeu_si512(to.cast(), times);
-            if self.n > FEW {
+            if self.n > EIGHT {
                 _mm512_storeu_si512(to.add(8).cast(), times);
                 _mm512_storeu_si512(to.add(16).cast(), times);
                 _mm512_storeu_si512(to.add(24).cast(), times);
@@ -337,7 +320,7 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
             let begin = (_mm_cvtsi128_si32(_mm512_castsi512_si128(found.position)) & 0xffff) as usize;
             // SAFETY: the events lie on the array, and so in `held`.
             unsafe {
-                if found.n > FEW && advances == 0 && usize::from(last) == begin + found.n {
+                if found.n > EIGHT && advances == 0 && usize::from(last) == begin + found.n {
                     hold_neighbours(begin, found.given, found.ticks, body.t, held);
                 } else {
                     constants.hold(&found, body.t, held);
