@@ -143,11 +143,21 @@ function showAxis(column_us) {
   part("zoom-out", HTMLButtonElement).disabled = column_us >= most;
 }
 
+/** When the last zoom is done: the next reckons with the window that it leaves. */
+let zoomed = Promise.resolve();
+
 /**
- * Shows half or twice the stretch of time; where the view holds, the time at the cursor stays where it is.
+ * Shows half or twice the stretch of time, after those asked for before; where the view holds, the time at the cursor
+ * stays where it is.
  * @param {1 | -1} by 1: half, -1: twice
  */
-async function zoom(by) {
+function zoom(by) {
+  zoomed = zoomed.then(() => zoomOnce(by));
+  return zoomed;
+}
+
+/** @param {1 | -1} by */
+async function zoomOnce(by) {
   const [least, most] = hello?.columns_us ?? [0, 0];
   if (!timeline) return;
   const column_us = by > 0 ? timeline.column_us / 2 : timeline.column_us * 2;
@@ -162,6 +172,7 @@ async function zoom(by) {
   player.seek(end);
   await player.settled();
   player.seek(t_us <= end && t_us > end - SPAN * column_us ? t_us : cursor);
+  await player.settled();
 }
 
 /** @param {ArrayBuffer} buffer */

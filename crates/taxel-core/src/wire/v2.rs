@@ -24,9 +24,9 @@ mod packer;
 mod stream;
 
 pub use counts::{Counts, Status};
-pub use decoder::{Decoder, Heard};
+pub use decoder::{Decoder, Heard, stream_rows};
 pub use packer::{Packer, Settings};
-pub use stream::{Decoded, StreamReader, decode, stream_rows};
+pub use stream::{Decoded, StreamReader, decode};
 
 use crate::{Array, problem};
 

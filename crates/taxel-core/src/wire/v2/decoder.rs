@@ -7,7 +7,6 @@ mod session;
 mod words;
 
 use super::counts::{Counts, Status};
-use super::stream::stream_rows;
 use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Layout, Refused, START, STOP};
 use crate::vectors::Instructions;
 use crate::wire::columns::Table;
@@ -15,9 +14,9 @@ use crate::wire::silence::silence;
 use crate::{Array, Events, Marker, Result};
 use held::Held;
 #[cfg(target_arch = "x86_64")]
-use run::Run;
+use run::{Run, Taken};
 use session::{Session, WINDOW};
-pub(in crate::wire::v2) use words::most_rows;
+pub use words::stream_rows;
 use words::{Body, Meaning};
 
 /// Sessions that are remembered, for datagrams that come behind a reset.
@@ -42,18 +41,6 @@ pub enum Heard {
     Repeated,
     /// No datagram of this board.
     Refused(Refused),
-}
-
-/// Plain datagrams that were taken.
-#[derive(Debug, Clone, Copy, Default)]
-pub(in crate::wire::v2) struct Taken {
-    pub(in crate::wire::v2) datagrams: usize,
-    /// Their own.
-    pub(in crate::wire::v2) bytes: usize,
-    /// When the last one began, us.
-    base: i64,
-    /// What it promises, us.
-    span: u16,
 }
 
 /// Turns one board's datagrams into events, in the order in which they come.

@@ -1,13 +1,10 @@
 //! Datagrams in files and on streams, each behind its length: cut anywhere, and found again after damage.
 
 use super::counts::Counts;
-use super::decoder::{Decoder, most_rows};
+use super::decoder::{Decoder, stream_rows};
 use super::{DATAGRAM_BYTES, HEADER_BYTES, Header, LENGTH_BYTES, TRAILER_BYTES};
 use crate::wire::columns::{Filled, Laid, Room};
 use crate::{Array, Marker, Result, Stop, problem};
-
-/// Bytes of the shortest word.
-const WORD_BYTES: usize = 2;
 
 /// Cuts a stream into datagrams. What is none is skipped byte by byte and counted, to the next place where length, magic and
 /// checksum agree.
@@ -102,12 +99,6 @@ pub struct Decoded {
     pub counts: Counts,
     /// Bytes that belonged to no datagram.
     pub skipped: u64,
-}
-
-/// How many rows a stream of so many bytes may need, whatever it holds.
-#[must_use]
-pub fn stream_rows(bytes: usize) -> usize {
-    most_rows(bytes / WORD_BYTES)
 }
 
 /// What lies one behind the other, each behind its length.

@@ -4,7 +4,6 @@
 //! earlier than what is held and all on the array. Anything else ends the run, and the decoder takes it by itself, which alone
 //! says what a datagram means. So both ways give the same rows, held values and counts.
 
-use super::Taken;
 use super::held::Held;
 use super::session::Session;
 use super::words::{EIGHT, Eight, FULL};
@@ -18,6 +17,18 @@ const LONGEST: usize = EVEN + 4;
 
 /// Rows that a datagram's stores may touch: a whole eight for each that is begun.
 const ROWS: usize = ((LONGEST - HEADER_BYTES - TRAILER_BYTES) / 2).next_multiple_of(EIGHT);
+
+/// Plain datagrams that were taken.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::wire::v2) struct Taken {
+    pub(in crate::wire::v2) datagrams: usize,
+    /// Their own.
+    pub(in crate::wire::v2) bytes: usize,
+    /// When the last one began, us.
+    pub(super) base: i64,
+    /// What it promises, us.
+    pub(super) span: u16,
+}
 
 /// What the decoder knows, as a run goes on with it.
 pub(super) struct Run<'a> {

@@ -28,8 +28,17 @@ const MARGIN: usize = 32;
 /// Words that are taken one by one before blocks are tried again.
 const STRETCH: usize = 32;
 
+/// Bytes of the shortest word.
+const WORD_BYTES: usize = 2;
+
+/// How many rows a stream of so many bytes may need, whatever it holds.
+#[must_use]
+pub fn stream_rows(bytes: usize) -> usize {
+    most_rows(bytes / WORD_BYTES)
+}
+
 /// How much room so many words need, rows.
-pub(in crate::wire::v2) fn most_rows(words: usize) -> usize {
+pub(super) fn most_rows(words: usize) -> usize {
     words + MARGIN
 }
 
