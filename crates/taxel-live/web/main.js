@@ -168,11 +168,25 @@ async function zoomOnce(by) {
   await server.ask({ type: "zoom", column_us }).catch(failed);
   if (!held || t_us === null || end_us === null || cursor === null) return;
   const end = cursor + (end_us - cursor) * (by > 0 ? 0.5 : 2);
-  // The window first, then the time in it.
+  // The window first, by a picture at its end, then the time in it; the server leaves out pictures that are overtaken.
   player.seek(end);
-  await player.settled();
+  await ended(player.goal ?? end);
   player.seek(t_us <= end && t_us > end - SPAN * column_us ? t_us : cursor);
   await player.settled();
+}
+
+/** Of a picture at which the window is to end, us, and what waits for it. @type {{ t_us: number, come: () => void } | null} */
+let ending = null;
+
+/**
+ * @param {number} t_us
+ * @returns {Promise<void>} fulfilled when the picture of that time has come and ends the window, or none has for 5 s
+ */
+function ended(t_us) {
+  return new Promise((come) => {
+    ending = { t_us, come };
+    setTimeout(come, 5000);
+  });
 }
 
 /** @param {ArrayBuffer} buffer */
@@ -183,7 +197,12 @@ function takePicture(buffer) {
   }
   if (!timeline) return;
   // A restart of a view that follows is a board that began anew; any other comes of our own seek, and the window stays.
-  timeline.put(picture, anew || (picture.restart && picture.following));
+  const ends = ending !== null && picture.t_us !== null && Math.abs(picture.t_us - ending.t_us) <= picture.column_us;
+  timeline.put(picture, anew || (picture.restart && picture.following), ends);
+  if (ends) {
+    ending?.come();
+    ending = null;
+  }
   anew = false;
   if (picture.column_us !== axisOf) showAxis(picture.column_us);
   maps.take(picture);

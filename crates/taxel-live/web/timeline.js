@@ -55,8 +55,9 @@ export class Timeline {
    * forth in it; any other moves it.
    * @param {Picture} picture
    * @param {boolean} anew forget what came before
+   * @param {boolean} ends the window ends at it, wherever that lay
    */
-  put(picture, anew) {
+  put(picture, anew, ends) {
     if (anew || picture.column_us !== this.column_us) {
       // Where a person points stays the same time.
       const cursor_us = this.cursor_us;
@@ -67,7 +68,7 @@ export class Timeline {
     this.t_us = picture.t_us;
     if (picture.t_us === null) return;
     const now = Math.floor(picture.t_us / this.column_us);
-    if (this.end === null || picture.following || now > this.end || now <= this.end - SPAN) this.end = now;
+    if (this.end === null || ends || picture.following || now > this.end || now <= this.end - SPAN) this.end = now;
     const { first, count, raster, spikes, sums, centres, history } = picture;
     for (let i = Math.max(0, this.end - SPAN + 1 - first); i < count && first + i <= this.end; i++) {
       const place = this.place(first + i);
