@@ -156,7 +156,7 @@ def estimate(
     Examples
     --------
     >>> estimate(["ball"] * 40 + ["edge"] * 40, ["ball"] * 38 + ["edge"] * 42)
-    Estimate(0.85 of 1.00 bits [0.70 0.99], 98 % right)
+    Estimate(0.85 of 1.00 bits [0.57 0.99], 98 % right)
     """
     truth = words("labels", labels)
     try:
