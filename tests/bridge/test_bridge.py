@@ -2,11 +2,8 @@
 
 import contextlib
 import json
-import os
 import signal
 import socket
-import subprocess
-import sys
 import threading
 import time
 
@@ -16,6 +13,8 @@ import pytest
 import taxel
 from taxel.live import Bridge, Live, Remote, send
 from taxel.simulate import Scene, Silence, emulate
+
+from .processes import command
 
 pytest.importorskip("taxel_bridge", reason="the wheel taxel-bridge is not built: make bridge")
 
@@ -162,39 +161,6 @@ def test_a_clock_that_is_ahead_and_drifts_is_one_clock_here(tmp_path, place):
     assert (apart < 50e6).all()
 
 
-class Process:
-    """A command of ours in a process of its own, ended at the end."""
-
-    def __init__(self, *arguments):
-        environment = os.environ | {"PYTHONUNBUFFERED": "1"}
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "taxel", *arguments],
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment,
-        )  # fmt: skip
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.communicate()
-
-    def says(self, what):
-        """Wait until a line on stderr holds this."""
-        assert self.process.stderr is not None
-        for line in self.process.stderr:
-            if what in line:
-                return line
-        raise AssertionError(f"ended with {self.process.wait()} before it said {what!r}")
-
-    def end(self, how=signal.SIGINT):
-        """End it as a person does; return its exit code and what it printed."""
-        self.process.send_signal(how)
-        printed, _ = self.process.communicate(timeout=60)
-        return self.process.returncode, printed
-
-
 @pytest.mark.slow
 def test_three_processes_lose_nothing_and_a_killed_one_comes_back(tmp_path, place):
     """A board, the computer that it sends to, and one that records; the second is killed and begun anew."""
@@ -202,26 +168,26 @@ def test_three_processes_lose_nothing_and_a_killed_one_comes_back(tmp_path, plac
     bridging = ["bridge", "--port", str(port), "--host", "127.0.0.1", "--name", "left", "--listen", place]
     skewed = [*bridging, "--clock-ahead", str(AHEAD_S), "--clock-drift", str(DRIFT_PPM)]
     board = ["emulate", "--port", str(port), "--wire", "2", "--seed", "1"]
-    with Process(*skewed) as bridge:
+    with command(*skewed) as bridge:
         bridge.says("listening on UDP")
         with (
             Remote(f"zenoh:{place}/left") as remote,
             Live(remote=remote, record=tmp_path / "far.mcap") as far,
-            Process(*board),
+            command(*board),
         ):
             wait_for(lambda: far.counters["decoded"] > 500)
             bridge.process.kill()
             wait_for(lambda: not far.counters["bridged"]["heard"])
             before = far.counters["decoded"]
-            with Process(*skewed) as again:
+            with command(*skewed) as again:
                 again.says("listening on UDP")
                 wait_for(lambda: far.counters["decoded"] > before + 500)
                 bridged = far.counters["bridged"]
                 assert bridged["heard"]
                 assert bridged["restarts"] == 1
                 assert abs(bridged["clock"]["ahead_ns"] / 1e9 - AHEAD_S) < 0.05
-                code, printed = again.end()
-                assert code == 0, printed
+                printed, _ = again.end()
+                assert again.process.returncode == 0, printed
                 wait_for(lambda: far.counters["bridged"]["ended"])
         summary = far.stop()
     # Between the first and the last datagram of a session none is missing; what the dead one did not bridge, the
@@ -240,22 +206,22 @@ def test_a_viewer_that_never_reads_holds_up_nobody(tmp_path, place):
     viewer = ["live", "--panel", "--from", f"zenoh:{place}", "--seconds", "600"]
     with contextlib.ExitStack() as all_of_it:
         begin = all_of_it.enter_context
-        bridge = begin(Process("bridge", "--port", str(port), "--host", "127.0.0.1", "--listen", place, "--json"))
+        bridge = begin(command("bridge", "--port", str(port), "--host", "127.0.0.1", "--listen", place, "--json"))
         far = begin(Live(remote=begin(Remote(f"zenoh:{place}", timeout=60.0)), record=tmp_path / "far.mcap"))
-        stopped, killed = (begin(Process(*viewer)) for _ in range(2))
+        stopped, killed = (begin(command(*viewer)) for _ in range(2))
         stopped.says("panel:")
         killed.says("panel:")
         stopped.process.send_signal(signal.SIGSTOP)
-        with Process("emulate", "--port", str(port), "--seed", "1"):
+        with command("emulate", "--port", str(port), "--seed", "1"):
             wait_for(lambda: far.counters["decoded"] > 2000)
             killed.process.kill()
             wait_for(lambda: far.counters["decoded"] > 12_000)
-        code, printed = bridge.end()
+        printed, _ = bridge.end()
         wait_for(lambda: far.counters["bridged"]["ended"])
         stopped.process.send_signal(signal.SIGCONT)
         came = far.stop()
     sent = json.loads(printed)
-    assert code == 0
+    assert bridge.process.returncode == 0
     assert sent["counters"]["capture"]["dropped_by_queue"] == 0
     bridged = came.counters["bridged"]
     assert (bridged["missing"], bridged["dropped"], bridged["silences"]) == (0, 0, 0)
@@ -265,7 +231,7 @@ def test_a_viewer_that_never_reads_holds_up_nobody(tmp_path, place):
 def test_what_a_viewer_was_too_slow_for_is_counted_to_the_last_datagram(tmp_path, place):
     with Live(0, host="127.0.0.1") as near:
         published = Bridge(near, listen=place)
-        with Process("record", "--from", f"zenoh:{place}", "--json", str(tmp_path / "far.mcap")) as recorder:
+        with command("record", "--from", f"zenoh:{place}", "--json", str(tmp_path / "far.mcap")) as recorder:
             wait_for(lambda: published.counts["block"]["heard"])
             # Some are kept between two that are not.
             for how in (signal.SIGCONT, signal.SIGSTOP, signal.SIGCONT):
@@ -274,7 +240,7 @@ def test_what_a_viewer_was_too_slow_for_is_counted_to_the_last_datagram(tmp_path
             sent = near.stop().counters["capture"]["datagrams"]
             published.stop()
             time.sleep(2.0)
-            _, printed = recorder.end()
+            printed, _ = recorder.end()
     said = json.loads(printed)["counters"]
     bridged = said["bridged"]
     assert bridged["ended"], "the last parcel says how many there were"

@@ -4,14 +4,14 @@ import contextlib
 import json
 import os
 import shutil
-import signal
 import subprocess
-import sys
 import time
 
 import pytest
 
 import taxel
+
+from .processes import Process
 
 BOARD, FAR = "10.77.0.1", "10.77.0.2"
 BOARD_6, FAR_6 = "fd77::1", "fd77::2"
@@ -70,29 +70,11 @@ def two():
             ip("netns", "del", name, check=False)
 
 
-class On:
+class On(Process):
     """A process on one of the computers."""
 
     def __init__(self, computer, *arguments):
-        line = ["ip", "netns", "exec", computer, sys.executable, *map(str, arguments)]
-        self.process = subprocess.Popen(
-            line, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-            env=os.environ | {"PYTHONUNBUFFERED": "1"},
-        )  # fmt: skip
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self.process.poll() is None:
-            self.process.kill()
-        self.process.communicate()
-
-    def says(self, what):
-        for line in self.process.stderr:
-            if what in line:
-                return
-        raise AssertionError(f"ended with {self.process.wait()} before it said {what!r}")
+        super().__init__(*arguments, before=("ip", "netns", "exec", computer))
 
     def tells(self, **what):
         """Return the first line of JSON that has all of this."""
@@ -107,10 +89,6 @@ class On:
         printed, said = self.process.communicate(timeout=120)
         assert self.process.returncode == 0, said
         return json.loads(printed.splitlines()[-1])
-
-    def end(self, how=signal.SIGINT):
-        self.process.send_signal(how)
-        return self.process.communicate(timeout=120)
 
 
 def taxel_on(computer, *arguments):
