@@ -183,9 +183,13 @@ let ending = null;
  * @returns {Promise<void>} fulfilled when the picture of that time has come and ends the window, or none has for 5 s
  */
 function ended(t_us) {
-  return new Promise((come) => {
-    ending = { t_us, come };
-    setTimeout(come, 5000);
+  return new Promise((resolve) => {
+    const asked = { t_us, come: () => {
+      if (ending === asked) ending = null;
+      resolve();
+    } };
+    ending = asked;
+    setTimeout(asked.come, 5000);
   });
 }
 
@@ -196,13 +200,10 @@ function takePicture(buffer) {
     size({ rows: picture.rows, columns: picture.columns, pitch_mm: 0, name: "", exists: null });
   }
   if (!timeline) return;
-  // A restart of a view that follows is a board that began anew; any other comes of our own seek, and the window stays.
   const ends = ending !== null && picture.t_us !== null && Math.abs(picture.t_us - ending.t_us) <= picture.column_us;
+  // A restart of a view that follows is a board that began anew; any other comes of our own seek, and the window stays.
   timeline.put(picture, anew || (picture.restart && picture.following), ends);
-  if (ends) {
-    ending?.come();
-    ending = null;
-  }
+  if (ends) ending?.come();
   anew = false;
   if (picture.column_us !== axisOf) showAxis(picture.column_us);
   maps.take(picture);
