@@ -52,7 +52,8 @@ class Process:
         )
         self.lines: Queue[str] = Queue()
         self.said: list[str] = []
-        threading.Thread(target=self._read, daemon=True).start()
+        self.reader = threading.Thread(target=self._read, daemon=True)
+        self.reader.start()
 
     def _read(self) -> None:
         assert self.process.stdout is not None
@@ -72,12 +73,20 @@ class Process:
             if found := re.search(pattern, line):
                 return found.group(1)
 
+    def heard(self) -> str:
+        """Return all that it has printed so far."""
+        while not self.lines.empty():
+            self.said.append(self.lines.get())
+        return "".join(self.said)
+
     def end(self) -> int:
-        """Send Ctrl-C and wait."""
+        """Send Ctrl-C and wait until it has ended and all that it printed is read."""
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
         try:
-            return self.process.wait(PATIENCE)
+            self.process.wait(PATIENCE)
+            self.reader.join(PATIENCE)
+            return self.process.returncode
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
