@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from datetime import date as day
 from pathlib import Path
@@ -30,6 +31,8 @@ __all__ = ["Calibration", "Load"]
 UNITS = ("N", "kPa")
 #: Between which an exponent is sought: conductance of a fabric and counts of common sheets lie well within.
 _EXPONENTS = (0.2, 5.0)
+#: Loads missed by less than this share are met, whichever exponent does it better.
+_ALIKE = 1e-3
 
 
 class Load(NamedTuple):
@@ -254,7 +257,7 @@ class Calibration:
         """Fit a calibration to known loads laid on the array.
 
         The gain is the one with the least squares of relative error. Where the loads differ, the exponent of the curve
-        is fitted with it.
+        is fitted with it; where another exponent would do as well, a warning says which.
 
         Parameters
         ----------
@@ -553,10 +556,20 @@ def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]
 
     # From a grid first: the squares need not have a single valley.
     grid = np.linspace(math.log(_EXPONENTS[0]), math.log(_EXPONENTS[1]), 33)
-    k = int(np.argmin([missed(log) for log in grid]))
-    around = (grid[max(0, k - 1)], grid[min(len(grid) - 1, k + 1)])
-    found = minimize_scalar(missed, bounds=around, method="bounded", options={"xatol": 1e-9})
-    return math.exp(float(found.x))
+    miss = np.array([np.inf, *map(missed, grid), np.inf])
+    valleys = np.flatnonzero((miss[1:-1] <= miss[:-2]) & (miss[1:-1] < miss[2:]))
+    around = [(grid[max(0, k - 1)], grid[min(len(grid) - 1, k + 1)]) for k in map(int, valleys)]
+    found = [minimize_scalar(missed, bounds=bounds, method="bounded", options={"xatol": 1e-9}) for bounds in around]
+    best, *others = sorted((float(one.fun), math.exp(float(one.x))) for one in found)
+    alike = [exponent for squares, exponent in others if squares <= max(4.0 * best[0], _ALIKE**2)]
+    if alike:
+        also = ", ".join(f"{exponent:.3g}" for exponent in alike)
+        warnings.warn(
+            f"loads: an exponent of {best[1]:.3g} is taken, but {also} fits them as well; one more load, or exponent, "
+            "would tell",
+            stacklevel=3,
+        )
+    return best[1]
 
 
 def _gains(calibration: Calibration, laid: Sequence[_Laid], each: bool) -> tuple[Values, float]:

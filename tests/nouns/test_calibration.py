@@ -139,6 +139,20 @@ def test_the_residual_is_how_far_the_loads_are_missed():
     assert found.residual == pytest.approx(np.sqrt(np.mean((gain * share - 1) ** 2)))
 
 
+def test_two_loads_that_two_exponents_fit_are_said_to_be_too_few():
+    """One strong taxel and six weak ones against four in between."""
+    strong, between = np.zeros((2, 1, *ARRAY.shape))
+    strong[0].flat[:7], between[0].flat[:4] = [100.0, *[10.0] * 6], 50.0
+    ratio = [(strong**e).sum() / (between**e).sum() for e in (0.5, 1.0, 3.0)]
+    assert ratio[0] > ratio[1] < ratio[2], "the same share of the two loads belongs to two exponents"
+    loads = [Load(frames(read), float((read[read > 0] ** 0.5).sum())) for read in (strong, between)]
+    with pytest.warns(UserWarning, match="fits them as well; one more load"):
+        Calibration.fit(loads, date=DAY)
+    loads.append(Load(frames(strong + between), float(((strong + between) ** 0.5).sum())))
+    found = Calibration.fit(loads, date=DAY)
+    assert json.loads(found.to_json())["curve"]["power"]["exponent"] == pytest.approx(0.5, rel=1e-3)
+
+
 def test_one_load_fits_itself_and_has_no_residual():
     found = Calibration.fit([Load(frames(2.0), 6.0)], date=DAY)
     assert found.residual is None
