@@ -302,7 +302,7 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
     count = max(1, round(i.depth_mm / (i.step_um / 1000)))
     paths = np.linspace(0, i.depth_mm, count + 1)
     kept = {int(np.abs(paths - at).argmin()) for at in _SHAPES_MM if at <= i.depth_mm} | {count}
-    base = _Base(solids, ground, top)
+    base = _Base(ground, top)
     shapes: dict[float, NDArray[np.float64]] = {}
     fault, state = "", None
     try:
@@ -332,8 +332,8 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
 class _Base:
     """Collect forces on the half disc's top and at the block's base, step by step."""
 
-    def __init__(self, solids: Solids, ground: Mesh, top: NDArray[np.int64]) -> None:
-        self._solids, self._held, self._top = solids, ground.held, top
+    def __init__(self, ground: Mesh, top: NDArray[np.int64]) -> None:
+        self._held, self._top = ground.held, top
         self._x = ground.nodes[ground.held, 0]
         self._length = _belonging(self._x)
         above = ground.held + len(ground.held)
