@@ -322,11 +322,10 @@ def _circuit(said: list[str], seed: int) -> Circuit | None:
 
 
 def _faults(said: list[str], seed: int) -> Faults | None:
-    names = ("lost", "repeated", "reordered", "cut", "corrupted")
     shares = {name: _number("fault", name, value) for name, value in _pairs("fault", said).items()}
     for name in shares:
-        if name not in names:
-            raise ProblemError(f"--fault {name}: must be one of {', '.join(names)}")
+        if name not in Faults._names():
+            raise ProblemError(f"--fault {name}: must be one of {', '.join(Faults._names())}")
     return Faults(**shares, seed=seed) if shares else None
 
 

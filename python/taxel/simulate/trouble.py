@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
@@ -101,9 +100,13 @@ class Faults:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("lost", "repeated", "reordered", "cut", "corrupted"):
+        for name in self._names():
             number(name, getattr(self, name))
         whole("seed", self.seed, 0, 2**63 - 1)
 
+    @classmethod
+    def _names(cls) -> list[str]:
+        return [field.name for field in fields(cls) if field.name != "seed"]
+
     def _parts(self) -> dict[str, Any]:
-        return json.loads(json.dumps(asdict(self)))  # type: ignore[no-any-return]
+        return asdict(self)
