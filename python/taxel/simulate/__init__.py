@@ -7,9 +7,11 @@ UDP: acts, a recording again, or the frames of any other sensor. `Board` is the 
 
 from taxel.simulate import circuit
 from taxel.simulate.acts import Act, Contact, Motion, Pictures, Scene, Silence, Track
-from taxel.simulate.board import EmulatorReport, Pipe, Played, Replay, emulate, play, truth
-from taxel.simulate.emulated import NOT_RETURNED, Board, Version2
+from taxel.simulate.board import NOT_RETURNED, Board, Version2
+from taxel.simulate.emulator import EmulatorReport, Played, emulate, play, truth
 from taxel.simulate.layer import Layer, Pressed
+from taxel.simulate.pipe import Pipe
+from taxel.simulate.replay import Replay
 from taxel.simulate.scene_file import SceneFile
 from taxel.simulate.trouble import Faults, Flaws
 

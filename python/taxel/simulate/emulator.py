@@ -1,0 +1,381 @@
+"""The emulated board at work: it feels acts as fast as it goes, or in real time and over UDP whatever it is given."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import _core
+from taxel._arguments import callback, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._arguments import path as checked_path
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.simulate.acts import Act, Contact, Pictures, Scene, Silence
+from taxel.simulate.board import Version2, fitting, reading
+from taxel.simulate.circuit import Circuit
+from taxel.simulate.pipe import Pipe
+from taxel.simulate.replay import Replay
+from taxel.simulate.trouble import Faults, Flaws
+from taxel.spikes import to_ms
+from taxel.wire import Registers
+
+__all__ = ["EmulatorReport", "Played", "emulate", "play", "truth"]
+
+_QUANTILES = {"p50": "median", "p99": "99 %", "max": "at most"}
+
+
+class Played(NamedTuple):
+    """What a host decoded of a board's datagrams."""
+
+    events: Events
+    """All of them: the tare's, then from the start marker on what the scenes made."""
+    datagrams: int
+    words: int
+    """Of version 1 of the wire, of five bytes each; 0 on version 2."""
+    bytes: int
+    """Of all datagrams, without what the network puts around them."""
+
+
+@dataclass(frozen=True)
+class EmulatorReport:
+    """What an emulated board has done so far."""
+
+    frames: int
+    began_ns: int
+    """The host's clock at the board's time 0, ns since 1970: what the board does is due by it."""
+    board_seconds: float
+    """By the board's own clock."""
+    seconds: float
+    """By the host's: larger where the machine cannot hold the board's rate."""
+    changes: int
+    datagrams: int
+    bytes: int
+    dropped: int
+    """Changes that found the board's queue full."""
+    late_frames: int
+    """Sent more than a frame after their end."""
+    late_us: Mapping[str, float]
+    """How long after its end a frame was sent: p50, p99, max; not measured where frames go as they come."""
+    network: Mapping[str, int] | None = None
+    """What the network did to datagrams, where asked to: given, delivered, and by fault."""
+    resets: int = 0
+    """How often the board was reset."""
+
+    @property
+    def wanted_hz(self) -> float:
+        """Frames a second by the board's clock."""
+        return self.frames / self.board_seconds if self.board_seconds else 0.0
+
+    @property
+    def reached_hz(self) -> float:
+        """Frames a second by the host's clock."""
+        return self.frames / self.seconds if self.seconds else 0.0
+
+    @property
+    def held(self) -> bool:
+        """Whether the machine held the board's rate, to within half a per cent of the time."""
+        return self.seconds <= 1.005 * self.board_seconds + 0.02
+
+    @property
+    def verdict(self) -> str:
+        """One line: whether the rate was held, or by how much not, and how late frames were."""
+        late = ", ".join(f"{to_ms(self.late_us[q]):.2f} ms ({said})" for q, said in _QUANTILES.items())
+        late = f"late by {late}; {self.late_frames} of {self.frames} by a frame or more"
+        if self.held:
+            whole = "held" if self.late_frames <= 0.01 * self.frames else "held on the whole, but not frame by frame"
+            return f"{self.wanted_hz:.0f} frames/s {whole}; frames were {late}"
+        short = 100.0 * (1.0 - self.reached_hz / self.wanted_hz)
+        return (
+            f"this machine cannot hold {self.wanted_hz:.0f} frames/s: it reached {self.reached_hz:.0f}, "
+            f"{short:.1f} % less; frames were {late}"
+        )
+
+    @classmethod
+    def _from_json(cls, said: str) -> EmulatorReport:
+        report = json.loads(said)
+        board, sent, late = report["board"], report["sent"], report["late"]
+        return cls(
+            frames=board["frames"],
+            began_ns=report["began_ns"],
+            board_seconds=report["board_seconds"],
+            seconds=report["seconds"],
+            changes=board["changes"],
+            datagrams=sent["datagrams"],
+            bytes=sent["bytes"],
+            dropped=board["dropped"],
+            late_frames=report["late_frames"],
+            late_us={name: late[f"{name}_us"] or 0.0 for name in ("p50", "p99", "max")},
+            network=report["network"],
+            resets=report["resets"],
+        )
+
+
+def truth(
+    acts: Sequence[Act], *, preset: str | None = None, array: Array | None = None
+) -> tuple[list[Contact], NDArray[np.float32]]:
+    """Return what really happens in acts: touches by the board's clock (us from its first frame), force (N) by frame.
+
+    Parameters
+    ----------
+    acts : sequence of Scene, Silence, Pictures
+    preset : str, optional
+        The board's registers, one of `taxel.wire.PRESETS`, with as many lines as the array has; left out, "5.2 kHz", or
+        what a board of more than 64 lines resets to.
+    array : Array, optional
+        The thesis' 64 x 64 taxels where it is left out.
+
+    Raises
+    ------
+    SceneError : an act that cannot be played (names it)
+    DeviceError : the array has more lines than the preset reads
+
+    Examples
+    --------
+    >>> contacts, force = truth([Silence(100.0), Scene.draw(seed=1)])
+    >>> round(contacts[0].start_us), float(force[:520].max())
+    (427782, 0.0)
+    """
+    sensed = Array._of(array)
+    held = fitting(preset, sensed)._json()
+    contacts, force = _core.truth(sensed._parts(), held, _parts(acts, sensed))
+    return [Contact(*contact) for contact in contacts], force
+
+
+def play(
+    acts: Sequence[Act],
+    *,
+    seed: int,
+    preset: str | None = None,
+    tare_ms: float = 50.0,
+    array: Array | None = None,
+    sensor: Mapping[str, float] | None = None,
+    wire: Literal[1, 2] | None = None,
+    circuit: Circuit | None = None,
+    asynchronous: bool = False,
+    watch: Callable[[float], object] = lambda _: None,
+) -> Played:
+    """Let an emulated board feel acts, as fast as it goes, and decode its datagrams.
+
+    The board arms after its first frame, is tared with a noise floor of 0 for `tare_ms`, then takes the preset's floor
+    and marks a start; before the last frame it marks a stop.
+
+    Parameters
+    ----------
+    acts : sequence of Scene, Silence, Pictures
+        The first should be a Silence longer than the tare.
+    seed : int, 0 or more
+        Draws the taxels' spread and the noise.
+    preset, array
+        As in `truth`.
+    tare_ms : float, 0 to 60000
+    sensor : mapping, optional
+        What differs from the usual sensor: v_trans, feedback_kohm, rest_us, touch_us, exponent, side_mm, gain_spread,
+        offset_mv, noise_ticks.
+    wire : {1, 2}, optional
+        The version of the wire that it speaks; left out, its registers', or 2 where it is asynchronous.
+    circuit : Circuit, optional
+        Lines that its taxels share, settling, comparators with hysteresis; left out, each taxel reads by itself. Its
+        voltage and resistor must be the sensor's; the converter's times are the preset's.
+    asynchronous : bool
+        Each taxel compares by itself, as in `Board`; needs version 2, and no circuit.
+    watch : function, optional
+        Called with the share that is played, once a second of the board's time.
+
+    Raises
+    ------
+    SceneError : an act or a sensor that makes no sense
+    ProblemError : acts too short for the tare; a circuit of another voltage or resistor; asynchronous on version 1
+    DeviceError : the array has more lines than the preset, or that version of the wire, reads
+
+    Examples
+    --------
+    >>> played = play([Silence(60.0)], seed=1)
+    >>> played.events.markers
+    ((50300, True), (59900, False))
+    """
+    sensed = Array._of(array)
+    parts, held = _parts(acts, sensed), fitting(preset, sensed)
+    if wire is not None or asynchronous:
+        held = held.replace(wire_version=2 if wire is None else whole("wire", wire, 1, 2))
+    events, datagrams, words, taken = _core.play(
+        sensed._parts(),
+        held._json(),
+        parameters({} if sensor is None else mapping("sensor", sensor)),
+        whole("seed", seed, 0),
+        parts,
+        number("tare_ms", tare_ms),
+        parameters(reading(circuit, asynchronous)),
+        callback("watch", watch),
+    )
+    return Played(Events._from_parts(events), datagrams, words, taken)
+
+
+def emulate(
+    to: str,
+    touch: Iterable[Act] | Replay | Pipe,
+    *,
+    seed: int = 0,
+    preset: str | None = None,
+    registers: Registers | None = None,
+    tare_ms: float = 50.0,
+    array: Array | None = None,
+    sensor: Mapping[str, float] | None = None,
+    wire: Literal[1, 2] | None = None,
+    previous: Literal["last_sent", "last_sample"] = "last_sent",
+    intensity: Literal["value", "difference", "nothing"] = "value",
+    version_2: Version2 | None = None,
+    circuit: Circuit | None = None,
+    asynchronous: bool = False,
+    flaws: Flaws | None = None,
+    faults: Faults | None = None,
+    reset_every_s: float | None = None,
+    drift_ppm: float = 0.0,
+    control: str | None = None,
+    line: str | os.PathLike[str] | None = None,
+    baud: int = 115_200,
+    sync: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    source_port: int = 0,
+    begun: Callable[[str | None], None] = lambda _: None,
+    watch: Callable[[EmulatorReport], None] = lambda _: None,
+    touched: Callable[[list[Contact]], None] = lambda _: None,
+) -> EmulatorReport:
+    """Let an emulated board feel something in real time, and send its datagrams by UDP.
+
+    Parameters
+    ----------
+    to : str
+        Address and port, as "127.0.0.1:5208".
+    touch : iterable of Scene, Silence, Pictures; Replay; or Pipe
+        What it feels. Acts may be without an end: each is made ready while those before it are played. Of acts the
+        board arms after the first frame, is tared with a noise floor of 0 for `tare_ms`, marks a start, and at the end
+        a stop.
+    seed, preset, tare_ms, array, sensor
+        As in `play`; of a Replay or a Pipe the array is theirs.
+    registers : Registers, optional
+        What the board holds instead of the preset.
+    wire : {1, 2}, optional
+        The version of the wire that it speaks; left out, the registers'.
+    previous, intensity
+        As in `Board`.
+    version_2 : Version2, optional
+        How it speaks version 2.
+    circuit : Circuit, optional
+        Lines that its taxels share, settling, comparators with hysteresis; left out, each taxel reads by itself. Of
+        acts its voltage and resistor must be the sensor's; the converter's times are the registers', and flaws come
+        after it. How many frames a second one core then keeps is in the report.
+    asynchronous : bool
+        Each taxel compares by itself, as in `Board`; no circuit, and the registers must hold version 2 of the wire
+        (``wire=2``).
+    flaws : Flaws, optional
+        What is wrong with its taxels.
+    faults : Faults, optional
+        What the network does to its datagrams.
+    reset_every_s : float, s, optional
+        The board is reset so often, by its own clock.
+    drift_ppm : float, parts per million
+        How much faster its clock runs than this machine's.
+    control : str, optional
+        Address and port where the board takes commands by TCP; port 0 finds a free one.
+    line : path, optional
+        A serial line: a link of this name to a pseudo-terminal, at `baud` and no faster.
+    sync : path, optional
+        A new file, or a pipe that is there: the sync line, a line an edge: board time (us), 1 or 0, host time (ns).
+    overwrite : bool
+        Whether an existing file `sync` may be replaced.
+    source_port : int
+        The UDP port that it sends from; 0 finds a free one.
+    begun : function, optional
+        Called with the address of `control` just before the first frame.
+    watch : function, optional
+        Called with a report ten times a second.
+    touched : function, optional
+        Called before `watch` with touches of acts that were made ready since; us of the board's clock.
+
+    Returns
+    -------
+    EmulatorReport : also how late frames were, which is where a machine shows that it cannot hold the board's rate
+
+    Raises
+    ------
+    As in `play`; OSError where a socket, line or file cannot be had.
+    """
+    felt: Any
+    if isinstance(touch, Replay | Pipe):
+        sensed, acts = touch.array, None
+        held = touch.registers(preset) if registers is None else registers
+        felt = touch._touch(instance("registers", held, Registers))
+    else:
+        sensed, acts = Array._of(array), _checked(touch, Array._of(array))
+        held = fitting(preset, sensed) if registers is None else registers
+        felt = acts
+    held = instance("registers", held, Registers)
+    if wire is not None:
+        held = held.replace(wire_version=whole("wire", wire, 1, 2))
+    options = {
+        "registers": held._held,
+        "tare_ms": None if acts is None else number("tare_ms", tare_ms),
+        "previous": text("previous", previous, ("last_sent", "last_sample")),
+        "intensity": text("intensity", intensity, ("value", "difference", "nothing")),
+        "version_2": asdict(instance("version_2", version_2 or Version2(), Version2)),
+        "control": None if control is None else text("control", control),
+        "line": None if line is None else (str(Path(checked_path("line", line))), whole("baud", baud, 300, 4_000_000)),
+        "sync": None if sync is None else (str(Path(checked_path("sync", sync))), bool(overwrite)),
+        **reading(circuit, asynchronous),
+        "flaws": None if flaws is None else instance("flaws", flaws, Flaws)._parts(),
+        "faults": None if faults is None else instance("faults", faults, Faults)._parts(),
+        "reset_every_s": None if reset_every_s is None else number("reset_every_s", reset_every_s),
+        "drift_ppm": number("drift_ppm", drift_ppm),
+        "source_port": whole("source_port", source_port, 0, 65_535),
+    }
+
+    def tell(said: str, contacts: list[Any]) -> None:
+        if contacts:
+            touched([Contact(*contact) for contact in contacts])
+        watch(EmulatorReport._from_json(said))
+
+    callback("watch", watch), callback("touched", touched)
+    report = _core.emulate(
+        text("to", to),
+        sensed._parts(),
+        parameters({} if sensor is None else mapping("sensor", sensor)),
+        whole("seed", seed, 0),
+        felt,
+        parameters(options),
+        callback("begun", begun),
+        tell,
+    )
+    return EmulatorReport._from_json(report)
+
+
+def _checked(acts: Iterable[Act], array: Array) -> Iterator[Any]:
+    """Return the parts of acts, one after the other; what is wrong with one is said when it is its turn.
+
+    Of a sequence that is said at once.
+    """
+    if isinstance(acts, Sequence):
+        return iter(_parts(acts, array))
+    try:
+        return (_part(n, act, array) for n, act in enumerate(iter(acts)))
+    except TypeError:
+        raise ProblemError(f"touch is {shown(acts)}: must be acts, a Replay or a Pipe") from None
+
+
+def _parts(acts: Sequence[Act], array: Array) -> list[Any]:
+    return [_part(n, act, array) for n, act in enumerate(several("acts", acts))]
+
+
+def _part(n: int, act: Act, array: Array) -> Any:
+    if not isinstance(act, Silence | Scene | Pictures):
+        raise ProblemError(f"act {n} is {shown(act)}: must be a Scene, Silence or Pictures")
+    if isinstance(act, Pictures) and act.values.shape[1:] != array.shape:
+        raise ProblemError(f"act {n}: pictures of shape {act.values.shape[1:]}, the array has {array.shape}")
+    return act._part()

@@ -1,0 +1,74 @@
+"""What an emulated board may feel: frames of any other sensor, from a pipe."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import IO, Any
+
+from taxel import _core
+from taxel._arguments import number, whole
+from taxel._core import DeviceError, FormatError, ProblemError
+from taxel.array import Array
+from taxel.wire import Registers
+
+__all__ = ["Pipe"]
+
+#: Longer first lines are none, bytes.
+_LONGEST_LINE = 1 << 16
+
+
+class Pipe:
+    """Let the board feel frames of any other sensor as they come: from a pipe, after a line that says what they are.
+
+    The line is JSON: ``{"rows": 16, "columns": 8, "rate": 100, "bits": 12}``, and may name ``pitch_mm`` and ``name``.
+    Behind it stand frames: uint16, little-endian, row by row. The board's clock is the pipe's: a frame is one over
+    `rate` long.
+
+    Parameters
+    ----------
+    source : binary file
+        As ``sys.stdin.buffer``; must have a descriptor.
+    noise_floor : int, ticks
+        A change above it makes an event; a tick is one unit of the values, or more where so many bits are too many for
+        so fast a scan (`shift` says how often a value is halved).
+
+    Raises
+    ------
+    FormatError : another first line
+    ProblemError : numbers in it that make no sense
+    """
+
+    def __init__(self, source: IO[bytes], noise_floor: int = 3) -> None:
+        self._descriptor, self._ahead = source.fileno(), b""
+        line = self._line()
+        try:
+            said = json.loads(line)
+            rows, columns, rate, bits = (said[name] for name in ("rows", "columns", "rate", "bits"))
+        except (ValueError, TypeError, KeyError) as error:
+            wanted = '{"rows": 16, "columns": 8, "rate": 100, "bits": 12}'
+            begin = line[:60].decode("utf-8", "replace")
+            raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be JSON like {wanted}") from None
+        self.array = Array(rows, columns, pitch_mm=said.get("pitch_mm", 1.0), name=said.get("name", "pipe"))
+        self.rate_hz, self._floor = number("rate", rate), whole("noise_floor", noise_floor, 0, 255)
+        try:
+            held, self.shift = _core.registers_of_source(self.array._parts(), self.rate_hz, whole("bits", bits, 1, 16))
+        except DeviceError as error:
+            raise ProblemError(f"standard input, line 1: {rows} x {columns} taxels: {error}") from None
+        self._held = json.loads(held)
+
+    def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames say how fast they are
+        """Return what the board holds that scans such frames."""
+        return Registers._of(self._held, self.array).replace(noise_floor=self._floor)
+
+    def _line(self) -> bytes:
+        while b"\n" not in self._ahead and len(self._ahead) < _LONGEST_LINE:
+            more = os.read(self._descriptor, 4096)
+            if not more:
+                break
+            self._ahead += more
+        line, _, self._ahead = self._ahead.partition(b"\n")
+        return line
+
+    def _touch(self, registers: Registers) -> tuple[Any, ...]:
+        return self._descriptor, list(self._ahead), self.shift, registers.ramp

@@ -1,0 +1,83 @@
+"""What an emulated board may feel: a recording again."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+
+from taxel import _core
+from taxel._arguments import number, shown
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recording import Recording
+from taxel.simulate.board import fitting
+from taxel.wire import Registers
+
+__all__ = ["Replay"]
+
+
+class Replay:
+    """Let the board feel a recording again: its events as they were, or its pictures by the board's rules.
+
+    Parameters
+    ----------
+    source : Recording, Events or Frames
+    speed : float, above 0
+        2 plays it in half the time.
+
+    Raises
+    ------
+    ProblemError : neither of these, or nothing in it
+
+    Notes
+    -----
+    The board's frames quantise time: what came within one is sent at its end, of several events of a taxel the last.
+    Pictures that are not in ticks are scaled so that the largest value is the end of the ramp.
+    """
+
+    def __init__(self, source: Recording | Events | Frames, speed: float = 1.0) -> None:
+        self.speed = number("speed", speed)
+        if not 0 < self.speed < np.inf:
+            raise ProblemError(f"speed is {shown(speed)}: must be above 0")
+        self.recording = source if isinstance(source, Recording) else None
+        if isinstance(source, Recording):
+            source = source.events if source.has_events else source.frames()
+        if not isinstance(source, Events | Frames):
+            raise ProblemError(f"source is {shown(source)}: must be a Recording, Events or Frames")
+        if not len(source):
+            raise ProblemError("source: nothing to play in it")
+        self.source: Events | Frames = source
+
+    @property
+    def array(self) -> Array:
+        """The sensor."""
+        return self.source.array
+
+    def registers(self, preset: str | None) -> Registers:
+        """Return what the board holds that plays it: as it was recorded where that is known, else a preset."""
+        known = None if self.recording is None else self.recording.registers
+        held = fitting(preset, self.array) if known is None else known.replace(record=False)
+        values = self.source.intensity if isinstance(self.source, Events) else None
+        most = 0 if values is None else int(values.max())
+        # A converter sees nothing above its ramp: where that is a preset's and the sensor another, it is made longer.
+        rate_hz = 1e6 / held.frame_us
+        while most >= held.ramp:
+            fields, halved = _core.registers_of_source(self.array._parts(), rate_hz, (most + 1).bit_length())
+            rate_hz /= 2
+            if not halved:
+                longer = Registers._of(json.loads(fields), self.array)
+                held = longer.replace(noise_floor=held.noise_floor, wire_version=held.wire_version)
+        return held
+
+    def _touch(self, registers: Registers) -> tuple[Any, ...]:
+        if isinstance(self.source, Events):
+            return self.source.sorted()._parts(), self.speed
+        values = self.source.values
+        if self.source.unit != "ticks":
+            values = (values - min(0.0, float(values.min()))) * (registers.ramp / max(float(np.ptp(values)), 1e-30))
+        ticks = np.clip(np.rint(values), 0, registers.ramp).astype(np.uint16).reshape(-1)
+        return np.ascontiguousarray(self.source.t), np.ascontiguousarray(ticks), self.speed
