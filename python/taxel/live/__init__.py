@@ -3,8 +3,10 @@
 from taxel.live.bridge import Bridge
 from taxel.live.panel import Panel
 from taxel.live.remote import Remote
+from taxel.live.sending import PORT, send
+from taxel.live.source import Source
 from taxel.live.viewer import Viewer, Viewing
-from taxel.live.way import PORT, Live, Said, Source, Summary, heard, send
+from taxel.live.way import Live, Said, Summary, heard
 from taxel.live.way import delays as delays
 
 __all__ = [

@@ -51,8 +51,8 @@ def own_addresses() -> list[tuple[str, str]]:
     return found
 
 
-class Source(Protocol):
-    """What is listened to, and can begin anew."""
+class Listener(Protocol):
+    """What listens to a board, and can begin anew."""
 
     def listen(self, host: str, port: int) -> None:
         """Listen on another address."""
@@ -64,7 +64,7 @@ class Source(Protocol):
 class Office:
     """Answer the server's questions, from whichever thread asks."""
 
-    def __init__(self, panel: Source, cable: Cable | None) -> None:
+    def __init__(self, panel: Listener, cable: Cable | None) -> None:
         self._panel, self._cable = panel, cable
         self._at_cable, self._at_files = threading.Lock(), threading.Lock()
 
@@ -88,15 +88,16 @@ class Office:
 
     def _command(self, asked: Mapping[str, Any]) -> object:
         with self._at_cable:
-            if self._cable is None:
-                raise ProblemError("the board's serial line is not connected")
-            return {"value": self._cable.command(Command(asked["register"], asked["value"]))}
+            return {"value": self._connected().command(Command(asked["register"], asked["value"]))}
 
     def _greeting(self, _: Mapping[str, Any]) -> object:
         with self._at_cable:
-            if self._cable is None:
-                raise ProblemError("the board's serial line is not connected")
-            return {"channels": self._cable.greeting().channels}
+            return {"channels": self._connected().greeting().channels}
+
+    def _connected(self) -> Cable:
+        if self._cable is None:
+            raise ProblemError("the board's serial line is not connected")
+        return self._cable
 
     def _lines(self, _: Mapping[str, Any]) -> object:
         with self._at_cable:

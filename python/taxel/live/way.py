@@ -25,19 +25,17 @@ from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.remote import Remote
+from taxel.live.sending import PORT
 from taxel.tare import Tare
-from taxel.wire import FRAME_US, Registers
+from taxel.wire import Registers
 
-__all__ = ["PORT", "Live", "Said", "Source", "Summary", "heard", "send"]
-
-#: Where the board's datagrams go (reading: the thesis names no port).
-PORT = 5208
+__all__ = ["Live", "Said", "Summary", "delays", "heard"]
 
 #: How what goes to, or comes from, the lab streaming layer begins.
 _LSL = "lsl:"
 
-#: The largest value of a source's frames.
-_MOST = 2**16 - 1
+#: The largest column or row of any taxel.
+_MOST_PLACE = 2**16 - 1
 
 #: How long an iteration waits at a time.
 _WAIT_S = 0.5
@@ -192,6 +190,7 @@ class Live:
 
     Examples
     --------
+    >>> from taxel.live import send
     >>> with Live(0, host="127.0.0.1") as live:
     ...     sent = send([bytes.fromhex("c000050304")], *live.address, seconds=0.01)
     >>> live.stop().counters["wire"]["changes"] == sent["datagrams"]
@@ -441,7 +440,7 @@ class Live:
         if len(columns) != len(rows):
             raise ProblemError(f"x has {len(columns)} columns, y {len(rows)} rows: must be as many")
         for name, given in (("x", columns), ("y", rows)):
-            if len(given) and (given.min() < 0 or given.max() > _MOST):
+            if len(given) and (given.min() < 0 or given.max() > _MOST_PLACE):
                 raise ProblemError(
                     f"{name}: holds {given.min() if given.min() < 0 else given.max()}, must be a taxel's"
                 )
@@ -543,81 +542,6 @@ class Live:
         return f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)"
 
 
-class Source:
-    """Make any sensor that Python can read live: frames become events by the board's rules, and travel as a board's.
-
-    Whatever listens to a board listens to this: `Live`, ``taxel record``, ``taxel live``, with this array and, as
-    `registers`, these registers.
-
-    Parameters
-    ----------
-    array : Array
-    rate : float, 1/s
-        Frames a second; each push moves the source's clock on by one frame.
-    bits : int, 1 to 16
-        Of the values. More than so fast a scan can tell are halved `shift` times.
-    noise_floor : int, 0 to 255
-        A change above it makes an event.
-    to : str
-        Where the datagrams go.
-    board : int, 0 to 65535
-        Its number: sources on one address are told apart by it.
-
-    Raises
-    ------
-    ProblemError : arguments that make no sense
-    OSError : a socket cannot be had
-
-    Examples
-    --------
-    >>> array = Array(2, 3, name="six")
-    >>> with Live(0, host="127.0.0.1", array=array) as live:
-    ...     host, port = live.address
-    ...     source = Source(array, 100.0, bits=12, to=f"{host}:{port}")
-    ...     heard = [source.push(np.full((2, 3), value)) for value in (0, 700, 702, 900)]
-    >>> heard
-    [0, 6, 0, 6]
-    """
-
-    def __init__(
-        self,
-        array: Array,
-        rate: float,
-        *,
-        bits: int = 16,
-        noise_floor: int = 3,
-        to: str = f"127.0.0.1:{PORT}",
-        board: int = 0,
-    ) -> None:
-        self.array = instance("array", array, Array)
-        held, self.shift = _core.registers_of_source(array._parts(), number("rate", rate), whole("bits", bits, 1, 16))
-        floor = whole("noise_floor", noise_floor, 0, 255)
-        self.registers = Registers._of(json.loads(held), array).replace(noise_floor=floor)
-        options = parameters(
-            {"board": whole("board", board, 0, 65_535), "seed": int.from_bytes(os.urandom(2), "little")}
-        )
-        self._core = _core.Source(text("to", to), array._parts(), self.registers._json(), options)
-
-    def push(self, frame: ArrayLike) -> int:
-        """Take the next frame, shape (rows, columns) or flat, 0 or more; return how many events it made.
-
-        Raises
-        ------
-        ProblemError : not one number a taxel, or below 0
-        OSError : the system refuses to send
-        """
-        values = numbers("frame", frame, np.int64).reshape(-1)
-        if values.size and (values.min() < 0 or values.max() > _MOST):
-            wrong = values.min() if values.min() < 0 else values.max()
-            raise ProblemError(f"frame: holds {wrong}, must lie in 0 to {_MOST}")
-        ticks = np.minimum(values >> self.shift, self.registers.ramp)
-        return self._core.push(ticks.astype(np.uint16))
-
-    def __repr__(self) -> str:
-        rows, columns = self.array.shape
-        return f"Source({rows} x {columns} taxels, {1e6 / self.registers.frame_us:g} frames/s)"
-
-
 def _summary(said: str) -> Summary:
     values = json.loads(said)
     path = None if values["path"] is None else Path(values["path"])
@@ -673,56 +597,3 @@ def heard(said: Sequence[Said]) -> Detections:
         [s.said for s in said],
         [s.repaired for s in said],
     )
-
-
-def send(
-    datagrams: Sequence[bytes],
-    host: str = "127.0.0.1",
-    port: int = PORT,
-    *,
-    each: int = 1,
-    period_us: float = FRAME_US,
-    seconds: float = 1.0,
-    segment: bool = True,
-) -> dict[str, Any]:
-    """Send datagrams over and over, `each` of them every `period_us`, for `seconds`; return what was sent.
-
-    What a board does, without one: to try a receiver, or to measure it.
-
-    Parameters
-    ----------
-    datagrams : sequence of bytes, one or more
-    each : int, 1 or more
-        How many at a time.
-    period_us : float, us
-        From one time to the next, a frame where it is left out; 0 for as fast as it goes.
-    seconds : float, s
-    segment : bool
-        Hand trains of datagrams to the kernel in one call where it can cut them (`UDP_SEGMENT`).
-
-    Returns
-    -------
-    dict : messages (send calls), datagrams, bytes, segmenting
-
-    Raises
-    ------
-    OSError : the system refuses to send
-    """
-    counts: dict[str, Any] = json.loads(
-        _core.send(
-            text("host", host),
-            whole("port", port, 1, 65_535),
-            [_datagram(n, d) for n, d in enumerate(several("datagrams", datagrams))],
-            whole("each", each, 1, 2**31 - 1),
-            number("period_us", period_us),
-            number("seconds", seconds),
-            flag("segment", segment),
-        )
-    )
-    return counts
-
-
-def _datagram(n: int, data: object) -> bytes:
-    if not isinstance(data, bytes | bytearray | memoryview):
-        raise ProblemError(f"datagram {n} is {shown(data)}: must be bytes")
-    return bytes(data)

@@ -1,0 +1,70 @@
+"""What a board sends, without one: to try a receiver, or to measure it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+from taxel import _core
+from taxel._arguments import flag, number, several, shown, text, whole
+from taxel._core import ProblemError
+from taxel.wire import FRAME_US
+
+__all__ = ["PORT", "send"]
+
+#: Where the board's datagrams go (reading: the thesis names no port).
+PORT = 5208
+
+
+def send(
+    datagrams: Sequence[bytes],
+    host: str = "127.0.0.1",
+    port: int = PORT,
+    *,
+    each: int = 1,
+    period_us: float = FRAME_US,
+    seconds: float = 1.0,
+    segment: bool = True,
+) -> dict[str, Any]:
+    """Send datagrams over and over, `each` of them every `period_us`, for `seconds`; return what was sent.
+
+    What a board does, without one: to try a receiver, or to measure it.
+
+    Parameters
+    ----------
+    datagrams : sequence of bytes, one or more
+    each : int, 1 or more
+        How many at a time.
+    period_us : float, us
+        From one time to the next, a frame where it is left out; 0 for as fast as it goes.
+    seconds : float, s
+    segment : bool
+        Hand trains of datagrams to the kernel in one call where it can cut them (`UDP_SEGMENT`).
+
+    Returns
+    -------
+    dict : messages (send calls), datagrams, bytes, segmenting
+
+    Raises
+    ------
+    OSError : the system refuses to send
+    """
+    counts: dict[str, Any] = json.loads(
+        _core.send(
+            text("host", host),
+            whole("port", port, 1, 65_535),
+            [_datagram(n, d) for n, d in enumerate(several("datagrams", datagrams))],
+            whole("each", each, 1, 2**31 - 1),
+            number("period_us", period_us),
+            number("seconds", seconds),
+            flag("segment", segment),
+        )
+    )
+    return counts
+
+
+def _datagram(n: int, data: object) -> bytes:
+    if not isinstance(data, bytes | bytearray | memoryview):
+        raise ProblemError(f"datagram {n} is {shown(data)}: must be bytes")
+    return bytes(data)

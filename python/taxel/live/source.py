@@ -1,0 +1,97 @@
+"""Any sensor that Python can read, as a board."""
+
+from __future__ import annotations
+
+import json
+import os
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from taxel import _core
+from taxel._arguments import instance, number, numbers, parameters, text, whole
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.live.sending import PORT
+from taxel.wire import Registers
+
+__all__ = ["Source"]
+
+#: The largest value of a frame.
+_MOST = 2**16 - 1
+
+
+class Source:
+    """Make any sensor that Python can read live: frames become events by the board's rules, and travel as a board's.
+
+    Whatever listens to a board listens to this: `Live`, ``taxel record``, ``taxel live``, with this array and, as
+    `registers`, these registers.
+
+    Parameters
+    ----------
+    array : Array
+    rate : float, 1/s
+        Frames a second; each push moves the source's clock on by one frame.
+    bits : int, 1 to 16
+        Of the values. More than so fast a scan can tell are halved `shift` times.
+    noise_floor : int, 0 to 255
+        A change above it makes an event.
+    to : str
+        Where the datagrams go.
+    board : int, 0 to 65535
+        Its number: sources on one address are told apart by it.
+
+    Raises
+    ------
+    ProblemError : arguments that make no sense
+    OSError : a socket cannot be had
+
+    Examples
+    --------
+    >>> from taxel.live import Live
+    >>> array = Array(2, 3, name="six")
+    >>> with Live(0, host="127.0.0.1", array=array) as live:
+    ...     host, port = live.address
+    ...     source = Source(array, 100.0, bits=12, to=f"{host}:{port}")
+    ...     heard = [source.push(np.full((2, 3), value)) for value in (0, 700, 702, 900)]
+    >>> heard
+    [0, 6, 0, 6]
+    """
+
+    def __init__(
+        self,
+        array: Array,
+        rate: float,
+        *,
+        bits: int = 16,
+        noise_floor: int = 3,
+        to: str = f"127.0.0.1:{PORT}",
+        board: int = 0,
+    ) -> None:
+        self.array = instance("array", array, Array)
+        held, self.shift = _core.registers_of_source(array._parts(), number("rate", rate), whole("bits", bits, 1, 16))
+        floor = whole("noise_floor", noise_floor, 0, 255)
+        self.registers = Registers._of(json.loads(held), array).replace(noise_floor=floor)
+        options = parameters(
+            {"board": whole("board", board, 0, 65_535), "seed": int.from_bytes(os.urandom(2), "little")}
+        )
+        self._core = _core.Source(text("to", to), array._parts(), self.registers._json(), options)
+
+    def push(self, frame: ArrayLike) -> int:
+        """Take the next frame, shape (rows, columns) or flat, 0 or more; return how many events it made.
+
+        Raises
+        ------
+        ProblemError : not one number a taxel, or below 0
+        OSError : the system refuses to send
+        """
+        values = numbers("frame", frame, np.int64).reshape(-1)
+        if values.size and (values.min() < 0 or values.max() > _MOST):
+            wrong = values.min() if values.min() < 0 else values.max()
+            raise ProblemError(f"frame: holds {wrong}, must lie in 0 to {_MOST}")
+        ticks = np.minimum(values >> self.shift, self.registers.ramp)
+        return self._core.push(ticks.astype(np.uint16))
+
+    def __repr__(self) -> str:
+        rows, columns = self.array.shape
+        return f"Source({rows} x {columns} taxels, {1e6 / self.registers.frame_us:g} frames/s)"
