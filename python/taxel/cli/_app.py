@@ -5,17 +5,20 @@ from __future__ import annotations
 import errno
 import re
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand
 
 from taxel._core import Error
 
-__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "app"]
+__all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "app"]
 
 #: Exit codes: the user's input is wrong; board, socket or disk; stopped by Ctrl-C.
 WRONG_INPUT, OUTSIDE, STOPPED = 2, 3, 130
+
+#: Of commands that go on until they are stopped.
+SecondsOption = Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")]
 
 
 class _Command(TyperCommand):

@@ -20,12 +20,15 @@ from taxel.wire import PRESETS
 
 __all__ = [
     "QUOTED_PRESETS",
+    "REDRAW_S",
     "ArrayOption",
     "CongestionOption",
+    "DifferencesOption",
     "FromOption",
     "HostOption",
     "PortOption",
     "PresetOption",
+    "TareOption",
     "asked_to_end",
     "counters_table",
     "exit_code",
@@ -33,6 +36,9 @@ __all__ = [
     "remote",
     "rest_of",
 ]
+
+#: How often the display is drawn anew, and the end looked for, s.
+REDRAW_S = 0.1
 
 #: The names of all presets, for a text.
 QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
@@ -54,6 +60,10 @@ PresetOption = Annotated[
     ),
 ]
 
+DifferencesOption = Annotated[bool, typer.Option("--differences", help="The board sends intensity differences.")]
+TareOption = Annotated[
+    str | None, typer.Option(help="Seconds at rest for a fresh one, or the file of an earlier one (JSON).")
+]
 FromOption = Annotated[
     str | None,
     typer.Option(

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from taxel._core import ProblemError
-from taxel.cli._listening import SET_HELP, encoder_of
+from taxel.cli._recordings import SET_HELP, encoder_of
 from taxel.encode import Encoder
 from taxel.live import Live, Panel, Viewer
 

@@ -15,13 +15,16 @@ from rich.live import Live as Display
 from rich.text import Text
 
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import SecondsOption, app
 from taxel.cli._array import geometry
 from taxel.cli._board import (
+    REDRAW_S,
     ArrayOption,
+    DifferencesOption,
     HostOption,
     PortOption,
     PresetOption,
+    TareOption,
     counters_table,
     exit_code,
     rest_of,
@@ -32,9 +35,6 @@ from taxel.live.bridge import PLACE
 
 __all__ = ["bridge"]
 
-#: How often the display is drawn anew, and the end looked for, s.
-_REDRAW = 0.1
-
 
 @app.command()
 def bridge(
@@ -42,7 +42,7 @@ def bridge(
     host: HostOption = "0.0.0.0",
     array: ArrayOption = None,
     preset: PresetOption = None,
-    differences: Annotated[bool, typer.Option("--differences", help="The board sends intensity differences.")] = False,
+    differences: DifferencesOption = False,
     name: Annotated[str, typer.Option(help="Of the board: letters, digits, - _ or .")] = "board",
     listen: Annotated[
         list[str], typer.Option(help="HOST:PORT (TCP) of this computer for others to connect to; may be repeated.")
@@ -53,13 +53,11 @@ def bridge(
     readout: Annotated[
         Path | None, typer.Option(help="A trained readout (JSON), whose detections are published too.")
     ] = None,
-    tare: Annotated[
-        str | None, typer.Option(help="Seconds at rest for a fresh one, or the file of an earlier one (JSON).")
-    ] = None,
+    tare: TareOption = None,
     record: Annotated[
         Path | None, typer.Option(help="Keep everything here too, in a new file (.mcap or .lsa).")
     ] = None,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
+    seconds: SecondsOption = None,
     clock_ahead: Annotated[
         float, typer.Option(help="For trials: set this computer's clock ahead by so much, s.")
     ] = 0.0,
@@ -140,14 +138,14 @@ def _announce(place: str, name: str, console: Console) -> None:
 
 def _watch(live: Live, published: Bridge, seconds: float | None, console: Console) -> None:
     """Show what comes and who listens until the time is over."""
-    with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
+    with Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True) as display:
         before = live.counters
         while seconds is None or before["seconds"] < seconds:
-            said = live.next(_REDRAW)
+            said = live.next(REDRAW_S)
             while said is not None:
                 said = live.next(0.0)
             now = live.counters
-            if now["seconds"] - before["seconds"] >= _REDRAW:
+            if now["seconds"] - before["seconds"] >= REDRAW_S:
                 display.update(Group(counters_table(before, now), Text(_listeners(published.counts))))
                 before = now
 

@@ -12,7 +12,7 @@ import typer
 
 from taxel._core import FormatError, ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import TARE_HELP, assignments, tare_of, told
+from taxel.cli._recordings import TARE_HELP, assignments, tare_of, told
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

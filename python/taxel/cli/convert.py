@@ -11,7 +11,7 @@ from rich.console import Console
 
 from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption
-from taxel.cli._listening import of_source, open_recording
+from taxel.cli._recordings import of_source, open_recording
 
 __all__ = ["convert"]
 

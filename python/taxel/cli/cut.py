@@ -12,7 +12,7 @@ import typer
 from taxel import _core
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import of_source
+from taxel.cli._recordings import of_source
 
 __all__ = ["cut"]
 

@@ -11,7 +11,7 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import TARE_HELP, new_report, open_all, references, tare_of, told
+from taxel.cli._recordings import TARE_HELP, new_report, open_all, references, tare_of, told
 from taxel.spikes import to_ms
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from taxel._core import ProblemError
-from taxel.cli._app import App, app
+from taxel.cli._app import App, SecondsOption, app
 from taxel.cli._board import QUOTED_PRESETS
 from taxel.device import Device, ports
 from taxel.wire import PRESETS, Registers, described
@@ -117,7 +117,7 @@ def record(
 @_device.command()
 def watch(
     place: PlaceArgument,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
+    seconds: SecondsOption = None,
     baud: BaudOption = 115_200,
     as_json: Annotated[bool, typer.Option("--json", help="Print a line of JSON a change, and nothing else.")] = False,
 ) -> None:

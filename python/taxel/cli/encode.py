@@ -12,7 +12,7 @@ import typer
 from taxel._core import ProblemError, encoder_names
 from taxel._files import try_whole
 from taxel.cli._app import app
-from taxel.cli._listening import SET_HELP, TARE_HELP, encoder_of, open_recording, tare_of, told
+from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, open_recording, tare_of, told
 
 __all__ = ["encode"]
 

@@ -12,7 +12,7 @@ from taxel._arguments import whole
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption
-from taxel.cli._listening import SET_HELP, open_all, told
+from taxel.cli._recordings import SET_HELP, open_all, told
 
 if TYPE_CHECKING:
     from taxel.information import Answer, Estimate, LabelledTrial, Point
@@ -203,7 +203,7 @@ def _interval(found: Estimate) -> str:
 
 
 def _encoder(name: str, said: list[str]):  # type: ignore[no-untyped-def]
-    from taxel.cli._listening import encoder_of  # noqa: PLC0415  the command line starts quickly
+    from taxel.cli._recordings import encoder_of  # noqa: PLC0415  the command line starts quickly
 
     if name not in ("change_events", "fa1"):
         raise ProblemError(f"--encoder {name}: must be change_events or fa1, which have one train a taxel")

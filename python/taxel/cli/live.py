@@ -16,14 +16,16 @@ from rich.text import Text
 
 from taxel._core import ProblemError
 from taxel._files import try_whole
-from taxel.cli._app import app
+from taxel.cli._app import SecondsOption, app
 from taxel.cli._array import geometry
 from taxel.cli._board import (
+    REDRAW_S,
     CongestionOption,
     FromOption,
     HostOption,
     PortOption,
     PresetOption,
+    TareOption,
     asked_to_end,
     counters_table,
     exit_code,
@@ -31,8 +33,8 @@ from taxel.cli._board import (
     remote,
     rest_of,
 )
-from taxel.cli._listening import new_report
 from taxel.cli._paneling import OpenOption, PanelHostOption, PanelPortOption, announce
+from taxel.cli._recordings import new_report
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, how_it_goes, say_shown, spikes_of, viewers
 from taxel.detect import Readout
 from taxel.device import Cable
@@ -41,9 +43,6 @@ from taxel.spikes import to_ms
 from taxel.tare import Tare
 
 __all__ = ["live"]
-
-#: How often the display is drawn anew, and the end looked for, s.
-_REDRAW = 0.1
 
 
 @app.command()
@@ -60,9 +59,7 @@ def live(
     preset: PresetOption = None,
     address: FromOption = None,
     congestion: CongestionOption = None,
-    tare: Annotated[
-        str | None, typer.Option(help="Seconds at rest for a fresh one, or the file of an earlier one (JSON).")
-    ] = None,
+    tare: TareOption = None,
     control: Annotated[
         str | None,
         typer.Option(
@@ -71,7 +68,7 @@ def live(
     ] = None,
     save_tare: Annotated[Path | None, typer.Option(help="Keep the fresh tare in a new file (JSON).")] = None,
     record: Annotated[Path | None, typer.Option(help="Keep everything in a new file (.mcap or .lsa).")] = None,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
+    seconds: SecondsOption = None,
     guard_frames: Annotated[float, typer.Option(min=0.0, help="In silence, frames behind the host's clock.")] = 5.0,
     send: Annotated[
         list[str] | None,
@@ -247,7 +244,7 @@ def _tared(pipeline: Live, at_rest: contextlib.ExitStack, console: Console) -> N
     """Wait for the tare: one serial line has one user, so the panel gets it afterwards."""
     console.print("taking a tare: leave the sensor at rest")
     while pipeline.counters["taring"] and not pipeline._core.is_over():
-        pipeline.next(_REDRAW)
+        pipeline.next(REDRAW_S)
     at_rest.close()
     if pipeline.tare is not None:
         _unheard(pipeline.tare)
@@ -280,7 +277,7 @@ def _watch(
     above = console.is_terminal and sys.stdout.isatty()
     say: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else typer.echo
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
-    display = Display(console=console, refresh_per_second=1 / _REDRAW, transient=True, redirect_stdout=False)
+    display = Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True, redirect_stdout=False)
     with asked_to_end() as asked, display:
         before, told = None, False
         while not asked.is_set() and (before is None or seconds is None or before["seconds"] < seconds):
@@ -290,7 +287,7 @@ def _watch(
                     pipeline, before = panel.live, None
                 if before is None:
                     before = pipeline.counters
-                said = pipeline.next(_REDRAW)
+                said = pipeline.next(REDRAW_S)
                 if said is not None:
                     _tell(said, console, say)
                 _drain(pipeline, console, say)
@@ -308,7 +305,7 @@ def _watch(
             if not told and (wrong := outside(now, pipeline.array)):
                 typer.echo(f"taxel: {wrong}", err=True)
                 told = True
-            if now["seconds"] - before["seconds"] >= _REDRAW:
+            if now["seconds"] - before["seconds"] >= REDRAW_S:
                 lines = [Text(how_it_goes(viewer)) for viewer in looks]
                 display.update(Group(counters_table(before, now), _state(now), *lines))
                 before = now

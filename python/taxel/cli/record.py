@@ -16,10 +16,12 @@ from rich.live import Live as Display
 
 from taxel import _core
 from taxel._core import ProblemError
-from taxel.cli._app import OUTSIDE, app
+from taxel.cli._app import OUTSIDE, SecondsOption, app
 from taxel.cli._array import geometry
 from taxel.cli._board import (
+    REDRAW_S,
     ArrayOption,
+    DifferencesOption,
     FromOption,
     HostOption,
     PortOption,
@@ -34,9 +36,6 @@ from taxel.live import Live, Summary
 
 __all__ = ["record"]
 
-#: How often the display is drawn anew, and the end looked for, s.
-_REDRAW = 0.1
-
 #: With --trials: so many in a row to which nothing came end it.
 _EMPTY = 3
 
@@ -49,7 +48,7 @@ def record(
     array: ArrayOption = None,
     preset: PresetOption = None,
     address: FromOption = None,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
+    seconds: SecondsOption = None,
     markers: Annotated[bool, typer.Option("--markers", help="End where the board marks a stop.")] = False,
     compression: Annotated[str, typer.Option(help="Of .mcap: none, lz4 or zstd.")] = "none",
     name: Annotated[str, typer.Option(help="What the board is called among the recording's sources.")] = "board",
@@ -62,7 +61,7 @@ def record(
         ),
     ] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
-    differences: Annotated[bool, typer.Option("--differences", help="The board sends intensity differences.")] = False,
+    differences: DifferencesOption = False,
     length: Annotated[
         float | None, typer.Option(min=0.0, help="Automatic mode: record again and again, so long each, s.")
     ] = None,
@@ -212,14 +211,14 @@ def _watch(
     console.print(f"listening on {live.place}, recording to {file}; Ctrl-C ends")
     if keys:
         console.print(keys)
-    with Display(console=console, refresh_per_second=1 / _REDRAW, transient=True) as display:
+    with Display(console=console, refresh_per_second=1 / REDRAW_S, transient=True) as display:
         before, told = live.counters, False
         began = before["seconds"]
         if trial:
             # What was marked before is none of its business.
             live.take_markers()
         while seconds is None or before["seconds"] - began < seconds:
-            left = _REDRAW if seconds is None else min(_REDRAW, seconds - (before["seconds"] - began))
+            left = REDRAW_S if seconds is None else min(REDRAW_S, seconds - (before["seconds"] - began))
             live.next(left)
             for t, start in live.take_markers():
                 console.print(f"{t / 1e6:.4f} s: {'start' if start else 'stop'} marked")

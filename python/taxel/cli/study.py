@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from taxel.cli._app import App, app
-from taxel.cli._listening import SET_HELP, assignments
+from taxel.cli._recordings import SET_HELP, assignments
 from taxel.studies import STUDIES, load
 
 if TYPE_CHECKING:

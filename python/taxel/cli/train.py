@@ -13,7 +13,7 @@ import typer
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import (
+from taxel.cli._recordings import (
     SET_HELP,
     TARE_HELP,
     assignments,

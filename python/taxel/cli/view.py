@@ -12,7 +12,7 @@ import typer
 from rich.console import Console
 
 from taxel._core import ProblemError
-from taxel.cli._app import app
+from taxel.cli._app import SecondsOption, app
 from taxel.cli._paneling import PanelHostOption, PanelPortOption, announce
 from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, how_it_goes, say_shown, spikes_of, viewers
 from taxel.live import Panel
@@ -39,7 +39,7 @@ def view(
     ] = None,
     encoder: SpikesOption = None,
     values: SpikesSetOption = None,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="End after so long; else with Ctrl-C.")] = None,
+    seconds: SecondsOption = None,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print the panel's address as JSON, and nothing else.")
     ] = False,
