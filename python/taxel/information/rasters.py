@@ -35,24 +35,17 @@ def event_grams(spikes: Spikes, windows_us: Sequence[float], tau_ms: float) -> l
     each other, and there each window has its own last products. Distances of these inner products are van Rossum's,
     Euclidean over all taxels.
     """
-    ends = _ends(spikes, windows_us)
-    last = max((int(end.max()) for end in ends), default=0)
+    sums = _Sums(spikes, windows_us)
     decay = np.float32(np.exp(to_ms(-spikes.period_us) / tau_ms)) if tau_ms > 0 else np.float32(0)
     active, taxel = np.unique(spikes.taxel, return_inverse=True)
     state = np.zeros((spikes.trials, len(active)), np.float32)
-    begins = np.searchsorted(spikes.bin, np.arange(last + 1))
-    total = np.zeros((spikes.trials, spikes.trials))
-    found: list[NDArray[np.float64]] = [np.zeros_like(total) for _ in ends]
-    open_ = [True] * len(ends)
-    for b in range(last):
+    begins = np.searchsorted(spikes.bin, np.arange(sums.bins + 1))
+    for b in range(sums.bins):
         state *= decay
         here = slice(begins[b], begins[b + 1])
         np.add.at(state, (spikes.trial[here], taxel[here]), spikes.value[here])
-        _window_products(state, b, ends, total, found, open_)
-    for k, still in enumerate(open_):
-        if still:
-            found[k] = total.copy()
-    return found
+        sums.add(state)
+    return sums.finish()
 
 
 def frame_grams(values: NDArray[np.float32], spikes: Spikes, windows_us: Sequence[float]) -> list[NDArray[np.float64]]:
@@ -69,17 +62,10 @@ def frame_grams(values: NDArray[np.float32], spikes: Spikes, windows_us: Sequenc
     -------
     list of float64, shape (trials, trials)
     """
-    ends = _ends(spikes, windows_us)
-    last = min(len(values), max((int(end.max()) for end in ends), default=0))
-    total = np.zeros((spikes.trials, spikes.trials))
-    found: list[NDArray[np.float64]] = [np.zeros_like(total) for _ in ends]
-    open_ = [True] * len(ends)
-    for b in range(last):
-        _window_products(values[b], b, ends, total, found, open_)
-    for k, still in enumerate(open_):
-        if still:
-            found[k] = total.copy()
-    return found
+    sums = _Sums(spikes, windows_us)
+    for state in values[: sums.bins]:
+        sums.add(state)
+    return sums.finish()
 
 
 def features(spikes: Spikes, window_us: float) -> int:
@@ -88,35 +74,37 @@ def features(spikes: Spikes, window_us: float) -> int:
     return max(1, len(np.unique(spikes.taxel[kept] * (int(spikes.bin.max(initial=0)) + 1) + spikes.bin[kept])))
 
 
-def _ends(spikes: Spikes, windows_us: Sequence[float]) -> list[NDArray[np.int64]]:
-    """Return each trial's bins to each window; a silent trial adds nothing wherever it ends, so it ends last."""
-    silent = ~np.isfinite(spikes.first_us)
-    bins = [spikes.bins_to(window) for window in windows_us]
-    return [np.where(silent, one.max(initial=0), one) for one in bins]
+class _Sums:
+    """Sum up the inner products of all trials, bin by bin, to several windows at once."""
 
+    def __init__(self, spikes: Spikes, windows_us: Sequence[float]) -> None:
+        # A silent trial adds nothing wherever it ends, so it ends last.
+        silent = ~np.isfinite(spikes.first_us)
+        ends = [spikes.bins_to(window) for window in windows_us]
+        self._ends = [np.where(silent, end.max(initial=0), end) for end in ends]
+        self._common = np.zeros((spikes.trials, spikes.trials))
+        # A window goes on from the common sum until a trial has left it, then by itself.
+        self._own: list[NDArray[np.float64] | None] = [None] * len(ends)
+        self._bin = 0
+        #: How many bins there are to the last window.
+        self.bins = max((int(end.max()) for end in self._ends), default=0)
 
-def _window_products(
-    state: NDArray[np.float32],
-    b: int,
-    ends: Sequence[NDArray[np.int64]],
-    total: NDArray[np.float64],
-    found: list[NDArray[np.float64]],
-    open_: list[bool],
-) -> None:
-    """Add a bin's products to the common sum, and to those windows that some trials have left already."""
-    product: NDArray[np.float32] | None = None
-    for k, end in enumerate(ends):
-        inside = end > b
-        if not inside.any():
-            if open_[k]:
-                found[k], open_[k] = total.copy(), False
-            continue
-        if open_[k] and not inside.all():
-            found[k], open_[k] = total.copy(), False
-        if not open_[k]:
-            if product is None:
-                product = state @ state.T
-            mine = np.flatnonzero(inside)
-            found[k][np.ix_(mine, mine)] += product[np.ix_(mine, mine)]
-    if any(open_):
-        total += state @ state.T if product is None else product
+    def add(self, state: NDArray[np.float32]) -> None:
+        """Add the next bin's products, of values of shape (trials, taxels)."""
+        product: NDArray[np.float32] | None = None
+        for k, end in enumerate(self._ends):
+            inside = end > self._bin
+            if self._own[k] is None and not inside.all():
+                self._own[k] = self._common.copy()
+            own = self._own[k]
+            if own is not None and inside.any():
+                product = state @ state.T if product is None else product
+                mine = np.flatnonzero(inside)
+                own[np.ix_(mine, mine)] += product[np.ix_(mine, mine)]
+        if any(own is None for own in self._own):
+            self._common += state @ state.T if product is None else product
+        self._bin += 1
+
+    def finish(self) -> list[NDArray[np.float64]]:
+        """Return the matrix of each window."""
+        return [self._common.copy() if own is None else own for own in self._own]
