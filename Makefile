@@ -12,6 +12,7 @@ help:
 	@echo "make lint   format, lint, types, floors     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
+	@echo "make build  .venv and the extension, after a change in crates/     make format  formats"
 	@echo "make dist   a wheel for machines without cargo, and the source package, to dist/"
 
 check:
