@@ -23,6 +23,7 @@ from taxel._tables import write_csv, write_npz
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.labels import TURN_US
 from taxel.recording import Datagrams, Recording, _Source, open_recording, period_us
 
 __all__ = ["KINDS", "convert"]
@@ -39,8 +40,8 @@ _PICTURE_US, _NEAR_US = 100_000, 10_000
 #: Of a stream of numbers.
 _UNREAD = "lines_that_could_not_be_read"
 
-#: The board's stamps: their unit and how far they count.
-_STAMP_US, _TURN_US = 100, 6_553_600
+#: The unit of the board's stamps, us.
+_STAMP_US = 100
 
 
 def convert(
@@ -231,7 +232,7 @@ def _write_mcap(
         payload, lost = _encoded(events)
         datagrams = _cut(np.frombuffer(payload, np.uint8), events)
         # The first stamp shows its time modulo one turn of the counter; the turns before it are kept apart.
-        first_us = int(datagrams.arrived_ns[0]) // 1000 // _TURN_US * _TURN_US if len(datagrams) else 0
+        first_us = int(datagrams.arrived_ns[0]) // 1000 // TURN_US * TURN_US if len(datagrams) else 0
     # Before 1970 there is no time of the host: board times are moved there as a whole.
     earliest = int(datagrams.arrived_ns[0]) if len(datagrams) else 0
     arrived = datagrams.arrived_ns - min(0, earliest)

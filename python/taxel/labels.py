@@ -16,7 +16,7 @@ from taxel._arguments import shown
 from taxel._core import FormatError, ProblemError
 from taxel._files import whole_file
 
-__all__ = ["Label", "Labels", "ahead_us", "beside", "write_labels"]
+__all__ = ["TURN_US", "Label", "Labels", "ahead_us", "beside", "write_labels"]
 
 #: A whole turn of the board's 16-bit clock of 100 us, us.
 TURN_US = 6_553_600
