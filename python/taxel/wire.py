@@ -549,6 +549,12 @@ class Registers:
         return registers
 
     @classmethod
+    def _of_source(cls, array: Array, rate_hz: float, bits: int) -> tuple[Registers, int]:
+        """Return what a board holds that scans another sensor's frames, and how often it halves their values."""
+        held, halved = _core.registers_of_source(array._parts(), rate_hz, bits)
+        return cls._of(json.loads(held), array), halved
+
+    @classmethod
     def from_words(cls, words: Sequence[int], *, array: Array | None = None, channels: int = 16) -> Registers:
         """Return the set that eight 32-bit registers hold, REG0 first; of REG6 nothing is looked at.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 
 import numpy as np
@@ -69,9 +68,8 @@ class Source:
         board: int = 0,
     ) -> None:
         self.array = instance("array", array, Array)
-        held, self.shift = _core.registers_of_source(array._parts(), number("rate", rate), whole("bits", bits, 1, 16))
-        floor = whole("noise_floor", noise_floor, 0, 255)
-        self.registers = Registers._of(json.loads(held), array).replace(noise_floor=floor)
+        held, self.shift = Registers._of_source(self.array, number("rate", rate), whole("bits", bits, 1, 16))
+        self.registers = held.replace(noise_floor=whole("noise_floor", noise_floor, 0, 255))
         options = parameters(
             {"board": whole("board", board, 0, 65_535), "seed": int.from_bytes(os.urandom(2), "little")}
         )

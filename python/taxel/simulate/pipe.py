@@ -6,7 +6,6 @@ import json
 import os
 from typing import IO, Any
 
-from taxel import _core
 from taxel._arguments import number, whole
 from taxel._core import DeviceError, FormatError, ProblemError
 from taxel.array import Array
@@ -50,16 +49,16 @@ class Pipe:
             begin = line[:60].decode("utf-8", "replace")
             raise FormatError(f"standard input, line 1: {begin!r} ({error}); must be JSON like {wanted}") from None
         self.array = Array(rows, columns, pitch_mm=said.get("pitch_mm", 1.0), name=said.get("name", "pipe"))
-        self.rate_hz, self._floor = number("rate", rate), whole("noise_floor", noise_floor, 0, 255)
+        self.rate_hz, floor = number("rate", rate), whole("noise_floor", noise_floor, 0, 255)
         try:
-            held, self.shift = _core.registers_of_source(self.array._parts(), self.rate_hz, whole("bits", bits, 1, 16))
+            held, self.shift = Registers._of_source(self.array, self.rate_hz, whole("bits", bits, 1, 16))
         except DeviceError as error:
             raise ProblemError(f"standard input, line 1: {rows} x {columns} taxels: {error}") from None
-        self._held = json.loads(held)
+        self._registers = held.replace(noise_floor=floor)
 
     def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames say how fast they are
         """Return what the board holds that scans such frames."""
-        return Registers._of(self._held, self.array).replace(noise_floor=self._floor)
+        return self._registers
 
     def _line(self) -> bytes:
         while b"\n" not in self._ahead and len(self._ahead) < _LONGEST_LINE:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
 
 import numpy as np
 
-from taxel import _core
 from taxel._arguments import number, shown
 from taxel._core import ProblemError
 from taxel.array import Array
@@ -66,10 +64,9 @@ class Replay:
         # A converter sees nothing above its ramp: where that is a preset's and the sensor another, it is made longer.
         rate_hz = 1e6 / held.frame_us
         while most >= held.ramp:
-            fields, halved = _core.registers_of_source(self.array._parts(), rate_hz, (most + 1).bit_length())
+            longer, halved = Registers._of_source(self.array, rate_hz, (most + 1).bit_length())
             rate_hz /= 2
             if not halved:
-                longer = Registers._of(json.loads(fields), self.array)
                 held = longer.replace(noise_floor=held.noise_floor, wire_version=held.wire_version)
         return held
 
