@@ -5,7 +5,7 @@ pub mod bridged;
 pub mod clock;
 pub mod error;
 pub mod host_clock;
-pub mod latency;
+mod latency;
 mod locked;
 pub mod ports;
 

@@ -6,13 +6,14 @@
 
 pub mod assets;
 mod door;
-pub mod film;
+mod film;
 mod guests;
 mod hub;
-pub mod lens;
+mod lens;
 mod limits;
 mod options;
 mod picture;
+mod player;
 mod recorder;
 mod requests;
 mod session;

@@ -5,6 +5,7 @@ use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Duration;
 
 use super::counts::Counts;
+use crate::locked::lock;
 use crate::recording::now_ns;
 
 /// One datagram of a [`Batch`].
@@ -220,6 +221,6 @@ impl Queue {
 
     /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
     fn state(&self) -> MutexGuard<'_, Received> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 }

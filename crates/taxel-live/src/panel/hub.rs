@@ -14,7 +14,9 @@ use taxel_core::wire::registers::{PRESETS, Preset};
 use taxel_core::{Array, encode, problem};
 use tokio::sync::{Notify, broadcast, watch};
 
-use super::film::{Activity, FileFilm, Film, REACH_US, RingFilm};
+use super::film::file::FileFilm;
+use super::film::ring::{REACH_US, RingFilm};
+use super::film::{Activity, Film};
 use super::lens::{COLUMN_US, COLUMNS_US, Keyframe, Lens, SPAN, Strip};
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::options::PanelOptions;

@@ -214,12 +214,6 @@ impl Strip {
             Err(_) => out.resize(out.len() + self.rows, 0),
         }
     }
-
-    /// Bytes of memory.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        self.blocks.len() * Self::block_bytes(self.rows)
-    }
 }
 
 /// Of nothing that is pressed.
@@ -365,7 +359,8 @@ impl Lens {
         }
     }
 
-    /// Takes one.
+    /// Takes one, as no view does.
+    #[cfg(test)]
     pub fn take(&mut self, change: &Change) {
         self.take_all(std::slice::from_ref(change));
     }

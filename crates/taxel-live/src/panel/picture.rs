@@ -1,7 +1,7 @@
 //! A picture as it goes to a browser: see docs/panel-protocol.md, *Pictures*.
 
-use super::film::Player;
 use super::lens::{COLUMN_US, History, Lens, SPAN, Strip, column_of};
+use super::player::Player;
 use super::spikes::Spikes;
 use crate::recording::now_ns;
 

@@ -8,11 +8,13 @@ use serde_json::{Map, Value, json};
 use taxel_core::encode::Encoder;
 use tokio::sync::{broadcast, mpsc, watch};
 
-use super::film::{FileFilm, Film, Gaze, Player};
+use super::film::Film;
+use super::film::file::FileFilm;
 use super::hub::{Hub, LiveSide, Seat, Told, said_of, said_of_zeroing};
 use super::lens::{COLUMN_US, COLUMNS_US, History, LATE_US, column_of, is_column};
 use super::limits::{MOST_BYTES, MOST_CREDITS};
 use super::picture::{self, About, FOLLOWS, LIVE, MOVES, RECORDS, RESTART};
+use super::player::{Gaze, Player};
 use super::requests::{Answer, Asked, Refused, carry_out, prepare};
 use super::spikes::Spikes;
 use crate::locked::lock;

@@ -5,6 +5,8 @@ use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use taxel_core::encode::Zeroing;
 use taxel_core::{Array, Events};
 
+use crate::locked::lock;
+
 /// Events that wait for the readout, and how far the board's time has come without any.
 #[derive(Debug)]
 pub(super) struct Handover {
@@ -112,7 +114,7 @@ impl Handover {
 
     /// No holder of the lock can panic half-way through a change, so a poisoned lock still guards a sound state.
     fn state(&self) -> MutexGuard<'_, Waiting> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 }
 

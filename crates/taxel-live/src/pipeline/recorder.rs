@@ -348,7 +348,7 @@ impl Recorder {
     pub(super) fn flush(&self) -> Result<()> {
         match self.kind.get() {
             Some(Kind::Mcap(_) | Kind::Track(_)) | None => Ok(()),
-            Some(Kind::Lsa(writer)) => writer.lock().unwrap_or_else(PoisonError::into_inner).flush(),
+            Some(Kind::Lsa(writer)) => lock(writer).flush(),
         }
     }
 

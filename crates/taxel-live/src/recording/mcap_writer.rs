@@ -426,7 +426,7 @@ impl Track {
     }
 
     fn pictures(&self) -> MutexGuard<'_, Pictures> {
-        self.pictures.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.pictures)
     }
 
     /// Keeps a picture of held values for viewers: 8 bits above rest, the largest of the last 10 s being white. The
@@ -524,11 +524,11 @@ impl Drop for Writer {
 
 impl Shared {
     fn lock(&self) -> MutexGuard<'_, Pending> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.state)
     }
 
     fn pen(&self) -> MutexGuard<'_, Option<Pen>> {
-        self.pen.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.pen)
     }
 
     /// Begins the file, once; gives whether it was this call that did.
