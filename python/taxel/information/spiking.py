@@ -19,55 +19,7 @@ from taxel.spikes import SpikeTrains, to_ms
 __all__ = ["ConeRReadout", "TempotronReadout", "patterns_of", "readout_responses"]
 
 
-class _NeuronAClass(Classifier):
-    """Share what neurons do, one a class: each is taught its own class, and the one driven highest names a trial."""
-
-    learners_: list[Any]
-
-    def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
-        """Train a neuron a class.
-
-        Parameters
-        ----------
-        patterns : sequence of SpikeTrains
-            The same trains and window in each.
-        y : shape (patterns,)
-
-        Raises
-        ------
-        ProblemError : patterns or labels that make no sense
-        """
-        trains = _listed(patterns)
-        self.classes_, row = labelled(y, len(trains))
-        self.learners_ = [self._trained(trains, row == k) for k in range(len(self.classes_))]
-        return self
-
-    def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
-        """Return the potential of each class' neuron that counts, mV, shape (patterns, classes).
-
-        Raises
-        ------
-        ProblemError : not fitted, or patterns that make no sense
-        """
-        learners = self._fitted("learners_")
-        trains = _listed(patterns)
-        driven = [[self._driven(one, pattern) for one in learners] for pattern in trains]
-        return np.array(driven).reshape(len(trains), len(learners))
-
-    def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
-        """Return a label a pattern."""
-        return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
-
-    def _trained(self, trains: list[SpikeTrains], mine: NDArray[np.bool_]) -> Any:
-        """Return a learner of one class."""
-        raise NotImplementedError
-
-    def _driven(self, learner: Any, pattern: SpikeTrains) -> float:
-        """Return the potential by which a class is named."""
-        raise NotImplementedError
-
-
-class ConeRReadout(_NeuronAClass):
+class ConeRReadout(Classifier):
     """Classify by a neuron a class, which `ConeR` teaches to fire at the window's end on its own class and never else.
 
     Parameters
@@ -106,17 +58,48 @@ class ConeRReadout(_NeuronAClass):
             if not 0 < number(name, getattr(self, name)) < np.inf:
                 raise ProblemError(f"{name} is {shown(getattr(self, name))}: must be above 0, and finite")
 
-    def _trained(self, trains: list[SpikeTrains], mine: NDArray[np.bool_]) -> ConeR:
-        targets = [[one.stop] if own else [] for one, own in zip(trains, mine, strict=True)]
-        neuron = Neuron(tau=self.tau, after_spike="keep", step_ms=1.0)
-        learner = ConeR(neuron=neuron, lb=-self.bound, ub=self.bound, max_seconds=self.max_seconds)
-        return learner.fit(trains, targets)
+    def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
+        """Train a neuron a class.
 
-    def _driven(self, learner: ConeR, pattern: SpikeTrains) -> float:
-        return float(learner.neuron_.potential(learner.weights_, pattern, [pattern.stop])[0])
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+            The same trains and window in each.
+        y : shape (patterns,)
+
+        Raises
+        ------
+        ProblemError : patterns or labels that make no sense
+        """
+        trains = _listed(patterns)
+        self.classes_, row = labelled(y, len(trains))
+        self.learners_ = []
+        for k in range(len(self.classes_)):
+            targets = [[one.stop] if mine == k else [] for one, mine in zip(trains, row, strict=True)]
+            neuron = Neuron(tau=self.tau, after_spike="keep", step_ms=1.0)
+            learner = ConeR(neuron=neuron, lb=-self.bound, ub=self.bound, max_seconds=self.max_seconds)
+            self.learners_.append(learner.fit(trains, targets))
+        return self
+
+    def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
+        """Return each class' potential at the window's end, mV, shape (patterns, classes).
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that make no sense
+        """
+        learners = self._fitted("learners_")
+        trains = _listed(patterns)
+        return np.array(
+            [[one.neuron_.potential(one.weights_, s, [s.stop])[0] for one in learners] for s in trains]
+        ).reshape(len(trains), len(learners))
+
+    def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
+        """Return a label a pattern."""
+        return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
 
 
-class TempotronReadout(_NeuronAClass):
+class TempotronReadout(Classifier):
     """Classify by a `Tempotron` a class, taught to fire on its own class and on no other.
 
     Parameters
@@ -156,11 +139,41 @@ class TempotronReadout(_NeuronAClass):
     def _learner(self) -> Tempotron:
         return Tempotron(tau=self.tau, epochs=self.epochs, max_seconds=self.max_seconds, seed=self.seed)
 
-    def _trained(self, trains: list[SpikeTrains], mine: NDArray[np.bool_]) -> Tempotron:
-        return self._learner().fit(trains, mine)
+    def fit(self, patterns: Sequence[SpikeTrains], y: ArrayLike) -> Self:
+        """Train a neuron a class.
 
-    def _driven(self, learner: Tempotron, pattern: SpikeTrains) -> float:
-        return float(learner.peak(learner.weights_, pattern)[0])
+        Parameters
+        ----------
+        patterns : sequence of SpikeTrains
+        y : shape (patterns,)
+
+        Raises
+        ------
+        ProblemError : patterns or labels that make no sense
+        """
+        trains = _listed(patterns)
+        self.classes_, row = labelled(y, len(trains))
+        self.learners_ = []
+        for k in range(len(self.classes_)):
+            self.learners_.append(self._learner().fit(trains, row == k))
+        return self
+
+    def decision_function(self, patterns: Sequence[SpikeTrains]) -> NDArray[np.float64]:
+        """Return each class' highest potential, shape (patterns, classes).
+
+        Raises
+        ------
+        ProblemError : not fitted, or patterns that make no sense
+        """
+        learners = self._fitted("learners_")
+        trains = _listed(patterns)
+        return np.array([[one.peak(one.weights_, s)[0] for one in learners] for s in trains]).reshape(
+            len(trains), len(learners)
+        )
+
+    def predict(self, patterns: Sequence[SpikeTrains]) -> NDArray[Any]:
+        """Return a label a pattern."""
+        return np.asarray(self.classes_[self.decision_function(patterns).argmax(1)])
 
 
 def patterns_of(spikes: Spikes, window_us: float) -> list[SpikeTrains]:
