@@ -11,7 +11,7 @@ mod instructions;
 mod products;
 mod windows;
 
-pub(crate) use aligned::Aligned;
+pub(crate) use aligned::{Aligned, OnLine};
 pub(crate) use eight::{LANES, Vector, lines, lines_mut};
 #[cfg(target_arch = "x86_64")]
 pub(crate) use eight::{Ymm, Zmm};
@@ -19,4 +19,4 @@ pub(crate) use fetch::fetch;
 pub use instructions::Instructions;
 pub(crate) use instructions::{by_width, kernel, wide};
 pub(crate) use products::{add, add_lines, dot, times};
-pub(crate) use windows::Windows;
+pub(crate) use windows::{ROW, WIDE, Windows};

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::law::Law;
-use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
+use super::sampled::{BLOCK, Block, Channels, Next, Rule, Sampled};
 use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 pub use crate::board::Previous;
@@ -126,9 +126,10 @@ impl Rule for Changes {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         let floor = self.floor;
         for (block, (new, last)) in held.iter().zip(&mut self.last).enumerate().filter(|(b, _)| changed[*b]) {
+            next.fetch();
             let moved = |new: f32, last: f32| match self.rounding {
                 Rounding::Truncate => (new - last).abs() > floor,
                 Rounding::Floor => new - last >= floor || new < last,

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 use super::law::Law;
 use super::power::power;
-use super::sampled::{BLOCK, Block, Channels, Rule, Sampled};
+use super::sampled::{BLOCK, Block, Channels, Next, Rule, Sampled};
 use super::stream::Stream;
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
@@ -148,8 +148,9 @@ impl Law for Fa1 {
     }
 }
 
-/// The state of the afferents of one block.
+/// The state of the afferents of one block; on cache lines' borders, so that no vector straddles two.
 #[derive(Clone)]
+#[repr(align(64))]
 struct Afferent {
     /// rho (5.1) where U was last reset: U, the sum of changes since then (5.3), is rho less this.
     base: [f64; BLOCK],
@@ -359,11 +360,12 @@ impl Rule for Afferents {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         /// Written at once, needed or not, as a guess of how many there are costs more.
         const AT_ONCE: usize = 4;
         let (mut near, mut n) = (std::mem::take(&mut self.near), 0);
         for (block, afferent) in self.blocks.iter_mut().enumerate() {
+            next.fetch();
             if afferent.still && !changed[block] {
                 continue;
             }
@@ -473,7 +475,8 @@ mod tests {
             let mut out = vec![];
             afferents.begin(0, &pictures[..1], &mut out);
             for (t, picture) in (1..).zip(pictures[1..].chunks(1)) {
-                afferents.sample(t, picture, &[picture != &pictures[t as usize - 1..t as usize]], &mut out);
+                let changed = picture != &pictures[t as usize - 1..t as usize];
+                afferents.sample(t, picture, &[changed], &mut Next::unknown(), &mut out);
             }
             assert!(out == plainly(&parameters, &pictures), "round {round}: {parameters:?}");
         }

@@ -1,24 +1,34 @@
 //! Receptive fields: what afferents feel of an array, each the weighed mean of the taxels in its field.
 //!
 //! Row by row of the array a field's channels follow each other, so a field is a few short windows of channels. Those of
-//! a block of afferents are read first; what each weighs is then reckoned for all of them at once. Sums run from a
+//! a group of afferents are read first; what each weighs is then reckoned for all of them at once. Sums run from a
 //! field's first channel to its last whatever the vectors, as what fills a window up weighs 0: all machines feel the same.
 
-use super::sampled::{BLOCK, Block, blocks};
-use crate::vectors::Windows;
+use std::ops::Range;
 
-/// Channels that are read at once.
-const WIDE: usize = 4;
+use super::sampled::{BLOCK, Block, blocks};
+use crate::vectors::{Instructions, OnLine, ROW, WIDE, Windows, by_width};
+
+/// Channels that a window of a small field holds: what weighs nothing need not come from memory for every sample.
+const NARROW: usize = 2;
 
 /// The fields of afferents, a block of them at a time.
+///
+/// Within a block those with the most windows stand first, so that few rows of windows hold them all.
 #[derive(Clone)]
 pub(super) struct Fields {
+    /// The afferent in each lane.
+    afferents: Vec<u32>,
     /// Where the rows of a block's windows begin in what follows, and where the last block's end.
     rows: Vec<usize>,
-    /// A window an afferent in each row.
-    windows: Windows<WIDE, BLOCK>,
-    /// What the channels of these windows weigh.
-    weights: Vec<[Block; WIDE]>,
+    /// To which group of lanes each row belongs, groups counted within a block.
+    groups: Vec<usize>,
+    /// A window a lane in each row.
+    windows: Windows,
+    /// What the channels of these windows weigh: of a row the first of each window, then the second, and so on.
+    weights: Vec<OnLine<[f32; ROW]>>,
+    /// Where the weights of a row begin, and where the last row's end: [`NARROW`] where no window holds more.
+    weighed: Vec<usize>,
     /// The blocks of channels that each block of afferents feels, from one to before another.
     feels: Vec<[usize; 2]>,
 }
@@ -27,25 +37,40 @@ impl Fields {
     /// Fields of channels with their weights, in ascending order; of `channels` channels in all.
     pub(super) fn new(fields: &[Vec<(u32, f32)>], channels: usize) -> Self {
         let last = (blocks(channels) * BLOCK).saturating_sub(WIDE);
-        let mut new = Self { rows: vec![0], windows: Windows::default(), weights: vec![], feels: vec![] };
-        for block in fields.chunks(BLOCK) {
-            let windows: Vec<Vec<(u32, [f32; WIDE])>> = block.iter().map(|field| cut(field, last)).collect();
-            for row in 0..windows.iter().map(Vec::len).max().unwrap_or(0) {
-                let (mut starts, mut weights) = ([0; BLOCK], [[0.0; BLOCK]; WIDE]);
-                for (lane, windows) in windows.iter().enumerate() {
-                    if let Some((start, own)) = windows.get(row) {
-                        starts[lane] = *start;
-                        (0..WIDE).for_each(|k| weights[k][lane] = own[k]);
+        let (windows, weights, feels) = (Windows::default(), vec![], vec![]);
+        let (afferents, rows, groups, weighed) = (vec![], vec![0], vec![], vec![0]);
+        let mut new = Self { afferents, rows, groups, windows, weights, weighed, feels };
+        for (block, fields) in fields.chunks(BLOCK).enumerate() {
+            let mut cut: Vec<(usize, Vec<Window>)> = fields.iter().map(|field| cut(field, last)).enumerate().collect();
+            cut.sort_by_key(|(_, windows)| std::cmp::Reverse(windows.len()));
+            new.afferents.extend(cut.iter().map(|(lane, _)| (block * BLOCK + lane) as u32));
+            // The next row is another group's, so that no sum waits for the one before.
+            for row in 0..cut[0].1.len() {
+                for (number, group) in cut.chunks(ROW).enumerate().filter(|(_, group)| row < group[0].1.len()) {
+                    let (mut starts, mut weights) = ([0; ROW], [[0.0; ROW]; WIDE]);
+                    for (lane, (_, windows)) in group.iter().enumerate() {
+                        if let Some((start, own)) = windows.get(row) {
+                            starts[lane] = *start;
+                            (0..WIDE).for_each(|k| weights[k][lane] = own[k]);
+                        }
                     }
+                    new.groups.push(number);
+                    new.windows.push(starts);
+                    let wide = weights[NARROW..].as_flattened().iter().any(|&weight| weight != 0.0);
+                    new.weights.extend(weights[..if wide { WIDE } else { NARROW }].iter().map(|&own| OnLine(own)));
+                    new.weighed.push(new.weights.len());
                 }
-                new.windows.push(starts);
-                new.weights.push(weights);
             }
-            new.rows.push(new.weights.len());
-            let felt = || block.iter().flatten().map(|&(channel, _)| channel as usize / BLOCK);
+            new.rows.push(new.groups.len());
+            let felt = || fields.iter().flatten().map(|&(channel, _)| channel as usize / BLOCK);
             new.feels.push([felt().min().unwrap_or(0), felt().max().map_or(0, |last| last + 1)]);
         }
         new
+    }
+
+    /// The afferent in a lane, lanes counted through all blocks.
+    pub(super) fn afferent(&self, lane: usize) -> u32 {
+        self.afferents[lane]
     }
 
     /// Whether a block of afferents feels any of the blocks of channels that `changed`.
@@ -55,41 +80,83 @@ impl Fields {
         changed[from..to].contains(&true)
     }
 
-    /// What a block of afferents feels of these pressures.
-    #[inline(always)]
+    /// What a block of afferents feels of these pressures, by lane.
     pub(super) fn feel(&self, block: usize, held: &[Block]) -> Block {
-        let mut felt = [0.0; BLOCK];
-        for row in self.rows[block]..self.rows[block + 1] {
-            let (read, weights) = (self.windows.read(row, held.as_flattened()), &self.weights[row]);
-            for lane in 0..BLOCK {
-                for k in 0..WIDE {
-                    felt[lane] += read[lane][k] * weights[k][lane];
+        #[inline(always)]
+        fn by(fields: &Fields, block: usize, read: impl Fn(usize) -> [[f32; ROW]; WIDE]) -> Block {
+            let mut felt = OnLine([[0.0; ROW]; BLOCK / ROW]);
+            for row in fields.rows_of(block) {
+                let (read, weights) = (read(row), &fields.weights[fields.weights_of(row)]);
+                let felt = &mut felt.0[fields.groups[row]];
+                if let Some(weights) = weights.first_chunk::<WIDE>() {
+                    *felt = add(*felt, &read, weights);
+                } else if let Some(weights) = weights.first_chunk::<NARROW>() {
+                    *felt = add(*felt, &read, weights);
                 }
             }
+            let mut all = [0.0; BLOCK];
+            all.copy_from_slice(felt.0.as_flattened());
+            all
         }
-        felt
+        let (fields, held) = (self, held.as_flattened());
+        by_width!(
+            Instructions::best(), (fields: &Fields, block: usize, held: &[f32]) -> Block, [],
+            |fields, block, held| by(fields, block, |row| fields.windows.read_avx512(row, held)),
+            |fields, block, held| by(fields, block, |row| fields.windows.read(row, held)),
+            |fields, block, held| by(fields, block, |row| fields.windows.read(row, held))
+        )
     }
 
-    /// The afferents that feel a channel, with what it weighs to each.
+    /// The rows of a block's windows.
+    #[inline(always)]
+    fn rows_of(&self, block: usize) -> Range<usize> {
+        self.rows[block]..self.rows[block + 1]
+    }
+
+    /// The weights of a row.
+    #[inline(always)]
+    fn weights_of(&self, row: usize) -> Range<usize> {
+        self.weighed[row]..self.weighed[row + 1]
+    }
+
+    /// The lanes of the afferents that feel a channel, with what it weighs to each.
     pub(super) fn feeling(&self, channel: usize) -> impl Iterator<Item = (usize, f32)> {
         let near = move |block: &usize| (self.feels[*block][0]..self.feels[*block][1]).contains(&(channel / BLOCK));
         (0..self.feels.len()).filter(near).flat_map(|block| block * BLOCK..(block + 1) * BLOCK).filter_map(
-            move |afferent| {
-                let (block, lane) = (afferent / BLOCK, afferent % BLOCK);
+            move |lane| {
                 let of = |row: usize| {
-                    let at = channel.wrapping_sub(self.windows.starts(row)[lane] as usize);
-                    self.weights[row].get(at).map_or(0.0, |weights| weights[lane])
+                    let at = channel.wrapping_sub(self.windows.starts(row)[lane % ROW] as usize);
+                    self.weights[self.weights_of(row)].get(at).map_or(0.0, |weights| weights.0[lane % ROW])
                 };
-                let weight: f32 = (self.rows[block]..self.rows[block + 1]).map(of).sum();
-                (weight != 0.0).then_some((afferent, weight))
+                let own = |row: &usize| self.groups[*row] == lane % BLOCK / ROW;
+                let weight: f32 = self.rows_of(lane / BLOCK).filter(own).map(of).sum();
+                (weight != 0.0).then_some((lane, weight))
             },
         )
     }
 }
 
+/// Adds what was read, weighed.
+#[inline(always)]
+fn add<const N: usize>(
+    mut sum: [f32; ROW],
+    read: &[[f32; ROW]; WIDE],
+    weights: &[OnLine<[f32; ROW]>; N],
+) -> [f32; ROW] {
+    for k in 0..N {
+        for lane in 0..ROW {
+            sum[lane] += read[k][lane] * weights[k].0[lane];
+        }
+    }
+    sum
+}
+
+/// Where a window begins, and what its channels weigh.
+type Window = (u32, [f32; WIDE]);
+
 /// Cuts a field into windows, none of which begins behind `last`.
-fn cut(field: &[(u32, f32)], last: usize) -> Vec<(u32, [f32; WIDE])> {
-    let mut windows: Vec<(u32, [f32; WIDE])> = vec![];
+fn cut(field: &[(u32, f32)], last: usize) -> Vec<Window> {
+    let mut windows: Vec<Window> = vec![];
     let mut end = 0;
     for &(channel, weight) in field {
         if channel >= end {
@@ -138,10 +205,11 @@ mod tests {
             let new = Fields::new(&fields, channels);
             for (block, own) in fields.chunks(BLOCK).enumerate() {
                 let felt = new.feel(block, &held);
-                for (lane, field) in own.iter().enumerate() {
+                for (lane, felt) in felt[..own.len()].iter().enumerate() {
+                    let field = &fields[new.afferent(block * BLOCK + lane) as usize];
                     let weighed = |&(channel, weight): &(u32, f32)| held.as_flattened()[channel as usize] * weight;
                     let wanted = field.iter().map(weighed).fold(0.0, |sum, weighed| sum + weighed);
-                    assert_eq!(felt[lane].to_bits(), f32::to_bits(wanted), "{field:?}");
+                    assert_eq!(felt.to_bits(), f32::to_bits(wanted), "{field:?}");
                 }
                 assert!(felt[own.len()..].iter().all(|&felt| felt == 0.0));
                 for changed in 0..held.len() {
@@ -156,7 +224,10 @@ mod tests {
                     field.iter().find(|felt| felt.0 as usize == channel).map(|felt| (afferent, felt.1))
                 };
                 let wanted: Vec<(usize, f32)> = fields.iter().enumerate().filter_map(of).collect();
-                assert_eq!(new.feeling(channel).collect::<Vec<_>>(), wanted);
+                let mut feeling: Vec<(usize, f32)> =
+                    new.feeling(channel).map(|(lane, weight)| (new.afferent(lane) as usize, weight)).collect();
+                feeling.sort_by_key(|&(afferent, _)| afferent);
+                assert_eq!(feeling, wanted);
             }
         }
     }

@@ -8,7 +8,7 @@ use super::bracket::{Bracket, check_levels};
 use super::law::Law;
 use super::periods::micros;
 use super::running_range::{RunningRange, Window};
-use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
+use super::sampled::{BLOCK, Block, Channels, Next, Rule, Sampled, blocks};
 use super::stream::{Stream, sort_from};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
@@ -345,7 +345,7 @@ impl Rule for Crossings {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut Next, out: &mut Vec<Spike>) {
         let Some(mut window) = self.window.take() else { return self.cross(t, held, changed, out) };
         let everything = vec![true; held.len()];
         let first = window.first_full(t);

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::law::Law;
 use super::loaded::Loaded;
 use super::periods::micros;
-use super::sampled::{BLOCK, Block, Rule, Sampled};
+use super::sampled::{BLOCK, Block, Next, Rule, Sampled};
 use super::stream::{Stream, sort_from};
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
@@ -299,7 +299,7 @@ impl Rule for Passing {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], _next: &mut Next, out: &mut Vec<Spike>) {
         if !changed.contains(&true) {
             return;
         }

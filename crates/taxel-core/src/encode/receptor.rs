@@ -8,7 +8,7 @@
 //! the threshold was reached is found on a straight line as well, and what the spike leaves behind decays from there. So
 //! rates do not depend on the sampling period as long as it is short beside the filter.
 
-use super::sampled::{BLOCK, Block, Rule, blocks};
+use super::sampled::{BLOCK, Block, Next, Rule, blocks};
 use crate::Spike;
 use crate::spikes::ms;
 
@@ -69,8 +69,9 @@ pub(super) struct Firing {
 /// Below this share of the range a raised threshold counts as recovered.
 const RECOVERED: f64 = 1e-12;
 
-/// The afferents of one block.
+/// The afferents of one block; on cache lines' borders, so that no vector straddles two.
 #[derive(Clone)]
+#[repr(align(64))]
 struct Afferent<S> {
     state: S,
     u: Lanes,
@@ -211,8 +212,9 @@ impl<F: Filter> Rule for ByTaxel<F> {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
+            next.fetch();
             let x = |lane: usize| share(self.scale, values[lane]);
             let fired = |lane| out.push(Spike { t: ms(t), train: (block * BLOCK + lane) as u32, value: 1.0 });
             if changed[block] {
@@ -301,7 +303,7 @@ mod tests {
         for (t, pair) in (1..).zip(pictures.windows(2)) {
             let changed: Vec<bool> = pair[0].iter().zip(&pair[1]).map(|(a, b)| a != b).collect();
             left_out += (0..changed.len()).filter(|&block| !changed[block] && rule.afferents.is_still(block)).count();
-            rule.sample(t, &pair[1], &changed, &mut out);
+            rule.sample(t, &pair[1], &changed, &mut Next::unknown(), &mut out);
         }
         let shares = |picture: &Vec<Block>| -> Vec<f64> {
             picture.as_flattened()[..channels].iter().map(|&value| share(rule.scale, value)).collect()

@@ -31,8 +31,9 @@ pub(super) trait Rule: Send + Clone + 'static {
     /// The first sample: the encoder begins as if it had always been so.
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>);
 
-    /// A later sample; only blocks that `changed` differ from the last one. Everything before `t` was passed.
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>);
+    /// A later sample; only blocks that `changed` differ from the last one. Everything before `t` was passed. A rule that
+    /// takes its time over each block asks for some of what comes `next` by the way.
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>);
 
     /// What falls due before `t` (exclusive) while the last sample holds.
     fn pass(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
@@ -57,9 +58,47 @@ pub(super) trait Rule: Send + Clone + 'static {
 }
 
 wide! {
-    fn take_sample<R: Rule>(rule: &mut R, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+    fn take_sample<R: Rule>(
+        rule: &mut R,
+        t: i64,
+        held: &[Block],
+        changed: &[bool],
+        next: &mut Next,
+        out: &mut Vec<Spike>,
+    ) {
         rule.pass(t, out);
-        rule.sample(t, held, changed, out);
+        rule.sample(t, held, changed, next, out);
+        while next.fetch() {}
+    }
+}
+
+/// The next picture, where it follows in memory: asked for while this one is encoded, a block at a time, as memory
+/// takes only so many wishes at once.
+pub(super) struct Next {
+    at: *const Block,
+    left: usize,
+}
+
+impl Next {
+    /// Nobody knows what comes next.
+    pub(super) fn unknown() -> Self {
+        Self { at: std::ptr::null(), left: 0 }
+    }
+
+    /// What follows a picture.
+    fn after(picture: &[f32]) -> Self {
+        Self { at: picture.as_ptr_range().end.cast(), left: blocks(picture.len()) }
+    }
+
+    /// Asks for a block; says whether there was one.
+    #[inline(always)]
+    pub(super) fn fetch(&mut self) -> bool {
+        if self.left == 0 {
+            return false;
+        }
+        fetch(self.at);
+        (self.at, self.left) = (self.at.wrapping_add(1), self.left - 1);
+        true
     }
 }
 
@@ -74,10 +113,7 @@ wide! {
     fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool]) -> Result<()> {
         /// All exponent bits: infinite or not a number.
         const NOT_FINITE: u32 = 0x7f80_0000;
-        let picture = new.len();
         for ((new, held), changed) in new.iter().zip(held).zip(changed) {
-            // Where the next picture follows in memory, it comes while this one is encoded.
-            fetch(std::ptr::from_ref(new).wrapping_add(picture));
             let (mut other, mut bad) = (0, 0);
             for (new, held) in new.iter().zip(held.iter()) {
                 other |= new.to_bits() ^ held.to_bits();
@@ -328,9 +364,9 @@ impl<R: Rule> Sampled<R> {
         self
     }
 
-    fn sample(&mut self, t: i64, out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, mut next: Next, out: &mut Vec<Spike>) {
         if self.begun {
-            take_sample(&mut self.rule, t, &self.held, &self.changed, out);
+            take_sample(&mut self.rule, t, &self.held, &self.changed, &mut next, out);
         } else {
             self.rule.begin(t, &self.held, out);
             self.begun = true;
@@ -348,7 +384,7 @@ impl<R: Rule> Sampled<R> {
                 self.next = self.next.saturating_add_unsigned(left.saturating_mul(self.period.unsigned_abs()));
                 return;
             }
-            self.sample(self.next, out);
+            self.sample(self.next, Next::unknown(), out);
             self.next += self.period;
         }
     }
@@ -450,6 +486,7 @@ impl<R: Rule> Stream for Sampled<R> {
             let (since, period) = (ms(t - self.last), ms(self.period));
             return Err(problem!("frame at {t} us, {since} ms after the last: must come every period_ms, {period}"));
         }
+        let next = Next::after(values);
         let values = match &mut self.above {
             Some(above) if values.len() == above.read.len() => {
                 above.read.copy_from_slice(values);
@@ -462,7 +499,7 @@ impl<R: Rule> Stream for Sampled<R> {
             _ => values,
         };
         self.channels.load(t, values, &mut self.held, &mut self.changed)?;
-        self.sample(t, out);
+        self.sample(t, next, out);
         Ok(())
     }
 

@@ -11,7 +11,7 @@ use super::law::Law;
 use super::receptor::ByTaxel;
 use super::sa1::Sa1;
 use super::sa2::Sa2;
-use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
+use super::sampled::{BLOCK, Block, Channels, Next, Rule, Sampled, blocks};
 use super::slow::Slow;
 use super::stream::{Stream, sort_from};
 use super::tare::Tare;
@@ -265,7 +265,7 @@ struct Type<R> {
     /// Number of its first train.
     first: usize,
     fields: Fields,
-    /// What each afferent feels.
+    /// What the afferent in each lane feels.
     held: Vec<Block>,
     changed: Vec<bool>,
 }
@@ -294,12 +294,12 @@ impl<R: Rule> Type<R> {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         self.take(held, changed);
         let from = out.len();
-        self.rule.sample(t, &self.held, &self.changed, out);
+        self.rule.sample(t, &self.held, &self.changed, next, out);
         for spike in &mut out[from..] {
-            spike.train += self.first as u32;
+            spike.train = self.first as u32 + self.fields.afferent(spike.train as usize);
             spike.value = 1.0;
         }
     }
@@ -309,11 +309,11 @@ impl<R: Rule> Type<R> {
         if R::HEARS_REPAIRED {
             return;
         }
-        for (afferent, weight) in self.fields.feeling(channel) {
-            let felt = &mut self.held[afferent / BLOCK][afferent % BLOCK];
+        for (lane, weight) in self.fields.feeling(channel) {
+            let felt = &mut self.held[lane / BLOCK][lane % BLOCK];
             let before = *felt;
             *felt += weight * (to - from);
-            self.rule.repair(afferent, before, *felt);
+            self.rule.repair(lane, before, *felt);
         }
     }
 }
@@ -364,12 +364,12 @@ impl Rule for Afferents {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         let from = out.len();
-        self.sa1.sample(t, held, changed, out);
-        self.fa1.sample(t, held, changed, out);
-        self.sa2.sample(t, held, changed, out);
-        self.fa2.sample(t, held, changed, out);
+        self.sa1.sample(t, held, changed, next, out);
+        self.fa1.sample(t, held, changed, next, out);
+        self.sa2.sample(t, held, changed, next, out);
+        self.fa2.sample(t, held, changed, next, out);
         sort_from(out, from);
     }
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bracket::{Bracket, check_levels};
 use super::law::Law;
-use super::sampled::{BLOCK, Block, Channels, Rule, Sampled, blocks};
+use super::sampled::{BLOCK, Block, Channels, Next, Rule, Sampled, blocks};
 use super::stream::{Stream, sort_from};
 use crate::allowed::{Range, ranges};
 use crate::parameters::Described;
@@ -334,8 +334,9 @@ impl Rule for Pairs {
     }
 
     #[inline(always)]
-    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], out: &mut Vec<Spike>) {
+    fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
+            next.fetch();
             if changed[block] && self.bracket.left(block, values) {
                 for channel in block * BLOCK..self.channels.min((block + 1) * BLOCK) {
                     let value = values[channel % BLOCK];

@@ -5,6 +5,11 @@ use super::eight::LANES;
 /// Bytes of a cache line.
 const LINE: usize = 64;
 
+/// Something that begins on a cache line's border.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct OnLine<T>(pub(crate) T);
+
 /// Numbers on a cache line's border, so that no vector straddles two lines.
 #[derive(Debug, Default)]
 pub(crate) struct Aligned {
