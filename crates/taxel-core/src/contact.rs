@@ -28,7 +28,7 @@ pub use body::{Along, Body, Ending, Material, Move, Press};
 pub use bonded::Bonded;
 pub use foam::Foam;
 pub use footprint::Footprint;
-pub use motion::{Contact, Motion, TouchKind, Track};
+pub use motion::{Contact, Motion, Narrow, TouchKind, Track};
 pub use push::Push;
 pub use scene::{Scene, Surface};
 pub use sensor::{Sensor, Taxels};

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use serde::Deserialize;
 use taxel_core::board::{Board, Crossed, Faults, Flaws, IntensityWord, Play, Played, Previous, Version2, opening};
 use taxel_core::circuit::Chain;
-use taxel_core::contact::{Act, Bonded, Contact, Foam, Motion, Pictures, Scene, Sensor, Taxels, Track};
+use taxel_core::contact::{Act, Bonded, Contact, Foam, Motion, Narrow, Pictures, Scene, Sensor, Taxels, Track};
 use taxel_core::wire::Registers;
 use taxel_core::{Array, Error, Result, Stop, reading};
 use taxel_live::address::of_text;
@@ -54,8 +54,15 @@ fn to_sensor(json: &str) -> PyResult<Sensor> {
 /// Touches as Python gets them: kind, start and stop in us, speed in m/s, peak force in N.
 type ContactsOut = Vec<(String, f64, f64, f64, f64)>;
 
-/// By body: place in mm, depth in mm and force in N at even steps; and touches.
-type MotionOut<'py> = (Vec<[Bound<'py, PyArray1<f32>>; 4]>, ContactsOut);
+/// By body: place in mm, depth in mm and force in N at even steps; touches; what is said of one that is too narrow.
+type MotionOut<'py> = (Vec<[Bound<'py, PyArray1<f32>>; 4]>, ContactsOut, Option<String>);
+
+/// By number of an act what is said of a touch that is narrower than its cells resolve.
+type NarrowOut = Vec<(usize, String)>;
+
+fn from_narrow(narrow: &[(usize, Narrow)]) -> NarrowOut {
+    narrow.iter().map(|(act, narrow)| (*act, narrow.to_string())).collect()
+}
 
 fn from_contacts(contacts: &[Contact]) -> ContactsOut {
     contacts.iter().map(|c| (c.kind.name().to_owned(), c.start_us, c.stop_us, c.speed_m_s, c.peak_n)).collect()
@@ -81,10 +88,10 @@ fn check_scene(parts: ArrayParts, json: &str, sensor: &str) -> PyResult<()> {
 fn motion<'py>(py: Python<'py>, parts: ArrayParts, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
     let felt = to_array(parts)?;
     let motion = enter(py, |_| Motion::of(&scene(json)?, &felt, step_us))?;
-    let contacts = from_contacts(&motion.contacts);
+    let (contacts, narrow) = (from_contacts(&motion.contacts), motion.narrow.map(|narrow| narrow.to_string()));
     let column = |values| array(py, values);
     let out = |t: Track| [t.x_mm, t.y_mm, t.depth_mm, t.force_n].map(column);
-    Ok((motion.tracks.into_iter().map(out).collect(), contacts))
+    Ok((motion.tracks.into_iter().map(out).collect(), contacts, narrow))
 }
 
 /// Works acts out without playing them: touches in us of the board's clock, force in N by frame. `registers` is JSON.
@@ -94,14 +101,14 @@ fn truth<'py>(
     parts: ArrayParts,
     registers: &str,
     acts: Vec<ActIn<'py>>,
-) -> PyResult<(ContactsOut, Bound<'py, PyArray1<f32>>)> {
+) -> PyResult<(ContactsOut, Bound<'py, PyArray1<f32>>, NarrowOut)> {
     let registers = parsed("registers", registers)?;
     let (array_felt, sensor) = (to_array(parts)?, Sensor::default());
     let (circuit, asynchronous, tare_ms) = (None, false, 0.0);
     let acts = to_acts(acts)?;
     let play = Play { array: array_felt, registers, sensor, seed: 0, acts, tare_ms, circuit, asynchronous };
     let stage = enter(py, |_| play.stage())?;
-    Ok((from_contacts(stage.contacts()), array(py, stage.force_n())))
+    Ok((from_contacts(stage.contacts()), array(py, stage.force_n()), from_narrow(stage.narrow())))
 }
 
 /// How a board that is played to works.
@@ -128,14 +135,14 @@ fn play<'py>(
     tare_ms: f64,
     options: &str,
     watch: Py<PyAny>,
-) -> PyResult<(EventsOut<'py>, u64, u64, u64)> {
+) -> PyResult<(EventsOut<'py>, u64, u64, u64, NarrowOut)> {
     let (array, registers, sensor) = (to_array(parts)?, parsed("registers", registers)?, to_sensor(sensor)?);
     let PlayedBy { circuit, asynchronous } = parsed("options", options)?;
     let play = Play { array, registers, sensor, seed, acts: to_acts(acts)?, tare_ms, circuit, asynchronous };
-    let Played { events, datagrams, words, bytes } = enter_telling(py, |stop, teller| {
+    let Played { events, datagrams, words, bytes, narrow } = enter_telling(py, |stop, teller| {
         play.hear(|share| teller.tell(Some(&watch), |py, told| told.call1(py, (share,))), stop)
     })?;
-    Ok((from_events(py, events), datagrams, words, bytes))
+    Ok((from_events(py, events), datagrams, words, bytes, from_narrow(&narrow)))
 }
 
 /// What an emulated board feels, as Python hands it over.
@@ -320,10 +327,11 @@ struct Layer(Shared<Bonded>);
 impl Layer {
     /// `foam` is JSON.
     #[new]
-    fn new(py: Python<'_>, parts: ArrayParts, foam: &str, tolerance: f64) -> PyResult<Self> {
+    fn new(py: Python<'_>, parts: ArrayParts, foam: &str, cells_per_pitch: u16, tolerance: f64) -> PyResult<Self> {
         let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::Scene(unfit.of("foam"))))?;
         let array = to_array(parts)?;
-        Ok(Self(Shared::new(enter(py, |_| Ok::<_, Error>(Bonded::new(&foam, &array)?.to_within(tolerance)))?)))
+        let layer = enter(py, |_| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch)?.to_within(tolerance)))?;
+        Ok(Self(Shared::new(layer)))
     }
 
     /// mm/MPa and the share that arrives at the base, by wave number in 1/mm.
@@ -335,7 +343,13 @@ impl Layer {
         Ok((array(py, compliance), array(py, share)))
     }
 
-    /// Pressure on the face and stress at the base, MPa, by taxel, where a body has sunk by so many mm.
+    /// Rows and columns of cells over the array: where they lie, mm below and right of the first taxel.
+    fn cells_mm<'py>(&self, py: Python<'py>) -> TwoOut<'py, f64, f64> {
+        let places = self.0.look(py, |layer| layer.cells_mm());
+        (array(py, places.0), array(py, places.1))
+    }
+
+    /// Pressure on the face and stress at the base, MPa, by taxel, where a body has sunk by so many mm at each cell.
     fn press<'py>(&self, py: Python<'py>, sunk: PyReadonlyArray1<'py, f64>) -> PyResult<TwoOut<'py, f64, f32>> {
         let sunk = slice("sunk", &sunk)?;
         let (pressure, base) = self.0.enter(py, |layer, _| {

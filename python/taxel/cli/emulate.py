@@ -21,6 +21,7 @@ from taxel._files import try_whole
 from taxel._opening import open_any
 from taxel.cli._app import app
 from taxel.cli._board import QUOTED_PRESETS
+from taxel.cli._listening import told
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
@@ -136,7 +137,8 @@ def emulate(
     )  # fmt: skip
     if labels is not None:
         try_whole(labels, overwrite=overwrite)
-    written = None if scene is None else SceneFile.open(scene)
+    with told(quiet=True):
+        written = None if scene is None else SceneFile.open(scene)
     said_by = _with(written or SceneFile(Scene({})), preset, known=replay is None and not pipe)
     tare = said_by.tare_ms / 1e3 if tare is None else tare
     seed = (secrets.randbelow(TRAINING_SEED) if written is None else written.seed) if seed is None else seed

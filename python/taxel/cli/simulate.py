@@ -12,6 +12,7 @@ from rich.progress import Progress
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.cli._listening import told
 
 __all__ = ["simulate"]
 
@@ -42,7 +43,8 @@ def simulate(
     from taxel.plot.film import film, writer_of  # noqa: PLC0415
     from taxel.simulate import SceneFile, play, truth  # noqa: PLC0415
 
-    said = SceneFile.open(scene)
+    with told(quiet=True):
+        said = SceneFile.open(scene)
     seed = said.seed if seed is None else seed
     wanted = [path for path in (out, movie, labels) if path is not None]
     if len({path.resolve() for path in wanted}) < len(wanted):

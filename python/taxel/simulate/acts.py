@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -89,11 +90,18 @@ class Scene:
           dashpot_ms.
         - ``surface``: "layer", foam bonded to the board, for any bodies; or "columns", for one ball that moves straight
           up and down on foam with poisson up to 0.1: the fastest.
+        - ``cells_per_pitch``: how many cells of the layer lie along the pitch of taxels; usually 1, more for a touch
+          narrower than two taxels.
         - ``slant_deg``, ``downhill_deg``: how far the array is tilted, and which way; ``lead_ms``, ``tail_ms``.
 
     Raises
     ------
     SceneError : when it is played, and a parameter makes no sense, a body is off the array or bottoms out
+
+    Warns
+    -----
+    UserWarning : when it is worked out or played for the first time, and a touch is narrower than cells resolve even at
+        its deepest: names the body, and how many cells would do
 
     Notes
     -----
@@ -114,6 +122,7 @@ class Scene:
         if not isinstance(parameters, Mapping):
             raise ProblemError(f"parameters are {shown(parameters)}: must be a mapping, as Scene.draw(seed).parameters")
         self.parameters = dict(parameters)
+        self._warned = False
 
     @classmethod
     def draw(cls, seed: int, index: int = 0, *, left_to_rest: bool = False, array: Array | None = None) -> Scene:
@@ -133,7 +142,7 @@ class Scene:
 
     def replace(self, **changes: Any) -> Scene:
         """Return the scene with parameters changed; a mapping changes some of a part, as ``foam={"dashpot_ms": 0}``."""
-        return Scene(_replaced("a scene", self.parameters, changes))
+        return Scene(_replaced("a scene", self.parameters, changes, ("cells_per_pitch",)))
 
     def body(self, n: int = 0, **changes: Any) -> Scene:
         """Return the scene with parameters of body `n` changed, as ``x_mm=80``; a mapping changes some of a part.
@@ -149,11 +158,19 @@ class Scene:
 
     def motion(self, step_us: float = 48.0, *, array: Array | None = None) -> Motion:
         """Work the scene out; by default in quarters of a frame of 5208 Hz, over the thesis' array."""
-        tracks, contacts = _core.motion(Array._of(array)._parts(), self._part(), number("step_us", step_us, "us"))
+        step = number("step_us", step_us, "us")
+        tracks, contacts, narrow = _core.motion(Array._of(array)._parts(), self._part(), step)
+        self._warn(narrow)
         return Motion(float(step_us), [Track(*track) for track in tracks], [Contact(*contact) for contact in contacts])
 
     def _part(self) -> str:
         return parameters(self.parameters)
+
+    def _warn(self, narrow: str | None) -> None:
+        """Say once of a scene that a touch is too narrow."""
+        if narrow is not None and not self._warned:
+            self._warned = True
+            warnings.warn(narrow, stacklevel=3)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scene) and self.parameters == other.parameters

@@ -143,9 +143,10 @@ def truth(
     >>> round(contacts[0].start_us), float(force[:520].max())
     (427782, 0.0)
     """
-    sensed = Array._of(array)
+    sensed, acts = Array._of(array), several("acts", acts)
     held = fitting(preset, sensed)._json()
-    contacts, force = _core.truth(sensed._parts(), held, _parts(acts, sensed))
+    contacts, force, narrow = _core.truth(sensed._parts(), held, _parts(acts, sensed))
+    _warn(acts, narrow)
     return [Contact(*contact) for contact in contacts], force
 
 
@@ -201,11 +202,11 @@ def play(
     >>> played.events.markers
     ((50300, True), (59900, False))
     """
-    sensed = Array._of(array)
+    sensed, acts = Array._of(array), several("acts", acts)
     parts, held = _parts(acts, sensed), fitting(preset, sensed)
     if wire is not None or asynchronous:
         held = held.replace(wire_version=2 if wire is None else whole("wire", wire, 1, 2))
-    events, datagrams, words, taken = _core.play(
+    events, datagrams, words, taken, narrow = _core.play(
         sensed._parts(),
         held._json(),
         parameters({} if sensor is None else mapping("sensor", sensor)),
@@ -215,6 +216,7 @@ def play(
         parameters(reading(circuit, asynchronous)),
         callback("watch", watch),
     )
+    _warn(acts, narrow)
     return Played(Events._from_parts(events), datagrams, words, taken)
 
 
@@ -370,7 +372,15 @@ def _checked(acts: Iterable[Act], array: Array) -> Iterator[Any]:
 
 
 def _parts(acts: Sequence[Act], array: Array) -> list[Any]:
-    return [_part(n, act, array) for n, act in enumerate(several("acts", acts))]
+    return [_part(n, act, array) for n, act in enumerate(acts)]
+
+
+def _warn(acts: Sequence[Act], narrow: list[tuple[int, str]]) -> None:
+    """Say of scenes, by number of the act, that a touch is too narrow."""
+    for n, said in narrow:
+        act = acts[n]
+        if isinstance(act, Scene):
+            act._warn(said)
 
 
 def _part(n: int, act: Act, array: Array) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import mapping, number, numbers, parameters
+from taxel._arguments import mapping, number, numbers, parameters, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 
@@ -23,7 +23,7 @@ class Pressed(NamedTuple):
     """What a layer answers to a body that has sunk into it."""
 
     pressure_kpa: NDArray[np.float64]
-    """On the layer's face, shape (rows, columns); nowhere negative."""
+    """On the layer's face, by taxel, shape (rows, columns); nowhere negative."""
     base_kpa: NDArray[np.float64]
     """At the layer's base, where the taxels lie; beside the body a bonded base is also pulled, a little."""
     force_n: float
@@ -40,18 +40,21 @@ class Layer:
         exponent (losses are of motion: see `Scene`).
     array : Array, optional
         The taxels that lie beneath; the thesis' where it is left out.
+    cells_per_pitch : int, 1 to 16
+        How many cells of the layer lie along the pitch of taxels: more than one for a touch narrower than two taxels.
     tolerance : float, above 0
         A solution ends when no pressure moves by more than this share of the largest.
 
     Raises
     ------
-    SceneError : foam that makes no sense
-    ProblemError : a tolerance that is none
+    SceneError : foam that makes no sense; so many cells on so large an array
+    ProblemError : a number of cells or a tolerance that is none
 
     Notes
     -----
     Carbone and Mangialardi 2008 for the face; the base's share of a wave solves the same four conditions. Contact is
-    solved by projected Gauss-Seidel, of more than 600 taxels by conjugate gradients with FFT (Polonsky and Keer 1999).
+    solved by projected Gauss-Seidel, of more than 600 cells (times `cells_per_pitch`) by conjugate gradients with FFT
+    (Polonsky and Keer 1999). A taxel feels the mean of its cells.
     Collapse and densification replace how far a body has sunk by how far it would have in a linear column under the
     same pressure (ours): exact for a wide touch, for columns and for linear foam.
 
@@ -62,16 +65,37 @@ class Layer:
     >>> ball = 1.0 - ((x - 80) ** 2 + (y - 80) ** 2) / (2 * 30)  # of 30 mm, 1 mm deep
     >>> round(layer.press(ball).force_n, 2)
     0.63
+
+    One of 2 mm, 0.1 mm deep, is narrower than a taxel:
+
+    >>> layer = Layer({"poisson": 0.1}, cells_per_pitch=4)
+    >>> y, x = layer.cells_mm
+    >>> round(layer.press(0.1 - ((x - 80) ** 2 + (y - 80) ** 2) / (2 * 2)).force_n, 4)
+    0.0036
     """
 
     def __init__(
-        self, foam: Mapping[str, float] | None = None, array: Array | None = None, *, tolerance: float = 1e-4
+        self,
+        foam: Mapping[str, float] | None = None,
+        array: Array | None = None,
+        *,
+        cells_per_pitch: int = 1,
+        tolerance: float = 1e-4,
     ) -> None:
         self.array = Array._of(array)
         self.foam: dict[str, Any] = {} if foam is None else mapping("foam", foam)
         if not 0 < number("tolerance", tolerance) < 1:
             raise ProblemError(f"tolerance is {tolerance:g}: must be above 0 and below 1")
-        self._core = _core.Layer(self.array._parts(), parameters(self.foam), number("tolerance", tolerance))
+        self.cells_per_pitch = whole("cells_per_pitch", cells_per_pitch, 1, 16)
+        self._core = _core.Layer(
+            self.array._parts(), parameters(self.foam), self.cells_per_pitch, number("tolerance", tolerance)
+        )
+
+    @property
+    def cells_mm(self) -> NDArray[np.float64]:
+        """Where the cells lie: y and x from the first taxel, each as `press` takes what has sunk there."""
+        y, x = self._core.cells_mm()
+        return np.stack(np.meshgrid(y, x, indexing="ij"))
 
     def compliance(self, waves: ArrayLike) -> NDArray[np.float64]:
         """Return how far a wave of pressure pushes the face in, mm/kPa, by wave number (1/mm)."""
@@ -86,23 +110,24 @@ class Layer:
 
         Parameters
         ----------
-        sunk_mm : float64, shape (rows, columns)
-            At each taxel; below 0 where the body is still above the face.
+        sunk_mm : float64, shape (rows, columns), each times `cells_per_pitch`
+            At each cell; below 0 where the body is still above the face.
 
         Raises
         ------
         ProblemError : another shape, or what is not finite
         """
         sunk = numbers("sunk_mm", sunk_mm, np.float64)
-        if sunk.shape != self.array.shape:
-            raise ProblemError(f"sunk_mm has shape {sunk.shape}: the array has {self.array.shape}")
+        cells = (self.array.rows * self.cells_per_pitch, self.array.columns * self.cells_per_pitch)
+        if sunk.shape != cells:
+            raise ProblemError(f"sunk_mm has shape {sunk.shape}: the array has {cells}")
         if not np.all(np.isfinite(sunk)):
             raise ProblemError("sunk_mm: must be finite")
         pressure, base = self._core.press(sunk.reshape(-1))
-        on = _KPA * pressure.reshape(sunk.shape)
+        on = _KPA * pressure.reshape(self.array.shape)
         # MPa mm^2 is N.
         force = float(pressure.sum()) * self.array.pitch_mm**2
-        return Pressed(on, _KPA * base.reshape(sunk.shape).astype(np.float64), force)
+        return Pressed(on, _KPA * base.reshape(self.array.shape).astype(np.float64), force)
 
     def forget(self) -> None:
         """Begin the next touch from nothing."""

@@ -26,7 +26,7 @@ __all__ = ["SceneFile"]
 
 #: What a file may hold beside what a scene holds.
 _OWN = ("seed", "preset", "tare_ms", "array", "taxels")
-_SCENE = ("surface", "foam", "bodies", "slant_deg", "downhill_deg", "lead_ms", "tail_ms")
+_SCENE = ("surface", "cells_per_pitch", "foam", "bodies", "slant_deg", "downhill_deg", "lead_ms", "tail_ms")
 _TAXELS = (
     "v_trans",
     "feedback_kohm",
@@ -94,6 +94,10 @@ class SceneFile:
         ------
         SceneError : no TOML, an unknown key, a value that makes no sense; names the file and the place
         OSError : a file that cannot be read
+
+        Warns
+        -----
+        UserWarning : a touch narrower than its cells resolve, as a `Scene` does
         """
         place = Path(checked_path("path", path))
         try:

@@ -2,7 +2,7 @@
 
 use super::{Board, Crossed, session};
 use crate::circuit::Chain;
-use crate::contact::{Act, Sensor, Stage, Taxels};
+use crate::contact::{Act, Narrow, Sensor, Stage, Taxels};
 use crate::wire::{Command, Decoder, Receiver, Registers, WORD_BYTES};
 use crate::{Array, Events, Result, Stop};
 
@@ -51,6 +51,8 @@ pub struct Played {
     pub words: u64,
     /// How many bytes they held.
     pub bytes: u64,
+    /// The acts, numbered from 0, with a touch that is narrower than their cells resolve.
+    pub narrow: Vec<(usize, Narrow)>,
 }
 
 impl Play {
@@ -111,6 +113,7 @@ impl Play {
             bytes += datagram.len() as u64;
             true
         };
+        let narrow = stage.narrow().to_vec();
         let (frames, second) = (stage.frames(), (1e6 / self.registers.frame_us()) as usize);
         let mut done = 0_usize;
         // The session writes the floor and the markers alone: neither moves the converter.
@@ -129,6 +132,6 @@ impl Play {
         };
         board.play(touch, &commands, hear, stop)?;
         let words = if version == 1 { bytes / WORD_BYTES as u64 } else { 0 };
-        Ok(Played { events, datagrams, words, bytes })
+        Ok(Played { events, datagrams, words, bytes, narrow })
     }
 }

@@ -1,22 +1,29 @@
 //! A foam layer bonded to the board: which pressures hold bodies off it, and what of them arrives at its base.
 //!
-//! Pressure on one cell (a taxel, or one of the cells beside the array) moves the faces of all others. Where a body has
-//! sunk by `t` into the layer at rest, pressures `p` leave the gap `g = K p - t`, and contact asks for `p >= 0`,
-//! `g >= 0` and `p g = 0` in each cell. `K` is [`surface_compliance`] at the grid's wave numbers, tabulated once.
+//! The layer's face is cut into cells, one or several along the pitch of taxels, over the array and beside it. Pressure on
+//! one cell moves the faces of all others. Where a body has sunk by `t` into the layer at rest, pressures `p` leave the gap
+//! `g = K p - t`, and contact asks for `p >= 0`, `g >= 0` and `p g = 0` in each cell. `K` is [`surface_compliance`] at the
+//! grid's wave numbers, tabulated once. A taxel feels the mean of what arrives at its own cells.
 
 use super::Foam;
 use super::layer::{base_stress, surface_compliance};
 use super::waves::{Waves, fast_length};
+use super::within;
+use crate::allowed::Range;
 use crate::vectors::wide;
-use crate::{Array, Result};
+use crate::{Array, Error, Result};
 
 /// The layer's influence has died within so many thicknesses; less than a per cent of the force arrives beyond.
 const REACH: f64 = 4.0;
 /// Planes are no longer than this where only a very thick layer's influence would ask for more, cells.
 const LONGEST: usize = 1024;
+/// Cells along a pitch: at most so many, on planes of so many cells; a plane of the largest takes some 300 MB.
+const MOST_PER_PITCH: u16 = 16;
+const LARGEST: usize = 4_000_000;
 /// Over-relaxation of a sweep.
 const RELAXATION: f64 = 1.2;
-/// More cells than these are solved by waves: a sweep costs their square, a convolution the grid whatever is loaded.
+/// More cells than these, times those along a pitch, are solved by waves: a sweep costs their square, a convolution the
+/// grid whatever is loaded. Up to these, sweeps hold the board's rate.
 pub const MOST_SWEPT: usize = 600;
 /// Sweeps and iterations end here at the latest; what a frame misses, the next one, which begins there, catches up.
 const MOST_TURNS: usize = 400;
@@ -36,14 +43,20 @@ pub struct Cell {
 #[derive(Debug)]
 pub struct Bonded {
     foam: Foam,
+    /// Cells along a pitch of taxels.
+    per_pitch: usize,
+    /// From one cell to the next, and where the array's first one lies.
     pitch_mm: f64,
+    first_mm: f64,
+    /// Cells, and those of them that lie beside the array on each side: whole taxels.
     rows: usize,
     columns: usize,
     margin: usize,
     array: (usize, usize),
     /// Displacement of a cell's face for 1 MPa on another one, mm: by rows and columns between them.
     influence: Vec<f64>,
-    /// Share of a cell's pressure that arrives at a taxel: by rows and columns between them, up to `reach`.
+    /// Share of a cell's pressure that arrives at a taxel: by the cell's row and column in its own taxel, then by rows
+    /// and columns of taxels between them, up to `reach`.
     spread: Vec<f32>,
     reach: usize,
     waves: Waves,
@@ -80,21 +93,70 @@ struct Run {
     y: usize,
 }
 
+/// How many cells a plane has, by sides, and what it is made of.
+struct Plan {
+    per_pitch: usize,
+    /// In taxels: how far the influence reaches, and what lies beside the array on each side.
+    reach: usize,
+    margin: usize,
+    tall: usize,
+    wide: usize,
+}
+
+impl Plan {
+    fn of(foam: &Foam, array: &Array, per_pitch: usize) -> Self {
+        let reach = (REACH * foam.thickness_mm / array.pitch_mm).ceil().max(1.0) as usize;
+        let margin = reach.min(usize::from(array.rows.max(array.columns)));
+        // The plane repeats: so far apart that no cell feels another's repetition, for a layer thinner than the plane.
+        let apart = |taxels: u16| {
+            let n = (usize::from(taxels) + 2 * margin) * per_pitch;
+            fast_length((n + reach * per_pitch).min(LONGEST.max(2 * n)))
+        };
+        Self { per_pitch, reach, margin, tall: apart(array.rows), wide: apart(array.columns) }
+    }
+
+    fn fits(&self) -> bool {
+        self.tall * self.wide <= LARGEST
+    }
+}
+
+/// Refuses more cells along a pitch than can be reckoned with.
+///
+/// # Errors
+///
+/// `Scene`, with how many can.
+pub fn check_cells(foam: &Foam, array: &Array, cells_per_pitch: u16) -> Result<()> {
+    let cells = f64::from(cells_per_pitch);
+    within("scene", "cells_per_pitch", cells, "", Range::within(1.0, f64::from(MOST_PER_PITCH)))?;
+    let most = most_cells(foam, array);
+    if cells_per_pitch > most {
+        return Err(Error::Scene(format!(
+            "scene: cells_per_pitch is {cells_per_pitch}: must be {most} or less on {} x {} taxels and {} mm of foam, where \
+             more would make more than {LARGEST} cells",
+            array.rows, array.columns, foam.thickness_mm
+        )));
+    }
+    Ok(())
+}
+
+/// The most cells along a pitch that can be reckoned with.
+pub(super) fn most_cells(foam: &Foam, array: &Array) -> u16 {
+    (2..=MOST_PER_PITCH).rev().find(|n| Plan::of(foam, array, usize::from(*n)).fits()).unwrap_or(1)
+}
+
 impl Bonded {
-    /// Tabulates a layer of `foam` over `array`.
+    /// Tabulates a layer of `foam` over `array`, with so many cells along the pitch of its taxels.
     ///
     /// # Errors
     ///
-    /// `Scene` where the foam makes no sense.
-    pub fn new(foam: &Foam, array: &Array) -> Result<Self> {
+    /// `Scene` where the foam makes no sense, or the cells are too many.
+    pub fn new(foam: &Foam, array: &Array, cells_per_pitch: u16) -> Result<Self> {
         foam.check()?;
-        let (pitch, thick) = (array.pitch_mm, foam.thickness_mm);
-        let reach = (REACH * thick / pitch).ceil().max(1.0) as usize;
-        let margin = reach.min(usize::from(array.rows.max(array.columns)));
-        let (rows, columns) = (usize::from(array.rows) + 2 * margin, usize::from(array.columns) + 2 * margin);
-        // The plane repeats: so far apart that no cell feels another's repetition, for a layer thinner than the plane.
-        let apart = |n: usize| fast_length((n + reach).min(LONGEST.max(2 * n)));
-        let (tall, wide) = (apart(rows), apart(columns));
+        check_cells(foam, array, cells_per_pitch)?;
+        let Plan { per_pitch, reach, margin, tall, wide } = Plan::of(foam, array, usize::from(cells_per_pitch));
+        let (pitch, thick) = (array.pitch_mm / f64::from(cells_per_pitch), foam.thickness_mm);
+        let of = |taxels: u16| (usize::from(taxels) + 2 * margin) * per_pitch;
+        let (rows, columns) = (of(array.rows), of(array.columns));
         let mut waves = Waves::new(tall, wide, pitch);
         let per_mpa = thick / (foam.modulus_kpa * 1e-3);
         let surface = waves.kernel(|q| per_mpa * surface_compliance(q * thick, foam.poisson));
@@ -106,21 +168,28 @@ impl Bonded {
             waves.plane.clone()
         };
         let (near, through) = (of_one(&surface), of_one(&base));
-        let table = |plane: &[f64], down: usize, across: usize| -> Vec<f64> {
-            let (down, across) = (down as isize, across as isize);
-            let between = |y: isize, x: isize| {
-                plane[y.rem_euclid(tall as isize) as usize * wide + x.rem_euclid(wide as isize) as usize]
-            };
-            (-down..=down).flat_map(|y| (-across..=across).map(move |x| between(y, x))).collect()
+        let on = |plane: &[f64], y: isize, x: isize| {
+            plane[y.rem_euclid(tall as isize) as usize * wide + x.rem_euclid(wide as isize) as usize]
         };
-        let influence = table(&near, rows - 1, columns - 1);
-        let spread = table(&through, reach, reach).into_iter().map(|share| share as f32).collect();
+        let (down, across) = (rows as isize - 1, columns as isize - 1);
+        let influence = (-down..=down).flat_map(|y| (-across..=across).map(move |x| (y, x)));
+        let influence = influence.map(|(y, x)| on(&near, y, x)).collect();
+        let (n, far) = (per_pitch as isize, reach as isize);
+        let mut spread = Vec::with_capacity((per_pitch * (2 * reach + 1)).pow(2));
+        for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+            for (y, x) in (-far..=far).flat_map(|y| (-far..=far).map(move |x| (y * n - row, x * n - column))) {
+                let own = (y..y + n).flat_map(|y| (x..x + n).map(move |x| (y, x)));
+                spread.push((own.map(|(y, x)| on(&through, y, x)).sum::<f64>() / (n * n) as f64) as f32);
+            }
+        }
         Ok(Self {
             foam: foam.clone(),
+            per_pitch,
             pitch_mm: pitch,
+            first_mm: (pitch - array.pitch_mm) / 2.0,
             rows,
             columns,
-            margin,
+            margin: margin * per_pitch,
             array: (usize::from(array.rows), usize::from(array.columns)),
             influence,
             spread,
@@ -152,13 +221,13 @@ impl Bonded {
     /// Where cell column or row `n` lies, mm right of or below the first taxel.
     #[must_use]
     pub fn place_mm(&self, n: usize) -> f64 {
-        (n as f64 - self.margin as f64) * self.pitch_mm
+        (n as f64 - self.margin as f64) * self.pitch_mm + self.first_mm
     }
 
     /// The grid's columns or rows (`count` of them) from one place to another.
     #[must_use]
     pub fn between(&self, from_mm: f64, to_mm: f64, count: usize) -> std::ops::Range<usize> {
-        let at = |mm: f64| (mm / self.pitch_mm + self.margin as f64).clamp(-1.0, count as f64);
+        let at = |mm: f64| ((mm - self.first_mm) / self.pitch_mm + self.margin as f64).clamp(-1.0, count as f64);
         let (first, last) = (at(from_mm).ceil().max(0.0) as usize, at(to_mm).floor());
         if last < 0.0 { 0..0 } else { first..((last as usize) + 1).min(count).max(first) }
     }
@@ -185,28 +254,47 @@ impl Bonded {
         base_stress(wave * self.foam.thickness_mm, self.foam.poisson)
     }
 
-    /// Cells that may be touched by a body that has sunk by `sunk_mm` at each taxel of the array, row by row.
+    /// Rows and columns of the cells over the array.
+    #[must_use]
+    pub fn over_array(&self) -> (usize, usize) {
+        (self.array.0 * self.per_pitch, self.array.1 * self.per_pitch)
+    }
+
+    /// Where their rows and columns lie, mm below and right of the first taxel.
+    #[must_use]
+    pub fn cells_mm(&self) -> (Vec<f64>, Vec<f64>) {
+        let (rows, columns) = self.over_array();
+        let places = |count| (0..count).map(|n| self.place_mm(n + self.margin)).collect();
+        (places(rows), places(columns))
+    }
+
+    /// Cells that may be touched by a body that has sunk by `sunk_mm` at each cell over the array, row by row.
     #[must_use]
     pub fn under(&self, sunk_mm: &[f64]) -> Vec<Cell> {
         let above = -self.bulge() * sunk_mm.iter().fold(0.0_f64, |a, b| a.max(*b));
-        let (_, columns) = self.array;
+        let (_, columns) = self.over_array();
         let at = |n: usize| (n + self.margin) as u32;
         let cell = |(k, sunk_mm): (usize, &f64)| Cell { x: at(k % columns), y: at(k / columns), sunk_mm: *sunk_mm };
         sunk_mm.iter().enumerate().map(cell).filter(|cell| cell.sunk_mm > above).collect()
     }
 
-    /// The array's pressures, row by row, MPa, of pressures on cells.
+    /// The mean pressure on each taxel of the array, row by row, MPa, of pressures on cells.
     #[must_use]
     pub fn on_array(&self, cells: &[Cell], pressure: &[f64]) -> Vec<f64> {
-        let (rows, columns) = self.array;
+        let ((rows, columns), n) = (self.array, self.per_pitch);
         let mut on = vec![0.0; rows * columns];
         for (cell, pressure) in cells.iter().zip(pressure) {
             let (x, y) = ((cell.x as usize).wrapping_sub(self.margin), (cell.y as usize).wrapping_sub(self.margin));
-            if x < columns && y < rows {
-                on[y * columns + x] = *pressure;
+            if x < columns * n && y < rows * n {
+                on[y / n * columns + x / n] += *pressure / (n * n) as f64;
             }
         }
         on
+    }
+
+    /// More cells than these are solved by waves.
+    fn most_swept(&self) -> usize {
+        MOST_SWEPT * self.per_pitch
     }
 
     /// Forgets what was touched before.
@@ -234,7 +322,7 @@ impl Bonded {
             let index = cell.y as usize * self.columns + cell.x as usize;
             pressure.push((2.0 * self.before[0][index] - self.before[1][index]).max(0.0));
         }
-        if cells.len() <= MOST_SWEPT {
+        if cells.len() <= self.most_swept() {
             self.sweep(cells);
         } else {
             self.descend(cells);
@@ -371,8 +459,10 @@ impl Bonded {
         out.clear();
         out.resize(rows * columns, 0.0);
         let loaded = pressure.iter().filter(|p| **p > 0.0).count();
-        if loaded <= MOST_SWEPT {
-            let spread = Spread { table: &self.spread, reach: self.reach, margin: self.margin, array: self.array };
+        let n = self.per_pitch;
+        if loaded <= self.most_swept() {
+            let margin = self.margin / n;
+            let spread = Spread { table: &self.spread, per_pitch: n, reach: self.reach, margin, array: self.array };
             for (cell, pressure) in cells.iter().zip(pressure) {
                 if *pressure > 0.0 {
                     spread.add(out, *cell, *pressure as f32);
@@ -386,9 +476,12 @@ impl Bonded {
         }
         self.waves.convolve(&self.base);
         for (y, row) in out.chunks_exact_mut(columns).enumerate() {
-            let from = (y + self.margin) * self.wide + self.margin;
-            for (stress, arrived) in row.iter_mut().zip(&self.waves.plane[from..from + columns]) {
-                *stress = *arrived as f32;
+            for (x, stress) in row.iter_mut().enumerate() {
+                let own = (0..n).flat_map(|down| {
+                    let from = (y * n + down + self.margin) * self.wide + x * n + self.margin;
+                    &self.waves.plane[from..from + n]
+                });
+                *stress = (own.sum::<f64>() / (n * n) as f64) as f32;
             }
         }
     }
@@ -469,10 +562,11 @@ wide! {
     }
 }
 
-/// How a cell's pressure spreads over the taxels below.
+/// How a cell's pressure spreads over the taxels below; reach and margin in taxels.
 #[derive(Clone, Copy)]
 struct Spread<'a> {
     table: &'a [f32],
+    per_pitch: usize,
     reach: usize,
     margin: usize,
     array: (usize, usize),
@@ -486,24 +580,28 @@ impl Spread<'_> {
 
 wide! {
     fn add(spread: Spread<'_>, out: &mut [f32], cell: Cell, pressure: f32) {
-        let (rows, columns) = spread.array;
+        let ((rows, columns), n) = (spread.array, spread.per_pitch);
         let side = 2 * spread.reach + 1;
-        // Taxel (x, y) is cell (x + margin, y + margin); the table's first entry is `reach` before the cell itself.
+        // The cell's taxel, and which of its cells it is. Taxel (x, y) of the array is (x + margin, y + margin); a table's
+        // first entry is `reach` before the cell's own.
+        let (own_x, own_y) = (cell.x as usize / n, cell.y as usize / n);
+        let which = cell.y as usize % n * n + cell.x as usize % n;
+        let table = &spread.table[which * side * side..(which + 1) * side * side];
         let span = |at: usize, count: usize| {
             let first = at.saturating_sub(spread.margin + spread.reach);
             let last = (at + spread.reach + 1).saturating_sub(spread.margin).min(count);
             (first, last)
         };
-        let (left, right) = span(cell.x as usize, columns);
-        let (top, bottom) = span(cell.y as usize, rows);
+        let (left, right) = span(own_x, columns);
+        let (top, bottom) = span(own_y, rows);
         if left >= right {
             return;
         }
         for y in top..bottom {
-            let down = y + spread.margin + spread.reach - cell.y as usize;
-            let across = left + spread.margin + spread.reach - cell.x as usize;
+            let down = y + spread.margin + spread.reach - own_y;
+            let across = left + spread.margin + spread.reach - own_x;
             let from = down * side + across;
-            let row = &spread.table[from..from + right - left];
+            let row = &table[from..from + right - left];
             for (stress, share) in out[y * columns + left..y * columns + right].iter_mut().zip(row) {
                 *stress += pressure * share;
             }
@@ -547,7 +645,7 @@ mod tests {
         // a / h is 0.03 here: the layer is a half-space to 2 %, less what a pitch of a / 10 leaves.
         let (radius, depth, nu) = (40.0_f64, 0.9_f64, 0.3_f64);
         let array = Array::new(72, 72, 0.4, "fine").unwrap();
-        let layer = Bonded::new(&linear(50.0, 200.0, nu), &array).unwrap();
+        let layer = Bonded::new(&linear(50.0, 200.0, nu), &array, 1).unwrap();
         let mut layer = layer.to_within(1e-7);
         let found = cells(&layer, depth, parabola(radius, (14.2, 14.2)));
         let force: f64 = layer.press(&found).iter().sum::<f64>() * layer.area_mm2();
@@ -567,7 +665,7 @@ mod tests {
             let thick = [2.0, 10.0, 40.0][round % 3];
             let array = Array::new(24, 30, draw.random_range(1.0..4.0), "drawn").unwrap();
             let foam = linear(10f64.powf(draw.random_range(0.5..3.0)), thick, nu);
-            let make = || Bonded::new(&foam, &array).unwrap().to_within(1e-9);
+            let make = || Bonded::new(&foam, &array, 1).unwrap().to_within(1e-9);
             let (mut swept, mut descended) = (make(), make());
             // One to three bodies, round or edged, from far too flat to a needle, some over the array's edge.
             let span = array.pitch_mm * 26.0;
@@ -622,7 +720,7 @@ mod tests {
         {
             let array = Array::new(40, 40, 1.5, "bulging").unwrap();
             for (radius, depth) in [(20.0, 0.05 * thick), (35.0, 0.2 * thick), (300.0, 0.1 * thick)] {
-                let mut layer = Bonded::new(&linear(60.0, thick, nu), &array).unwrap().to_within(1e-7);
+                let mut layer = Bonded::new(&linear(60.0, thick, nu), &array, 1).unwrap().to_within(1e-7);
                 let shape = parabola(radius, (29.0, 30.0));
                 let found = cells(&layer, depth, &shape);
                 let pressure = layer.press(&found).to_vec();
@@ -649,7 +747,7 @@ mod tests {
         let foam = Foam::default();
         let array = Array::new(60, 60, 2.0, "wide").unwrap();
         for depth in [0.3, 2.0, 6.0, 9.2] {
-            let mut layer = Bonded::new(&foam, &array).unwrap().to_within(1e-6);
+            let mut layer = Bonded::new(&foam, &array, 1).unwrap().to_within(1e-6);
             let found =
                 cells(
                     &layer,
@@ -672,21 +770,81 @@ mod tests {
     #[test]
     fn all_of_the_force_arrives_at_the_base() {
         let array = Array::thesis();
-        for nu in [0.0, 0.3] {
-            let mut layer = Bonded::new(&linear(60.0, 10.0, nu), &array).unwrap();
+        for (nu, per_pitch) in [(0.0, 1), (0.3, 1), (0.0, 2), (0.3, 3)] {
+            let mut layer = Bonded::new(&linear(60.0, 10.0, nu), &array, per_pitch).unwrap();
             let found = cells(&layer, 2.0, parabola(30.0, (80.0, 85.0)));
             let pressure = layer.press(&found).to_vec();
             let mut near = vec![];
             layer.arrive(&found, &pressure, &mut near);
-            let (up, down) = (pressure.iter().sum::<f64>(), near.iter().map(|s| f64::from(*s)).sum::<f64>());
-            assert!((down / up - 1.0).abs() < 1e-2, "nu {nu}: {down} of {up}");
+            let up = pressure.iter().sum::<f64>() * layer.area_mm2();
+            let down = near.iter().map(|s| f64::from(*s)).sum::<f64>() * array.pitch_mm.powi(2);
+            assert!((down / up - 1.0).abs() < 1e-2, "nu {nu}, {per_pitch}: {down} of {up} N");
+            let on = layer.on_array(&found, &pressure).iter().sum::<f64>() * array.pitch_mm.powi(2);
+            assert!((on / up - 1.0).abs() < 1e-9, "nu {nu}, {per_pitch}: {on} of {up} N");
         }
     }
 
     #[test]
+    fn cells_along_a_pitch_are_the_grid_of_as_many_taxels_and_a_taxel_feels_their_mean() {
+        let foam = linear(60.0, 3.0, 0.2);
+        for n in [2_u16, 3] {
+            let array = Array::new(16, 20, 1.5, "coarse").unwrap();
+            let pitch = 1.5 / f64::from(n);
+            let fine = Array::new(16 * n, 20 * n, pitch, "fine").unwrap();
+            let mut cut = Bonded::new(&foam, &array, n).unwrap().to_within(1e-8);
+            let mut small = Bonded::new(&foam, &fine, 1).unwrap().to_within(1e-8);
+            // The array's first cell lies before its first taxel.
+            let first = (pitch - 1.5) / 2.0;
+            let touch = cells(&cut, 0.3, parabola(6.0, (14.0, 9.0)));
+            let same = cells(&small, 0.3, parabola(6.0, (14.0 - first, 9.0 - first)));
+            assert_eq!(touch.len(), same.len());
+            let pressure = cut.press(&touch).to_vec();
+            let expected = small.press(&same).to_vec();
+            let peak = expected.iter().fold(0.0_f64, |a, b| a.max(*b));
+            for (a, b) in pressure.iter().zip(&expected) {
+                assert!((a - b).abs() < 1e-4 * peak, "{n}: {a} against {b}");
+            }
+            let (mut felt, mut by_cell) = (vec![], vec![]);
+            cut.arrive(&touch, &pressure, &mut felt);
+            small.arrive(&same, &expected, &mut by_cell);
+            let (side, columns) = (usize::from(n), 20 * usize::from(n));
+            let most = felt.iter().fold(0.0_f32, |a, b| a.max(*b));
+            for (k, stress) in felt.iter().enumerate() {
+                let (y, x) = (k / 20 * side, k % 20 * side);
+                let mean = (0..side * side).map(|c| by_cell[(y + c / side) * columns + x + c % side]).sum::<f32>()
+                    / (side * side) as f32;
+                assert!((stress - mean).abs() < 1e-3 * most, "{n}, taxel {k}: {stress} against {mean}");
+            }
+            // By waves, as of many cells, and cell by cell.
+            let (mut whole, many) = (vec![], vec![1e-3; cut.over_array().0 * cut.over_array().1]);
+            let all = cut.under(&many);
+            assert!(all.len() > cut.most_swept());
+            cut.arrive(&all, &many, &mut whole);
+            let (mut sum, mut part) = (vec![0.0_f32; felt.len()], vec![]);
+            for some in all.chunks(cut.most_swept()) {
+                cut.arrive(some, &many[..some.len()], &mut part);
+                sum.iter_mut().zip(&part).for_each(|(sum, part)| *sum += part);
+            }
+            for (k, (a, b)) in whole.iter().zip(&sum).enumerate() {
+                assert!((a - b).abs() < 2e-2 * 1e-3, "{n}, taxel {k}: {a} against {b}");
+            }
+        }
+    }
+
+    #[test]
+    fn more_cells_than_can_be_reckoned_with_are_refused_with_how_many_can() {
+        let said = |array: &Array, n: u16| check_cells(&Foam::default(), array, n).unwrap_err().to_string();
+        let (thesis, large) = (Array::thesis(), Array::new(256, 256, 2.67, "large").unwrap());
+        assert!(said(&thesis, 0).contains("cells_per_pitch is 0") && said(&thesis, 17).contains("from 1 to 16"));
+        check_cells(&Foam::default(), &thesis, 16).unwrap();
+        let most = most_cells(&Foam::default(), &large);
+        assert!((2..16).contains(&most) && said(&large, 16).contains(&format!("must be {most} or less")));
+    }
+
+    #[test]
     fn the_next_frame_begins_where_the_last_two_lead() {
-        let mut layer = Bonded::new(&linear(60.0, 10.0, 0.0), &Array::thesis()).unwrap();
-        let mut cold = Bonded::new(&linear(60.0, 10.0, 0.0), &Array::thesis()).unwrap().to_within(1e-9);
+        let mut layer = Bonded::new(&linear(60.0, 10.0, 0.0), &Array::thesis(), 1).unwrap();
+        let mut cold = Bonded::new(&linear(60.0, 10.0, 0.0), &Array::thesis(), 1).unwrap().to_within(1e-9);
         for k in 1..60 {
             let depth = 0.02 * f64::from(k);
             let found = cells(&layer, depth, parabola(35.0, (80.0, 80.0)));

@@ -1,8 +1,11 @@
 //! How bodies move, and when they really touched.
 
+use std::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::body::{Along, Body, Ending, Move, Press};
+use super::bonded::most_cells;
 use super::shape::turned;
 use super::{Bonded, Push, Scene, Surface};
 use crate::spikes::us;
@@ -92,6 +95,63 @@ pub struct Motion {
     pub pushes: Vec<Push>,
     /// The touches, by time; us from the scene's start.
     pub contacts: Vec<Contact>,
+    /// Of touches that are narrower than cells resolve, the narrowest.
+    pub narrow: Option<Narrow>,
+}
+
+/// A touch that is narrow even at its deepest: its force is too small.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Narrow {
+    /// Of which body.
+    pub body: usize,
+    /// How wide it is, mm.
+    pub width_mm: f64,
+    /// From one cell to the next, mm.
+    pub cell_mm: f64,
+    /// Cells along the pitch of taxels that would do, and the most that there may be.
+    pub cells_per_pitch: u16,
+    /// The most.
+    pub most: u16,
+}
+
+/// From so many cells across on the mean force of a touch is within 6 % of that on far finer ones (measured: balls,
+/// cylinders, edges).
+const ACROSS: f64 = 1.5;
+
+impl Narrow {
+    fn of(scene: &Scene, array: &Array, tracks: &[Track]) -> Option<Self> {
+        let most = most_cells(&scene.foam, array);
+        let of_body = |(n, track): (usize, &Track)| {
+            let touching = track.depth_mm.iter().zip(&track.force_n).filter(|(_, force)| **force > 0.0);
+            let deepest = touching.fold(0.0_f32, |deepest, (depth, _)| deepest.max(*depth));
+            let width_mm = scene.bodies[n].shape.width_mm(f64::from(deepest));
+            let enough = (ACROSS * array.pitch_mm / width_mm).ceil();
+            (width_mm > 0.0 && enough > f64::from(scene.cells_per_pitch)).then(|| Self {
+                body: n,
+                width_mm,
+                cell_mm: array.pitch_mm / f64::from(scene.cells_per_pitch),
+                cells_per_pitch: enough as u16,
+                most,
+            })
+        };
+        tracks.iter().enumerate().filter_map(of_body).min_by(|a, b| a.width_mm.total_cmp(&b.width_mm))
+    }
+}
+
+impl fmt::Display for Narrow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { body, width_mm, cell_mm, cells_per_pitch, most } = self;
+        write!(
+            f,
+            "bodies[{body}]: its touch is {width_mm:.2} mm wide at its deepest, less than {ACROSS} cells of {cell_mm:.2} mm"
+        )?;
+        write!(f, ": its force is too small; cells_per_pitch = {cells_per_pitch} would do")?;
+        if cells_per_pitch > most {
+            write!(f, ", but {most} is the most: take a smaller array.pitch_mm")
+        } else {
+            Ok(())
+        }
+    }
 }
 
 impl Motion {
@@ -113,7 +173,7 @@ impl Motion {
     /// `Scene` where the foam makes no sense.
     pub fn layer(scene: &Scene, array: &Array) -> Result<Option<Bonded>> {
         match scene.surface {
-            Surface::Layer => Bonded::new(&scene.foam, array).map(Some),
+            Surface::Layer => Bonded::new(&scene.foam, array, scene.cells_per_pitch).map(Some),
             Surface::Columns => Ok(None),
         }
     }
@@ -147,6 +207,9 @@ impl Motion {
             motion.contacts.append(&mut player.contacts);
         }
         motion.contacts.sort_by(|a, b| a.start_us.total_cmp(&b.start_us));
+        if scene.surface == Surface::Layer {
+            motion.narrow = Narrow::of(scene, array, &motion.tracks);
+        }
         Ok(motion)
     }
 
@@ -526,7 +589,16 @@ mod tests {
 
     fn alone(surface: Surface, foam: Foam, body: Body) -> Scene {
         let bodies = vec![body];
-        Scene { surface, foam, bodies, slant_deg: 0.0, downhill_deg: 0.0, lead_ms: 20.0, tail_ms: 20.0 }
+        Scene {
+            surface,
+            cells_per_pitch: 1,
+            foam,
+            bodies,
+            slant_deg: 0.0,
+            downhill_deg: 0.0,
+            lead_ms: 20.0,
+            tail_ms: 20.0,
+        }
     }
 
     fn dropped(foam: Foam, radius_mm: f64, height_mm: f64, after: u32) -> Scene {
@@ -783,6 +855,17 @@ mod tests {
         let ms = 1e-3 * (first.stop_us - first.start_us);
         assert!((4.0..16.0).contains(&ms) && first.peak_n < 0.8 * rigid, "{first:?}, rigid {rigid} N");
         assert!(motion.tracks[0].depth_mm.iter().all(|d| *d <= 10.0));
+    }
+
+    #[test]
+    fn a_touch_that_is_too_narrow_is_told_how_many_cells_would_do() {
+        // What needs more than there may be is told so; a wide touch is told nothing.
+        let press = Press { peak_n: None, depth_mm: Some(0.05), speed_mm_s: 50.0, hold_ms: 2.0, wait_ms: 0.0 };
+        let shape = Shape::Edge { slope_deg: 45.0, length_mm: 20.0, axis_deg: 0.0 };
+        let mut scene = alone(Surface::Layer, undamped(), body(shape, 36.0, Move::Pressed(press)));
+        assert!(play(&scene, 200.0).unwrap().narrow.unwrap().to_string().contains("16 is the most"));
+        scene.bodies[0].shape = Shape::Sphere { radius_mm: 60.0 };
+        assert_eq!(play(&scene, 200.0).unwrap().narrow, None);
     }
 
     #[test]

@@ -6,6 +6,7 @@ use rand::rngs::StdRng;
 use serde::{Deserialize, Serialize};
 
 use super::body::WAIT;
+use super::bonded::check_cells;
 use super::{Body, Ending, Foam, Move, Press, Shape, within};
 use crate::allowed::Range;
 use crate::{Array, Error, Result};
@@ -32,6 +33,10 @@ pub struct Scene {
     /// How what lies under them is reckoned.
     #[serde(default)]
     pub surface: Surface,
+    /// How many cells of the layer lie along the pitch of taxels: more than one where a touch is narrower than some two
+    /// taxels.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub cells_per_pitch: u16,
     /// The foam on the array.
     #[serde(default)]
     pub foam: Foam,
@@ -49,6 +54,15 @@ pub struct Scene {
     /// After all is over, ms.
     #[serde(default)]
     pub tail_ms: f64,
+}
+
+fn one() -> u16 {
+    1
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+fn is_one(value: &u16) -> bool {
+    *value == 1
 }
 
 /// Foam widens when it is pressed; columns do not, and up to here that hardly shows.
@@ -114,7 +128,16 @@ impl Scene {
             motion: Move::Dropped { height_mm, ending },
         };
         let (surface, bodies) = (Surface::Columns, vec![body]);
-        Ok(Self { surface, foam, bodies, slant_deg: 0.0, downhill_deg: 0.0, lead_ms, tail_ms: 150.0 })
+        Ok(Self {
+            surface,
+            cells_per_pitch: 1,
+            foam,
+            bodies,
+            slant_deg: 0.0,
+            downhill_deg: 0.0,
+            lead_ms,
+            tail_ms: 150.0,
+        })
     }
 
     /// Checks that the scene can be played on an array.
@@ -124,6 +147,7 @@ impl Scene {
     /// `Scene`, naming the parameter.
     pub fn check(&self, array: &Array) -> Result<()> {
         self.foam.check()?;
+        check_cells(&self.foam, array, self.cells_per_pitch)?;
         within("scene", "lead_ms", self.lead_ms, "ms", WAIT)?;
         within("scene", "tail_ms", self.tail_ms, "ms", WAIT)?;
         within("scene", "slant_deg", self.slant_deg, "degrees", Range::within(0.0, 80.0))?;
@@ -140,6 +164,12 @@ impl Scene {
             within(&place, "y_mm", body.y_mm, "mm", last(array.rows)).map_err(off)?;
         }
         if self.surface == Surface::Columns {
+            if self.cells_per_pitch > 1 {
+                return Err(Error::Scene(format!(
+                    "scene: cells_per_pitch is {}: must be 1 with surface \"columns\", which are no cells; take \"layer\"",
+                    self.cells_per_pitch
+                )));
+            }
             let [Body { shape: Shape::Sphere { radius_mm }, motion, .. }] = self.bodies.as_slice() else {
                 return Err(columns_take_one_ball());
             };

@@ -122,8 +122,7 @@ impl Shape {
             let (sin, cos) = axis_deg.to_radians().sin_cos();
             ((along * cos).abs() + (across * sin).abs(), (along * sin).abs() + (across * cos).abs())
         };
-        let chord =
-            |radius: f64| if height_mm >= radius { radius } else { (height_mm * (2.0 * radius - height_mm)).sqrt() };
+        let chord = |radius: f64| half_chord(radius, height_mm);
         match self {
             Self::Sphere { radius_mm } => (chord(*radius_mm), chord(*radius_mm)),
             Self::Cylinder { radius_mm, length_mm, axis_deg } => box_of(length_mm / 2.0, chord(*radius_mm), *axis_deg),
@@ -133,6 +132,36 @@ impl Shape {
             Self::HeightMap { heights_mm, pitch_mm } => {
                 let half = |count: usize| (count - 1) as f64 * pitch_mm / 2.0;
                 (half(heights_mm[0].len()), half(heights_mm.len()))
+            }
+        }
+    }
+
+    /// How wide the part below a height is the narrow way, mm; of a height map, whose parts differ, what a point of it
+    /// finds around itself along x or y, in the mean.
+    #[must_use]
+    pub fn width_mm(&self, height_mm: f64) -> f64 {
+        match self {
+            Self::Sphere { radius_mm } => 2.0 * half_chord(*radius_mm, height_mm),
+            Self::Cylinder { radius_mm, length_mm, .. } => length_mm.min(2.0 * half_chord(*radius_mm, height_mm)),
+            Self::Edge { slope_deg, length_mm, .. } => length_mm.min(2.0 * height_mm / slope_deg.to_radians().tan()),
+            Self::HeightMap { .. } => {
+                let (half_x, half_y) = self.reach_mm(height_mm);
+                let step = 2.0 * half_x.max(half_y) / SAMPLES as f64;
+                let count = |half: f64| (2.0 * half / step) as usize + 1;
+                let (columns, rows) = (count(half_x), count(half_y));
+                let at = |x: usize, y: usize| self.height_mm(x as f64 * step - half_x, y as f64 * step - half_y);
+                let below: Vec<bool> = (0..columns * rows).map(|k| at(k % columns, k / columns) < height_mm).collect();
+                let mut narrow = vec![usize::MAX; below.len()];
+                for y in 0..rows {
+                    runs(&below, (y * columns..(y + 1) * columns).collect(), &mut narrow);
+                }
+                for x in 0..columns {
+                    runs(&below, (x..below.len()).step_by(columns).collect(), &mut narrow);
+                }
+                let (sum, many) = narrow.iter().zip(&below).fold((0.0, 0.0), |(sum, many), (run, below)| {
+                    if *below { (sum + *run as f64, many + 1.0) } else { (sum, many) }
+                });
+                if many > 0.0 { step * sum / many } else { 0.0 }
             }
         }
     }
@@ -159,6 +188,23 @@ impl Shape {
             Self::Edge { .. } | Self::HeightMap { .. } => (0.0, 0.0, 0.0),
         }
     }
+}
+
+/// The longer side of a height map is looked at in so many places.
+const SAMPLES: usize = 400;
+
+/// Shortens what is known of each place of a line to the run of places below that it lies in.
+fn runs(below: &[bool], line: Vec<usize>, narrow: &mut [usize]) {
+    for run in line.chunk_by(|a, b| below[*a] == below[*b]) {
+        for k in run {
+            narrow[*k] = narrow[*k].min(run.len());
+        }
+    }
+}
+
+/// Half of how wide a ball is so high above its lowest point, mm.
+fn half_chord(radius: f64, height: f64) -> f64 {
+    if height >= radius { radius } else { (height * (2.0 * radius - height)).sqrt() }
 }
 
 fn arc(radius: f64, off: f64) -> f64 {
@@ -197,6 +243,33 @@ mod tests {
             }
             assert!(shape.height_mm(0.0, 0.0).is_finite());
         }
+    }
+
+    #[test]
+    fn a_height_map_is_as_wide_as_the_body_that_it_shows() {
+        let map = |of: &Shape| Shape::HeightMap {
+            heights_mm: (0..121)
+                .map(|y| {
+                    (0..161).map(|x| of.height_mm(0.1 * f64::from(x - 80), 0.1 * f64::from(y - 60)).min(9.0)).collect()
+                })
+                .collect(),
+            pitch_mm: 0.1,
+        };
+        for (shape, height, width, within) in [
+            // Of a disc the shorter of two chords through a point, in the mean.
+            (Shape::Sphere { radius_mm: 5.0 }, 0.5, 4.36, 0.22),
+            (Shape::Cylinder { radius_mm: 4.0, length_mm: 12.0, axis_deg: 0.0 }, 0.2, 2.5, 0.05),
+            (Shape::Cylinder { radius_mm: 9.0, length_mm: 1.5, axis_deg: 90.0 }, 0.9, 1.5, 0.1),
+            (Shape::Edge { slope_deg: 45.0, length_mm: 10.0, axis_deg: 90.0 }, 0.6, 1.2, 0.1),
+        ] {
+            assert!((shape.width_mm(height) / width - 1.0).abs() < 0.01, "{shape:?}: {}", shape.width_mm(height));
+            let seen = map(&shape).width_mm(height);
+            assert!((seen / width - 1.0).abs() < within, "{shape:?}: {seen} of {width}");
+        }
+        // Two ridges are no wider than one.
+        let ridges = vec![(0..81).map(|x: i32| f64::from((x - 20).abs().min((x - 60).abs()))).collect(); 9];
+        let seen = Shape::HeightMap { heights_mm: ridges, pitch_mm: 0.5 }.width_mm(2.0);
+        assert!((seen / 2.0 - 1.0).abs() < 0.1, "{seen}");
     }
 
     #[test]

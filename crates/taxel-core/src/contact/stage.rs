@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::bonded::MOST_SWEPT;
 use super::push::Sinking;
-use super::{Bonded, Contact, Footprint, Motion, Scene, Shape, Taxels, TouchKind, Track};
+use super::{Bonded, Contact, Footprint, Motion, Narrow, Scene, Shape, Taxels, TouchKind, Track};
 use crate::spikes::us;
 use crate::{Array, Error, Result};
 
@@ -48,6 +48,7 @@ pub struct Stage {
     frame_us: f64,
     parts: Vec<Part>,
     contacts: Vec<Contact>,
+    narrow: Vec<(usize, Narrow)>,
     /// Part and frame within it that come next.
     part: usize,
     frame: usize,
@@ -61,6 +62,7 @@ pub struct Stage {
 pub struct Prepared {
     part: Part,
     contacts: Vec<Contact>,
+    narrow: Option<Narrow>,
 }
 
 impl Prepared {
@@ -70,8 +72,7 @@ impl Prepared {
     ///
     /// `Scene` where the act cannot be played.
     pub fn of(array: &Array, frame_us: f64, act: &Act) -> Result<Self> {
-        let (part, contacts) = part(array, frame_us, act)?;
-        Ok(Self { part, contacts })
+        part(array, frame_us, act)
     }
 }
 
@@ -111,8 +112,8 @@ impl Stage {
             return Err(Error::Scene(format!("frame is {frame_us} us: must be above 0, at most 4000")));
         }
         let clean = (0..taxels.len()).map(|k| taxels.ticks(k, 0.0)).collect();
-        let (parts, contacts, profile, drive) = (vec![], vec![], vec![], vec![]);
-        let mut stage = Self { taxels, frame_us, parts, contacts, part: 0, frame: 0, clean, profile, drive };
+        let (parts, contacts, narrow, profile, drive) = (vec![], vec![], vec![], vec![], vec![]);
+        let mut stage = Self { taxels, frame_us, parts, contacts, narrow, part: 0, frame: 0, clean, profile, drive };
         for (n, act) in acts.iter().enumerate() {
             stage.push(Prepared::of(array, frame_us, act).map_err(|error| match error {
                 Error::Scene(text) => Error::Scene(format!("act {n}: {text}")),
@@ -130,6 +131,7 @@ impl Stage {
             stop_us: c.stop_us + offset,
             ..c
         }));
+        self.narrow.extend(act.narrow.map(|narrow| (self.parts.len(), narrow)));
         self.parts.push(act.part);
     }
 
@@ -143,6 +145,12 @@ impl Stage {
     #[must_use]
     pub fn contacts(&self) -> &[Contact] {
         &self.contacts
+    }
+
+    /// The acts, numbered from 0, with a touch that is narrower than their cells resolve.
+    #[must_use]
+    pub fn narrow(&self) -> &[(usize, Narrow)] {
+        &self.narrow
     }
 
     /// How many frames there are in all.
@@ -379,13 +387,14 @@ impl Felt {
 /// Stress that no taxel feels, MPa: a millionth of a newton on it, a hundred-thousandth of what the thesis could tell.
 const FAINT_MPA: f32 = 2e-7;
 
-fn part(array: &Array, frame_us: f64, act: &Act) -> Result<(Part, Vec<Contact>)> {
+fn part(array: &Array, frame_us: f64, act: &Act) -> Result<Prepared> {
     match act {
         Act::Silence { ms } => {
             if !(0.0..=86_400_000.0).contains(ms) {
                 return Err(Error::Scene(format!("silence of {ms} ms: must be 0 to a day")));
             }
-            Ok((Part { frames: (us(*ms) / frame_us).round() as usize, what: What::Silence }, vec![]))
+            let part = Part { frames: (us(*ms) / frame_us).round() as usize, what: What::Silence };
+            Ok(Prepared { part, contacts: vec![], narrow: None })
         }
         Act::Scene(scene) => {
             scene.check(array)?;
@@ -394,12 +403,13 @@ fn part(array: &Array, frame_us: f64, act: &Act) -> Result<(Part, Vec<Contact>)>
             if motion.len() < 2 {
                 return Err(Error::Scene(format!("scene: shorter than a quarter of a frame, {frame_us} us")));
             }
-            let (contacts, frames) = (std::mem::take(&mut motion.contacts), motion.len().div_ceil(GROUPS));
+            let (contacts, narrow) = (std::mem::take(&mut motion.contacts), motion.narrow.take());
+            let frames = motion.len().div_ceil(GROUPS);
             let what = match layer {
                 Some(layer) => What::Layer(Box::new(Felt::new(scene, layer, motion, array))),
                 None => straight(scene, motion.tracks.swap_remove(0), array)?,
             };
-            Ok((Part { frames, what }, contacts))
+            Ok(Prepared { part: Part { frames, what }, contacts, narrow })
         }
         Act::Pictures(pictures) => {
             let size = array.len();
@@ -419,7 +429,8 @@ fn part(array: &Array, frame_us: f64, act: &Act) -> Result<(Part, Vec<Contact>)>
             }
             let frames = (count as f64 * pictures.period_us / frame_us).ceil() as usize;
             let contacts = touched(pictures, count, size);
-            Ok((Part { frames, what: What::Pictures { pictures: pictures.clone(), count } }, contacts))
+            let part = Part { frames, what: What::Pictures { pictures: pictures.clone(), count } };
+            Ok(Prepared { part, contacts, narrow: None })
         }
     }
 }
