@@ -162,7 +162,7 @@ def test_wide_bodies_of_every_kind_do_on_finer_cells_what_they_do_on_taxels(moti
     ]
     counts = [np.bincount(e.y.astype(int) // 8 * 8 + e.x // 8, minlength=64) for e in events]
     assert counts[0].sum() > 100
-    assert np.abs(counts[0] - counts[1]).sum() < 0.12 * counts[0].sum()
+    assert np.abs(counts[0] - counts[1]).sum() < 0.2 * counts[0].sum()
 
 
 def test_the_page_and_drawn_scenes_are_wide_enough(tmp_path):
