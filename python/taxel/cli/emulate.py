@@ -21,7 +21,7 @@ from taxel._files import try_whole
 from taxel._opening import open_any
 from taxel.cli._app import app
 from taxel.cli._board import QUOTED_PRESETS
-from taxel.cli._listening import told
+from taxel.cli._recordings import told
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run

@@ -12,7 +12,7 @@ from rich.progress import Progress
 
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._listening import told
+from taxel.cli._recordings import told
 
 __all__ = ["simulate"]
 
