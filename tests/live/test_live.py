@@ -406,18 +406,24 @@ def test_a_full_disk_is_one_clear_error(tmp_path: Path, name: str) -> None:
         record()
 
 
-def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path) -> None:
+@pytest.mark.parametrize("differences", [False, True])
+def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path, differences: bool) -> None:
     port, events = free_port(), presses(5)
+    if differences:
+        moved = np.diff(events.intensity.astype(int), prepend=0)
+        said = Events(events.t, events.x, events.y, moved >= 0, array=SMALL, intensity=np.abs(moved))
+    else:
+        said = events
     touch().save(tmp_path / "touch.json")
     files = ["--readout", tmp_path / "touch.json", "--record", tmp_path / "live.mcap"]
     arguments = command("live", *files, "--host", LOOPBACK, "--port", port, "--array", "4x4", "--json")
     # The datagrams do not keep the board's time: here the host's clock moves nothing on.
-    arguments += ["--guard-frames", "1e6"]
+    arguments += ["--guard-frames", "1e6", *(["--differences"] if differences else [])]
     with subprocess.Popen(arguments, stdout=subprocess.PIPE, text=True) as process:
         while not (tmp_path / "live.mcap").exists():
             assert process.poll() is None
             time.sleep(0.02)
-        play(events, port)
+        play(said, port)
         assert process.stdout is not None
         lines = [json.loads(process.stdout.readline()) for _ in range(4)]
         process.send_signal(signal.SIGINT)
@@ -429,7 +435,9 @@ def test_taxel_live_writes_a_line_of_json_a_detection(tmp_path: Path) -> None:
     again = subprocess.run(command(*heard_again), capture_output=True, text=True, check=True)
     detected = json.loads(again.stdout)["detections"]
     assert detected == [{key: line[key] for key in keys} for line in lines], "one schema"
-    np.testing.assert_array_equal([line["t_us"] for line in lines], taxel.open(tmp_path / "live.mcap").detections.t)
+    recorded = taxel.open(tmp_path / "live.mcap")
+    np.testing.assert_array_equal([line["t_us"] for line in lines], recorded.detections.t)
+    np.testing.assert_array_equal(recorded.events.intensity, events.intensity)
 
 
 def test_taxel_live_prints_a_line_a_detection_where_nobody_watches(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
     CongestionOption,
+    DifferencesOption,
     FromOption,
     HostOption,
     PortOption,
@@ -57,6 +58,7 @@ def live(
         typer.Option(metavar="ROWSxCOLUMNS[xMM]", help="The sensor and its pitch; the readout's where left out."),
     ] = None,
     preset: PresetOption = None,
+    differences: DifferencesOption = False,
     address: FromOption = None,
     congestion: CongestionOption = None,
     tare: TareOption = None,
@@ -131,6 +133,7 @@ def live(
             remote=far,
             array=None if array is None else geometry(array),
             registers=preset,
+            differences=differences,
             readout=heard,
             tare=rest,
             record=record,
