@@ -122,8 +122,8 @@ impl Narrow {
     fn of(scene: &Scene, array: &Array, tracks: &[Track]) -> Option<Self> {
         let most = most_cells(&scene.foam, array);
         let of_body = |(n, track): (usize, &Track)| {
-            let touching = track.depth_mm.iter().zip(&track.force_n).filter(|(_, force)| **force > 0.0);
-            let deepest = touching.fold(0.0_f32, |deepest, (depth, _)| deepest.max(*depth));
+            // Whether it was felt or not: between cells the narrowest touch makes no force at all.
+            let deepest = track.depth_mm.iter().fold(0.0_f32, |deepest, depth| deepest.max(*depth));
             let width_mm = scene.bodies[n].shape.width_mm(f64::from(deepest));
             let enough = (ACROSS * array.pitch_mm / width_mm).ceil();
             (width_mm > 0.0 && enough > f64::from(scene.cells_per_pitch)).then(|| Self {
