@@ -739,7 +739,7 @@ SOUND: dict[str, Sound] = {
     "taxel.simulate.truth": plain(
         taxel.simulate.truth, acts=[taxel.simulate.Silence(10.0)], preset="5.2 kHz", array=None
     ),
-    "taxel.simulate.Layer": plain(taxel.simulate.Layer, foam={}, array=ARRAY, tolerance=1e-4),
+    "taxel.simulate.Layer": plain(taxel.simulate.Layer, foam={}, array=ARRAY, cells_per_pitch=2, tolerance=1e-4),
     "taxel.simulate.Layer.press": method(LAYER, "press", sunk_mm=np.full((4, 4), 0.5)),
     "taxel.simulate.Layer.forget": method(LAYER, "forget"),
     "taxel.simulate.Layer.compliance": method(LAYER, "compliance", waves=[0.1]),
