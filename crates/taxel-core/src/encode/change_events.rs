@@ -125,6 +125,8 @@ impl Rule for Changes {
         self.last = held.to_vec();
     }
 
+    const ASKS: bool = true;
+
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         let floor = self.floor;

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::law::Law;
 use super::loaded::Loaded;
-use super::sampled::{BLOCK, Block, Channels, Source, blocks};
+use super::sampled::{BLOCK, Block, Channels, Next, Source, blocks};
 use super::stream::Stream;
 use super::tare::Tare;
 use crate::allowed::{Range, ranges};
@@ -185,7 +185,7 @@ impl Stream for Area {
 
     fn push_frame(&mut self, t: i64, values: &[f32], out: &mut Vec<Spike>) -> Result<()> {
         self.source.frame(t)?;
-        self.channels.load(t, values, &mut self.held, &mut self.changed)?;
+        self.channels.load(t, values, &mut self.held, &mut self.changed, &mut Next::after(values))?;
         for (block, values) in self.held.iter().enumerate() {
             if std::mem::take(&mut self.changed[block]) {
                 self.loaded.take_block(block, values);

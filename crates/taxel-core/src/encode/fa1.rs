@@ -359,6 +359,8 @@ impl Rule for Afferents {
         }
     }
 
+    const ASKS: bool = true;
+
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         /// Written at once, needed or not, as a guess of how many there are costs more.

@@ -211,6 +211,8 @@ impl<F: Filter> Rule for ByTaxel<F> {
         self.afferents.begin(x.iter());
     }
 
+    const ASKS: bool = true;
+
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {

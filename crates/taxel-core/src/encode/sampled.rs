@@ -31,9 +31,11 @@ pub(super) trait Rule: Send + Clone + 'static {
     /// The first sample: the encoder begins as if it had always been so.
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>);
 
-    /// A later sample; only blocks that `changed` differ from the last one. Everything before `t` was passed. A rule that
-    /// takes its time over each block asks for some of what comes `next` by the way.
+    /// A later sample; only blocks that `changed` differ from the last one. Everything before `t` was passed.
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>);
+
+    /// Whether it takes its time over each block, and asks for some of what comes `next` by the way.
+    const ASKS: bool = false;
 
     /// What falls due before `t` (exclusive) while the last sample holds.
     fn pass(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
@@ -72,8 +74,8 @@ wide! {
     }
 }
 
-/// The next picture, where it follows in memory: asked for while this one is encoded, a block at a time, as memory
-/// takes only so many wishes at once.
+/// The next picture, where it follows in memory: asked for while this one is read or encoded, a block at a time, as
+/// memory takes only so many wishes at once.
 pub(super) struct Next {
     at: *const Block,
     left: usize,
@@ -86,7 +88,7 @@ impl Next {
     }
 
     /// What follows a picture.
-    fn after(picture: &[f32]) -> Self {
+    pub(super) fn after(picture: &[f32]) -> Self {
         Self { at: picture.as_ptr_range().end.cast(), left: blocks(picture.len()) }
     }
 
@@ -110,10 +112,11 @@ wide! {
 
 wide! {
     /// Takes blocks of a picture where they differ from those held.
-    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool]) -> Result<()> {
+    fn take(t: i64, new: &[Block], held: &mut [Block], changed: &mut [bool], next: &mut Next) -> Result<()> {
         /// All exponent bits: infinite or not a number.
         const NOT_FINITE: u32 = 0x7f80_0000;
         for ((new, held), changed) in new.iter().zip(held).zip(changed) {
+            next.fetch();
             let (mut other, mut bad) = (0, 0);
             for (new, held) in new.iter().zip(held.iter()) {
                 other |= new.to_bits() ^ held.to_bits();
@@ -183,18 +186,25 @@ impl Channels {
     }
 
     /// Copies a picture into blocks and marks those that changed.
-    pub(super) fn load(&self, t: i64, values: &[f32], held: &mut [Block], changed: &mut [bool]) -> Result<()> {
+    pub(super) fn load(
+        &self,
+        t: i64,
+        values: &[f32],
+        held: &mut [Block],
+        changed: &mut [bool],
+        next: &mut Next,
+    ) -> Result<()> {
         if values.len() != self.grid() {
             let (rows, columns) = (self.rows, self.columns);
             return Err(problem!("frame at {t} us: {} values, must be {rows} x {columns}", values.len()));
         }
         let Some(places) = &self.places else {
             let (whole, rest) = values.as_chunks::<BLOCK>();
-            take(t, whole, held, changed)?;
+            take(t, whole, held, changed, next)?;
             if !rest.is_empty() {
                 let mut new = [0.0; BLOCK];
                 new[..rest.len()].copy_from_slice(rest);
-                take(t, &[new], &mut held[whole.len()..], &mut changed[whole.len()..])?;
+                take(t, &[new], &mut held[whole.len()..], &mut changed[whole.len()..], next)?;
             }
             return Ok(());
         };
@@ -203,7 +213,7 @@ impl Channels {
             for (value, &place) in new.iter_mut().zip(places) {
                 *value = values[place as usize];
             }
-            take(t, &[new], &mut held[block..], &mut changed[block..])?;
+            take(t, &[new], &mut held[block..], &mut changed[block..], next)?;
         }
         Ok(())
     }
@@ -486,7 +496,10 @@ impl<R: Rule> Stream for Sampled<R> {
             let (since, period) = (ms(t - self.last), ms(self.period));
             return Err(problem!("frame at {t} us, {since} ms after the last: must come every period_ms, {period}"));
         }
-        let next = Next::after(values);
+        let (mut next, mut later) = (Next::after(values), Next::unknown());
+        if R::ASKS {
+            std::mem::swap(&mut next, &mut later);
+        }
         let values = match &mut self.above {
             Some(above) if values.len() == above.read.len() => {
                 above.read.copy_from_slice(values);
@@ -498,8 +511,8 @@ impl<R: Rule> Stream for Sampled<R> {
             }
             _ => values,
         };
-        self.channels.load(t, values, &mut self.held, &mut self.changed)?;
-        self.sample(t, next, out);
+        self.channels.load(t, values, &mut self.held, &mut self.changed, &mut next)?;
+        self.sample(t, later, out);
         Ok(())
     }
 

@@ -363,6 +363,8 @@ impl Rule for Afferents {
         self.fa2.begin(t, held, out);
     }
 
+    const ASKS: bool = true;
+
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         let from = out.len();

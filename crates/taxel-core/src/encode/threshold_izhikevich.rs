@@ -333,6 +333,8 @@ impl Rule for Pairs {
         }
     }
 
+    const ASKS: bool = true;
+
     #[inline(always)]
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>) {
         for (block, values) in held.iter().enumerate() {
