@@ -496,10 +496,8 @@ impl<R: Rule> Stream for Sampled<R> {
             let (since, period) = (ms(t - self.last), ms(self.period));
             return Err(problem!("frame at {t} us, {since} ms after the last: must come every period_ms, {period}"));
         }
-        let (mut next, mut later) = (Next::after(values), Next::unknown());
-        if R::ASKS {
-            std::mem::swap(&mut next, &mut later);
-        }
+        let (now, later) = (Next::after(values), Next::unknown());
+        let (mut now, later) = if R::ASKS { (later, now) } else { (now, later) };
         let values = match &mut self.above {
             Some(above) if values.len() == above.read.len() => {
                 above.read.copy_from_slice(values);
@@ -511,7 +509,7 @@ impl<R: Rule> Stream for Sampled<R> {
             }
             _ => values,
         };
-        self.channels.load(t, values, &mut self.held, &mut self.changed, &mut next)?;
+        self.channels.load(t, values, &mut self.held, &mut self.changed, &mut now)?;
         self.sample(t, later, out);
         Ok(())
     }
