@@ -17,7 +17,7 @@ from docutils.statemachine import StringList
 from sphinx.application import Sphinx
 
 from taxel import learn
-from taxel._parameters import Parameters
+from taxel._base.parameters import Parameters
 from taxel.cli import app as command_line
 from taxel.studies import STUDIES
 

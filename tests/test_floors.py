@@ -66,7 +66,7 @@ def excepted() -> set[tuple[str, str]]:
 def test_the_exceptions_are_nouns_that_draw_themselves() -> None:
     for importer, imported in excepted():
         assert imported == "taxel.plot"
-        assert importer.count(".") == 1
+        assert importer.count(".") == 1 or importer.startswith("taxel.recording.")
 
 
 @pytest.mark.parametrize("module", MODULES)
@@ -98,10 +98,9 @@ def test_no_module_comes_back_to_itself_by_way_of_a_package() -> None:
 #: Who reckons with thousands that are no us and ms, and why.
 THOUSANDS = {
     "taxel.spikes": "the home of us and ms; NWB counts in seconds",
-    "taxel._convert": "ns of the host's clock",
     "taxel.recording": "ns of the host's clock",
     "taxel.cli.emulate": "seconds; ns of the host's clock",
-    "taxel._clock": "ns of the host, us of the board",
+    "taxel.clock": "ns of the host, us of the board",
     "taxel.detect.exchange": "NIR counts in seconds and volts",
     "taxel.demo": "seconds, kbit/s, seeds",
     "taxel.information.answers": "bits a thousand events",

@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 
 import taxel
 from taxel import _core
-from taxel._parameters import described
+from taxel._base.parameters import described
 
 mpl.use("Agg")
 

@@ -16,7 +16,7 @@ import pytest
 
 import taxel
 from taxel import _core
-from taxel._parameters import Parameters, Value, described
+from taxel._base.parameters import Parameters, Value, described
 
 
 def of(kind: type[Parameters]) -> Iterator[type[Parameters]]:

@@ -12,7 +12,7 @@ import typer
 
 import taxel
 from taxel import _core
-from taxel._parameters import Parameters
+from taxel._base.parameters import Parameters
 from taxel.cli import app
 from taxel.encode import Encoder
 

@@ -5,11 +5,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from taxel import detect, device, encode, formats, information, learn, live, metrics, simulate, wire, wire_v2
-from taxel._convert import convert
 from taxel._core import DeviceError, Error, FormatError, NotFittedError, ProblemError, SceneError
-from taxel._health import Health, health
-from taxel._opening import open_any as open  # noqa: A004  taxel.open is a recording's
-from taxel._parts import cut, merge
 from taxel.array import Array
 from taxel.calibration import Calibration, Load
 from taxel.detect import Readout
@@ -18,7 +14,8 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Label, Labels
 from taxel.neuron import Neuron
-from taxel.recording import BoardChange, Clock, Datagrams, Note, Recording, Zeroing
+from taxel.recording import BoardChange, Clock, Datagrams, Health, Note, Recording, Zeroing, convert, cut, health, merge
+from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 

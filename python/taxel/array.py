@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import instance, number, numbers, shown, text, whole
+from taxel._base.arguments import instance, number, numbers, shown, text, whole
 from taxel._core import ProblemError
 
 __all__ = ["Array"]

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import fields, nth, shown, window
-from taxel._arguments import path as checked_path
-from taxel._columns import Columns, frozen, kept, own
+from taxel._base.arguments import fields, nth, shown, window
+from taxel._base.arguments import path as checked_path
+from taxel._base.columns import Columns, frozen, kept, own
+from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
-from taxel._files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import Self, TypeVar
 
 from taxel import _core
-from taxel._arguments import flag, instance, number, shown, text, whole
+from taxel._base.arguments import flag, instance, number, shown, text, whole
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.wire import Command, Registers

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import column, fields, instance, nth, rows, shown, window
-from taxel._columns import Columns, frozen, kept
+from taxel._base.arguments import column, fields, instance, nth, rows, shown, window
+from taxel._base.columns import Columns, frozen, kept
 from taxel._core import ProblemError
 from taxel.array import Array
 

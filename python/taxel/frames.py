@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import instance, number, shown, text, whole, window
-from taxel._columns import Columns, frozen, kept, kept_numbers
+from taxel._base.arguments import instance, number, shown, text, whole, window
+from taxel._base.columns import Columns, frozen, kept, kept_numbers
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events

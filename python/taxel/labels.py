@@ -11,10 +11,10 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import path as checked_path
-from taxel._arguments import shown
+from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import shown
+from taxel._base.files import whole_file
 from taxel._core import FormatError, ProblemError
-from taxel._files import whole_file
 
 __all__ = ["TURN_US", "Label", "Labels", "ahead_us", "beside", "write_labels"]
 

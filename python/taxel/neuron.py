@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import floats, number, numbers
+from taxel._base.arguments import floats, number, numbers
+from taxel._base.parameters import Value, defaults
 from taxel._core import ProblemError
-from taxel._parameters import Value, defaults
 from taxel.spikes import SpikeTrains
 
 __all__ = ["Neuron"]

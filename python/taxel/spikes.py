@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import bare, column, floats, nth, number, shown, text, window
-from taxel._arguments import path as checked_path
-from taxel._columns import Columns, frozen, kept
+from taxel._base.arguments import bare, column, floats, nth, number, shown, text, window
+from taxel._base.arguments import path as checked_path
+from taxel._base.columns import Columns, frozen, kept
+from taxel._base.files import whole_file, write_whole
 from taxel._core import FormatError, ProblemError
-from taxel._files import whole_file, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,15 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import instance, shown, whole
-from taxel._arguments import path as checked_path
-from taxel._arguments import text as checked_text
+from taxel._base.arguments import instance, shown, whole
+from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import text as checked_text
+from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
-from taxel._files import write_whole
-from taxel._recorded import Recorded, recorded
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recorded import Recorded, recorded
 
 __all__ = ["Tare"]
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import column, flag, instance, number, several, shown, text, whole
-from taxel._columns import frozen
+from taxel._base.arguments import column, flag, instance, number, several, shown, text, whole
+from taxel._base.columns import frozen
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.events import Events

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import whole
+from taxel._base.arguments import whole
 from taxel.array import Array
 from taxel.events import Events
 from taxel.wire import Columns, _bytes

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import Array, Events, Frames, _core
-from taxel._parameters import described
+from taxel._base.parameters import described
 from taxel.encode import FA1, ChangeEvents, ContactArea, Encoder, LevelCrossing, RunningRange
 
 from .scenes import ARRAY, at_times, frames_of, rest, spikes_of, touch, wander

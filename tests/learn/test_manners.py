@@ -12,7 +12,7 @@ import pytest
 
 import taxel
 from taxel import Events, Neuron, NotFittedError, SpikeTrains, _core, learn
-from taxel._parameters import Parameters, described
+from taxel._base.parameters import Parameters, described
 from taxel.encode import ContactArea, LevelCrossing
 from taxel.learn import ConeR, ConeX, OnlineConeR, Tempotron
 

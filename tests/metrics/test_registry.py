@@ -8,7 +8,7 @@ import pytest
 
 import taxel
 from taxel import Array, ProblemError, SpikeTrains, _core, metrics
-from taxel._parameters import described
+from taxel._base.parameters import described
 
 ROOT = Path(__file__).parents[2]
 NAMES = _core.metric_names()

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import Array, Detections, Events, Frames, SpikeTrains, Tare
-from taxel._arguments import bare, column, floats, number, whole
+from taxel._base.arguments import bare, column, floats, number, whole
 from taxel._core import ProblemError
 
 pq = pytest.importorskip("quantities")

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
 from taxel import SpikeTrains
-from taxel._arguments import column
+from taxel._base.arguments import column
 from taxel._core import FormatError, ProblemError
 
 mpl.use("Agg")

@@ -7,7 +7,7 @@ import pytest
 
 import taxel
 from taxel._core import ProblemError
-from taxel._health import _around
+from taxel.recording.health import _around
 from taxel.simulate import Board, Version2
 from taxel.wire import Registers
 

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 
 import taxel
 from taxel import _core
-from taxel._clock import Clock
+from taxel.clock import Clock
 from taxel.live import Live
 from taxel.simulate import Board
 

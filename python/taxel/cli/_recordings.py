@@ -53,7 +53,7 @@ def assignments(said: list[str]) -> dict[str, Any]:
 
 def encoder_of(name: str | None, said: list[str]) -> Encoder:
     """Return the encoder that ``--encoder`` and ``--set`` describe."""
-    from taxel._arguments import parameters  # noqa: PLC0415  the command line starts quickly
+    from taxel._base.arguments import parameters  # noqa: PLC0415  the command line starts quickly
     from taxel.encode import Encoder  # noqa: PLC0415
 
     return Encoder.from_json(parameters({**assignments(said), **({"name": name} if name else {})}))
@@ -65,8 +65,8 @@ def tare_of(said: str | None, recording: Recording) -> Tare | None:
     The stretch ends early where the board marked the start of the recording, as a board that was tared does. One
     longer than half of the recording is refused: hardly all of that was rest.
     """
-    from taxel._recorded import recorded  # noqa: PLC0415  the command line starts quickly
     from taxel.events import Events  # noqa: PLC0415
+    from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
     from taxel.tare import Tare  # noqa: PLC0415
 
     if said is None:
@@ -97,8 +97,8 @@ def tare_before(labels: Mapping[str, NDArray[np.int64]], recording: Recording) -
 
     A label that a person set may come late, so the rest ends a little earlier.
     """
-    from taxel._recorded import recorded  # noqa: PLC0415  the command line starts quickly
     from taxel.events import Events  # noqa: PLC0415
+    from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
 
     source = recorded(recording)
     ends = [int(times[0]) - _BEFORE_US for times in labels.values() if len(times)]
@@ -234,7 +234,7 @@ def of_source(recording: Recording, name: str | None) -> Recording:
 
 def open_all(paths: Sequence[Path], array: str | None = None) -> list[Recording]:
     """Open recordings one after the other; of a folder, or of another maker's file, all trials in it."""
-    from taxel._opening import open_any  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.opening import open_any  # noqa: PLC0415  the command line starts quickly
 
     opened = (open_any(path, array=None if array is None else geometry(array)) for path in paths)
     return [of_array(one, array) for each in opened for one in (each if isinstance(each, list) else [each])]

@@ -12,8 +12,8 @@ from typing import Annotated, Any, BinaryIO
 
 import typer
 
+from taxel._base.files import write_whole
 from taxel._core import ProblemError
-from taxel._files import write_whole
 from taxel.cli._app import app
 
 __all__ = ["bench"]

@@ -67,7 +67,7 @@ def calibrate(
 
     Example: taxel calibrate weight.mcap --load 9.81 --from 2 --to 4 --tare 1
     """
-    from taxel._files import try_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.calibration import Calibration  # noqa: PLC0415
 
     for wrong, why in (
@@ -142,7 +142,7 @@ def _opened(path: Path) -> Recording:
 
 
 def _read(recording: Recording, tare: str | None) -> _Read:
-    from taxel._pressure import readings  # noqa: PLC0415
+    from taxel.recording.pressure import readings  # noqa: PLC0415
 
     found = readings(recording)
     if found is None:

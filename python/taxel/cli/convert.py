@@ -37,7 +37,7 @@ def convert(
     Example: taxel convert walk.mcap walk.csv
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
-    from taxel._files import try_whole  # noqa: PLC0415
+    from taxel._base.files import try_whole  # noqa: PLC0415
 
     try_whole(target, overwrite=overwrite)
     # Shown on a terminal only, and gone when done.

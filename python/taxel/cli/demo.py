@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from taxel._files import try_whole
+from taxel._base.files import try_whole
 from taxel.cli._app import app
 from taxel.demo.script import TRAINING_SEED
 

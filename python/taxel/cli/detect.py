@@ -71,7 +71,7 @@ def detect(
 
     Example: taxel detect walk.mcap --readout gait.json --truth steps.csv --csv found.csv
     """
-    from taxel._files import try_whole, write_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel._base.files import try_whole, write_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.detect import Readout, run, score  # noqa: PLC0415
     from taxel.detect.scoring import score_together  # noqa: PLC0415
 
@@ -98,7 +98,7 @@ def detect(
     if csv is not None:
         write_whole(csv, lambda file: file.write(_table(heard).encode()), overwrite=overwrite)
     if report is not None:
-        from taxel._recorded import recorded  # noqa: PLC0415  the command line starts quickly
+        from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
         from taxel.report import Listened, write_listening  # noqa: PLC0415  pictures load slowly
 
         shown = [Listened(said.name, recorded(one), *said[1:]) for one, said in zip(opened, heard, strict=True)]

@@ -16,13 +16,13 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
+from taxel._base.files import try_whole
 from taxel._core import ProblemError
-from taxel._files import try_whole
-from taxel._opening import open_any
 from taxel.cli._app import app
 from taxel.cli._board import QUOTED_PRESETS
 from taxel.cli._recordings import told
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
+from taxel.recording.opening import open_any
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run
 from taxel.simulate.board import fitting

@@ -9,8 +9,8 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from taxel._base.files import try_whole
 from taxel._core import ProblemError, encoder_names
-from taxel._files import try_whole
 from taxel.cli._app import app
 from taxel.cli._recordings import SET_HELP, TARE_HELP, encoder_of, open_recording, tare_of, told
 

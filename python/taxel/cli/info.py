@@ -49,8 +49,8 @@ def info(
 
     Example: taxel info walk.mcap --picture walk.png --table walk.csv
     """
-    from taxel._files import try_whole, write_whole  # noqa: PLC0415
-    from taxel._pressure import above_rest  # noqa: PLC0415
+    from taxel._base.files import try_whole, write_whole  # noqa: PLC0415
+    from taxel.recording.pressure import above_rest  # noqa: PLC0415
 
     if picture is not None and picture.suffix.lower() not in _PICTURES:
         raise ProblemError(f"{picture}: a picture ends in {', '.join(_PICTURES)}")
@@ -104,7 +104,7 @@ def info(
 
 def _sources(recording: Recording, *, drawn: bool) -> dict[str, Any]:
     """Return what is said of each source of a file, and how their clocks lie to the first one's."""
-    from taxel._pressure import above_rest  # noqa: PLC0415  the command line starts quickly
+    from taxel.recording.pressure import above_rest  # noqa: PLC0415  the command line starts quickly
 
     if drawn:
         raise ProblemError(
@@ -153,7 +153,7 @@ def _opened(file: Path, array: str | None) -> Recording | list[Recording]:
 
 def about(recording: Recording, pressed: tuple[Frames, float] | None) -> dict[str, Any]:
     """Return all that `taxel info` says, as JSON holds it."""
-    from taxel._health import health  # noqa: PLC0415
+    from taxel.recording.health import health  # noqa: PLC0415
 
     array = recording.array
     table = recording.events if recording.has_events else recording.frames()
@@ -256,7 +256,7 @@ def _page(said: dict[str, Any]) -> str:
 
 
 def _contents(said: dict[str, Any]) -> Iterator[tuple[str, str]]:
-    from taxel._curves import N_PER_KPA_MM2  # noqa: PLC0415  the command line starts quickly
+    from taxel.calibration._curves import N_PER_KPA_MM2  # noqa: PLC0415  the command line starts quickly
 
     array = said["array"]
     size = f"{array['rows']} x {array['columns']} taxels, {array['pitch_mm']:g} mm, {array['name']}"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from taxel._arguments import whole
+from taxel._base.arguments import whole
 from taxel._core import ProblemError
 from taxel.cli._app import app
 from taxel.cli._array import FileArrayOption

@@ -14,8 +14,8 @@ from rich.console import Console, Group
 from rich.live import Live as Display
 from rich.text import Text
 
+from taxel._base.files import try_whole
 from taxel._core import ProblemError
-from taxel._files import try_whole
 from taxel.cli._app import SecondsOption, app
 from taxel.cli._array import geometry
 from taxel.cli._board import (

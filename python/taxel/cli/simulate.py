@@ -39,7 +39,7 @@ def simulate(
     Example: taxel simulate scene.toml -o touch.mcap --movie touch.gif
     """
     import taxel  # noqa: PLC0415  the command line starts quickly
-    from taxel._files import try_whole, write_whole  # noqa: PLC0415
+    from taxel._base.files import try_whole, write_whole  # noqa: PLC0415
     from taxel.plot.film import film, writer_of  # noqa: PLC0415
     from taxel.simulate import SceneFile, play, truth  # noqa: PLC0415
 

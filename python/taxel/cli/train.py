@@ -80,7 +80,7 @@ def train(
     Example: taxel train a.mcap b.mcap --labels events.csv --encoder contact_area --tare 0.05
     --set learner.refractory=15 --set neurons.contact.tau=0.5 --set neurons.contact.delay_ms=0.2 -o touch.json
     """
-    from taxel._files import try_whole  # noqa: PLC0415  the command line starts quickly
+    from taxel._base.files import try_whole  # noqa: PLC0415  the command line starts quickly
     from taxel.detect import Recipe, choose, judge, recipes  # noqa: PLC0415
     from taxel.detect import train as train_readout  # noqa: PLC0415
     from taxel.detect.training import changed  # noqa: PLC0415
@@ -131,7 +131,7 @@ def train(
 
 
 def _source(recording: Recording) -> Events | Frames:
-    from taxel._recorded import recorded  # noqa: PLC0415  the command line starts quickly
+    from taxel.recorded import recorded  # noqa: PLC0415  the command line starts quickly
 
     return recorded(recording)
 

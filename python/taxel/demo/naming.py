@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._files import write_whole
+from taxel._base.files import write_whole
 from taxel.demo.hearing import Hearing
 from taxel.demo.script import SLANTS_DEG, TRAINING_SEED, drawn, fall_ms
 from taxel.encode import ContactArea

@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import instance, number, shown
-from taxel._arguments import path as checked_path
+from taxel._base.arguments import instance, number, shown
+from taxel._base.arguments import path as checked_path
+from taxel._base.files import whole_file
 from taxel._core import FormatError, ProblemError
-from taxel._files import whole_file
 from taxel.array import Array
 from taxel.detect.trained import TrainedNeuron
 from taxel.encode import Encoder

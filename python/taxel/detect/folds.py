@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from taxel._arguments import callback, flag, instance, number, whole
+from taxel._base.arguments import callback, flag, instance, number, whole
 from taxel._core import ProblemError
 from taxel.detect.readout import run
 from taxel.detect.scoring import Score, score, score_together

@@ -12,11 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import floats, instance, number, parameters, shown, text, whole
-from taxel._arguments import path as checked_path
+from taxel._base.arguments import floats, instance, number, parameters, shown, text, whole
+from taxel._base.arguments import path as checked_path
+from taxel._base.files import write_whole
 from taxel._core import FormatError, NotFittedError, ProblemError
-from taxel._files import write_whole
-from taxel._recorded import recorded
 from taxel.array import Array
 from taxel.detect.exchange import read_nir, write_nir
 from taxel.detect.trained import TrainedNeuron
@@ -25,6 +24,7 @@ from taxel.encode import Encoder
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.neuron import Neuron
+from taxel.recorded import recorded
 from taxel.recording import Recording
 from taxel.tare import Tare
 from taxel.wire import FRAME_US

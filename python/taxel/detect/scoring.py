@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import column, floats, instance, numbers, shown
+from taxel._base.arguments import column, floats, instance, numbers, shown
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.spikes import to_us

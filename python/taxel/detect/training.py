@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import callback, column, instance, mapping, number, parameters, several, shown, text
+from taxel._base.arguments import callback, column, instance, mapping, number, parameters, several, shown, text
 from taxel._core import ProblemError
-from taxel._recorded import Recorded, recorded
 from taxel.array import Array
 from taxel.detect import recipes
 from taxel.detect.readout import Readout
@@ -24,6 +23,7 @@ from taxel.events import Events
 from taxel.frames import Frames
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
+from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains, to_ms
 from taxel.tare import Tare
 

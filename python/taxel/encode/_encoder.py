@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from taxel import _core
-from taxel._arguments import instance, several, shown
+from taxel._base.arguments import instance, several, shown
+from taxel._base.parameters import Value
 from taxel._core import ProblemError
-from taxel._parameters import Value
-from taxel._recorded import Recorded, recorded
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 

@@ -9,12 +9,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from taxel._arguments import number, parameters, shown, whole
+from taxel._base.arguments import number, parameters, shown, whole
 from taxel._core import ProblemError
-from taxel._recorded import Recorded, recorded
 from taxel.encode._encoder import Encoder
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 

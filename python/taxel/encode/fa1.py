@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from taxel._parameters import defaults
+from taxel._base.parameters import defaults
 from taxel.encode._encoder import Encoder
 
 __all__ = ["FA1"]

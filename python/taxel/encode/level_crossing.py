@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import ClassVar, Literal
 
-from taxel._parameters import Value, defaults
+from taxel._base.parameters import Value, defaults
 from taxel.encode._encoder import Encoder
 
 __all__ = ["LevelCrossing", "RunningRange"]

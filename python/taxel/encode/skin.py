@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import instance, shown
+from taxel._base.arguments import instance, shown
+from taxel._base.parameters import defaults
 from taxel._core import ProblemError
-from taxel._parameters import defaults
 from taxel.array import Array
 from taxel.encode._tared import Tared
 from taxel.tare import Tare

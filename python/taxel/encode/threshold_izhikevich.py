@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from typing import Literal
 
-from taxel._parameters import defaults
+from taxel._base.parameters import defaults
 from taxel.encode._encoder import Encoder
 
 __all__ = ["ThresholdIzhikevich"]

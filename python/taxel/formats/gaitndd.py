@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _arguments as arguments
+from taxel._base import arguments
 from taxel._core import FormatError, ProblemError
-from taxel._limits import ascending_us, whole_us
 from taxel.array import Array
 from taxel.formats import text
+from taxel.formats.checks import ascending_us, whole_us
 from taxel.formats.trial import MARGIN_US, Trial
 from taxel.frames import Frames
 

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _arguments as arguments
-from taxel._columns import frozen
+from taxel._base import arguments
+from taxel._base.columns import frozen
+from taxel._base.limits import unpacked
 from taxel._core import FormatError, ProblemError
-from taxel._limits import unpacked
 from taxel.array import Array
 from taxel.formats import text
 from taxel.formats.trial import Trial

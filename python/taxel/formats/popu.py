@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from taxel import _arguments as arguments
+from taxel._base import arguments
 from taxel._core import FormatError
 from taxel.array import Array
 from taxel.formats.trial import Trial

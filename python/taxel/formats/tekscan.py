@@ -15,11 +15,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _arguments as arguments
+from taxel._base import arguments
+from taxel._base.limits import TIME_US, VALUE, unpacked
 from taxel._core import FormatError
-from taxel._limits import TIME_US, VALUE, sensor, unpacked
 from taxel.array import Array
 from taxel.formats import text
+from taxel.formats.checks import sensor
 from taxel.formats.trial import Trial
 from taxel.frames import Frames
 

@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import shown
+from taxel._base.arguments import shown
+from taxel._base.limits import TEXT, VALUE
 from taxel._core import FormatError
-from taxel._limits import TEXT, VALUE
 
 __all__ = ["lines", "number", "numbers", "table"]
 

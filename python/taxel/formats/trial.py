@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _arguments as arguments
+from taxel._base import arguments
 from taxel._core import ProblemError
 from taxel.events import Events
 from taxel.frames import Frames

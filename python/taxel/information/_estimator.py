@@ -8,8 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from taxel._base.parameters import Parameters
 from taxel._core import NotFittedError, ProblemError
-from taxel._parameters import Parameters
 from taxel.information._labels import words
 
 __all__ = ["Classifier", "labelled"]

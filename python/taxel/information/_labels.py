@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import shown
+from taxel._base.arguments import shown
 from taxel._core import ProblemError
 
 __all__ = ["belonging", "one_label_a_group", "words"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from taxel._arguments import callback, instance, number, several, shown, text, whole
+from taxel._base.arguments import callback, instance, number, several, shown, text, whole
 from taxel._core import ProblemError
 from taxel.encode import FA1, ChangeEvents, Encoder
 from taxel.frames import Frames

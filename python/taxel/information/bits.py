@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import numbers, shown, whole
+from taxel._base.arguments import numbers, shown, whole
 from taxel._core import ProblemError
 from taxel.information._labels import words
 

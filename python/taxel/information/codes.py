@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import floats, instance, mapping, number, several, shown
+from taxel._base.arguments import floats, instance, mapping, number, several, shown
 from taxel._core import ProblemError
 from taxel.information.estimate import Estimate, estimate
 from taxel.information.nested import nested_predictions

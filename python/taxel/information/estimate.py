@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import callback, number, shown, whole
+from taxel._base.arguments import callback, number, shown, whole
 from taxel._core import ProblemError
 from taxel.information._labels import belonging, one_label_a_group, words
 from taxel.information.bits import (

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from threadpoolctl import threadpool_limits
 
-from taxel._arguments import callback, instance, numbers, text, whole
+from taxel._base.arguments import callback, instance, numbers, text, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import labelled
 from taxel.information._labels import words

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import shown, whole
+from taxel._base.arguments import shown, whole
 from taxel._core import ProblemError
 from taxel.information._labels import belonging, words
 

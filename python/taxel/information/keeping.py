@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import instance, number, shown
+from taxel._base.arguments import instance, number, shown
 from taxel._core import ProblemError
 from taxel.information._labels import belonging
 from taxel.information.estimate import Estimate

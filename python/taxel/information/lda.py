@@ -9,7 +9,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import number, numbers, shown, text
+from taxel._base.arguments import number, numbers, shown, text
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.gram_lda import GramLDA

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import instance, numbers, several, shown, whole
+from taxel._base.arguments import instance, numbers, several, shown, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import labelled
 from taxel.information._labels import belonging

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import instance, several
+from taxel._base.arguments import instance, several
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.encode import FA1, ChangeEvents, Encoder

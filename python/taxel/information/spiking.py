@@ -8,7 +8,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import instance, number, several, shown, text
+from taxel._base.arguments import instance, number, several, shown, text
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
 from taxel.information.sampling import Spikes

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from taxel._arguments import instance, mapping, number, path, several, shown, text, whole
+from taxel._base.arguments import instance, mapping, number, path, several, shown, text, whole
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events

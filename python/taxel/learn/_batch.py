@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import instance, several
+from taxel._base.arguments import instance, several
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner
 from taxel.spikes import SpikeTrains

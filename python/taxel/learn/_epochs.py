@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, floats, instance, several
-from taxel._parameters import defaults
+from taxel._base.arguments import callback, floats, instance, several
+from taxel._base.parameters import defaults
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner
 from taxel.neuron import Neuron

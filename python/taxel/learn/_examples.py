@@ -7,7 +7,7 @@ from typing import Any
 from numpy import float64
 from numpy.typing import NDArray
 
-from taxel._arguments import floats, instance, several
+from taxel._base.arguments import floats, instance, several
 from taxel.spikes import SpikeTrains
 
 __all__ = ["examples"]

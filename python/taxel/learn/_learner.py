@@ -9,9 +9,9 @@ from typing import Any
 from numpy import float64
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import floats, instance, several
+from taxel._base.arguments import floats, instance, several
+from taxel._base.parameters import Parameters, defaults
 from taxel._core import NotFittedError, ProblemError
-from taxel._parameters import Parameters, defaults
 from taxel.learn._examples import examples
 from taxel.metrics import f1
 from taxel.spikes import SpikeTrains

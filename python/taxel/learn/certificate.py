@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taxel._arguments import flag, instance
+from taxel._base.arguments import flag, instance
 from taxel.learn.cone_x import Certificate, ConeXProblem
 
 __all__ = ["check_certificate"]

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import callback, flag, instance, number, shown, whole
+from taxel._base.arguments import callback, flag, instance, number, shown, whole
+from taxel._base.parameters import defaults
 from taxel._core import NotFittedError, ProblemError
-from taxel._parameters import defaults
 from taxel.learn._examples import examples
 from taxel.learn._learner import SpikeLearner, predicted
 from taxel.neuron import Neuron

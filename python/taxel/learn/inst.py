@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from taxel._parameters import defaults
+from taxel._base.parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner, Updates
 
 __all__ = ["INST"]

@@ -11,9 +11,9 @@ from typing import Any, Self
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._arguments import callback, floats, instance, several
+from taxel._base.arguments import callback, floats, instance, several
+from taxel._base.parameters import defaults
 from taxel._core import ProblemError
-from taxel._parameters import defaults
 from taxel.learn.cone_r import ConeR, _keep, _warn, _weighed
 from taxel.spikes import SpikeTrains
 

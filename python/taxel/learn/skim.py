@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import instance, number
-from taxel._parameters import defaults
+from taxel._base.arguments import instance, number
+from taxel._base.parameters import defaults
 from taxel.learn._batch import BatchLearner
 from taxel.spikes import SpikeTrains
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from taxel._parameters import defaults
+from taxel._base.parameters import defaults
 from taxel.learn._epochs import AfterSpike, EpochLearner
 
 __all__ = ["SPAN"]

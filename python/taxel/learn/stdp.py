@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import instance, several
+from taxel._base.arguments import instance, several
+from taxel._base.parameters import defaults
 from taxel._core import ProblemError
-from taxel._parameters import defaults
 from taxel.learn._learner import SpikeLearner
 from taxel.spikes import SpikeTrains
 

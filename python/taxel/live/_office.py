@@ -17,15 +17,15 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from taxel._convert import convert
+from taxel._base.files import whole_file
 from taxel._core import ProblemError
-from taxel._files import whole_file
-from taxel._health import Told, judged
-from taxel._parts import cut
-from taxel._remarks import array_of
 from taxel.device import Cable, ports
 from taxel.labels import Labels, write_labels
 from taxel.recording import open_recording
+from taxel.recording.convert import convert
+from taxel.recording.health import Told, judged
+from taxel.recording.parts import cut
+from taxel.recording.remarks import array_of
 from taxel.wire import Command
 
 __all__ = ["Office", "own_addresses", "presets_path"]

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Any
 
 from taxel import _core
-from taxel._arguments import number, text
+from taxel._base.arguments import number, text
 from taxel._core import DeviceError, ProblemError
 from taxel.live.remote import told, wheel
 from taxel.live.way import Live

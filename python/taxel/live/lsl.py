@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Callable
 from typing import Any
 
-from taxel._arguments import text
+from taxel._base.arguments import text
 from taxel._core import Error, ProblemError
 
 __all__ = ["LslInlet", "LslOutlet"]

@@ -8,8 +8,8 @@ from pathlib import Path
 from types import TracebackType
 
 from taxel import _core
-from taxel._arguments import flag, text, whole
-from taxel._arguments import path as checked_path
+from taxel._base.arguments import flag, text, whole
+from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.device import Cable
 from taxel.live._office import Office

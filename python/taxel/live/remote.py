@@ -18,7 +18,7 @@ from types import TracebackType
 from typing import Any, NamedTuple
 
 from taxel import _core
-from taxel._arguments import number, shown, text
+from taxel._base.arguments import number, shown, text
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 

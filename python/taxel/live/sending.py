@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from taxel import _core
-from taxel._arguments import flag, number, several, shown, text, whole
+from taxel._base.arguments import flag, number, several, shown, text, whole
 from taxel._core import ProblemError
 from taxel.wire import FRAME_US
 

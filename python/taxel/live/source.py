@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._arguments import instance, number, numbers, parameters, text, whole
+from taxel._base.arguments import instance, number, numbers, parameters, text, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.live.sending import PORT

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any
 from urllib.parse import urlsplit
 
-from taxel._arguments import instance, number, shown, text
+from taxel._base.arguments import instance, number, shown, text
 from taxel._core import ProblemError
 from taxel.encode import Encoder
 from taxel.live.panel import Panel

@@ -16,16 +16,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import flag, instance, number, numbers, parameters, several, shown, text, whole
-from taxel._arguments import path as checked_path
+from taxel._base.arguments import flag, instance, number, numbers, parameters, several, shown, text, whole
+from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
-from taxel._remarks import Zeroing
 from taxel.array import Array
 from taxel.detect import Readout
 from taxel.detections import Detections
 from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.remote import Remote
 from taxel.live.sending import PORT
+from taxel.recording.remarks import Zeroing
 from taxel.tare import Tare
 from taxel.wire import Registers
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._arguments import bare, floats, instance, number, parameters, several, shown, text
+from taxel._base.arguments import bare, floats, instance, number, parameters, several, shown, text
+from taxel._base.parameters import ranges
 from taxel._core import ProblemError
-from taxel._parameters import ranges
 from taxel.array import Array
 from taxel.spikes import SpikeTrains
 

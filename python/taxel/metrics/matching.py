@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import floats, number, several
+from taxel._base.arguments import floats, number, several
+from taxel._base.parameters import defaults
 from taxel._core import ProblemError
-from taxel._parameters import defaults
 
 __all__ = ["Matching", "f1", "matching"]
 

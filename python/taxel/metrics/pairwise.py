@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import callback, whole
+from taxel._base.arguments import callback, whole
 from taxel.metrics._metric import Pattern, listed, stated
 from taxel.spikes import SpikeTrains
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from taxel._parameters import defaults
+from taxel._base.parameters import defaults
 from taxel.metrics._metric import Pattern, distance
 
 __all__ = ["van_rossum_absolute"]

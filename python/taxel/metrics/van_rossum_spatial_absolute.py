@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from taxel._arguments import instance
-from taxel._parameters import defaults
+from taxel._base.arguments import instance
+from taxel._base.parameters import defaults
 from taxel.array import Array
 from taxel.metrics._metric import distance
 from taxel.spikes import SpikeTrains

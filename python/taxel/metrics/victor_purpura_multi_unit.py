@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from taxel._arguments import instance
+from taxel._base.arguments import instance
 from taxel.metrics._metric import distance
 from taxel.spikes import SpikeTrains
 

@@ -16,9 +16,9 @@ from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
 from numpy.typing import NDArray
 
-from taxel._arguments import number
+from taxel._base.arguments import number
+from taxel._base.files import write_whole
 from taxel._core import ProblemError
-from taxel._files import write_whole
 from taxel.events import Events
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US

@@ -8,15 +8,15 @@ from html import escape
 
 from matplotlib.figure import Figure
 
-from taxel._arguments import shown
+from taxel._base.arguments import shown
 from taxel._core import ProblemError
-from taxel._health import Health
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.plot.nouns import detections, event_picture, pressure_map, raster
 from taxel.plot.recordings import health_map, overview
 from taxel.recording import Recording
+from taxel.recording.health import Health
 from taxel.spikes import SpikeTrains
 
 __all__ = ["html"]

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, Normalize
 
-from taxel._arguments import instance, number, shown
+from taxel._base.arguments import instance, number, shown
 from taxel._core import ProblemError
 from taxel.detections import Detections
 from taxel.events import Events

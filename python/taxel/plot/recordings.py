@@ -9,13 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 
-from taxel._arguments import instance
+from taxel._base.arguments import instance
 from taxel.frames import Frames
 from taxel.plot.nouns import axes
 
 if TYPE_CHECKING:
-    from taxel._health import Health
     from taxel.recording import Recording
+    from taxel.recording.health import Health
 
 __all__ = ["health_map", "overview", "pressure"]
 
@@ -30,8 +30,8 @@ def overview(recording: Recording, figure: None = None) -> Figure: ...
 def overview(recording: Recording, figure: F) -> F: ...
 def overview(recording: Recording, figure: FigureBase | None = None) -> FigureBase:
     """Draw events a second (or the sum of pressure) over time, and the activity of each taxel."""
-    from taxel._health import health  # noqa: PLC0415  health draws itself here
     from taxel.recording import Recording  # noqa: PLC0415  a recording draws itself here
+    from taxel.recording.health import health  # noqa: PLC0415  health draws itself here
 
     instance("recording", recording, Recording)
 
@@ -92,7 +92,7 @@ def pressure(frames: Frames, above: float = 0.0, figure: FigureBase | None = Non
 
 def health_map(health: Health, ax: Axes | None = None) -> Axes:
     """Draw the activity of each taxel, with those marked that are dead, stuck or noisy."""
-    from taxel._health import Health  # noqa: PLC0415  health draws itself here
+    from taxel.recording.health import Health  # noqa: PLC0415  health draws itself here
 
     instance("health", health, Health)
     ax = axes(ax, (5, 4.4))

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import matplotlib as mpl
 import numpy as np
 
-from taxel._arguments import instance
-from taxel._files import write_whole
+from taxel._base.arguments import instance
+from taxel._base.files import write_whole
 from taxel.information import Answer, Point
 from taxel.report.charts import STYLE, chart
 from taxel.report.page import render

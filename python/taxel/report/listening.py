@@ -16,9 +16,9 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from numpy.typing import NDArray
 
-from taxel._arguments import instance
+from taxel._base.arguments import instance
+from taxel._base.files import write_whole
 from taxel._core import ProblemError
-from taxel._files import write_whole
 from taxel.array import Array
 from taxel.detect import Readout, Score
 from taxel.detections import Detections

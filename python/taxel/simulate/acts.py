@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import flag, number, numbers, parameters, shown, whole
+from taxel._base.arguments import flag, number, numbers, parameters, shown, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from taxel import _core
-from taxel._arguments import flag, instance, numbers, text, whole
+from taxel._base.arguments import flag, instance, numbers, text, whole
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.simulate.circuit import Circuit

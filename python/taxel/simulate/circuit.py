@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import floats, number, numbers, shown
+from taxel._base.arguments import floats, number, numbers, shown
+from taxel._base.parameters import Value, defaults
 from taxel._core import ProblemError
-from taxel._parameters import Value, defaults
 
 __all__ = ["AdaptiveRamp", "Circuit", "Converted", "Converter", "Divider", "Fabric", "Trace", "VirtualGround"]
 

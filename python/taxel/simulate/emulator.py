@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import callback, instance, mapping, number, parameters, several, shown, text, whole
-from taxel._arguments import path as checked_path
+from taxel._base.arguments import callback, instance, mapping, number, parameters, several, shown, text, whole
+from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events

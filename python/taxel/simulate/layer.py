@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import mapping, number, numbers, parameters, whole
+from taxel._base.arguments import mapping, number, numbers, parameters, whole
 from taxel._core import ProblemError
 from taxel.array import Array
 

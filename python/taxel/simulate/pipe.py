@@ -6,7 +6,7 @@ import json
 import os
 from typing import IO, Any
 
-from taxel._arguments import number, whole
+from taxel._base.arguments import number, whole
 from taxel._core import DeviceError, FormatError, ProblemError
 from taxel.array import Array
 from taxel.wire import Registers

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel._arguments import number, shown
+from taxel._base.arguments import number, shown
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events

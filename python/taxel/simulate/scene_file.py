@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from taxel import _core
-from taxel._arguments import number, text, whole
-from taxel._arguments import path as checked_path
+from taxel._base.arguments import number, text, whole
+from taxel._base.arguments import path as checked_path
 from taxel._core import SceneError
 from taxel.array import Array
 from taxel.simulate.acts import Act, Scene, Silence

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from taxel._arguments import mapping, number, shown, whole
+from taxel._base.arguments import mapping, number, shown, whole
 from taxel._core import ProblemError
 
 __all__ = ["Faults", "Flaws"]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from taxel import simulate
+from taxel._base.files import write_whole
 from taxel._core import SceneError
-from taxel._files import write_whole
 from taxel.array import Array
 from taxel.encode import ChangeEvents
 from taxel.events import Events

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from taxel._files import write_whole
+from taxel._base.files import write_whole
 from taxel.report.page import render
 from taxel.studies import STUDIES, load
 from taxel.studies.study import Section, read_section

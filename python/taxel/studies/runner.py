@@ -21,10 +21,10 @@ from typing import Any
 import joblib
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from taxel import _arguments as arguments
 from taxel import _core
+from taxel._base import arguments
+from taxel._base.files import source_digest
 from taxel._core import DeviceError, ProblemError
-from taxel._files import source_digest
 
 __all__ = ["BACKENDS", "HERE", "Results", "Task", "Workers", "code_digest", "run"]
 

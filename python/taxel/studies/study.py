@@ -18,9 +18,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from taxel import __version__
-from taxel import _arguments as arguments
+from taxel._base import arguments
+from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
-from taxel._files import write_whole
 from taxel.studies.runner import HERE, Results, Task, Workers, code_digest, run
 
 if TYPE_CHECKING:

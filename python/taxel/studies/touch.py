@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import detect, encode, information, labels, simulate
-from taxel._convert import convert
 from taxel.detect import Example, Recipe, run, score
 from taxel.detect import train as train_readout
 from taxel.detections import Detections
@@ -28,6 +27,7 @@ from taxel.frames import Frames
 from taxel.information import LDA, folds
 from taxel.labels import Labels
 from taxel.recording import open_recording
+from taxel.recording.convert import convert
 from taxel.simulate import Act, Contact, Scene, Silence, play, truth
 from taxel.spikes import to_ms, to_us
 from taxel.studies.runner import Task

@@ -15,8 +15,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from taxel._arguments import path as checked_path
-from taxel._arguments import shown, text
+from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import shown, text
 from taxel._core import FormatError, ProblemError
 from taxel.events import Events
 from taxel.frames import Frames

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
-from taxel._arguments import number
+from taxel._base.arguments import number
 from taxel._core import ProblemError
 from taxel.simulate.fem.indentation import Indentation
 

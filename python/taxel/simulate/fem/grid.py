@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import instance, number, shown, whole
+from taxel._base.arguments import instance, number, shown, whole
 from taxel._core import ProblemError
 from taxel.simulate.fem.indentation import Course
 

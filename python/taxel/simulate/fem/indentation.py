@@ -12,9 +12,9 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import callback, instance, number
+from taxel._base.arguments import callback, instance, number
+from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
-from taxel._files import write_whole
 from taxel.simulate.fem.contact import Contact
 from taxel.simulate.fem.material import DRAGON_SKIN_10, Yeoh
 from taxel.simulate.fem.mesh import Mesh, block, half_disc

@@ -6,9 +6,9 @@ import hashlib
 import json
 from pathlib import Path
 
-from taxel._arguments import instance
-from taxel._arguments import path as checked_path
-from taxel._files import source_digest
+from taxel._base.arguments import instance
+from taxel._base.arguments import path as checked_path
+from taxel._base.files import source_digest
 from taxel.simulate.fem import contact, indentation, material, mesh, solids, solver
 from taxel.simulate.fem.indentation import Course, Indentation, press
 

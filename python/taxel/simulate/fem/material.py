@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import number
+from taxel._base.arguments import number
 from taxel._core import ProblemError
 
 __all__ = ["DRAGON_SKIN_10", "Yeoh"]

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel import _arguments as arguments
+from taxel._base import arguments
 from taxel._core import ProblemError
 from taxel.studies.gait import folds, protocols, sources
 from taxel.studies.gait.folds import Scope

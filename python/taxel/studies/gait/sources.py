@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _arguments as arguments
 from taxel import formats
+from taxel._base import arguments
+from taxel._base.parameters import defaults
 from taxel._core import FormatError
-from taxel._parameters import defaults
 from taxel.array import Array
 from taxel.encode import Encoder
 from taxel.formats import Trial, plate

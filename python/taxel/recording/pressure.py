@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._parameters import defaults
+from taxel._base.parameters import defaults
 from taxel.events import Events
 from taxel.frames import Frames
-from taxel.recording import Recording
+from taxel.recording.recording import Recording
 
 __all__ = ["above_rest", "readings"]
 

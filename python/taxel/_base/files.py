@@ -11,8 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from taxel._arguments import flag
-from taxel._arguments import path as checked_path
+from taxel._base.arguments import flag
+from taxel._base.arguments import path as checked_path
 
 __all__ = ["source_digest", "try_whole", "whole_file", "write_whole"]
 

@@ -13,20 +13,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import _arguments as arguments
 from taxel import _core
-from taxel._arguments import flag, instance, number, several, shown, text, window
-from taxel._clock import Clock
+from taxel._base import arguments
+from taxel._base.arguments import flag, instance, number, several, shown, text, window
 from taxel._core import FormatError, ProblemError
-from taxel._h5 import read_h5
-from taxel._remarks import Note, Remarks, Zeroing, array_of, detections_of, notes_of, zeroings_of
-from taxel._tables import read_csv, read_npz
 from taxel.array import Array
 from taxel.calibration import Calibration
+from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Labels, beside
+from taxel.recording.h5 import read_h5
+from taxel.recording.remarks import Note, Remarks, Zeroing, array_of, detections_of, notes_of, zeroings_of
+from taxel.recording.tables import read_csv, read_npz
 from taxel.tare import Tare
 from taxel.wire import Registers
 

@@ -14,17 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core, wire
-from taxel._arguments import flag, path, shown, text
+from taxel._base.arguments import flag, path, shown, text
+from taxel._base.files import whole_file, write_whole
 from taxel._core import ProblemError
-from taxel._files import whole_file, write_whole
-from taxel._h5 import write_h5
-from taxel._remarks import Remarks
-from taxel._tables import write_csv, write_npz
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import TURN_US
-from taxel.recording import Datagrams, Recording, _Source, open_recording, period_us
+from taxel.recording.h5 import write_h5
+from taxel.recording.recording import Datagrams, Recording, _Source, open_recording, period_us
+from taxel.recording.remarks import Remarks
+from taxel.recording.tables import write_csv, write_npz
 
 __all__ = ["KINDS", "convert"]
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import shown
+from taxel._base.arguments import shown
 from taxel._core import ProblemError
-from taxel._recorded import Recorded
-from taxel._recorded import recorded as held_by
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recorded import Recorded
+from taxel.recorded import recorded as held_by
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from taxel._base.limits import DESCRIPTION, unpacked
 from taxel._core import FormatError
-from taxel._limits import DESCRIPTION, unpacked
-from taxel._remarks import Remarks
-from taxel._tables import columns_of, table_of
 from taxel.array import Array
 from taxel.events import Events
 from taxel.frames import Frames
+from taxel.recording.remarks import Remarks
+from taxel.recording.tables import columns_of, table_of
 
 __all__ = ["is_ours", "read_h5", "write_h5"]
 

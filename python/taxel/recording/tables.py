@@ -19,15 +19,15 @@ from typing import IO, Any, BinaryIO, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._arguments import shown
-from taxel._columns import frozen
+from taxel._base.arguments import shown
+from taxel._base.columns import frozen
+from taxel._base.limits import COLUMNS, DESCRIPTION, TAXELS, UNPACKED, VALUE, unpacked
 from taxel._core import FormatError, ProblemError
-from taxel._limits import COLUMNS, DESCRIPTION, TAXELS, UNPACKED, VALUE, unpacked
-from taxel._limits import table as limited
-from taxel._remarks import Remarks
 from taxel.array import Array
 from taxel.events import Events
+from taxel.formats.checks import table as limited
 from taxel.frames import Frames
+from taxel.recording.remarks import Remarks
 
 __all__ = ["columns_of", "read_csv", "read_npz", "table_of", "write_csv", "write_npz"]
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from taxel._arguments import flag, instance, number, several, shown, text, window
+from taxel._base.arguments import flag, instance, number, several, shown, text, window
 from taxel._core import ProblemError
-from taxel._remarks import Note, Remarks, Zeroing
 from taxel.array import Array
 from taxel.detections import Detections
 from taxel.events import Events, repaired_of
 from taxel.frames import Frames
-from taxel.recording import Recording, in_memory
+from taxel.recording.recording import Recording, in_memory
+from taxel.recording.remarks import Note, Remarks, Zeroing
 
 __all__ = ["cut", "merge"]
 

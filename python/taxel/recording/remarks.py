@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from taxel import _limits
-from taxel._arguments import number, text, whole
+from taxel._base import limits
+from taxel._base.arguments import number, text, whole
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.detections import Detections
+from taxel.formats.checks import sensor
 from taxel.wire import Registers
 
 __all__ = ["Note", "Remarks", "Zeroing", "array_of", "detections_of", "notes_of", "zeroings_of"]
@@ -115,14 +116,14 @@ class Remarks:
         ------
         FormatError : no JSON as taxel writes it (names the entry)
         """
-        _limits.unpacked(place, len(said), _limits.DESCRIPTION)
+        limits.unpacked(place, len(said), limits.DESCRIPTION)
         entry = "the whole"
         try:
             about = json.loads(said)
             if not isinstance(about, dict):
                 raise ProblemError("no object")
             entry = "array"
-            array = None if about.get(entry) is None else _limits.sensor(place, array_of(about[entry]))
+            array = None if about.get(entry) is None else sensor(place, array_of(about[entry]))
             entry = "registers"
             if about.get(entry) is not None:
                 Registers._of(about[entry], array or Array.thesis())
@@ -160,7 +161,7 @@ def notes_of(said: Any) -> tuple[Note, ...]:
     return tuple(
         Note(
             text("text", n["text"]),
-            None if n["t_us"] is None else whole("t_us", n["t_us"], -_limits.TIME_US, _limits.TIME_US),
+            None if n["t_us"] is None else whole("t_us", n["t_us"], -limits.TIME_US, limits.TIME_US),
             whole("at_ns", n["at_ns"]),
         )
         for n in said
@@ -180,7 +181,7 @@ def zeroings_of(said: Any) -> tuple[Zeroing, ...]:
     """Return zeroed taxels, in order of time, from records of t, x, y, rest and before."""
     zeroings = (
         Zeroing(
-            whole("t", one["t"], -_limits.TIME_US, _limits.TIME_US),
+            whole("t", one["t"], -limits.TIME_US, limits.TIME_US),
             whole("x", one["x"], 0, 65_535),
             whole("y", one["y"], 0, 65_535),
             number("rest", one["rest"]),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._arguments import column, numbers
+from taxel._base.arguments import column, numbers
 
 __all__ = ["Columns", "frozen", "kept", "kept_numbers", "own"]
 

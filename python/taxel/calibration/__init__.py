@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._arguments import flag, instance, mapping, number, numbers, several, shown, whole
-from taxel._arguments import path as checked_path
-from taxel._arguments import text as checked_text
+from taxel._base.arguments import flag, instance, mapping, number, numbers, several, shown, whole
+from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import text as checked_text
+from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
-from taxel._curves import N_PER_KPA_MM2, Curve, Law, Power, Table, Values, above_0, curve_of
-from taxel._files import write_whole
 from taxel.array import Array
+from taxel.calibration._curves import N_PER_KPA_MM2, Curve, Law, Power, Table, Values, above_0, curve_of
 from taxel.frames import Frames
 from taxel.tare import Tare
 

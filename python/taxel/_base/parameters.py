@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import Any, ClassVar, Self
 
 from taxel import _core
-from taxel._arguments import bare, flag, instance, parameters, shown
+from taxel._base.arguments import bare, flag, instance, parameters, shown
 from taxel._core import ProblemError
 
 __all__ = ["Parameters", "Value", "defaults", "described", "ranges"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import _core
-from taxel._arguments import floats, mapping, number, numbers, parameters, shown
+from taxel._base.arguments import floats, mapping, number, numbers, parameters, shown
 from taxel._core import ProblemError
 
 __all__ = ["N_PER_KPA_MM2", "Curve", "Law", "Power", "Table", "Values", "above_0", "curve_of"]

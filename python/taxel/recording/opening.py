@@ -8,15 +8,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from taxel import _arguments as arguments
 from taxel import formats
+from taxel._base import arguments
 from taxel._core import FormatError
-from taxel._h5 import is_ours
-from taxel._remarks import Note, Remarks
 from taxel.array import Array
 from taxel.formats import Trial
 from taxel.labels import Labels
-from taxel.recording import ENDINGS, Clock, Recording, in_memory, open_recording
+from taxel.recording.h5 import is_ours
+from taxel.recording.recording import ENDINGS, Clock, Recording, in_memory, open_recording
+from taxel.recording.remarks import Note, Remarks
 
 __all__ = ["open_any"]
 
@@ -58,8 +58,8 @@ def open_any(
     Notes
     -----
     A .csv holds events as ``t_us,x,y,p[,intensity]``, or frames as ``t_us`` and a column a taxel. The layout of a .h5
-    stands in `taxel._h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) appear as notes of the
-    recordings that it names; where a folder holds files of ours, other files in it are not looked at.
+    stands in `taxel.recording.h5`. The reference events of a ``labels.csv`` in a folder (`taxel.Labels`) appear as
+    notes of the recordings that it names; where a folder holds files of ours, other files in it are not looked at.
 
     Examples
     --------
