@@ -16,7 +16,8 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 import taxel
-from taxel import _limits, formats
+from taxel import formats
+from taxel._base import limits
 from taxel._core import FormatError
 from taxel.live import Live
 
@@ -95,7 +96,7 @@ def test_a_huge_text_in_a_description_is_refused(tmp_path: Path) -> None:
 def test_a_sensor_that_is_too_large_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
     np.savez(path, t=[0], x=[60_000], y=[60_000], p=[True])
-    refused(path, f"60001 x 60001 taxels; at most {_limits.TAXELS}")
+    refused(path, f"60001 x 60001 taxels; at most {limits.TAXELS}")
     huge = {"rows": 65_535, "columns": 65_535, "pitch_mm": 1.0, "name": ""}
     with pytest.raises(taxel.ProblemError, match="65535 x 65535 taxels; at most"):
         record(tmp_path / "a.mcap", some_events(), header={"array": huge})
@@ -112,7 +113,7 @@ def test_a_time_out_of_all_reason_is_refused(tmp_path: Path) -> None:
 def test_a_table_of_very_many_columns_is_refused_before_it_is_read(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("t_us" + ",a" * 3_000_000 + "\n")
-    refused(path, f"line 1: 3000001 columns; at most {_limits.COLUMNS}")
+    refused(path, f"line 1: 3000001 columns; at most {limits.COLUMNS}")
     path.write_text("t_us,x0y0,x2000y2000\n" + "".join(f"{k},1,1\n" for k in range(1000)))
     refused(path, "most are missing")
 
@@ -172,8 +173,8 @@ def test_what_is_just_within_the_limits_is_read(tmp_path: Path) -> None:
     packed(path, 900)
     assert len(taxel.open(path).datagrams()) == 900
     table = tmp_path / "a.csv"
-    names = ",".join(f"x{k % 256}y{k // 256}" for k in range(_limits.COLUMNS - 1))
-    table.write_text(f"t_us,{names}\n" + ",".join(["0"] * _limits.COLUMNS) + "\n")
+    names = ",".join(f"x{k % 256}y{k // 256}" for k in range(limits.COLUMNS - 1))
+    table.write_text(f"t_us,{names}\n" + ",".join(["0"] * limits.COLUMNS) + "\n")
     assert taxel.open(table).frames().values.shape == (1, 256, 256)
 
 
