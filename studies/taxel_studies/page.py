@@ -6,7 +6,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from taxel._base.files import write_whole
+from taxel.report import write_whole
 from taxel.report.page import render
 from taxel_studies import STUDIES, load
 from taxel_studies.study import Section, read_section
@@ -33,7 +33,7 @@ def write_page(report: Path) -> Path:
     """
     sections = {name: read_section(report / name) for name in STUDIES}
     charts = {name: _charts(name, section) for name, section in sections.items()}
-    text = render("studies/page.html.j2", titles=STUDIES, sections=sections, charts=charts)
+    text = render("page.html.j2", package="taxel_studies", titles=STUDIES, sections=sections, charts=charts)
     return write_whole(report / "index.html", lambda file: file.write(text.encode()), overwrite=True)
 
 

@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperCommand
 
 from taxel._core import Error
+from taxel.cli._added import WithAdded
 
 __all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "app"]
 
@@ -76,6 +77,7 @@ class App(typer.Typer):
 
 app = App(
     name="taxel",
+    cls=WithAdded,
     help="Touch as events: from the bytes of a tactile array to decisions that say when.",
     no_args_is_help=True,
     add_completion=False,
