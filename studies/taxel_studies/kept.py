@@ -18,7 +18,7 @@ from taxel.report import write_whole
 from taxel_studies import STUDIES, load
 from taxel_studies.study import Section
 
-__all__ = ["COARSE", "changed", "coarse_result", "confirm", "stale_figures"]
+__all__ = ["COARSE", "changed", "coarse_result", "confirm", "keep_coarse", "stale_figures"]
 
 #: The size of the coarse result.
 COARSE = "toy"
@@ -95,22 +95,25 @@ def confirm(name: str, folder: Path, *, data: Path | None = None, strict: bool =
     section = _kept(folder, name)
     if section is None:
         raise ProblemError(f"{folder}: holds no figure of {name}; taxel study {name} makes one")
-    found = coarse_result(name, data, strict=strict)
     file = folder / "coarse" / f"{name}.json"
     if file.exists():
-        differs = list(_differences(json.loads(file.read_text(encoding="utf-8")), found))
+        before, now = json.loads(file.read_text(encoding="utf-8")), coarse_result(name, data, strict=strict)
+        differs = list(_differences(before, now))
         if differs:
             more = f" and {len(differs) - 3} more" if len(differs) > 3 else ""
-            raise ProblemError(
-                f"{name}: its coarse result is another one: {'; '.join(differs[:3])}{more}; run it again"
-            )
+            raise ProblemError(f"{name}: its coarse result is another one: {'; '.join(differs[:3])}{more}")
         done = "confirmed"
     else:
-        file.parent.mkdir(exist_ok=True)
-        _write(file, found)
+        keep_coarse(name, folder, data=data, strict=strict)
         done = "first coarse result kept"
     _write(folder / f"{name}.json", section | {"made_of": load(name).made_of, "confirmed": _today()})
     return done
+
+
+def keep_coarse(name: str, folder: Path, *, data: Path | None = None, strict: bool = False) -> None:
+    """Run a study at coarse size, and keep what it gives beside its figure."""
+    (folder / "coarse").mkdir(exist_ok=True)
+    _write(folder / "coarse" / f"{name}.json", coarse_result(name, data, strict=strict))
 
 
 def _differences(kept: Any, found: Any, where: str = "") -> Any:
