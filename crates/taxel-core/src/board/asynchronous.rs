@@ -1,6 +1,6 @@
-//! Taxels that compare by themselves: no scan, each change told as it happens (thesis 4.5 and Table 7.1).
+//! Taxels that compare by themselves: no scan, each change sent as it happens (thesis 4.5 and Table 7.1).
 
-/// A taxel that has moved by a step since it last told, and when.
+/// A taxel whose value has moved by a step since its last event, and when.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Crossing {
     /// Since reset, 10 ns.
@@ -14,20 +14,20 @@ pub(super) struct Crossing {
     pub(super) moved: u16,
 }
 
-/// What taxels by themselves are at.
+/// The readings of the last frame, and the crossings that are still to be sent.
 ///
-/// Of each is known what it reads once a frame, at the time of its line; between two readings it counts as a straight
-/// line, and tells each step of `floor + 1` ticks when it is reached. So what comes between two readings is known by the
-/// second, and is told a frame after it has happened, with the time at which it did.
+/// The reading of a taxel is known once a frame, at the time of its line. Between two readings the value counts as a
+/// straight line, and each step of `floor + 1` ticks on it is an event. So what lies between two readings is known with the
+/// second, and is sent a frame after it has happened, with the time at which it did.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Alone {
-    /// What each read in the frame before, and when that began; nothing before the first frame.
+pub(super) struct Asynchronous {
+    /// When the frame before began, and its reading of each taxel; nothing before the first frame.
     last: Option<(u64, Vec<u16>)>,
-    /// What lies too late for the frame in which it was found.
+    /// Crossings that lie after the start of the frame in which they were found.
     waiting: Vec<Crossing>,
 }
 
-/// A reading: its taxel, when it is taken after a frame's beginning, and what it is.
+/// A reading: its taxel, how long after the frame's start it is made, and its value.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sample {
     pub(super) taxel: usize,
@@ -37,19 +37,19 @@ pub(super) struct Sample {
     pub(super) ticks: u16,
 }
 
-impl Alone {
+impl Asynchronous {
     /// Whether no frame has come yet.
     pub(super) fn is_new(&self) -> bool {
         self.last.is_none()
     }
 
-    /// Lets go what would still be told.
-    pub(super) fn hush(&mut self) {
+    /// Drops the crossings that would still be sent.
+    pub(super) fn clear(&mut self) {
         self.waiting.clear();
     }
 
-    /// Finds the steps that a taxel has made since the last frame; `sent` is what it told last, and becomes what it tells
-    /// now. Before the first frame it tells what it reads.
+    /// Finds the steps of a taxel since the last frame; `sent` is the value of its last event, and becomes that of its new
+    /// last event. Before the first frame the reading itself is an event.
     pub(super) fn cross(&mut self, begins: u64, sample: Sample, floor: u16, sent: &mut u16) {
         let Sample { taxel, x, y, after, ticks } = sample;
         let Some((began, last)) = &self.last else {
@@ -71,8 +71,8 @@ impl Alone {
         }
     }
 
-    /// Ends a frame that began then: keeps what was read, gives what happened before it, by time.
-    pub(super) fn over(&mut self, begins: u64, ticks: impl Iterator<Item = u16>) -> Vec<Crossing> {
+    /// Ends a frame that began at `begins`: stores its readings, returns what happened before it, by time.
+    pub(super) fn end_frame(&mut self, begins: u64, ticks: impl Iterator<Item = u16>) -> Vec<Crossing> {
         match &mut self.last {
             Some((began, last)) => {
                 *began = begins;
