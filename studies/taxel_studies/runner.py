@@ -15,12 +15,14 @@ from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from time import process_time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import joblib
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from taxel import DeviceError, ProblemError
+
+if TYPE_CHECKING:
+    import joblib
 
 __all__ = ["BACKENDS", "HERE", "Results", "Task", "Workers", "one_of", "run", "whole"]
 
@@ -160,15 +162,21 @@ class Workers:
                 raise ProblemError(f"scheduler is {self.scheduler!r}: must be an address")
             if self.backend == "loky":
                 raise ProblemError('scheduler is for the backends "dask" and "ray": loky has its processes here')
-        package = {"dask": "distributed", "ray": "ray"}.get(self.backend)
-        if package is not None and find_spec(package) is None:
+        package, extra = {
+            "dask": ("distributed", "cluster"),
+            "ray": ("ray", "cluster"),
+            "loky": ("joblib", "studies"),
+        }[self.backend]
+        if (self.backend != "loky" or self.jobs > 1) and find_spec(package) is None:
             raise ProblemError(
-                f'backend "{self.backend}" needs the package {package}: install it by pip install "taxel[cluster]"'
+                f'backend "{self.backend}" needs the package {package}: install it by pip install "taxel[{extra}]"'
             )
 
     @contextmanager
     def joblib(self) -> Iterator[joblib.Parallel]:
         """Give joblib's way to them, for the time of a ``with`` block."""
+        import joblib  # noqa: PLC0415  what runs in one process does not need it
+
         if self.backend == "dask":
             with _dask(self.jobs, self.scheduler), joblib.parallel_config(backend="dask"):
                 yield joblib.Parallel(n_jobs=-1, return_as="generator_unordered", batch_size=1)
@@ -278,6 +286,8 @@ def _realised(
         for task in tasks:
             yield (task, *_one(realise, task))
         return
+    import joblib  # noqa: PLC0415  what runs in one process does not need it
+
     calls = [joblib.delayed(_numbered)(realise, k, task) for k, task in enumerate(tasks)]
     with workers.joblib() as parallel:
         # joblib gives Ray's results in a list at the end of a call only: a call for a few of them at a time.

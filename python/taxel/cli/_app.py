@@ -68,7 +68,16 @@ class _Command(TyperCommand):
 
 
 class App(typer.Typer):
-    """A group of such commands."""
+    """A group of such commands: no colours, no completion, no traceback of its own."""
+
+    def __init__(self, **options: Any) -> None:
+        plain: dict[str, Any] = {
+            "add_completion": False,
+            "pretty_exceptions_enable": False,
+            "rich_markup_mode": None,
+            "context_settings": {"help_option_names": ["-h", "--help"]},
+        }
+        super().__init__(**(plain | options))
 
     def command(self, *names: Any, **options: Any) -> Callable[[Any], Any]:
         """Register a command."""
@@ -80,8 +89,4 @@ app = App(
     cls=WithAdded,
     help="Touch as events: from the bytes of a tactile array to decisions that say when.",
     no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
 )
