@@ -4,6 +4,7 @@ mod convert;
 mod enter;
 mod errors;
 mod guest;
+mod instructions;
 mod knock;
 
 mod bridge;
@@ -32,6 +33,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
+    instructions::register(module)?;
     knock::register(module)?;
     nouns::register(module)?;
     bridge::register(module)?;
