@@ -24,6 +24,7 @@ mod parameters;
 mod recording;
 mod rivals;
 mod simulate;
+mod sources;
 mod wire;
 mod wire_v2;
 
@@ -51,6 +52,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;
+    sources::register(module)?;
     wire::register(module)?;
     wire_v2::register(module)?;
     Ok(())
