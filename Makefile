@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-bridge/*' -name '*.rs' -o -name Cargo.toml -o -path '*/web/*' -type f)
 
-.PHONY: help check setup build aarch64 bridge demo test slow lint format registers bench docs dist clean
+.PHONY: help check setup build released aarch64 bridge demo test slow lint format registers bench docs dist clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -23,18 +23,41 @@ check:
 	@command -v cargo >/dev/null || { echo "taxel needs cargo 1.89 or later: install it from https://rustup.rs"; exit 1; }
 	@command -v cc >/dev/null || { echo "taxel needs a C compiler: on Debian, apt install build-essential"; exit 1; }
 
+# What taxel itself needs; what tests, lint, docs, benchmarks and wheels need is installed by the target that needs it.
+wanted = $(BIN)/python -c 'import sys, tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; print("\n".join(sum((p["optional-dependencies"][x] for x in sys.argv[1:]), p["dependencies"])))'
+install = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
 $(VENV)/.installed: pyproject.toml | check
-	@echo "taxel: installing what it needs into $(VENV): over a hundred packages, minutes the first time"
+	@echo "taxel: installing what it needs into $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.16,<2"
-	@$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]; print("\n".join(p["dependencies"] + sum((e[x] for x in ("test", "lint", "docs", "bench", "foxglove", "neo", "nir", "nwb", "cluster")), [])))' > $(VENV)/wanted.txt
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/wanted.txt
+	@$(wanted) > $(VENV)/wanted.txt
+	@$(install) "maturin>=1.16,<2" -r $(VENV)/wanted.txt
 	@touch $@
 
+# One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-bench, .for-dist.
+EXTRAS_test := test studies foxglove neo nir nwb cluster bench
+EXTRAS_lint := lint
+EXTRAS_docs := docs
+EXTRAS_bench := bench test
+EXTRAS_dist := dist
+$(VENV)/.for-%: pyproject.toml | $(VENV)/.installed
+	@echo "taxel: installing what make $* needs"
+	@$(wanted) $(EXTRAS_$*) > $(VENV)/wanted-$*.txt
+	@$(install) -r $(VENV)/wanted-$*.txt
+	@touch $@
+
+# Two builds of one extension, of which one is in place: incremental, so that a change in one file takes seconds, and as
+# released, which tests and benchmarks use. They share what the crates of others compiled to.
+develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building: minutes the first time"
-	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release
-	@touch $@
+	@CARGO_INCREMENTAL=1 $(develop) --config 'profile.release.package.taxel-core.codegen-units=256'
+	@rm -f $(VENV)/.released && touch $@
+
+$(VENV)/.released: $(VENV)/.installed $(SOURCES)
+	@echo "taxel: building as it is released: minutes"
+	@$(develop)
+	@rm -f $(VENV)/.built && touch $@
 
 # Outside the workspace: 260 crates for those only who have more than one computer.
 BRIDGE := --release --manifest-path crates/taxel-bridge/Cargo.toml --target-dir target/bridge
@@ -59,21 +82,22 @@ aarch64:
 
 setup: $(VENV)/.installed
 build: $(VENV)/.built
+released: $(VENV)/.released
 bridge: $(VENV)/.bridge
 
 demo: build
 	$(BIN)/taxel demo
 
-test: build
+test: released $(VENV)/.for-test
 	cargo test --release --workspace --quiet
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow"
 
-slow: build dist bridge
+slow: released $(VENV)/.for-test dist bridge
 	cargo test --release --workspace --quiet -- --ignored
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
 	$(BIN)/python -m pytest -q -m slow
 
-lint: build
+lint: build $(VENV)/.for-test $(VENV)/.for-lint
 	cargo fmt --all --check
 	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
@@ -87,7 +111,7 @@ lint: build
 	$(BIN)/python -m mypy.stubtest taxel._core --allowlist tests/stubtest-allowed.txt
 	$(BIN)/python tools/page_types.py
 
-format:
+format: $(VENV)/.for-lint
 	cargo fmt --all
 	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml
 	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs
@@ -104,19 +128,14 @@ $(VENV)/.peers: $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/peers.txt
 	@touch $@
 
-bench: build bridge $(VENV)/.peers
+bench: released bridge $(VENV)/.for-bench $(VENV)/.peers
 	$(BIN)/taxel bench all
 
-docs: build
+docs: build $(VENV)/.for-docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
 # Zig links against the glibc of 2018 (2.28), whatever this machine has; auditwheel looks whether that is so.
-$(VENV)/.dist: $(VENV)/.installed
-	$(BIN)/python -c 'import tomllib; print("\n".join(tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["dist"]))' > $(VENV)/dist.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/dist.txt
-	@touch $@
-
-dist: $(VENV)/.dist
+dist: $(VENV)/.for-dist
 	rm -rf dist
 	$(BIN)/maturin sdist --out dist
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/maturin build --release --zig --compatibility manylinux_2_28 --out dist

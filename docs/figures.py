@@ -15,9 +15,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from taxel.studies import STUDIES, load
-from taxel.studies.runner import code_digest
-from taxel.studies.study import drawn
+from taxel_studies import STUDIES, load
+from taxel_studies.runner import code_digest
+from taxel_studies.study import drawn
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
 

@@ -19,7 +19,7 @@ from sphinx.application import Sphinx
 from taxel import learn
 from taxel._base.parameters import Parameters
 from taxel.cli import app as command_line
-from taxel.studies import STUDIES
+from taxel_studies import STUDIES
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
 VERDICTS = {True: "holds", False: "**does not hold**", None: "not judged"}
