@@ -55,6 +55,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "metrics",
                 "neuron",
                 "nouns",
+                "pictures",
                 "recording",
                 "rivals",
                 "simulate",

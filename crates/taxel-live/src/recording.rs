@@ -12,6 +12,7 @@ mod lsa;
 mod mcap_reader;
 mod mcap_writer;
 mod picture;
+mod pictures;
 mod stream;
 mod topic;
 
@@ -29,6 +30,7 @@ pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub(crate) use mcap_reader::begin_with;
 pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks};
 pub use mcap_writer::{Track, Writer};
+pub use pictures::Pictures;
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
 

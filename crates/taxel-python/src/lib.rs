@@ -21,6 +21,7 @@ mod neuron;
 mod nouns;
 mod panel;
 mod parameters;
+mod pictures;
 mod recording;
 mod rivals;
 mod simulate;
@@ -49,6 +50,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     neuron::register(module)?;
     described::register(module)?;
     panel::register(module)?;
+    pictures::register(module)?;
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;
