@@ -84,3 +84,6 @@ def test_the_wheel_runs_the_demo_in_a_bare_environment(tmp_path: Path) -> None:
         cwd=tmp_path,
     )
     assert where.stdout.startswith(str(tmp_path))
+    program = "from taxel import _core; print(hasattr(_core, 'Live'), hasattr(_core, 'test_hook'))"
+    hooks = subprocess.run([python, "-c", program], capture_output=True, text=True, check=True, env=bare, cwd=tmp_path)
+    assert hooks.stdout == "True False\n", "what only tests call does not ship"

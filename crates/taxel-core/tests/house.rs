@@ -41,7 +41,8 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
         "taxel-python",
         &[
             &["errors"],
-            &["enter", "guest", "convert", "parameters"],
+            &["enter", "thread_state", "convert", "parameters"],
+            &["threaded"],
             &["bridge"],
             &[
                 "calibration",
@@ -49,7 +50,6 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "cone_x",
                 "detect",
                 "encode",
-                "knock",
                 "learn",
                 "live",
                 "metrics",
@@ -58,6 +58,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "recording",
                 "rivals",
                 "simulate",
+                "test_hooks",
                 "wire",
                 "wire_v2",
             ],

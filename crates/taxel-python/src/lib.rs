@@ -3,8 +3,10 @@
 mod convert;
 mod enter;
 mod errors;
-mod guest;
-mod knock;
+#[cfg(feature = "test-hooks")]
+mod test_hooks;
+mod thread_state;
+mod threaded;
 
 mod bridge;
 mod calibration;
@@ -32,7 +34,8 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
-    knock::register(module)?;
+    #[cfg(feature = "test-hooks")]
+    test_hooks::register(module)?;
     nouns::register(module)?;
     bridge::register(module)?;
     calibration::register(module)?;
