@@ -41,7 +41,8 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
         "taxel-python",
         &[
             &["errors"],
-            &["enter", "guest", "convert", "parameters"],
+            &["enter", "thread_state", "convert", "parameters"],
+            &["threaded"],
             &["bridge"],
             &[
                 "calibration",
@@ -49,7 +50,6 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "cone_x",
                 "detect",
                 "encode",
-                "knock",
                 "learn",
                 "live",
                 "metrics",
@@ -60,6 +60,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "rivals",
                 "simulate",
                 "sources",
+                "test_hooks",
                 "wire",
                 "wire_v2",
             ],
