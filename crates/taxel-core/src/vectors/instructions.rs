@@ -141,6 +141,9 @@ macro_rules! by_width {
                 return unsafe { avx2($($argument),*) };
             }
         }
+        // Other machines have one set, which needs no choice.
+        #[cfg(not(target_arch = "x86_64"))]
+        let _: $crate::vectors::Instructions = $set;
         $plain($($argument),*)
     }};
 }
