@@ -160,7 +160,7 @@ def _refuse_masked(name: str, values: list[Any]) -> None:
 
 
 def _has_unit(kind: type[Any]) -> bool:
-    """Tell whether values of a class say what they are in; `dimensions` is Brian's word."""
+    """Return whether values of a class have a unit; `dimensions` is Brian's word."""
     return kind not in _PLAIN and any(hasattr(kind, word) for word in ("units", "unit", "dimensions"))
 
 
