@@ -6,6 +6,7 @@ import contextlib
 import signal
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -15,19 +16,26 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import OUTSIDE, WRONG_INPUT
 from taxel.live import Remote, Summary, delays
+from taxel.live.options import about
 from taxel.tare import Tare
-from taxel.wire import PRESETS
 
 __all__ = [
-    "QUOTED_PRESETS",
     "REDRAW_S",
     "ArrayOption",
+    "CompressionOption",
     "CongestionOption",
     "DifferencesOption",
     "FromOption",
+    "GuardFramesOption",
     "HostOption",
+    "NameOption",
+    "OverwriteOption",
     "PortOption",
     "PresetOption",
+    "ReadoutOption",
+    "RecordOption",
+    "SendOption",
+    "SourceOption",
     "TareOption",
     "asked_to_end",
     "counters_table",
@@ -40,38 +48,28 @@ __all__ = [
 #: How often the display is drawn anew, and the end looked for, s.
 REDRAW_S = 0.1
 
-#: The names of all presets, for a text.
-QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
 
-PortOption = Annotated[int, typer.Option(min=0, max=65_535, help="The UDP port that the board sends to.")]
-HostOption = Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: every one.")]
-ArrayOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ROWSxCOLUMNS[xMM]",
-        help="The sensor and its pitch, as 24x20x5 (2.67 mm where it is left out); without it 64x64x2.67, or what is "
-        "told with --from.",
-    ),
-]
-PresetOption = Annotated[
-    str | None,
-    typer.Option(
-        help=f'The board\'s registers, "5.2 kHz" where left out: one of {QUOTED_PRESETS}. With --from they are told.'
-    ),
-]
+def live_option(name: str, *flags: str, metavar: str | None = None) -> Any:
+    """Return the option of the command line that sets an option of `Live`: its text and range."""
+    return typer.Option(*flags, metavar=metavar, **about(name))
 
-DifferencesOption = Annotated[bool, typer.Option("--differences", help="The board sends intensity differences.")]
-TareOption = Annotated[
-    str | None, typer.Option(help="Seconds at rest for a fresh one, or the file of an earlier one (JSON).")
-]
-FromOption = Annotated[
-    str | None,
-    typer.Option(
-        "--from",
-        metavar="ADDRESS",
-        help="A board of another computer, in place of --port: zenoh:HOST:PORT/NAME, as taxel bridge says it there.",
-    ),
-]
+
+PortOption = Annotated[int, live_option("port")]
+HostOption = Annotated[str, live_option("host")]
+ArrayOption = Annotated[str | None, live_option("array", metavar="ROWSxCOLUMNS[xMM]")]
+PresetOption = Annotated[str | None, live_option("registers")]
+DifferencesOption = Annotated[bool, live_option("differences", "--differences")]
+TareOption = Annotated[str | None, typer.Option(help=about("tare")["help"])]
+RecordOption = Annotated[Path | None, live_option("record")]
+CompressionOption = Annotated[str, live_option("compression")]
+NameOption = Annotated[str, live_option("name")]
+SourceOption = Annotated[list[str] | None, live_option("sources", metavar="NAME=WHAT")]
+OverwriteOption = Annotated[bool, live_option("overwrite", "--overwrite")]
+GuardFramesOption = Annotated[float, live_option("guard_frames")]
+SendOption = Annotated[list[str] | None, live_option("send", metavar="WHERE")]
+ReadoutOption = Annotated[Path | None, live_option("readout")]
+FromOption = Annotated[str | None, live_option("remote", "--from", metavar="ADDRESS")]
+
 CongestionOption = Annotated[
     str | None,
     typer.Option(

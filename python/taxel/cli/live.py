@@ -23,9 +23,13 @@ from taxel.cli._board import (
     CongestionOption,
     DifferencesOption,
     FromOption,
+    GuardFramesOption,
     HostOption,
     PortOption,
     PresetOption,
+    ReadoutOption,
+    RecordOption,
+    SendOption,
     TareOption,
     asked_to_end,
     counters_table,
@@ -40,6 +44,7 @@ from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, how_it_g
 from taxel.detect import Readout
 from taxel.device import Cable
 from taxel.live import Live, Panel, Said, Summary, Viewer, delays
+from taxel.live.options import LiveOptions
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -48,17 +53,15 @@ __all__ = ["live"]
 
 @app.command()
 def live(
-    readout: Annotated[
-        Path | None, typer.Option(help="A trained readout (JSON), as taxel train writes it; the panel needs none.")
-    ] = None,
-    port: PortOption = 5208,
-    host: HostOption = "0.0.0.0",
+    readout: ReadoutOption = None,
+    port: PortOption = LiveOptions.port,
+    host: HostOption = LiveOptions.host,
     array: Annotated[
         str | None,
         typer.Option(metavar="ROWSxCOLUMNS[xMM]", help="The sensor and its pitch; the readout's where left out."),
     ] = None,
     preset: PresetOption = None,
-    differences: DifferencesOption = False,
+    differences: DifferencesOption = LiveOptions.differences,
     address: FromOption = None,
     congestion: CongestionOption = None,
     tare: TareOption = None,
@@ -69,17 +72,10 @@ def live(
         ),
     ] = None,
     save_tare: Annotated[Path | None, typer.Option(help="Keep the fresh tare in a new file (JSON).")] = None,
-    record: Annotated[Path | None, typer.Option(help="Keep everything in a new file (.mcap or .lsa).")] = None,
+    record: RecordOption = None,
     seconds: SecondsOption = None,
-    guard_frames: Annotated[float, typer.Option(min=0.0, help="In silence, frames behind the host's clock.")] = 5.0,
-    send: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="WHERE",
-            help="Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be "
-            "repeated.",
-        ),
-    ] = None,
+    guard_frames: GuardFramesOption = LiveOptions.guard_frames,
+    send: SendOption = None,
     report: Annotated[
         Path | None,
         typer.Option(help="With --record: a folder for a page: potential, weights, errors, the worst events."),

@@ -21,11 +21,15 @@ from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
     ArrayOption,
+    CompressionOption,
     DifferencesOption,
     FromOption,
     HostOption,
+    NameOption,
+    OverwriteOption,
     PortOption,
     PresetOption,
+    SourceOption,
     counters_table,
     exit_code,
     outside,
@@ -33,6 +37,7 @@ from taxel.cli._board import (
 )
 from taxel.cli._noting import noting
 from taxel.live import Live, Summary
+from taxel.live.options import LiveOptions
 
 __all__ = ["record"]
 
@@ -43,25 +48,18 @@ _EMPTY = 3
 @app.command()
 def record(
     file: Annotated[Path, typer.Argument(help="A new file: .mcap keeps all that is known, .lsa raw bytes.")],
-    port: PortOption = 5208,
-    host: HostOption = "0.0.0.0",
+    port: PortOption = LiveOptions.port,
+    host: HostOption = LiveOptions.host,
     array: ArrayOption = None,
     preset: PresetOption = None,
     address: FromOption = None,
     seconds: SecondsOption = None,
     markers: Annotated[bool, typer.Option("--markers", help="End where the board marks a stop.")] = False,
-    compression: Annotated[str, typer.Option(help="Of .mcap: none, lz4 or zstd.")] = "none",
-    name: Annotated[str, typer.Option(help="What the board is called among the recording's sources.")] = "board",
-    source: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=WHAT",
-            help="Record this too: another board (udp:HOST:PORT,array=16x16), lines of numbers as an IMU's "
-            "(serial:PATH@BAUD, pipe:PATH, columns=t_us:ax:ay); may be repeated.",
-        ),
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
-    differences: DifferencesOption = False,
+    compression: CompressionOption = LiveOptions.compression,
+    name: NameOption = LiveOptions.name,
+    source: SourceOption = None,
+    overwrite: OverwriteOption = LiveOptions.overwrite,
+    differences: DifferencesOption = LiveOptions.differences,
     length: Annotated[
         float | None, typer.Option(min=0.0, help="Automatic mode: record again and again, so long each, s.")
     ] = None,

@@ -23,7 +23,10 @@ from taxel.wire import PRESETS, Registers
 if TYPE_CHECKING:
     from taxel.live.said import Said
 
-__all__ = ["LiveOptions", "about", "takes"]
+__all__ = ["QUOTED_PRESETS", "LiveOptions", "about", "takes"]
+
+#: The names of all presets, for a text.
+QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
 
 _P = ParamSpec("_P")
 _Self = TypeVar("_Self")
@@ -52,9 +55,7 @@ class LiveOptions:
     )
     registers: str | Registers | None = _option(
         None,
-        'The board\'s registers, "5.2 kHz" where left out: one of '
-        + ", ".join(f'"{name}"' for name in PRESETS)
-        + ". With --from they are told.",
+        f'The board\'s registers, "5.2 kHz" where left out: one of {QUOTED_PRESETS}. With --from they are told.',
     )
     differences: bool = _option(False, "The board sends intensity differences.")
     readout: Readout | None = _option(None, "A trained readout (JSON), as taxel train writes it; the panel needs none.")
@@ -158,10 +159,10 @@ def takes(
     """Let a constructor that is written for a dataclass of options take the fields of that dataclass."""
 
     def decorate(begin: Callable[[_Self, _Options], None]) -> Callable[Concatenate[_Self, _P], None]:
-        @functools.wraps(begin)
         def init(self: _Self, *arguments: _P.args, **keywords: _P.kwargs) -> None:
             begin(self, options(*arguments, **keywords))
 
+        functools.update_wrapper(init, begin)
         own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
         named = inspect.signature(options).parameters.values()
         init.__signature__ = inspect.Signature([own, *named])  # type: ignore[attr-defined]
