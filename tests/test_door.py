@@ -123,7 +123,7 @@ def test_a_decoder_of_version_2_may_be_used_from_several_threads():
     for value in range(40, 60):
         ticks[:] = value
         datagrams += board.frame(ticks)
-    decoder = taxel.wire_v2.Decoder()
+    decoder = taxel.wire.Decoder(2)
 
     def push(number):
         for datagram in datagrams[number::6]:
@@ -140,7 +140,7 @@ def test_a_stream_of_version_2_may_be_used_from_several_threads():
     board = taxel.simulate.Board(taxel.wire.Registers(wire_version=2))
     sent = board.frame(np.full(4096, 40, np.uint16))
     data = b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent)
-    reader, found = taxel.wire_v2.StreamReader(), []
+    reader, found = taxel.wire.StreamReader(), []
 
     def push(_):
         for _ in range(20):

@@ -14,6 +14,7 @@ mod mcap_reader;
 mod mcap_writer;
 mod output;
 mod picture;
+mod pictures;
 mod stream;
 mod topic;
 
@@ -31,6 +32,7 @@ pub(crate) use mcap_reader::begin_with;
 pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
+pub use pictures::Pictures;
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
 

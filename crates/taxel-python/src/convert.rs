@@ -10,7 +10,7 @@ use numpy::{
 };
 use pyo3::Borrowed;
 use pyo3::prelude::*;
-use taxel_core::wire::Room;
+use taxel_core::wire::{Columns, Filled, Room};
 use taxel_core::{Array, Events, EventsView, FramesView, IntensitiesView, Marker, SpikeTrains};
 
 use crate::errors::{ProblemError, core};
@@ -81,6 +81,16 @@ pub(crate) fn to_array((rows, columns, pitch_mm, name, exists): ArrayParts) -> P
 
 pub(crate) fn from_array(array: &Array) -> ArrayParts {
     (array.rows, array.columns, array.pitch_mm, array.name.clone(), array.exists.clone())
+}
+
+/// How many rows of columns were filled, whether ticks were, which rows states gave (none where no row is of that kind), and
+/// the markers.
+pub(crate) type FilledOut<'py> = (usize, bool, Option<Bound<'py, PyArray1<bool>>>, Vec<(i64, bool)>);
+
+pub(crate) fn from_filled(py: Python<'_>, columns: Columns) -> FilledOut<'_> {
+    let Columns { filled: Filled { rows, paired }, repaired, markers } = columns;
+    let markers = markers.iter().map(|m| (m.t, m.start)).collect();
+    (rows, paired, repaired.map(|column| array(py, column)), markers)
 }
 
 /// Events as Python hands them over: array, t, x, y, p, intensity with present, repaired, markers as (t, start).

@@ -3,6 +3,7 @@
 mod convert;
 mod enter;
 mod errors;
+mod instructions;
 #[cfg(feature = "test-hooks")]
 mod test_hooks;
 mod thread_state;
@@ -22,9 +23,11 @@ mod neuron;
 mod nouns;
 mod panel;
 mod parameters;
+mod pictures;
 mod recording;
 mod rivals;
 mod simulate;
+mod sources;
 mod wire;
 mod wire_v2;
 
@@ -34,6 +37,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
+    instructions::register(module)?;
     #[cfg(feature = "test-hooks")]
     test_hooks::register(module)?;
     nouns::register(module)?;
@@ -49,9 +53,11 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     neuron::register(module)?;
     described::register(module)?;
     panel::register(module)?;
+    pictures::register(module)?;
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;
+    sources::register(module)?;
     wire::register(module)?;
     wire_v2::register(module)?;
     Ok(())

@@ -41,7 +41,7 @@ class Said(NamedTuple):
 
 def heard(said: Sequence[Said]) -> Detections:
     """Return what was said live as `Detections`."""
-    return Detections(
+    return Detections._of(
         [s.label for s in said],
         [s.t for s in said],
         [s.known for s in said],

@@ -14,7 +14,8 @@ from taxel._base.arguments import flag, instance, numbers, text, whole
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.simulate.circuit import Circuit
-from taxel.wire import Registers, _bytes
+from taxel.wire import Registers
+from taxel.wire.given import given_bytes
 
 __all__ = ["NOT_RETURNED", "Board", "Version2", "fitting", "reading"]
 
@@ -186,7 +187,7 @@ class Board:
 
     def command(self, data: Any) -> str:
         """Take command bytes as they come; return the status lines that answer them."""
-        return self._core.command(_bytes(data))
+        return self._core.command(given_bytes(data))
 
     def record(self, start: bool) -> None:
         """Start or stop a recording: a marker goes out where that changes anything."""
