@@ -40,7 +40,7 @@ def _option(default: Any, about: str, *, least: float | None = None, most: float
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """What a `Live` may be told, with its defaults; `Live` describes each."""
+    """Hold the options of a `Live`, which documents each, with their defaults."""
 
     port: int = _option(PORT, "The UDP port that the board sends to.", least=0, most=65_535)
     _: KW_ONLY
@@ -86,7 +86,7 @@ class LiveOptions:
     gro: bool | None = _option(None, "Let the kernel hand over trains of datagrams in one piece.")
 
     def completed(self) -> LiveOptions:
-        """Return them with what the remote board and the readout say of the sensor; refuse what makes no sense."""
+        """Return them with the sensor of the remote board or the readout; refuse what makes no sense."""
         readout, remote, array, registers, differences = (
             self.readout, self.remote, self.array, self.registers, self.differences,
         )  # fmt: skip
@@ -112,7 +112,7 @@ class LiveOptions:
         return [text("send", to) for to in ([self.send] if isinstance(self.send, str) else several("send", self.send))]
 
     def named_sources(self) -> list[tuple[str, str]]:
-        """Return the other sources of a recording: their names, and what they are."""
+        """Return the other sources of a recording, by name."""
         if self.sources is None:
             return []
         if not isinstance(self.sources, Mapping):
@@ -129,7 +129,7 @@ class LiveOptions:
         return path, text("compression", self.compression), flag("overwrite", self.overwrite)
 
     def for_rust(self, *, send: list[str], sources: list[tuple[str, str]]) -> dict[str, Any]:
-        """Return what Rust reads; `send` and `sources` are those that it can open itself."""
+        """Return the options that Rust reads; `send` and `sources` are those that it can open itself."""
         registers: object = self.registers
         held = json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
         sizes = {name: getattr(self, name) for name in ("kernel_buffer_bytes", "queue_bytes", "readout_events")}
