@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-bridge/*' -name '*.rs' -o -name Cargo.toml -o -path '*/web/*' -type f)
 
-.PHONY: help check setup build released bridge demo test slow lint format registers bench docs dist clean
+.PHONY: help check setup build released aarch64 bridge demo test slow lint format registers bench docs dist clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -12,6 +12,7 @@ help:
 	@echo "make lint   format, lint, types, floors     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
+	@echo "make aarch64 the extension for ARM computers, where a cross compiler is installed; says what is missing"
 	@echo "make build  .venv and the extension, after a change in crates/     make format  formats"
 	@echo "make dist   a wheel for machines without cargo, and the source package, to dist/"
 
@@ -48,7 +49,7 @@ $(VENV)/.for-%: pyproject.toml studies/pyproject.toml | $(VENV)/.installed
 
 # Two builds of one extension, of which one is in place: incremental, so that a change in one file takes seconds, and as
 # released, which tests and benchmarks use. They share what the crates of others compiled to.
-develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release
+develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --features test-hooks
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building: minutes the first time"
 	@CARGO_INCREMENTAL=1 $(develop) --config 'profile.release.package.taxel-core.codegen-units=256'
@@ -65,6 +66,20 @@ $(VENV)/.bridge: $(VENV)/.installed $(shell find crates/taxel-bridge -type f)
 	$(BIN)/maturin build $(BRIDGE) --out target/bridge/wheels
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_bridge-*.whl
 	@touch $@
+
+# For boards like a Jetson or a Raspberry Pi: the extension for their processor, made on this machine. No test runs there.
+ARM := aarch64-unknown-linux-gnu
+aarch64:
+	@missing=; needs() { echo "make aarch64 needs $$1"; missing=1; }; \
+	command -v $${CARGO:-cargo} >/dev/null || needs "cargo 1.89 or later: install it from https://rustup.rs"; \
+	test -n "$$(ls "$$($${RUSTC:-rustc} --print target-libdir --target $(ARM) 2>/dev/null)" 2>/dev/null)" || needs "Rust's library for $(ARM): rustup target add $(ARM), or on Debian dpkg --add-architecture arm64, apt install libstd-rust-web-dev:arm64 and RUSTC=/usr/bin/rustc CARGO=/usr/bin/cargo"; \
+	if command -v aarch64-linux-gnu-gcc >/dev/null; \
+	then echo '#include <stdlib.h>' | aarch64-linux-gnu-gcc -E - >/dev/null 2>&1 || needs "the C library of $(ARM): on Debian, apt install libc6-dev-arm64-cross"; \
+	else needs "aarch64-linux-gnu-gcc: on Debian, apt install gcc-aarch64-linux-gnu libc6-dev-arm64-cross"; fi; \
+	test -z "$$missing"
+	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc PYO3_CROSS_PYTHON_VERSION=3.11 \
+		$${CARGO:-cargo} build --release --target $(ARM) -p taxel-core -p taxel-live -p taxel-python
+	@echo "taxel: built for $(ARM), not tested there: target/$(ARM)/release/lib_core.so"
 
 setup: $(VENV)/.installed
 build: $(VENV)/.built
@@ -87,7 +102,7 @@ lint: build $(VENV)/.for-test $(VENV)/.for-lint
 	cargo fmt --all --check
 	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
-	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	cargo clippy --workspace --all-targets --all-features --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .

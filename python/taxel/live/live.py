@@ -5,31 +5,28 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
 from functools import partial
-from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import flag, instance, number, numbers, parameters, several, shown, text, whole
+from taxel._base.arguments import flag, number, numbers, parameters, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect import Readout
-from taxel.detections import Detections
 from taxel.live.lsl import LslInlet, LslOutlet
-from taxel.live.remote import Remote
-from taxel.live.sending import PORT
+from taxel.live.options import LiveOptions, takes
+from taxel.live.said import Said
+from taxel.live.summary import Summary, summary_of
 from taxel.recording.remarks import Zeroing
 from taxel.tare import Tare
-from taxel.wire import Registers
 
-__all__ = ["Live", "Said", "Summary", "delays", "heard"]
+__all__ = ["Live"]
 
 #: How what goes to, or comes from, the lab streaming layer begins.
 _LSL = "lsl:"
@@ -39,74 +36,6 @@ _MOST_PLACE = 2**16 - 1
 
 #: How long an iteration waits at a time.
 _WAIT_S = 0.5
-
-
-class Said(NamedTuple):
-    """Say what was detected, and when: all times but the last in us of the board's clock.
-
-    Attributes
-    ----------
-    label : str
-    t : int, us
-        When the event was: the crossing less the encoder's latency and the trained delay.
-    known : int, us
-        When it could first be said: the end of the board's frame in which the potential crosses.
-    slope : float, mV/ms
-        How steeply the potential crossed its threshold, as a measure of how sure.
-    said : int, us
-        When it was said, by the host's clock less the estimated offset between the clocks.
-    said_ns : int, ns since 1970
-        The same by the host's clock.
-    repaired : bool
-        Whether it may rest on values that states of wire version 2 repaired after a loss.
-    """
-
-    label: str
-    t: int
-    known: int
-    slope: float
-    said: int
-    said_ns: int
-    repaired: bool = False
-
-
-@dataclass(frozen=True)
-class Summary:
-    """Say how a `Live` ended.
-
-    Attributes
-    ----------
-    counters : dict
-        As `Live.counters`; its sums are closed.
-    verdict : str
-        One line: nothing lost after arrival, what was lost where, or that nothing came.
-    path : Path or None
-        The recording; none where nothing came: then an empty one is not kept, and an earlier one is not replaced.
-    tare : Tare or None
-        The fresh tare, where one was completed.
-    """
-
-    counters: dict[str, Any]
-    verdict: str
-    path: Path | None
-    tare: Tare | None
-
-    @property
-    def lost(self) -> int:
-        """How much was lost after it had arrived: messages in the kernel, datagrams in our queue; 0 is nothing.
-
-        Of a board of another computer also what was lost there and between the two.
-        """
-        boards = [self.counters, *(one for one in self.counters["sources"].values() if "capture" in one)]
-        lost = sum(int(one["capture"]["dropped_by_kernel"] + one["capture"]["dropped_by_queue"]) for one in boards)
-        bridged = self.counters["bridged"] or {}
-        return lost + sum(int(bridged.get(cause, 0)) for cause in ("missing", "dropped", "dropped_by_kernel"))
-
-    @property
-    def nothing_came(self) -> bool:
-        """Whether not even a datagram that was lost has come."""
-        capture = self.counters["capture"]
-        return not capture["messages"] + capture["dropped_by_kernel"]
 
 
 class Live:
@@ -128,48 +57,49 @@ class Live:
         The sensor; by default the remote board's or the readout's own, or the thesis' 64 x 64.
     registers : str or taxel.wire.Registers
         What the board's registers hold: themselves, or a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz", of
-        which a smaller array drives fewer lines. Left out: as a board of this array is at reset, up to 64 x 64 at
-        5.2 kHz; a remote board says what they hold.
+        which a smaller array drives fewer lines. Left out: those of a board of this array at reset, up to 64 x 64 at
+        5.2 kHz; a remote board reports its own.
     differences : bool
         Whether the board sends differences for intensities (the panel's "delta intensity").
     readout : Readout, optional
-        What listens. Left out, nothing is detected.
+        Reads the events out. Left out, nothing is detected.
     tare : Tare or float (s), optional
         For a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event on, which
         ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
     record : path, optional
         A new file: `.mcap` keeps all that is known, `.lsa` the manual's raw bytes.
     record_later : bool
-        Whether recordings are begun and ended while all is heard (`record`, `end_recording`); then none is begun here,
-        and `sources` are kept where one runs.
+        Whether recordings begin and end while it runs (`record`, `end_recording`); then none begins here, and `sources`
+        are recorded while one runs.
     name : str
-        What the board is called in the recording.
+        The board's name in the recording.
     sources : mapping of str to str, optional
-        What else the recording (`.mcap`) holds, by name, each with its own clock:
+        The other sources of the recording (`.mcap`), by name, each with its own clock:
         "udp:HOST:PORT,array=16x16,preset=2 kHz" another board, which sends to that address of this machine;
         "serial:PATH@BAUD" or "pipe:PATH" lines of numbers, as an IMU's ("-" is the standard input); "given" numbers
-        that a program gives (`sample`). Of numbers ``columns=t_us:ax:ay`` says what a line holds (else its first line
-        is waited for), and ``time=NAME:UNIT`` which column is its clock, where not one called `t_us`,
-        `time_ms` ... is; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, a line's time is when it
+        that a program gives (`sample`). Of numbers ``columns=t_us:ax:ay`` names the columns of a line (else the first
+        line is waited for), and ``time=NAME:UNIT`` the column that is its clock, where that is not one called `t_us`,
+        `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, a line's time is when it
         came.
     compression : {"none", "lz4", "zstd"}
         Of `.mcap`.
     overwrite : bool
         Whether an existing file may be replaced.
     guard_frames : float, 0 or more
-        In silence the readout's time moves on by the host's clock, so many frames behind it.
+        In silence the readout's time moves on by the host's clock, this many frames behind it.
     gap_frames : float, 0 or more
         At a gap in the sequence of wire version 2 time waits so many frames for what may only be late.
     say : callable, optional
-        Called with each `Said` in the thread that made it, one at a time; what it raises ends the way and is raised by
-        `next`. Where it takes longer than 2 ms another thread goes on receiving; up to 16 384 detections wait for it.
+        Called with each `Said` in the thread that made it, one at a time; what it raises ends everything and is
+        raised by `next`. It must not call `stop`. Where it takes longer than 2 ms another thread goes on receiving; up
+        to 16 384 detections wait for it.
     lines : bool
         Write each detection to the standard output as one line of JSON, from the thread that made it.
     send : str or sequence of str
-        Send each detection as such a line to "udp:HOST:PORT" (a datagram a line), "pipe:PATH" (a named pipe that is
-        there) or "serial:PATH@BAUD", from the thread that made it; "lsl:NAME" says its label in a stream of markers of
-        the lab streaming layer. Up to 1024 lines wait for who reads slowly; what
-        finds no room, or nobody who reads, is lost and counted, and nothing waits for it.
+        Send each detection as such a line to "udp:HOST:PORT" (a datagram a line), "pipe:PATH" (a named pipe that
+        exists) or "serial:PATH@BAUD", from the thread that made it; "lsl:NAME" sends its label in a stream of markers
+        of the lab streaming layer. Up to 1024 lines wait for a slow reader; lines that find no room, or no reader, are
+        lost and counted, and nothing waits for them.
     kernel_buffer_bytes, queue_bytes, readout_events : int, optional
         How much may wait in the kernel, before the decoder and before the readout.
     gro : bool, optional
@@ -177,14 +107,14 @@ class Live:
 
     Raises
     ------
-    OSError : the port is taken, the file cannot be created
+    OSError : the port is taken; the file cannot be created, or is being recorded by another program
     FileExistsError : the file is there already and `overwrite` is false
     ProblemError : arguments that make no sense; a readout that needs a tare and has none
     DeviceError : registers that break a rule
 
     Notes
     -----
-    `t` and `known` of a detection are the same here and from the recording; `said` is when it was said in fact. The
+    `t` and `known` of a detection are the same here and from the recording; `said` is when it was output in fact. The
     clocks' offset and drift are estimated from arrivals: nothing comes early, so the lower envelope of arrival less
     board time is the offset.
 
@@ -199,97 +129,37 @@ class Live:
     Live(ended; nothing lost after arrival (version 1 of the wire cannot show what was lost before it))
     """
 
-    def __init__(
-        self,
-        port: int = PORT,
-        *,
-        host: str = "0.0.0.0",
-        remote: Remote | None = None,
-        array: Array | None = None,
-        registers: str | Registers | None = None,
-        differences: bool = False,
-        readout: Readout | None = None,
-        tare: Tare | float | None = None,
-        record: str | os.PathLike[str] | None = None,
-        record_later: bool = False,
-        name: str = "board",
-        sources: Mapping[str, str] | None = None,
-        compression: str = "none",
-        overwrite: bool = False,
-        guard_frames: float = 5.0,
-        gap_frames: float = 1.0,
-        say: Callable[[Said], object] | None = None,
-        lines: bool = False,
-        send: str | Sequence[str] = (),
-        kernel_buffer_bytes: int | None = None,
-        queue_bytes: int | None = None,
-        readout_events: int | None = None,
-        gro: bool | None = None,
-    ) -> None:
-        if readout is not None:
-            instance("readout", readout, Readout)
-        if remote is not None:
-            instance("remote", remote, Remote)
-            array = remote.array if array is None else array
-            registers = Registers._of(remote.registers, remote.array) if registers is None else registers
-            differences = flag("differences", differences) or remote.differences
-        if array is None and readout is not None:
-            array = readout.array
-        self.array = Array._of(array)
-        goes = [text("send", to) for to in ([send] if isinstance(send, str) else several("send", send))]
-        heard_of = _sources(sources)
-        outlets = [LslOutlet(to.removeprefix(_LSL)) for to in goes if to.startswith(_LSL)]
-        inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in heard_of if how.startswith(_LSL)}
+    @takes(LiveOptions)
+    def __init__(self, options: LiveOptions) -> None:
+        options = options.completed()
+        remote, readout, tare, say = options.remote, options.readout, options.tare, options.say
+        self.array = Array._of(options.array)
+        #: To begin another one on another address.
+        self._options = replace(options, array=self.array)
+        destinations, sources = options.destinations(), options.named_sources()
+        outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
+        inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in sources if how.startswith(_LSL)}
         self._inlets = list(inlets.values())
-        registers = Registers(array=self.array) if registers is None else registers
-        sizes = {
-            "kernel_buffer_bytes": kernel_buffer_bytes,
-            "queue_bytes": queue_bytes,
-            "readout_events": readout_events,
-        }
-        options = {
-            "registers": _held(registers),
-            "differences": flag("differences", differences),
-            "guard_frames": number("guard_frames", guard_frames),
-            "gap_frames": number("gap_frames", gap_frames),
-            "gro": None if gro is None else flag("gro", gro),
-            "send": [to for to in goes if not to.startswith(_LSL)],
-            "name": text("name", name),
-            "record_later": flag("record_later", record_later),
-            "sources": [(what, _given(inlets[what]) if what in inlets else how) for what, how in heard_of],
-            **{what: None if size is None else whole(what, size, 0, 2**31 - 1) for what, size in sizes.items()},
-        }
-        #: What is needed to begin again on another address.
-        self._how: dict[str, Any] = {
-            "array": self.array, "registers": registers, "differences": differences, "readout": readout, "tare": tare,
-            "record": record, "record_later": record_later, "name": name, "sources": sources,
-            "compression": compression, "overwrite": overwrite, "guard_frames": guard_frames,
-            "gap_frames": gap_frames, "say": say, "lines": lines, "send": send,
-            "kernel_buffer_bytes": kernel_buffer_bytes, "queue_bytes": queue_bytes, "readout_events": readout_events,
-            "gro": gro,
-        }  # fmt: skip
         self._labels = None if readout is None else list(json.loads(readout.to_json())["neurons"])
-        if say is not None and not callable(say):
-            raise ProblemError(f"say is {shown(say)}: must be a function of a Said")
-        listeners: list[Callable[[Said], object]] = [*outlets, *([] if say is None else [say])]
-        if readout is None and tare is not None:
-            raise ProblemError("tare without a readout: nothing would use it")
-        recording = None
-        if record is not None:
-            recording = (checked_path("record", record), text("compression", compression), flag("overwrite", overwrite))
+        receivers: list[Callable[[Said], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
-        feed = None if remote is None else remote._fed(queue_bytes)
+        feed = None if remote is None else remote._fed(options.queue_bytes)
         self._core = _core.Live(
-            text("host", host),
-            whole("port", port, 0, 65_535),
+            text("host", options.host),
+            whole("port", options.port, 0, 65_535),
             self.array._parts(),
-            parameters(options),
-            recording,
+            parameters(
+                options.for_rust(
+                    send=[to for to in destinations if not to.startswith(_LSL)],
+                    sources=[(what, _given(inlets[what]) if what in inlets else how) for what, how in sources],
+                )
+            ),
+            options.recording(),
             None if readout is None else readout.to_json(),
             tare.to_json() if isinstance(tare, Tare) else None,
             None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
-            None if not listeners else lambda *said: [hear(Said(*said)) for hear in listeners],
-            flag("lines", lines),
+            None if not receivers else lambda *said: [receive(Said(*said)) for receive in receivers],
+            flag("lines", options.lines),
             feed,
         )
         self._remote, self._place = remote, self._core.place()
@@ -298,16 +168,21 @@ class Live:
         for what, inlet in inlets.items():
             inlet.begin(partial(self._core.sample, what))
 
+    def _again(self, port: int, host: str, **changed: Any) -> Live:
+        """Return another one that works alike, of a board that sends to this address."""
+        options = replace(self._options, port=port, host=host, remote=None, **changed)
+        return Live(**{field.name: getattr(options, field.name) for field in fields(options)})
+
     @property
     def address(self) -> tuple[str, int]:
-        """Host and port that it listens on.
+        """Host and port that it receives on.
 
         Raises
         ------
         ProblemError : the board is another computer's
         """
         if self._remote is not None:
-            raise ProblemError(f"live: hears {self.place}, and listens on no address of this computer")
+            raise ProblemError(f"live: receives from {self.place}, and on no address of this computer")
         return self._core.address()
 
     @property
@@ -338,7 +213,7 @@ class Live:
 
     @property
     def counters(self) -> dict[str, Any]:
-        """What came, what became of it and what was lost where, up to now.
+        """Counts of what came, what became of it and what was lost where, up to now.
 
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
@@ -346,8 +221,8 @@ class Live:
         `wire_late` (events of version 2 that came when time had gone on without them), `bridged` (None, or of a board
         of another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
         ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
-        `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence
-        that was none, because events came later than the guard), `detections_dropped`, `sources` (what came of
+        `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those output in a
+        silence that an event then interrupted, later than the guard), `detections_dropped`, `sources` (the counts of
         each other source), `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
         `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
@@ -364,7 +239,7 @@ class Live:
 
     @property
     def picture(self) -> NDArray[np.uint16]:
-        """What the taxels hold, ticks, shape (rows, columns), ten times a second; 0 until a taxel was heard of."""
+        """Values that the taxels hold, ticks, shape (rows, columns), ten times a second; 0 without any event so far."""
         return self._core.picture().reshape(self.array.shape)
 
     @property
@@ -376,11 +251,11 @@ class Live:
         return None if taken is None else Tare.from_json(taken)
 
     def take_markers(self) -> list[tuple[int, bool]]:
-        """Return the markers that came since this was asked last: (t us, start)."""
+        """Return the markers that came since the last call: (t us, start)."""
         return self._core.take_markers()
 
     def expect_version(self, version: int) -> None:
-        """Say that the board was told to speak this version of the wire: it is believed at once, not after a second.
+        """Announce that the board was told to speak this version of the wire: decoded at once, not after a second.
 
         Raises
         ------
@@ -389,7 +264,7 @@ class Live:
         self._core.expect_version(whole("version", version, 1, 2))
 
     def source_address(self, name: str) -> tuple[str, int]:
-        """Return host and port that another board of the recording is listened to on.
+        """Return host and port that another board of the recording sends to.
 
         Raises
         ------
@@ -401,7 +276,7 @@ class Live:
         return address
 
     def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
-        """Keep numbers of a source that is given.
+        """Record numbers of a source whose values a program gives.
 
         Parameters
         ----------
@@ -419,11 +294,11 @@ class Live:
         self._core.sample(text("name", name), numbers("values", values, np.float64).reshape(-1).tolist(), came)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
-        """Take what taxels hold now for their rest from now on: for taxels that drift.
+        """Take the values that taxels hold for their rest from now on: for taxels that drift.
 
-        The readout's encoder hears them above that rest, where it reads a tare; the recording keeps the command, with
-        the rests before and after, and `taxel.detect.run` applies it. Never done but when asked for: what stands on
-        a taxel then would be taken for rest.
+        The readout's encoder reads them above that rest, where it uses a tare; the recording states the zeroing, with
+        the rests before and after, and `taxel.detect.run` applies it. Only done on request: a load that stands on a
+        taxel then would be taken for its rest.
 
         Parameters
         ----------
@@ -432,8 +307,8 @@ class Live:
 
         Raises
         ------
-        ProblemError : a taxel that does not exist or was not heard of yet (names it; then none is zeroed), a tare that
-            is being taken, or a `.lsa` that is recorded, which could not keep it
+        ProblemError : a taxel that does not exist or has had no event so far (names it; then none is zeroed), a tare
+            that is being taken, or a `.lsa` that is recorded, which cannot hold it
         OSError : the disk is full
         """
         columns, rows = (numbers(name, given, np.int64).reshape(-1) for name, given in (("x", x), ("y", y)))
@@ -448,11 +323,11 @@ class Live:
 
     @property
     def zeroed(self) -> tuple[Zeroing, ...]:
-        """What was zeroed last at each taxel that was, by `zero` or a panel."""
+        """The latest zeroing of each taxel that was zeroed, by `zero` or a panel."""
         return tuple(Zeroing(*one) for one in self._core.zeroed())
 
     def note(self, said: str) -> None:
-        """Write something down in the recording, with the time of now.
+        """Write a note into the recording, with the time of now.
 
         Raises
         ------
@@ -463,7 +338,7 @@ class Live:
     def record(
         self, path: str | os.PathLike[str], *, compression: str = "none", overwrite: bool = False
     ) -> Summary | None:
-        """Record what comes from here on, of all sources, beginning with what the taxels hold and the registers.
+        """Record what comes from here on, of all sources, beginning with the registers and the taxels' values.
 
         A recording that runs ends with what came before: each datagram, and each line, belongs to one of the two.
 
@@ -482,14 +357,14 @@ class Live:
         ------
         FileExistsError : the file is there already and `overwrite` is false; the recording that runs goes on
         OSError : the file cannot be created; the disk was full before the end of the one that ran
-        ProblemError : `record_later` was not said
+        ProblemError : `record_later` was not given
         """
         place = checked_path("path", path)
         ended = self._core.record(place, text("compression", compression), flag("overwrite", overwrite))
-        return None if ended is None else _summary(ended)
+        return None if ended is None else summary_of(ended)
 
     def record_again(self) -> bool:
-        """Have the recording that runs begin anew, where nothing came into it of any source; return whether it does."""
+        """Let the recording that runs begin anew, where no source has given anything; return whether it does."""
         return self._core.record_again()
 
     def end_recording(self) -> Summary:
@@ -500,7 +375,7 @@ class Live:
         OSError : the disk was full before its end; what was written before stays readable
         ProblemError : nothing is recorded
         """
-        return _summary(self._core.end_recording())
+        return summary_of(self._core.end_recording())
 
     @property
     def records(self) -> bool:
@@ -508,19 +383,19 @@ class Live:
         return self._core.records()
 
     def stop(self) -> Summary:
-        """Work through what came, close the file, and say what was lost; once ended, say it again.
+        """Process what has arrived, close the file, and return what was lost; every call returns the same summary.
 
         Raises
         ------
-        OSError : the disk is full; what was written before stays readable
+        OSError : the disk is full, and what was written before stays readable; or the file was removed, renamed or
+            replaced while it was recorded, which names what is lost
+        ProblemError : called by `say`, in a forked child, or after an end by an error
         """
-        while self._inlets:
-            self._inlets.pop().close()
-        said = self._core.stop()
-        if said is not None:
-            self._summary = _summary(said)
+        inlets, self._inlets = self._inlets, []
+        for inlet in inlets:
+            inlet.close()
         if self._summary is None:
-            raise ProblemError("live: ended by an error, which was raised then")
+            self._summary = summary_of(self._core.stop())
         return self._summary
 
     def __enter__(self) -> Live:
@@ -532,7 +407,7 @@ class Live:
         if error is None:
             self.stop()
         elif self._summary is None:
-            # The first error is the one to hear of.
+            # The first error is the one to report.
             with contextlib.suppress(OSError, _core.Error):
                 self.stop()
 
@@ -542,27 +417,8 @@ class Live:
         return f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)"
 
 
-def _summary(said: str) -> Summary:
-    values = json.loads(said)
-    path = None if values["path"] is None else Path(values["path"])
-    taken = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
-    return Summary(values["counters"], values["verdict"], path, taken)
-
-
-def _sources(sources: Mapping[str, str] | None) -> list[tuple[str, str]]:
-    if sources is None:
-        return []
-    if not isinstance(sources, Mapping):
-        raise ProblemError(f'sources is {shown(sources)}: must be a mapping, as {{"imu": "serial:/dev/ttyACM0"}}')
-    return [(text("name of a source", name), text(f"source {name}", what)) for name, what in sources.items()]
-
-
 def _given(inlet: LslInlet) -> str:
     return f"given,columns={':'.join(inlet.columns)}"
-
-
-def _held(registers: str | Registers) -> object:
-    return json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
 
 
 def _stretch_us(seconds: float) -> int:
@@ -570,30 +426,3 @@ def _stretch_us(seconds: float) -> int:
     if not 1e-6 <= stretch <= 3600:
         raise ProblemError(f"tare is {stretch} s: must lie between 1 us and an hour, or be a taxel.Tare")
     return round(stretch * 1e6)
-
-
-def delays(measured: dict[str, Any]) -> str:
-    """Return median and 99 % of a latency of `Live.counters` in words, or that nothing was measured.
-
-    Examples
-    --------
-    >>> delays({"count": 5, "p50_us": 41.2, "p99_us": 1300.0, "max_us": 1300.0})
-    'p50 41 us, p99 1,300 us'
-    >>> delays({"count": 0, "p50_us": None, "p99_us": None, "max_us": None})
-    'nothing measured'
-    """
-    if not measured["count"]:
-        return "nothing measured"
-    return f"p50 {measured['p50_us']:,.0f} us, p99 {measured['p99_us']:,.0f} us"
-
-
-def heard(said: Sequence[Said]) -> Detections:
-    """Return what was said live as `Detections`."""
-    return Detections(
-        [s.label for s in said],
-        [s.t for s in said],
-        [s.known for s in said],
-        [s.slope for s in said],
-        [s.said for s in said],
-        [s.repaired for s in said],
-    )
