@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import encode, formats, learn
-from taxel.studies.gait import folds, insole, pieces, protocols, sources
+from taxel import detect, encode, formats, learn
+from taxel.studies.gait import insole, pieces, protocols, sources
 from taxel.studies.gait.outcomes import EVENTS
 from taxel.studies.gait.realise import realise
 from taxel.studies.gait.recipes import NOTES, PRINTED
@@ -46,11 +46,12 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
     for source, folder in sources.readable(data, p["sources"]).items():
         protocol = protocols.of(source, STANDS_FOR[source][0])
         scopes = protocols.scopes(folder, source, protocol.name)
+        names = protocols.names(folder, source)
         common = {
             "source": source,
             "protocol": protocol.name,
             "data": fingerprint(folder, source),
-            "folds": hashlib.sha256(json.dumps(folds.to_json(scopes)).encode()).hexdigest()[:16],
+            "folds": hashlib.sha256(json.dumps(protocols.to_json(scopes, names)).encode()).hexdigest()[:16],
             "train": dict(protocol.train),
             "placed": "own",
         }
@@ -59,10 +60,10 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
                 for scope in scopes[: p["scopes"] or None]:
                     for group in range(len(scope.groups))[: p["folds"] or None]:
                         fold = {"recipe": recipe, "event": event, "scope": scope.name, "left_out": [group]}
-                        both = common | fold | {"point": point}
+                        both = common | fold
                         skim = {"pulse_ms": p["pulse_ms"], "ridge": p["ridge"]}
-                        listed.append(Task(both | {"kind": "neuron"}, 1))
-                        listed.append(Task(both | {"kind": "skim", "skim": skim}, 1))
+                        listed.append(Task(both | {"kind": "neuron", "points": [point]}, 1))
+                        listed.append(Task(both | {"kind": "skim", "point": point, "skim": skim}, 1))
     return listed
 
 
@@ -203,7 +204,7 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(sources, insole, pieces, folds, formats, encode, learn),
+    code=(sources, insole, pieces, protocols, detect, formats, encode, learn),
     data=tuple(SOURCES[name].folder for name in STANDS_FOR),
     unread=unread,
 )

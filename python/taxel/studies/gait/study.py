@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from taxel import encode, formats, learn
-from taxel.studies.gait import folds, insole, pieces, plans, rules, sources
+from taxel import detect, encode, formats, learn
+from taxel.studies.gait import insole, pieces, plans, protocols, rules, sources
 from taxel.studies.gait.outcomes import summarise
 from taxel.studies.gait.pictures import draw
 from taxel.studies.gait.realise import realise
@@ -19,19 +19,18 @@ STUDY = Study(
     protocol=(
         "The protocols of 6.5.2 and 6.5.3 on recordings of other people, as far as each recording's truth allows. "
         "Errors are neuron minus reference (negative: early), window ±50 ms, one to one; every further spike counts as "
-        "false, inside the window too. First phase: fixed rows, plain rules, and the fits that choose inside the "
-        "folds; second phase: the folds' own fits with what was chosen."
+        "false, inside the window too. Where parameters are chosen, they are chosen inside each training fold "
+        "(taxel.detect.choose)."
     ),
     parameters=plans.PARAMETERS,
     sizes={"toy": plans.TOY},
     tasks=plans.tasks,
-    then=plans.then,
     realise=realise,
     summarise=summarise,
     statements=statements,
     tables=tables,
     draw=draw,
-    code=(sources, insole, pieces, folds, rules, formats, encode, learn),
+    code=(sources, insole, pieces, protocols, rules, detect, formats, encode, learn),
     data=tuple(source.folder for source in sources.SOURCES.values()),
     unread=plans.unread,
 )
