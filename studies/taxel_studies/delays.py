@@ -55,7 +55,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def delayed(params: dict[str, Any], drawn: Sequence[SpikeTrains], seed: int) -> list[SpikeTrains]:
-    """Return patterns as they reach the neuron of an arm; the random delays are the same in all patterns of a realisation."""
+    """Return patterns as an arm delays them; random delays are the same in all patterns of a realisation."""
     arm, longest, inputs = params["arm"], params["longest_ms"], params["inputs"]
     if arm == "none":
         return list(drawn)

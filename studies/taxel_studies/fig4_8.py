@@ -1,4 +1,4 @@
-"""Figures 4.8 and 4.10: a tennis ball dropped on the array, its pictures, and its bits by sampling rate (thesis 4.4.2)."""
+"""Figures 4.8 and 4.10: a tennis ball dropped on the array: pictures, and bits by sampling rate (thesis 4.4.2)."""
 
 from __future__ import annotations
 

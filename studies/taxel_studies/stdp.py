@@ -234,8 +234,8 @@ STUDY = Study(
     where="thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377",
     protocol="2000 inputs, Poisson at rates that wander between 0 and 90 Hz (speed within 1800 Hz/s, changed by up to "
     "360 Hz/s a ms), none silent for 50 ms. 50 ms of the first 1000 of them are played again in a quarter of the "
-    "sections of 50 ms, never twice in a row, each spike moved by 1 ms (sd). 10 Hz of noise on all. 150 s, presented three "
-    "times; judged by the last.",
+    "sections of 50 ms, never twice in a row, each spike moved by 1 ms (sd). 10 Hz of noise on all. 150 s, presented "
+    "three times; judged by the last.",
     parameters=PARAMETERS,
     sizes={
         "quick": {"runs": 4, "seconds": 50},

@@ -1,4 +1,4 @@
-"""A neuron that learns when touches begin from an array on which balls fall, without labels (thesis 3.6.2 asks for it)."""
+"""A neuron that learns without labels when touches of an array begin (thesis 3.6.2 asks for such learning)."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def _scene(rng: np.random.Generator, same: bool) -> Scene:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Train a neuron on half of the touches, presented again and again, and test it on the others, beside an untrained one."""
+    """Train a neuron on half of the touches, many times over; test it on the others, beside an untrained one."""
     play = played(params, seed)
     # Whole, so that pieces end where the next ones begin; and between two touches.
     half = float(np.floor(play.contacts[params["touches"] // 2] - 20))

@@ -203,7 +203,7 @@ STUDY = Study(
     title="a neuron learns without labels, from a foot that walks, to fire once a stride",
     where="thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008",
     protocol="Two minutes of walking a foot, eight force sensors (PhysioNet gaitpdb), as crossings of levels in shares "
-    "of the running range: 112 trains. One neuron a foot is trained on the first minute, presented eight times, then the second for the "
+    "of the running range: 112 trains. One neuron a foot gets the first minute eight times, then the second for the "
     "first time, always learning; judged by that. Its threshold is such that before it learns it fires once in ten "
     "seconds. Time constants are longer than the paper's (50 ms for 10), as a step is longer than its pattern. Beside "
     "it a neuron that never learns, whose threshold lets it fire as often as the learnt one.",
