@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PYTHON = ROOT / "python"
 CONTRACTS = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"]
 #: Who may import `taxel` itself: those above all that it re-exports.
-TOP = ("taxel.cli", "taxel.demo", "taxel.studies")
+TOP = ("taxel.cli", "taxel.demo")
 #: Where a noun may import plots.
 DRAWING = {"plot", "_repr_html_"}
 
@@ -109,7 +109,6 @@ THOUSANDS = {
     "taxel.report.listening": "seconds",
     "taxel.simulate.fem": "N/m, kPa",
     "taxel.live._to_foxglove": "ns",
-    "taxel.studies": "seconds, Hz, seeds, frames of whole ms",
 }
 
 

@@ -87,7 +87,7 @@ def spoil(file: Path, change: Callable[[dict[str, Any]], Any]) -> None:
 def test_a_figure_of_this_code_is_not_stale(figure: Path) -> None:
     assert kept.stale_figures(figure) == {}
     with pytest.raises(FormatError, match="holds no kept figure"):
-        kept.stale_figures(figure / "coarse")
+        kept.stale_figures(figure / "report")
 
 
 def test_a_figure_of_other_code_is_stale_until_its_coarse_result_is_confirmed(figure: Path) -> None:
@@ -121,7 +121,7 @@ def test_a_stale_figure_is_marked_on_the_page(tmp_path: Path) -> None:
     ("changed", "stale", "counts"),
     [
         ("taxel._core.neuron_run", {"fig6.1", "fig6.9", "fig6.11"}, {"fig4.3", "drops"}),
-        ("taxel._core.circuit_volts", {"fig4.6"}, {"fig6.1", "fig5.11", "stdp"}),
+        ("taxel._core.circuit_volts", {"fig4.6"}, {"fig6.1", "stdp"}),
         ("taxel.learn.cone_x", {"fig6.9", "fig6.7"}, {"fig4.3", "drops", "codes"}),
         ("taxel/detect/recipes/touch.toml", {"touch"}, {"fig6.1", "fig6.9"}),
     ],
