@@ -250,8 +250,8 @@ fn held(data: &[u8]) -> Option<Vec<u16>> {
     Some(ticks.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect())
 }
 
-/// Tells a decoder what the taxels held before the recording's first datagram.
-pub(crate) fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
+/// Gives a decoder what a recording says that the taxels held before its first datagram.
+pub fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
     if let Some(held) = held(data) {
         receiver.begin_with(held.iter().map(|ticks| (*ticks != u16::MAX).then_some(*ticks)));
     }
