@@ -1,26 +1,28 @@
 """Touch as events: from the bytes of a tactile array to decisions that say when."""
 
 from importlib import import_module
-from types import ModuleType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from taxel import detect, device, encode, formats, information, learn, live, metrics, simulate, wire, wire_v2
 from taxel._core import DeviceError, Error, FormatError, NotFittedError, ProblemError, SceneError
 from taxel.array import Array
 from taxel.calibration import Calibration, Load
-from taxel.detect import Readout
+from taxel.clock import Clock
 from taxel.detections import Detections
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.labels import Label, Labels
 from taxel.neuron import Neuron
-from taxel.recording import BoardChange, Clock, Datagrams, Health, Note, Recording, Zeroing, convert, cut, health, merge
-from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's
 from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
 if TYPE_CHECKING:
-    from taxel import plot
+    from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, wire, wire_v2
+    from taxel.detect import Readout
+    from taxel.recording import BoardChange, Datagrams, Note, Recording, Zeroing
+    from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's
+    from taxel.recording.convert import convert
+    from taxel.recording.health import Health, health
+    from taxel.recording.parts import cut, merge
 
 __version__ = "0.1.0"
 
@@ -70,8 +72,30 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> ModuleType:
-    """Load `taxel.plot` when it is first asked for: matplotlib takes longer than all else together."""
-    if name == "plot":
-        return import_module("taxel.plot")
+#: Where the names are that are loaded when they are first asked for, so that ``import taxel`` is quick.
+_ROOMS = (
+    "detect", "device", "encode", "formats", "information", "learn", "live", "metrics", "plot", "recording", "simulate",
+    "wire", "wire_v2",
+)  # fmt: skip
+_RECORDING = (
+    "BoardChange", "Datagrams", "Health", "Note", "Recording", "Zeroing", "convert", "cut", "health", "merge",
+)  # fmt: skip
+_ELSEWHERE = {name: ("taxel.recording", name) for name in _RECORDING}
+_ELSEWHERE |= {"open": ("taxel.recording", "open_any"), "Readout": ("taxel.detect", "Readout")}
+
+
+def __getattr__(name: str) -> Any:
+    """Load a room, or a name that stands in one, when it is first asked for."""
+    if name in _ROOMS:
+        return import_module(f"taxel.{name}")
+    if name in _ELSEWHERE:
+        place, inside = _ELSEWHERE[name]
+        found = getattr(import_module(place), inside)
+        globals()[name] = found
+        return found
     raise AttributeError(f"module 'taxel' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """List the public names, those not loaded yet among them."""
+    return sorted({*globals(), *__all__})

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import taxel
@@ -123,7 +123,53 @@ def test_any_bytes_are_survived_and_counted(data, sealed):
     heard = decoder.push(data)
     c = decoder.counts
     assert heard.intact == (c.intact == 1)
-    assert c.datagrams == 1 == c.intact + c.repeated + c.old + c.short + c.foreign + c.checksum
+    assert c.datagrams == 1 == c.intact + c.repeated + c.old + c.short + c.long + c.foreign + c.checksum
+
+
+@given(seed=st.integers(0, 2**32 - 1), sessions=st.integers(1, 6), plain=st.booleans())
+@settings(max_examples=300)
+def test_any_order_of_any_sessions_reads_as_the_slow_reader_does(seed, sessions, plain):
+    """Late datagrams of earlier sessions, states, first values of 0, and what the page says of bodies that break its rules."""
+    draw, sent = random.Random(seed), []
+    for session in range(sessions):
+        flags = draw.choice([0, 1, 2]) | draw.choice([0, 0, 4, 8])
+        for sequence in range(draw.randrange(1, 8)):
+            kind = draw.choice([0, 1, 1, 2, 3, 4, 5, 6, 6, 7])
+            base, stride = draw.randrange(200), 4 if plain or draw.random() < 0.8 else draw.choice([0, 3, 9, 16, 17, 31])
+            if kind == 3:
+                body = markers(*((draw.choice([0, 5, 2**31]), draw.randrange(4), 9) for _ in range(draw.randrange(4))))
+            elif kind in (4, 5):
+                body = bytes(draw.choice([0, 39, 40, 48]))
+            else:
+                times = [0, 0, 1, 50, 32_511] if plain else [0, 1, 50, 32_511, 32_512, 40_000, 65_535]
+                events = [
+                    (base + t, draw.randrange(17), draw.randrange(16), draw.random() < 0.5, draw.choice([0, 0, 7, 200]))
+                    for t in sorted(draw.choice(times) for _ in range(draw.randrange(12)))
+                ]
+                body = words(kind, events, base=base, stride=min(stride, 4))
+            body += b"" if plain else bytes(draw.choice([0, 0, 0, 1, 2, 1400 - 24 - len(body), 1401 - 24 - len(body)]))
+            data = datagram(
+                kind, body, session=session, sequence=sequence, base=base, stride=stride, flags=flags, span=draw.choice([0, 9])
+            )
+            # Sessions begin in turn; any datagram may come late, or never.
+            sent.append((session + (draw.choice([0, 0, 0, 1, 2]) if sequence else 0), draw.random(), data))
+    given_ = [data for _, _, data in sorted(sent, key=lambda s: s[:2]) if draw.random() < 0.9]
+    decoder, slow = Decoder(array=taxel.Array(16, 16)), Reader(16, 16)
+    for data in given_:
+        before = len(slow.events), len(slow.markers)
+        heard = decoder.push(data)
+        slow.push(data)
+        assert list(rows([heard])) == slow.events[before[0] :]
+        assert list(heard.events.markers) == slow.markers[before[1] :]
+        held = np.full((16, 16), -1)
+        for (x, y), value in slow.held.items():
+            held[y, x] = value
+        assert (decoder.held == held).all()
+    counts = asdict(decoder.counts)
+    told = {"missing", "events", "markers"}
+    assert {name: counts[name] for name in slow.counts if name not in told} == {
+        name: count for name, count in slow.counts.items() if name not in told
+    }
 
 
 @given(seed=st.integers(0, 2**32 - 1))

@@ -74,6 +74,7 @@ const FLOORS: [(&str, &[&[&str]]); 4] = [
                 "recording",
                 "rivals",
                 "simulate",
+                "sources",
                 "wire",
                 "wire_v2",
             ],

@@ -4,6 +4,7 @@ mod convert;
 mod enter;
 mod errors;
 mod guest;
+mod instructions;
 mod knock;
 
 mod bridge;
@@ -23,6 +24,7 @@ mod parameters;
 mod recording;
 mod rivals;
 mod simulate;
+mod sources;
 mod wire;
 mod wire_v2;
 
@@ -32,6 +34,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
+    instructions::register(module)?;
     knock::register(module)?;
     nouns::register(module)?;
     bridge::register(module)?;
@@ -49,6 +52,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;
+    sources::register(module)?;
     wire::register(module)?;
     wire_v2::register(module)?;
     Ok(())

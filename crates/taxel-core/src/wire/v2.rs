@@ -57,6 +57,9 @@ const STRIDE_BITS: u32 = 5;
 const FLAG_BITS: u32 = 4;
 const LOW_LINE_BITS: u32 = u8::BITS - STRIDE_BITS;
 
+/// The largest stride that names a taxel: positions of an array have 16 bits.
+const LARGEST_STRIDE: u8 = 16;
+
 /// The base time has 48 bits: 8.9 years.
 const BASE_BITS: u32 = 48;
 
@@ -182,6 +185,9 @@ pub enum Refused {
     /// Too short for header and trailer.
     #[error("shorter than 24 bytes")]
     Short,
+    /// Longer than any that a board sends.
+    #[error("longer than 1400 bytes")]
+    Long,
     /// Another first byte, or another version.
     #[error("begins with another byte or version")]
     Foreign,
@@ -202,6 +208,9 @@ impl Header {
         }
         if datagram.len() < HEADER_BYTES + TRAILER_BYTES {
             return Err(Refused::Short);
+        }
+        if datagram.len() > DATAGRAM_BYTES {
+            return Err(Refused::Long);
         }
         let (rest, sum) = datagram.split_at(datagram.len() - 4);
         if checksum::crc32c(rest).to_le_bytes() != sum {
