@@ -217,7 +217,7 @@ export class Board {
     this.select.onchange = () => {
       this.restoreAll();
       if (!this.select.value) return;
-      this.server.ask({ type: "preset_apply", name: this.select.value }).catch((error) => {
+      this.server.request({ type: "preset_apply", name: this.select.value }).catch((error) => {
         // What the board holds is another one still.
         this.showPresets();
         this.failed(error);
@@ -226,7 +226,7 @@ export class Board {
     part("preset-form", HTMLFormElement).onsubmit = (event) => {
       event.preventDefault();
       const name = part("preset-name", HTMLInputElement);
-      this.server.ask({ type: "preset_save", name: name.value.trim() }).then(() => {
+      this.server.request({ type: "preset_save", name: name.value.trim() }).then(() => {
         name.value = "";
       }, failed);
     };
@@ -238,7 +238,7 @@ export class Board {
 
   /** @param {{ type: string } & Record<string, unknown>} message */
   ask(message) {
-    return this.server.ask(message).catch(this.failed);
+    return this.server.request(message).catch(this.failed);
   }
 
   /** @param {Hello} hello */
@@ -247,8 +247,8 @@ export class Board {
     this.writable = hello.live && hello.control !== null;
     part("losses", HTMLElement).hidden = !hello.live;
     this.connection.greet(hello);
-    const said = hello.live ? "No control line: registers can be read here, not written. Choose a port above." : "Of a recording: what the registers held.";
-    write(part("registers-why", HTMLElement), this.writable ? "" : said);
+    const why = hello.live ? "No control line: registers can be read here, not written. Choose a port above." : "Of a recording: what the registers held.";
+    write(part("registers-why", HTMLElement), this.writable ? "" : why);
     this.enable();
   }
 
@@ -265,14 +265,14 @@ export class Board {
     this.preset = preset;
     this.showPresets();
     const rate = frame_us ? `${whole(1e6 / frame_us)} frames/s, a frame takes ${frame_us.toFixed(1)} µs` : "";
-    write(part("frame-rate", HTMLElement), known ? rate : `${rate}${rate ? " " : ""}(assumed: nobody has read the board yet)`);
+    write(part("frame-rate", HTMLElement), known ? rate : `${rate}${rate ? " " : ""}(assumed: the registers have not been read yet)`);
     this.warn();
     this.check();
   }
 
-  /** @param {RegistersTold} told */
-  take(told) {
-    this.show(told.values, told.frame_us, told.preset, told.known);
+  /** @param {RegistersTold} message */
+  take(message) {
+    this.show(message.values, message.frame_us, message.preset, message.known);
   }
 
   /** @param {PresetsTold} presets */
@@ -303,10 +303,10 @@ export class Board {
   }
 
   warn() {
-    const said = Object.keys(this.values).length ? warned(this.wanted()).map(({ text }) => text) : [];
+    const warnings = Object.keys(this.values).length ? warned(this.wanted()).map(({ text }) => text) : [];
     const place = part("registers-warning", HTMLElement);
-    place.hidden = !said.length;
-    write(place, said.join(". "));
+    place.hidden = !warnings.length;
+    write(place, warnings.join(". "));
   }
 
   /** Looks again at what is typed and was refused: a change elsewhere may have made it good. */
@@ -337,7 +337,7 @@ export class Board {
     const waiting = [...this.controls.values()].filter(({ wanted }) => wanted !== null);
     if (!waiting.length) return;
     const values = Object.fromEntries(waiting.map(({ field, wanted }) => [field.name, field.unit === "flag" ? Boolean(wanted) : wanted]));
-    this.server.ask({ type: "set", values }).catch((error) => {
+    this.server.request({ type: "set", values }).catch((error) => {
       const field = error instanceof RefusedError ? error.field : null;
       (this.controls.get(field ?? "") ?? control).refuse(error.message);
     });

@@ -1,4 +1,4 @@
-// Colour maps that colour-blind eyes can read, and what a value looks like in them.
+// Colour maps that can be read with a colour vision deficiency, and the colour of a value in them.
 
 /** @typedef {"dark" | "light"} Theme */
 /** @typedef {[number, number, number]} Colour red, green, blue, 0 to 255 */
@@ -40,7 +40,7 @@ const CHANGE = {
   light: [[6, 41, 102], [20, 92, 196], [144, 187, 240], [238, 241, 246], [243, 178, 132], [194, 82, 16], [92, 31, 4]],
 };
 
-/** What a taxel looks like that was never heard of: a chequered ground, two tones. */
+/** Colours of a taxel without any event so far: a chequered ground of two tones. */
 /** @type {Record<Theme, [Colour, Colour]>} */
 export const UNKNOWN = {
   dark: [[29, 33, 42], [41, 46, 57]],

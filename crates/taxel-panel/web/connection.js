@@ -1,4 +1,4 @@
-// Where the board is: its control line and the address of its events, found or entered; what it says on the line.
+// The connection to the board: its control line and the address of its events, chosen or typed; the lines that it sends.
 
 import { make, part, write } from "./dom.js";
 
@@ -14,15 +14,15 @@ const REMEMBERED = 8;
 const LINES_KEPT = 200;
 
 /** A place to choose from a list, or to type, and to connect to. */
-class Way {
+class PlaceForm {
   /**
    * @param {"control" | "udp"} name of its parts in the page
-   * @param {"lines" | "addresses"} kept the setting that remembers what was used
+   * @param {"lines" | "addresses"} setting the setting that remembers earlier places
    * @param {Settings} settings
    * @param {(place: string) => Promise<void>} connect
    */
-  constructor(name, kept, settings, connect) {
-    this.kept = kept;
+  constructor(name, setting, settings, connect) {
+    this.setting = setting;
     this.settings = settings;
     this.input = part(name, HTMLInputElement);
     this.choice = part(`${name}-choice`, HTMLSelectElement);
@@ -54,16 +54,16 @@ class Way {
   /** @param {string} place */
   remember(place) {
     const before = this.before.filter((other) => other !== place);
-    this.settings.set(this.kept, [place, ...before].slice(0, REMEMBERED).join("\n"));
+    this.settings.set(this.setting, [place, ...before].slice(0, REMEMBERED).join("\n"));
     this.show();
   }
 
   /** @returns {string[]} where it was before, the last first */
   get before() {
-    return this.settings.values[this.kept].split("\n").filter(Boolean);
+    return this.settings.values[this.setting].split("\n").filter(Boolean);
   }
 
-  /** @param {Group[]} groups @param {string} none what is said where there are none */
+  /** @param {Group[]} groups @param {string} none the text where there are none */
   offer(groups, none) {
     [this.groups, this.none] = [groups, none];
     this.show();
@@ -99,19 +99,19 @@ export class Connection {
   constructor(server, settings, failed) {
     this.server = server;
     this.udp = "";
-    this.line = new Way("control", "lines", settings, (place) => server.ask({ type: "control", place: place || null }));
-    this.events = new Way("udp", "addresses", settings, (place) => {
+    this.line = new PlaceForm("control", "lines", settings, (place) => server.request({ type: "control", place: place || null }));
+    this.events = new PlaceForm("udp", "addresses", settings, (place) => {
       const [host, port] = address(place);
-      return server.ask({ type: "listen", host, port });
+      return server.request({ type: "listen", host, port });
     });
     const drop = part("control-drop", HTMLButtonElement);
-    drop.onclick = () => server.ask({ type: "control", place: null }).then(() => this.line.refuse(null), failed);
+    drop.onclick = () => server.request({ type: "control", place: null }).then(() => this.line.refuse(null), failed);
     part("places-again", HTMLButtonElement).onclick = () => this.look();
     const where = part("where", HTMLDetailsElement);
     where.ontoggle = () => where.open && this.look();
     const delta = part("delta-intensity", HTMLInputElement);
     delta.onchange = () =>
-      server.ask({ type: "delta_intensity", on: delta.checked }).catch((error) => {
+      server.request({ type: "delta_intensity", on: delta.checked }).catch((error) => {
         delta.checked = !delta.checked;
         failed(error);
       });
@@ -119,7 +119,7 @@ export class Connection {
 
   /** Asks which ports and addresses there are. */
   look() {
-    this.server.say({ type: "places" });
+    this.server.send({ type: "places" });
   }
 
   /** @param {Hello} hello */
@@ -134,12 +134,12 @@ export class Connection {
     this.events.at(udp);
     part("control-drop", HTMLButtonElement).disabled = control === null;
     part("delta-intensity", HTMLInputElement).checked = delta_intensity ?? false;
-    write(part("where-said", HTMLElement), control ?? "no control line");
+    write(part("where-info", HTMLElement), control ?? "no control line");
   }
 
   /** @param {Places} places */
   offer({ serial, addresses }) {
-    const ports = serial.map((port) => ({ place: port.place, text: [port.place, said(port)].filter(Boolean).join(" · ") }));
+    const ports = serial.map((port) => ({ place: port.place, text: [port.place, described(port)].filter(Boolean).join(" · ") }));
     this.line.offer([{ label: "Serial ports", places: ports }], "no serial port found: type a place below");
     const port = address(this.udp)[1] || 5208;
     const own = addresses.map(({ host, name }) => ({ place: `${host}:${port}`, text: `${host}:${port} · ${name}` }));
@@ -147,18 +147,18 @@ export class Connection {
     this.events.offer([{ label: "This machine", places: [every, ...own] }], "type an address below");
   }
 
-  /** @param {string} text of the board's serial line */
-  hear(text) {
-    const log = part("board-lines", HTMLElement);
-    log.append(make("li", {}, text));
-    while (log.children.length > LINES_KEPT) log.firstElementChild?.remove();
-    log.scrollTop = log.scrollHeight;
+  /** @param {string} text a line from the board */
+  log(text) {
+    const lines = part("board-lines", HTMLElement);
+    lines.append(make("li", {}, text));
+    while (lines.children.length > LINES_KEPT) lines.firstElementChild?.remove();
+    lines.scrollTop = lines.scrollHeight;
     part("no-lines", HTMLElement).hidden = true;
   }
 }
 
-/** @param {Port} port @returns {string} what a port says of itself */
-function said({ kind, product, maker, serial }) {
+/** @param {Port} port @returns {string} description of a port */
+function described({ kind, product, maker, serial }) {
   return [product, maker, serial].filter(Boolean).join(", ") || (kind === "other" ? "" : kind);
 }
 

@@ -30,21 +30,21 @@ export async function savePicture({ title, file, lanes }) {
   [canvas.width, canvas.height] = [WIDE, Math.ceil(top + 24 + high + 50 + lanes.reduce((sum, lane) => sum + LANE + heightOf(lane), 0) + EDGE)];
   const context = ground(canvas);
   const font = getComputedStyle(document.body).fontFamily;
-  const text = (/** @type {string} */ said, /** @type {number} */ x, /** @type {number} */ y, /** @type {number} */ size, colour = "text") => {
+  const text = (/** @type {string} */ caption, /** @type {number} */ x, /** @type {number} */ y, /** @type {number} */ size, colour = "text") => {
     context.font = `${size}px ${font}`;
     context.fillStyle = themed(colour);
-    context.fillText(said, x, y);
+    context.fillText(caption, x, y);
   };
   context.fillStyle = themed("ground");
   context.fillRect(0, 0, canvas.width, canvas.height);
   text(title, EDGE, EDGE + 16, 20);
   context.imageSmoothingEnabled = false;
   [
-    { name: "pressure", said: "Pressure above rest", ends: ["0", part("pressure-top", HTMLElement).textContent ?? ""] },
-    { name: "change", said: "Change", ends: [part("change-least", HTMLElement).textContent ?? "", part("change-top", HTMLElement).textContent ?? ""] },
-  ].forEach(({ name, said, ends }, i) => {
+    { name: "pressure", caption: "Pressure above rest", ends: ["0", part("pressure-top", HTMLElement).textContent ?? ""] },
+    { name: "change", caption: "Change", ends: [part("change-least", HTMLElement).textContent ?? "", part("change-top", HTMLElement).textContent ?? ""] },
+  ].forEach(({ name, caption, ends }, i) => {
     const x = EDGE + i * (side + BETWEEN);
-    text(said, x, top + 14, 15);
+    text(caption, x, top + 14, 15);
     context.drawImage(part(`${name}-map`, HTMLCanvasElement), x, top + 24, side, high);
     context.drawImage(part(`${name}-bar`, HTMLCanvasElement), x, top + 24 + high + 8, side, 8);
     text(ends[0], x, top + high + 56, 13, "dim");

@@ -1,4 +1,4 @@
-// Every key of the page, in one table: it makes the help, and the documentation is held against it.
+// Every key of the page, in one table, from which the help is made; a test compares the documentation with it.
 
 import { make, part } from "./dom.js";
 
@@ -39,11 +39,11 @@ export const KEYS = [
 ];
 
 /**
- * Hears the keys, unless a person types or a part of the page takes them for itself.
+ * Calls the action of a key, unless the user types text or the focused element uses the key itself.
  * @param {Record<string, (event: KeyboardEvent) => void>} actions by name
  * @param {() => boolean} letters whether single characters count
  */
-export function hearKeys(actions, letters) {
+export function bindKeys(actions, letters) {
   /** @type {Map<string, string>} */
   const byKey = new Map(KEYS.flatMap(({ keys, action }) => keys.map((key) => [key, action])));
   for (const action of byKey.values()) if (!actions[action]) throw new Error(`no action for key ${action}`);
@@ -57,7 +57,7 @@ export function hearKeys(actions, letters) {
     const action = byKey.get(key);
     if (!action || (event.repeat && ["record", "play", "mark", "theme", "picture"].includes(action))) return;
     if (key.length === 1 && key !== " " && !letters()) return;
-    // What has keys of its own keeps them: lists and sliders the arrows and letters, buttons and boxes the space bar.
+    // Elements with keys of their own: lists and sliders use arrows and letters, buttons and boxes the space bar.
     const moves = key.startsWith("Arrow") || key === "Home" || key === "End";
     if (target instanceof HTMLSelectElement || (moves && target.matches("input, [role=tab]"))) return;
     if (key === " " && target.matches("button, input, summary, a")) return;

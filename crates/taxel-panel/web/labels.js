@@ -61,10 +61,10 @@ export class Labels {
     return (this.file && this.files.get(this.file)?.labels) || [];
   }
 
-  /** @param {LabelsTold} told */
-  take(told) {
-    this.files.set(told.name, { ...told, labels: [...told.labels].sort((a, b) => a.t_us - b.t_us) });
-    if (told.name === this.file) this.show();
+  /** @param {LabelsTold} message */
+  take(message) {
+    this.files.set(message.name, { ...message, labels: [...message.labels].sort((a, b) => a.t_us - b.t_us) });
+    if (message.name === this.file) this.show();
   }
 
   /** @param {string | null} file */
@@ -101,12 +101,12 @@ export class Labels {
       this.name.focus();
       return;
     }
-    if (t_us !== null) this.server.ask({ type: "mark", label, t_us }).catch(this.failed);
+    if (t_us !== null) this.server.request({ type: "mark", label, t_us }).catch(this.failed);
   }
 
   /** @param {number} label_id @param {number} t_us */
   move(label_id, t_us) {
-    this.server.ask({ type: "move", label_id, t_us: Math.max(0, Math.round(t_us)) }).catch((error) => {
+    this.server.request({ type: "move", label_id, t_us: Math.max(0, Math.round(t_us)) }).catch((error) => {
       this.failed(error);
       this.show();
     });
@@ -114,7 +114,7 @@ export class Labels {
 
   /** @param {number} label_id */
   remove(label_id) {
-    this.server.ask({ type: "delete", label_id }).catch(this.failed);
+    this.server.request({ type: "delete", label_id }).catch(this.failed);
   }
 
   /** @param {number} by 1: the next label after the picture's time, -1: the one before */
@@ -136,22 +136,22 @@ export class Labels {
   /** Writes the list and puts up the flags. */
   show() {
     const { labels } = this;
-    const told = this.file ? this.files.get(this.file) : undefined;
+    const table = this.file ? this.files.get(this.file) : undefined;
     write(part("label-count", HTMLElement), this.file ? counted(labels.length, "label") : "");
     this.lane.dataset.hint = this.file ? "Labels: click here to mark one" : "Labels: open a recording, or start one";
-    const place = told ? `Kept in ${told.path}` : "Open a recording, or start one, and mark what happens in it.";
+    const place = table ? `Saved in ${table.path}` : "Open a recording, or start one, and mark what happens in it.";
     write(part("label-place", HTMLElement), place);
     part("train-line", HTMLElement).hidden = !labels.length;
     if (this.file) write(part("train-command", HTMLElement), `taxel train ${this.file} --labels notes --search -o readout.json`);
     const list = part("label-list", HTMLElement);
     // A row in which a person types stays what it is.
     const typing = list.contains(document.activeElement) ? document.activeElement?.closest("li")?.dataset.id : undefined;
-    const kept = typing === undefined ? null : list.querySelector(`li[data-id="${CSS.escape(typing)}"]`);
-    const rows = labels.map((label) => (kept instanceof HTMLElement && kept.dataset.id === String(label.label_id) ? kept : this.row(label)));
+    const edited = typing === undefined ? null : list.querySelector(`li[data-id="${CSS.escape(typing)}"]`);
+    const rows = labels.map((label) => (edited instanceof HTMLElement && edited.dataset.id === String(label.label_id) ? edited : this.row(label)));
     if (rows.length !== list.children.length || rows.some((row, i) => row !== list.children[i])) {
       const focused = document.activeElement;
       list.replaceChildren(...rows);
-      if (kept && focused instanceof HTMLElement) focused.focus();
+      if (edited && focused instanceof HTMLElement) focused.focus();
     }
     for (const row of rows) row.classList.toggle("chosen", row.dataset.id === String(this.chosen));
     this.place();
@@ -163,10 +163,10 @@ export class Labels {
     const time = make("input", { type: "text", inputmode: "decimal", value: (t_us / 1e6).toFixed(6).replace(/0{1,3}$/, ""), "aria-label": `time of ${label}, seconds` });
     const go = make("button", { type: "button", class: "small", "aria-label": `go to ${label}, ${seconds(t_us)}` }, "Go");
     const away = make("button", { type: "button", class: "small", "aria-label": `delete ${label}, ${seconds(t_us)}` }, "×");
-    name.onchange = () => this.server.ask({ type: "rename", label_id, label: name.value.trim() }).catch((error) => this.refused(name, label, error));
+    name.onchange = () => this.server.request({ type: "rename", label_id, label: name.value.trim() }).catch((error) => this.refused(name, label, error));
     time.onchange = () => {
       const wanted = Math.round(Number(time.value.replace(",", ".")) * 1e6);
-      if (Number.isFinite(wanted)) this.server.ask({ type: "move", label_id, t_us: wanted }).catch((error) => this.refused(time, (t_us / 1e6).toFixed(3), error));
+      if (Number.isFinite(wanted)) this.server.request({ type: "move", label_id, t_us: wanted }).catch((error) => this.refused(time, (t_us / 1e6).toFixed(3), error));
       else this.refused(time, (t_us / 1e6).toFixed(3), new Error(`${time.value} is no number of seconds`));
     };
     go.onclick = () => {
@@ -209,8 +209,8 @@ export class Labels {
       }
       flag.style.left = `${(100 * share).toFixed(3)}%`;
       write(/** @type {HTMLElement} */ (flag.firstElementChild), label.label);
-      const said = `label ${label.label} at ${seconds(t_us)}`;
-      if (flag.getAttribute("aria-label") !== said) flag.setAttribute("aria-label", said);
+      const name = `label ${label.label} at ${seconds(t_us)}`;
+      if (flag.getAttribute("aria-label") !== name) flag.setAttribute("aria-label", name);
       flag.classList.toggle("chosen", label.label_id === this.chosen);
     }
     for (const [id, flag] of this.flags) {

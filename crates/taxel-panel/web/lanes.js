@@ -125,10 +125,10 @@ export class Lanes {
     const [, column, row] = this.data.centre;
     for (let i = 0; i < SPAN; i++) {
       const place = end === null ? -1 : timeline.known(end - SPAN + 1 + i);
-      const heard = place >= 0 && history[3 * place + 2] !== UNKNOWN_VALUE;
-      least[i] = heard ? history[3 * place] : null;
-      greatest[i] = heard ? history[3 * place + 1] : null;
-      last[i] = heard ? history[3 * place + 2] : null;
+      const known = place >= 0 && history[3 * place + 2] !== UNKNOWN_VALUE;
+      least[i] = known ? history[3 * place] : null;
+      greatest[i] = known ? history[3 * place + 1] : null;
+      last[i] = known ? history[3 * place + 2] : null;
       force[i] = place >= 0 ? sum[place] : null;
       touched[i] = place >= 0 ? area[place] : null;
       const pressed = place >= 0 && !Number.isNaN(x[place]);

@@ -49,7 +49,7 @@ class Map2D {
   /** @param {number} rows @param {number} columns */
   size(rows, columns) {
     [this.canvas.width, this.canvas.height] = [columns, rows];
-    // A sensor much longer than wide keeps within the page, and one of few rows can be pointed at: its taxels are no squares then.
+    // A sensor much longer than wide stays within the page, and one of few rows can be pointed at: its taxels are no squares then.
     const aspect = String(Math.max(1 / 3, Math.min(8, columns / rows)));
     this.frame.style.aspectRatio = aspect;
     this.frame.parentElement?.style.setProperty("--aspect", aspect);
@@ -101,7 +101,7 @@ export class Maps {
     /** @type {{ pressure: Uint32Array, change: Uint32Array }} */
     this.words = { pressure: new Uint32Array(256), change: new Uint32Array(256) };
     /** Of the last picture drawn. */
-    this.told = { unknown: 0, value: /** @type {number | null} */ (null), rest: /** @type {number | null} */ (null) };
+    this.info = { unknown: 0, value: /** @type {number | null} */ (null), rest: /** @type {number | null} */ (null) };
     this.colour();
     for (const map of [this.pressure, this.change]) {
       map.frame.addEventListener("pointerdown", (event) => this.point(this.at(map, event)));
@@ -188,11 +188,11 @@ export class Maps {
     }
     this.pressure.show();
     this.change.show();
-    this.told.unknown = unknown;
+    this.info.unknown = unknown;
     const watched = this.taxel ? this.taxel[1] * columns + this.taxel[0] : -1;
     const value = watched < 0 ? UNKNOWN_VALUE : pressure[watched];
-    this.told.value = value === UNKNOWN_VALUE ? null : value;
-    this.told.rest = watched < 0 || rest[watched] === UNKNOWN_VALUE ? null : rest[watched];
+    this.info.value = value === UNKNOWN_VALUE ? null : value;
+    this.info.rest = watched < 0 || rest[watched] === UNKNOWN_VALUE ? null : rest[watched];
   }
 
   /** Writes the numbers beside the colours. */
@@ -203,14 +203,14 @@ export class Maps {
     write(part("pressure-top", HTMLElement), `${Math.round(scale)} ticks`);
     write(part("change-least", HTMLElement), `−${Math.round(changes)}`);
     write(part("change-top", HTMLElement), `+${Math.round(changes)} ticks`);
-    const { unknown } = this.told;
+    const { unknown } = this.info;
     part("unknown", HTMLElement).hidden = unknown === 0;
-    write(part("unknown-count", HTMLElement), counted(unknown, "taxel not heard of", "taxels not heard of"));
+    write(part("unknown-count", HTMLElement), counted(unknown, "taxel without events", "taxels without events"));
     write(part("taxel-name", HTMLElement), this.named());
-    const { value, rest } = this.told;
+    const { value, rest } = this.info;
     const above = value === null || rest === null ? "" : `, ${Math.max(0, value - rest)} above rest`;
     const zeroed = this.zeroed.some(({ taxel: [x, y] }) => x === this.taxel?.[0] && y === this.taxel?.[1]) ? ", zeroed" : "";
-    write(part("taxel-value", HTMLElement), !this.taxel ? "" : value === null ? "not heard of" : `${value} ticks${above}${zeroed}`);
+    write(part("taxel-value", HTMLElement), !this.taxel ? "" : value === null ? "no event yet" : `${value} ticks${above}${zeroed}`);
   }
 
   /** @returns {string} row, column and traces of the taxel under the crosshair */
@@ -260,7 +260,7 @@ export class Maps {
     this.taxel = taxel;
     this.watched(taxel);
     this.mark();
-    write(part("taxel-said", HTMLElement), taxel ? this.named() : "no taxel watched");
+    write(part("taxel-info", HTMLElement), taxel ? this.named() : "no taxel watched");
   }
 
   /** Puts crosshair and marks where they belong. */

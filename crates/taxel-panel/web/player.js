@@ -66,16 +66,16 @@ export class Player {
     const { state, source, speed } = this.transport;
     // At rest to the microsecond, as stamps of the board are less than a millisecond apart.
     write(part("clock", HTMLElement), seconds(this.t_us, state === "paused" ? 6 : 3));
-    let said = "";
-    if (source === null && state !== "following" && this.reach && this.t_us !== null) said = `${short(Math.max(0, this.reach[1] - this.t_us))} behind`;
-    else if (source !== null && this.reach) said = `of ${seconds(this.reach[1])}`;
-    if (state === "playing" && speed !== 1) said += ` · × ${speed}`;
-    write(part("clock-more", HTMLElement), said);
+    let text = "";
+    if (source === null && state !== "following" && this.reach && this.t_us !== null) text = `${short(Math.max(0, this.reach[1] - this.t_us))} behind`;
+    else if (source !== null && this.reach) text = `of ${seconds(this.reach[1])}`;
+    if (state === "playing" && speed !== 1) text += ` · × ${speed}`;
+    write(part("clock-more", HTMLElement), text);
   }
 
   /** @param {{ type: string } & Record<string, unknown>} message */
   ask(message) {
-    return this.server.ask(message).catch(this.failed);
+    return this.server.request(message).catch(this.failed);
   }
 
   toggle() {

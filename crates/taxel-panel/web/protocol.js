@@ -1,8 +1,8 @@
-// What server and page say to each other: docs/panel-protocol.md, version 1.
+// The messages between server and page: docs/panel-protocol.md, version 1.
 
 export const VERSION = 1;
 
-/** A taxel that was never heard of. */
+/** The value of a taxel without any event so far. */
 export const UNKNOWN_VALUE = 65535;
 
 /**

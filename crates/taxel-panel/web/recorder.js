@@ -22,7 +22,7 @@ export class Recorder {
     this.tones = new Tones();
     this.able = false;
     /** @type {Told | null} */
-    this.told = null;
+    this.status = null;
     /** Seconds of the countdown that were sounded. @type {number | null} */
     this.sounded = null;
     this.button = part("record", HTMLButtonElement);
@@ -34,7 +34,7 @@ export class Recorder {
     part("note-form", HTMLFormElement).onsubmit = (event) => {
       event.preventDefault();
       const text = part("note", HTMLInputElement);
-      server.ask({ type: "note", text: text.value.trim() }).then(() => {
+      server.request({ type: "note", text: text.value.trim() }).then(() => {
         text.value = "";
       }, failed);
     };
@@ -55,7 +55,7 @@ export class Recorder {
   }
 
   get busy() {
-    return this.told !== null && this.told.state !== "idle";
+    return this.status !== null && this.status.state !== "idle";
   }
 
   /** Starts, or ends what runs. */
@@ -63,7 +63,7 @@ export class Recorder {
     if (!this.able) return;
     this.tones.wake();
     if (this.busy) {
-      this.server.ask({ type: "stop" }).catch(this.failed);
+      this.server.request({ type: "stop" }).catch(this.failed);
       return;
     }
     part("record-reason", HTMLElement).hidden = true;
@@ -82,7 +82,7 @@ export class Recorder {
       label: label || null,
       format,
     };
-    this.server.ask(message).catch((error) => this.refuse(error.message));
+    this.server.request(message).catch((error) => this.refuse(error.message));
   }
 
   /** @param {string} reason why nothing is recorded */
@@ -93,11 +93,11 @@ export class Recorder {
     write(place, reason);
   }
 
-  /** @param {Told} told */
-  take(told) {
-    const before = this.told;
-    this.told = told;
-    const { state, left_s, advance, error } = told;
+  /** @param {Told} status */
+  take(status) {
+    const before = this.status;
+    this.status = status;
+    const { state, left_s, advance, error } = status;
     if (state === "countdown" && left_s !== null) {
       const left = Math.ceil(left_s - 0.05);
       if (left > 0 && left !== this.sounded) this.tones.second();
@@ -107,8 +107,8 @@ export class Recorder {
     if (before?.state === "recording" && state !== "recording") this.tones.stop();
     // The index moves on by itself; a number that a person is typing stays.
     const index = part("record-index", HTMLInputElement);
-    if (before && before.index !== told.index && told.index !== null && document.activeElement !== index) {
-      index.value = String(told.index);
+    if (before && before.index !== status.index && status.index !== null && document.activeElement !== index) {
+      index.value = String(status.index);
       this.preview();
     }
     this.button.classList.toggle("on", this.busy);
@@ -121,46 +121,46 @@ export class Recorder {
     }
     for (const id of ["note-form"]) part(id, HTMLElement).hidden = state !== "recording";
     const last = part("record-last", HTMLElement);
-    last.hidden = !told.last;
-    if (told.last) {
-      write(part("record-last-file", HTMLElement), told.last.file);
-      write(part("record-last-verdict", HTMLElement), told.last.verdict);
+    last.hidden = !status.last;
+    if (status.last) {
+      write(part("record-last-file", HTMLElement), status.last.file);
+      write(part("record-last-verdict", HTMLElement), status.last.verdict);
     }
     this.write();
-    const said = part("recorder-said", HTMLElement);
-    if (state === "countdown" && left_s !== null) write(said, `${Math.ceil(left_s)}`);
-    else if (before?.state !== state) write(said, state === "recording" ? `recording ${told.file ?? ""}` : state === "idle" && before ? `stopped${advance ? "" : ", saved"}` : "");
+    const info = part("recorder-info", HTMLElement);
+    if (state === "countdown" && left_s !== null) write(info, `${Math.ceil(left_s)}`);
+    else if (before?.state !== state) write(info, state === "recording" ? `recording ${status.file ?? ""}` : state === "idle" && before ? `stopped${advance ? "" : ", saved"}` : "");
   }
 
   /** Writes what runs. */
   write() {
-    const { told } = this;
+    const { status } = this;
     const big = part("record-state", HTMLElement);
     const more = part("record-more", HTMLElement);
     const bar = part("record-bar", HTMLProgressElement);
-    if (!told || told.state === "idle") {
+    if (!status || status.state === "idle") {
       write(big, "Ready");
       write(more, "");
       bar.hidden = true;
       return;
     }
-    const { state, left_s, seconds, length_s, file } = told;
+    const { state, left_s, seconds, length_s, file } = status;
     if (state === "countdown") write(big, `${Math.ceil(left_s ?? 0)}`);
     else write(big, state === "recording" ? `${(seconds ?? 0).toFixed(0)} s` : "Saving");
-    write(more, `${state === "countdown" ? "then" : ""} ${file ?? ""}`.trim() + (told.label ? ` · ${told.label}` : ""));
+    write(more, `${state === "countdown" ? "then" : ""} ${file ?? ""}`.trim() + (status.label ? ` · ${status.label}` : ""));
     bar.hidden = !(state === "recording" && length_s);
     if (length_s && seconds !== null) bar.value = Math.min(1, seconds / length_s);
   }
 
-  /** @param {Recordings} told @param {string | null} open */
-  list(told, open) {
+  /** @param {Recordings} message @param {string | null} open */
+  list(message, open) {
     const select = part("files", HTMLSelectElement);
-    const files = [...told.files].sort((a, b) => b.modified_ns - a.modified_ns);
+    const files = [...message.files].sort((a, b) => b.modified_ns - a.modified_ns);
     const option = (/** @type {typeof files[0]} */ { name, bytes, labels }) =>
       make("option", { value: name }, `${name} (${size(bytes)}${labels ? `, ${labels} labelled` : ""})`);
     const first = make("option", { value: "" }, files.length ? "Open a recording…" : "No recordings yet");
     select.replaceChildren(first, ...files.map(option));
     select.value = open ?? "";
-    write(part("folder", HTMLElement), told.folder);
+    write(part("folder", HTMLElement), message.folder);
   }
 }

@@ -1,4 +1,4 @@
-// How this person likes the page: kept by the browser, for this address alone.
+// The settings of the page, which the browser stores for this address.
 
 const PLACE = "taxel.panel";
 
@@ -24,19 +24,19 @@ const DEFAULTS = {
 
 /** @typedef {typeof DEFAULTS} Values */
 
-/** Values by name; who wants to know of a change says so. */
+/** Values by name; listeners are called after a change. */
 export class Settings {
   constructor() {
     this.values = { ...DEFAULTS };
     /** @type {((name: keyof Values) => void)[]} */
     this.listeners = [];
     try {
-      const kept = JSON.parse(localStorage.getItem(PLACE) ?? "{}");
+      const stored = JSON.parse(localStorage.getItem(PLACE) ?? "{}");
       for (const name of /** @type {(keyof Values)[]} */ (Object.keys(DEFAULTS))) {
-        if (typeof kept[name] === typeof DEFAULTS[name]) Object.assign(this.values, { [name]: kept[name] });
+        if (typeof stored[name] === typeof DEFAULTS[name]) Object.assign(this.values, { [name]: stored[name] });
       }
     } catch {
-      // A browser that keeps nothing (private windows) has the defaults.
+      // A browser that stores nothing (private windows) has the defaults.
     }
   }
 

@@ -1,4 +1,4 @@
-// The whole recording, or all that can still be looked at while live: its event rate, with marks; click or drag to go there.
+// The whole recording, or the past of the live source as far as it can be viewed: event rate and marks; click or drag to move there.
 
 import { fitted, ground, part, themed } from "./dom.js";
 import { seconds } from "./words.js";
@@ -114,7 +114,7 @@ export class Strip {
     }
   }
 
-  /** Says where the view is, for those who cannot see it. */
+  /** Describes the position of the view to screen readers. */
   write() {
     const { reach, t_us } = this.player;
     const { canvas } = this;

@@ -4,7 +4,7 @@ import { UNKNOWN_VALUE } from "./protocol.js";
 
 /** @typedef {import("./protocol.js").Picture} Picture */
 
-/** Columns that are kept, and shown. */
+/** Columns that are stored and shown. */
 export const SPAN = 1250;
 
 /** What each column of time holds, in a ring by its number; the window that is shown, and the times in it. */
@@ -51,7 +51,7 @@ export class Timeline {
   }
 
   /**
-   * Takes a picture's columns. A time within the window leaves the window where it is, so that one can look back and
+   * Stores the columns of a picture. A time within the window leaves the window where it is, so that the view can move back and
    * forth in it; any other moves it.
    * @param {Picture} picture
    * @param {boolean} anew forget what came before
@@ -87,7 +87,7 @@ export class Timeline {
     }
   }
 
-  /** Another taxel is watched: what was kept of the last one does not count. */
+  /** Another taxel is watched: the values of the last one are discarded. */
   unwatch() {
     this.history.fill(UNKNOWN_VALUE);
   }

@@ -1,4 +1,4 @@
-// How the page looks: colours, flips, what the lanes show, the health of taxels, pictures and cuts.
+// The tab of the view: colours, flips, what the lanes show, the health of taxels, pictures and cuts.
 
 import { MAPS } from "./colours.js";
 import { make, part, write } from "./dom.js";
@@ -102,20 +102,20 @@ export class View {
   encode() {
     const { value: name } = this.encoder;
     if (!name && this.settings.values.raster === "changes") return;
-    this.server.ask({ type: "encode", encoder: name ? { name } : null }).then(() => {
+    this.server.request({ type: "encode", encoder: name ? { name } : null }).then(() => {
       this.settings.set("raster", name ? "spikes" : "changes");
     }, this.failed);
   }
 
   /** @param {"now" | "lowest"} how */
   rest(how) {
-    return this.server.ask({ type: "rest", how }).catch(this.failed);
+    return this.server.request({ type: "rest", how }).catch(this.failed);
   }
 
   look() {
-    write(part("health-said", HTMLElement), "looking …");
-    return this.server.ask({ type: "health" }).catch((error) => {
-      write(part("health-said", HTMLElement), "");
+    write(part("health-info", HTMLElement), "checking …");
+    return this.server.request({ type: "health" }).catch((error) => {
+      write(part("health-info", HTMLElement), "");
       this.failed(error);
     });
   }
@@ -123,8 +123,8 @@ export class View {
   /** @param {Health} health */
   takeHealth(health) {
     const kinds = /** @type {const} */ (["dead", "stuck", "noisy"]);
-    const said = kinds.map((kind) => `${health[kind].length} ${kind}`).join(", ");
-    write(part("health-said", HTMLElement), `${said}, of ${counted(health.taxels, "taxel")}`);
+    const counts = kinds.map((kind) => `${health[kind].length} ${kind}`).join(", ");
+    write(part("health-info", HTMLElement), `${counts}, of ${counted(health.taxels, "taxel")}`);
     const items = kinds.flatMap((kind) =>
       health[kind].slice(0, 200).map(([x, y]) => {
         const button = make("button", { type: "button", class: "link" }, make("span", { class: `unwell ${kind}` }), ` ${kind}: row ${y}, column ${x}`);
@@ -166,6 +166,6 @@ export class View {
   write() {
     const [start_us, stop_us] = this.cut;
     if (start_us === null || stop_us === null) return;
-    this.server.ask({ type: "cut", start_us, stop_us, name: part("cut-name", HTMLInputElement).value.trim() }).catch(this.failed);
+    this.server.request({ type: "cut", start_us, stop_us, name: part("cut-name", HTMLInputElement).value.trim() }).catch(this.failed);
   }
 }

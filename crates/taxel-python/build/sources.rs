@@ -12,7 +12,7 @@ use std::str::FromStr;
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
 /// The crates whose sources count.
-pub const CRATES: [&str; 3] = ["taxel-core", "taxel-live", "taxel-python"];
+pub const CRATES: [&str; 4] = ["taxel-core", "taxel-live", "taxel-panel", "taxel-python"];
 /// The crate whose rooms bind names.
 const BINDING: &str = "taxel_python";
 
