@@ -68,7 +68,6 @@ __all__ = [
     "plot",
     "simulate",
     "wire",
-    "wire_v2",
 ]
 
 

@@ -58,8 +58,8 @@ def markers(*given):
 
 
 NAMES = (
-    "datagrams intact repeated short long foreign checksum missing unknown_kind unknown_flags malformed events repaired "
-    "states stale outside markers unknown_marker dropped resets unknown_value"
+    "datagrams intact repeated short long foreign checksum missing unknown_kind unknown_flags malformed events "
+    "repaired states stale outside markers unknown_marker dropped resets unknown_value"
 )
 
 
@@ -123,39 +123,43 @@ class Reader:
 
     def body(self, kind, body, base, stride, line, flags, late):
         if kind == 3:
-            self.counts["malformed"] += len(body) % 8 > 0
-            for k in range(0, len(body) - 7, 8):
-                offset, code, _ = struct.unpack("<IHH", body[k : k + 8])
-                if code in (1, 2):
-                    self.markers.append((base + offset, code == 1))
-                    self.latest = max(self.latest, base + offset)
-                else:
-                    self.counts["unknown_marker"] += 1
+            self.marked(body, base)
         elif kind == 4:
             self.counts["malformed"] += len(body) < 40
         elif kind not in LAYOUT:
             self.counts["unknown_kind"] += 1
-        elif stride > 16:
-            self.counts["malformed"] += 1
         else:
-            size, s, v = LAYOUT[kind]
-            malformed = len(body) % size > 0
-            given = iter(int.from_bytes(body[k : k + size], "little") for k in range(0, len(body) - size + 1, size))
-            t, position = base, (line << stride) - 1
-            for bits in given:
-                p, skip, value = bits >> (s + v), bits >> v & (2**s - 1), bits & (2**v - 1)
-                if skip < 2**s - 1:
-                    position += skip + 1
-                    self.event(kind, t, position >> stride, position & (2**stride - 1), p, value, flags, late)
-                elif p:
-                    offset = next(given, 2**32)
-                    if offset > 32_511:
-                        malformed = True
-                        break
-                    t, position = base + offset, -1
-                else:
-                    position += (value + 1) << (s - 1)
-            self.counts["malformed"] += malformed
+            self.words(kind, body, base, stride, line, flags, late)
+
+    def marked(self, body, base):
+        self.counts["malformed"] += len(body) % 8 > 0
+        for k in range(0, len(body) - 7, 8):
+            offset, code, _ = struct.unpack("<IHH", body[k : k + 8])
+            if code in (1, 2):
+                self.markers.append((base + offset, code == 1))
+                self.latest = max(self.latest, base + offset)
+            else:
+                self.counts["unknown_marker"] += 1
+
+    def words(self, kind, body, base, stride, line, flags, late):
+        size, s, v = LAYOUT[kind]
+        malformed = len(body) % size > 0
+        given = iter(int.from_bytes(body[k : k + size], "little") for k in range(0, len(body) - size + 1, size))
+        t, position = base, (line << stride) - 1
+        for bits in given:
+            p, skip, value = bits >> (s + v), bits >> v & (2**s - 1), bits & (2**v - 1)
+            if skip < 2**s - 1:
+                position += skip + 1
+                self.event(kind, t, position >> stride, position & (2**stride - 1), p, value, flags, late)
+            elif p:
+                offset = next(given, 2**32)
+                if offset > 32_511:
+                    malformed = True
+                    break
+                t, position = base + offset, -1
+            else:
+                position += (value + 1) << (s - 1)
+        self.counts["malformed"] += malformed
 
     def event(self, kind, t, x, y, p, value, flags, late):
         if x >= self.columns or y >= self.rows:

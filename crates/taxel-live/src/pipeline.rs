@@ -12,19 +12,24 @@ mod counters;
 mod decode;
 mod handle;
 mod handover;
-mod lead;
+mod observers;
 mod options;
-mod read;
+mod output;
+mod read_out;
+mod reader;
+mod receive;
+mod record;
 mod recorder;
 mod rest;
 mod said;
-mod saying;
 mod sending;
 mod shared;
 mod source;
 mod sources;
+mod stages;
 mod stills;
 mod tap;
+mod threads;
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -35,7 +40,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use taxel_core::encode::Tare;
-use taxel_core::wire::{self, Decoder};
+use taxel_core::wire;
 use taxel_core::{Marker, Stop};
 
 use crate::capture::{Origin, Receiver};
@@ -43,22 +48,22 @@ use crate::locked::lock;
 use crate::{Error, Result, recording};
 pub use copies::{Copied, Copies};
 pub use counters::{Counters, SourceCounts, Summary};
-use decode::Work;
 pub use handle::Handle;
 use handover::Handover;
-use lead::Lead;
 pub use options::{LiveOptions, Record};
-pub use read::Ear;
-use read::Reader;
+use output::DetectionOutput;
+pub use reader::Listener;
+use reader::Reader;
 use recorder::{Host, Part, Recorder};
 pub use said::{Lines, Said, Sink};
-use saying::Saying;
 use sending::Sending;
 pub use sending::{Destination, Sent};
-use shared::{Shared, Shown};
+use shared::{Published, Shared};
 pub use source::{Place, Source, SourceKind};
 use sources::Others;
+use stages::Stages;
 pub use tap::{Change, Outlet, Piece, UNKNOWN};
+use threads::Threads;
 
 /// How long a wait lasts before it is asked whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
@@ -81,10 +86,10 @@ impl Live {
     ///
     /// `Socket` where the port is taken, `File` where the file exists or cannot be created, or a destination cannot be
     /// opened, `Core(Problem)` for options that make no sense.
-    pub fn start(address: SocketAddr, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+    pub fn start(address: SocketAddr, options: LiveOptions, listener: Listener, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
         let capture = options.capture;
         // The socket is opened before the file: where the port is taken no empty file is left behind.
-        Self::start_from(|| Receiver::bind(address, capture), options, ear, sinks)
+        Self::start_from(|| Receiver::bind(address, capture), options, listener, sinks)
     }
 
     /// As [`Live::start`], from what another computer receives ([`Receiver::fed`]).
@@ -92,14 +97,14 @@ impl Live {
     /// # Errors
     ///
     /// As [`Live::start`], without those of the socket.
-    pub fn start_fed(receiver: Receiver, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
-        Self::start_from(|| Ok(receiver), options, ear, sinks)
+    pub fn start_fed(receiver: Receiver, options: LiveOptions, listener: Listener, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+        Self::start_from(|| Ok(receiver), options, listener, sinks)
     }
 
     fn start_from(
         receiver: impl FnOnce() -> Result<Receiver>,
         options: LiveOptions,
-        ear: Ear,
+        listener: Listener,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
@@ -112,14 +117,14 @@ impl Live {
                 taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
             );
         }
-        Self::begin(Box::new(receiver), options, ear, sinks, None)
+        Self::begin(Box::new(receiver), options, listener, sinks, None)
     }
 
     /// Begins; `host` is whose recording this one's is a part of.
     fn begin(
         receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
         options: LiveOptions,
-        ear: Ear,
+        listener: Listener,
         sinks: Vec<Box<dyn Sink>>,
         host: Option<Part>,
     ) -> Result<Self> {
@@ -133,15 +138,15 @@ impl Live {
         }
         wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
-        if let (Ear::Deaf, Some(to)) = (&ear, options.send.first()) {
+        if let (Listener::None, Some(to)) = (&listener, options.send.first()) {
             return Err(taxel_core::problem!("send to {to} without a readout: nothing would be said").into());
         }
-        match &ear {
-            Ear::Taring(stretch_us, _) if *stretch_us <= 0 => {
+        match &listener {
+            Listener::Taring(stretch_us, _) if *stretch_us <= 0 => {
                 return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
             }
-            Ear::Taring(_, readout) => readout.check()?,
-            Ear::Deaf | Ear::Reading(_) => {}
+            Listener::Taring(_, readout) => readout.check()?,
+            Listener::None | Listener::Reading(_) => {}
         }
         let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
         let receiver = receiver()?;
@@ -150,18 +155,18 @@ impl Live {
             (Some(record), None) => Some(Recorder::create(record, &options, receiver.place())?),
             (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, receiver.place())),
         };
-        let shown = Shown { picture: vec![0; options.array.len()], ..Shown::default() };
+        let published = Published { picture: vec![0; options.array.len()], ..Published::default() };
         let shared = Arc::new(Shared {
             receiver,
             handover: Handover::new(&options.array, options.readout_events),
-            shown: Mutex::new(shown),
+            published: Mutex::new(published),
             recorder: Mutex::new(recorder),
             broken: Mutex::default(),
-            wishes: Mutex::default(),
-            wished: AtomicBool::new(false),
-            happened: Mutex::default(),
+            requests: Mutex::default(),
+            requested: AtomicBool::new(false),
+            picture_times: Mutex::default(),
             records: AtomicBool::new(false),
-            listeners: Mutex::default(),
+            subscribers: Mutex::default(),
             sending: sending.iter().map(Sending::line).collect(),
             registers: Mutex::new(options.registers),
             options: options.clone(),
@@ -169,13 +174,11 @@ impl Live {
             expected: AtomicU8::new(0),
             ended: AtomicBool::new(false),
         });
-        let (say, said) = channel::bounded(SAID_WAITING);
-        let decoder = Decoder::new(options.array.clone()).differences(options.differences);
-        let sender = wire::Receiver::new(decoder, 1);
-        let listens = !matches!(ear, Ear::Deaf);
+        let (queue, said) = channel::bounded(SAID_WAITING);
+        let reads_out = !matches!(listener, Listener::None);
         let board = |address, own: LiveOptions, part| {
             let capture = own.capture;
-            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Ear::Deaf, vec![], Some(part))
+            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Listener::None, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing came: a new file is not left behind.
@@ -184,16 +187,16 @@ impl Live {
         })?;
         let others = Mutex::new(others);
         let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![], others };
-        // Who drives something is not to wait for a callback.
+        // A device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
-        let saying = Saying::new(sending.chain(sinks).collect(), say);
-        let reader = listens.then(|| Reader::new(ear, &options));
-        let work = Work::new(Arc::clone(&shared), sender, reader);
-        let names: &[&str] = if listens { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
-        let lead = Arc::new(Lead::new(work, saying, names.len()));
+        let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
+        let reader = reads_out.then(|| Reader::new(listener, &options));
+        let stages = Stages::new(&shared, reader);
+        let names: &[&str] = if reads_out { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
+        let threads = Arc::new(Threads::new(stages, output, names.len()));
         for name in names {
-            let (lead, shared) = (Arc::clone(&lead), Arc::clone(&shared));
-            live.spawn(name, move || lead.serve(&shared))?;
+            let (threads, shared) = (Arc::clone(&threads), Arc::clone(&shared));
+            live.spawn(name, move || threads.run(&shared))?;
         }
         Ok(live)
     }
@@ -262,7 +265,7 @@ impl Live {
     }
 
     fn check(&self) -> Result<()> {
-        self.shared.shown().failed.take().map_or(Ok(()), Err)
+        self.shared.published().failed.take().map_or(Ok(()), Err)
     }
 
     /// Whether the way has ended, by [`Live::end`] or by an error, and everything was worked through.
@@ -302,19 +305,19 @@ impl Live {
     /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 until a taxel was heard of.
     #[must_use]
     pub fn picture(&self) -> Vec<u16> {
-        self.shared.shown().picture.clone()
+        self.shared.published().picture.clone()
     }
 
     /// The tare that was taken, once it is complete.
     #[must_use]
     pub fn tare(&self) -> Option<Tare> {
-        self.shared.shown().tare.clone()
+        self.shared.published().tare.clone()
     }
 
     /// The starts and stops that came since this was asked last.
     #[must_use]
     pub fn take_markers(&self) -> Vec<Marker> {
-        std::mem::take(&mut self.shared.shown().markers)
+        std::mem::take(&mut self.shared.published().markers)
     }
 
     /// Writes something down in the recording, with the time of now.

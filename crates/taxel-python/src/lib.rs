@@ -3,9 +3,11 @@
 mod convert;
 mod enter;
 mod errors;
-mod guest;
 mod instructions;
-mod knock;
+#[cfg(feature = "test-hooks")]
+mod test_hooks;
+mod thread_state;
+mod threaded;
 
 mod bridge;
 mod calibration;
@@ -21,6 +23,7 @@ mod neuron;
 mod nouns;
 mod panel;
 mod parameters;
+mod pictures;
 mod recording;
 mod rivals;
 mod simulate;
@@ -35,7 +38,8 @@ use pyo3::prelude::*;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     instructions::register(module)?;
-    knock::register(module)?;
+    #[cfg(feature = "test-hooks")]
+    test_hooks::register(module)?;
     nouns::register(module)?;
     bridge::register(module)?;
     calibration::register(module)?;
@@ -49,6 +53,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     neuron::register(module)?;
     described::register(module)?;
     panel::register(module)?;
+    pictures::register(module)?;
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;

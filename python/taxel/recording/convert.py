@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import json
 import os
-from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -33,9 +31,6 @@ KINDS = (".mcap", ".lsa", ".npz", ".csv", ".h5")
 
 #: Events a datagram at most, as the board sends them: 1400 bytes.
 _DATAGRAM_BYTES = 1400
-
-#: Between the pictures that a converted file shows to viewers, and at least between those around an event, us.
-_PICTURE_US, _NEAR_US = 100_000, 10_000
 
 #: Of a stream of numbers.
 _UNREAD = "lines_that_could_not_be_read"
@@ -227,10 +222,10 @@ def _write_mcap(
     if origin is not None and datagrams is not None:
         first_us = origin.origin_us
     elif origin is not None and origin.payload is not None:
-        datagrams = _cut(origin.payload, None)
+        datagrams = _cut(origin.payload)
     else:
         payload, lost = _encoded(events)
-        datagrams = _cut(np.frombuffer(payload, np.uint8), events)
+        datagrams = _cut_made(np.frombuffer(payload, np.uint8), events)
         # The first stamp shows its time modulo one turn of the counter; the turns before it are kept apart.
         first_us = int(datagrams.arrived_ns[0]) // 1000 // TURN_US * TURN_US if len(datagrams) else 0
     # Before 1970 there is no time of the host: board times are moved there as a whole.
@@ -275,27 +270,6 @@ def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64]
         )
 
 
-def _pictures(events: Events, around: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.uint16]]]:
-    """Give what the taxels hold: ten times a second where something came, and at whole 10 ms around `around`, us."""
-    if events.intensity is None or events.present is None:
-        return
-    there = np.flatnonzero(events.present)
-    order = there[np.argsort(events.t[there], kind="stable")]
-    if not len(order):
-        return
-    at, place, ticks = events.t[order], events.array.index(events.x[order], events.y[order]), events.intensity[order]
-    # Each event is in the first picture from it on.
-    tenths = -(-at // _PICTURE_US) * _PICTURE_US
-    near = -(-around // _NEAR_US) * _NEAR_US
-    near = np.concatenate([near - _NEAR_US, near])
-    times = np.union1d(tenths, near[(near >= at[0]) & (near <= tenths[-1])])
-    begins = [0, *np.searchsorted(at, times, side="right").tolist()]
-    held = np.zeros(events.array.rows * events.array.columns, np.uint16)
-    for t, (a, b) in zip(times.tolist(), pairwise(begins), strict=True):
-        held[place[a:b]] = ticks[a:b]
-        yield t, held
-
-
 def _add_remarks(writer: Any, events: Events, recording: Recording | None) -> None:
     clock = None if recording is None else recording.clock
 
@@ -307,7 +281,7 @@ def _add_remarks(writer: Any, events: Events, recording: Recording | None) -> No
     around = np.concatenate([found.t, found.known, np.array([*(t for t, _ in events.markers), *noted], np.int64)])
     for t, start in events.markers:
         writer.marker(max(0, at_ns(t)), t, start)
-    for t, ticks in _pictures(events, around):
+    for t, ticks in _core.RecordingPictures(events._parts(), around):
         writer.picture(max(0, at_ns(t)), t, events.array.columns, ticks)
     if recording is None:
         return
@@ -332,8 +306,15 @@ def _counts(recording: Recording | None, datagrams: int) -> dict[str, Any]:
     return {**known, "decoder": damage, "converted": recording.verdict}
 
 
-def _cut(raw: NDArray[np.uint8], events: Events | None) -> Datagrams:
-    """Cut raw bytes into datagrams, never between a change and its intensity.
+def _cut(raw: NDArray[np.uint8]) -> Datagrams:
+    """Cut raw bytes into datagrams; each has the board's time of its first stamp, as there are no arrival times."""
+    raw = np.ascontiguousarray(raw)
+    offsets, times = _core.wire_cut(raw)
+    return Datagrams(times * 1000, np.arange(len(times), dtype=np.uint64), offsets, raw)
+
+
+def _cut_made(raw: NDArray[np.uint8], events: Events) -> Datagrams:
+    """Cut bytes that were made of events into datagrams, never between a change and its intensity.
 
     The wire has no arrival times, so each datagram gets the board's time of its first stamp: what a reader needs to
     unwrap time as it was before. It looks at times within half a turn, so a datagram is never longer than a second.
@@ -343,7 +324,7 @@ def _cut(raw: NDArray[np.uint8], events: Events | None) -> Datagrams:
     ends = np.flatnonzero(first)[1:]
     # Whole words that show a time: a change or a marker, not an intensity (Z2).
     begins = begins[(ends - begins >= 5) & (raw[begins] & 0x20 == 0)]
-    at = _stamps(raw, begins) if events is None else _times(raw, begins, events)
+    at = _times(raw, begins, events)
     # Steps back do not count: arrivals never step back.
     at = np.maximum.accumulate(at) if len(at) else at
     offsets, arrived = [0], []
@@ -363,17 +344,6 @@ def _cut(raw: NDArray[np.uint8], events: Events | None) -> Datagrams:
         arrived.append(now * 1000)
     number = np.arange(len(arrived), dtype=np.uint64)
     return Datagrams(np.array(arrived, np.int64), number, np.array(offsets, np.int64), np.ascontiguousarray(raw))
-
-
-def _stamps(raw: NDArray[np.uint8], begins: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the times of words (us) as their stamps alone show them."""
-    word = [raw[begins + k].astype(np.int64) for k in range(3)]
-    stamp = (word[0] & 3) << 14 | (word[1] & 0x7F) << 7 | word[2] & 0x7F
-    step = np.diff(stamp, prepend=stamp[:1]) % 65_536
-    # As the decoder reads it: up to 0.1 s behind is a step back.
-    step[step >= 64_536] -= 65_536
-    first = int(stamp[0]) if len(stamp) else 0
-    return np.asarray((first + np.cumsum(step)) * _STAMP_US)
 
 
 def _times(raw: NDArray[np.uint8], begins: NDArray[np.int64], events: Events) -> NDArray[np.int64]:

@@ -57,9 +57,6 @@ const STRIDE_BITS: u32 = 5;
 const FLAG_BITS: u32 = 4;
 const LOW_LINE_BITS: u32 = u8::BITS - STRIDE_BITS;
 
-/// The largest stride that names a taxel: positions of an array have 16 bits.
-const LARGEST_STRIDE: u8 = 16;
-
 /// The base time has 48 bits: 8.9 years.
 const BASE_BITS: u32 = 48;
 

@@ -74,17 +74,17 @@ impl Copies {
             return None;
         }
         self.pictured = Instant::now();
-        let shown = self.shared.shown();
-        if shown.counters.decoded == self.decoded {
+        let published = self.shared.published();
+        if published.counters.decoded == self.decoded {
             return None;
         }
-        self.decoded = shown.counters.decoded;
+        self.decoded = published.counters.decoded;
         let array = &self.shared.options.array;
         let said = json!({
-            "t_us": shown.counters.board_us,
+            "t_us": published.counters.board_us,
             "rows": array.rows,
             "columns": array.columns,
-            "ticks": shown.picture,
+            "ticks": published.picture,
         });
         Some(Copied::Picture(said.to_string().into_bytes()))
     }

@@ -15,7 +15,7 @@ use super::counters::Counters;
 use super::options::{LiveOptions, Record};
 use super::recorder::Recorder;
 use super::said::Said;
-use super::shared::{Ended, Shared, Wish};
+use super::shared::{Ended, Shared, Request};
 use super::source::Source;
 use super::tap::Outlet;
 use crate::Result;
@@ -71,7 +71,7 @@ impl Handle {
     /// Tells what was written to the board's registers: the recording keeps it, and the version of the wire is expected.
     pub fn wrote(&self, registers: Registers) {
         *lock(&self.shared.registers) = registers;
-        self.shared.wish(Wish::Registers(registers));
+        self.shared.request(Request::Registers(registers));
     }
 
     /// Lets somebody look on, from the next batch on.
@@ -81,7 +81,7 @@ impl Handle {
     /// `Core(Problem)` where all is over.
     pub fn look(&self) -> Result<Outlet> {
         let (give, outlet) = channel::bounded(1);
-        self.shared.wish(Wish::Look(give));
+        self.shared.request(Request::Tap(give));
         self.wait(&outlet)
     }
 
@@ -93,7 +93,7 @@ impl Handle {
     pub fn copy(&self) -> Result<Copies> {
         let (give, parcels) = channel::bounded(1);
         let said = self.hear(COPIED_WAITING);
-        self.shared.wish(Wish::Copy(give));
+        self.shared.request(Request::Copy(give));
         Ok(Copies::new(Arc::clone(&self.shared), self.wait(&parcels)?, said))
     }
 
@@ -101,7 +101,7 @@ impl Handle {
     #[must_use]
     pub fn hear(&self, waiting: usize) -> channel::Receiver<Said> {
         let (say, said) = channel::bounded(waiting);
-        lock(&self.shared.listeners).push(say);
+        lock(&self.shared.subscribers).push(say);
         said
     }
 
@@ -131,7 +131,7 @@ impl Handle {
         // Who looks whether it goes on finds that it does.
         self.shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
         let (give, ended) = channel::bounded(1);
-        self.shared.wish(Wish::Record(next.map(Box::new), give));
+        self.shared.request(Request::Record(next.map(Box::new), give));
         let ended = self.wait(&ended).and_then(std::convert::identity);
         if ended.is_err() {
             self.shared.records.store(lock(&self.shared.recorder).is_some(), Ordering::Release);
@@ -189,21 +189,21 @@ impl Handle {
     /// could not keep it: then none is zeroed. `File` where the disk is full.
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let (give, zeroed) = channel::bounded(1);
-        self.shared.wish(Wish::Zero(taxels.to_vec(), give));
+        self.shared.request(Request::Zero(taxels.to_vec(), give));
         self.wait(&zeroed).and_then(std::convert::identity)
     }
 
     /// What was zeroed last at each taxel that was, by taxel index; and how often something was.
     #[must_use]
     pub fn zeroed(&self) -> (Vec<Zeroing>, u64) {
-        let shown = self.shared.shown();
-        (shown.zeroed.values().copied().collect(), shown.zeroings)
+        let published = self.shared.published();
+        (published.zeroed.values().copied().collect(), published.zeroings)
     }
 
     /// How often something was zeroed.
     #[must_use]
     pub fn zeroings(&self) -> u64 {
-        self.shared.shown().zeroings
+        self.shared.published().zeroings
     }
 
     fn wait<T>(&self, from: &channel::Receiver<T>) -> Result<T> {

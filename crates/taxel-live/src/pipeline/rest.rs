@@ -29,7 +29,7 @@ impl Rest {
     }
 
     /// Takes the next events and says, once the rest is over, when it ended (us) and how many of them belong to it.
-    pub(super) fn hear(&mut self, events: &Events, quiet_until: Option<i64>) -> Result<Option<(i64, usize)>> {
+    pub(super) fn push(&mut self, events: &Events, quiet_until: Option<i64>) -> Result<Option<(i64, usize)>> {
         if self.first.is_none() {
             self.first = events.t.first().copied();
         }
@@ -72,10 +72,10 @@ impl Rest {
             }),
             ..Events::empty(self.array)
         };
-        // What is said of the rest itself is not meant.
-        let mut unsaid = vec![];
-        stream.push_events(events.view(), &mut unsaid)?;
-        stream.advance(stop, &mut unsaid)?;
+        // Detections in the rest itself are discarded: the sensor was at rest.
+        let mut discarded = vec![];
+        stream.push_events(events.view(), &mut discarded)?;
+        stream.advance(stop, &mut discarded)?;
         Ok((tare, stream))
     }
 }

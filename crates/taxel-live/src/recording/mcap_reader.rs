@@ -20,7 +20,8 @@ use taxel_core::encode::Zeroing;
 use taxel_core::wire::{self, Decoder, Pairing, Registers};
 use taxel_core::{Events, Marker, Stop, problem};
 
-use super::mcap_writer::{BEGIN, END, unbase64};
+use super::base64::unbase64;
+use super::mcap_writer::{BEGIN, END};
 use super::stream::Sampling;
 use super::{BoardChange, Change, Counts, Header, Note, Samples, Topic, limits};
 use crate::clock::leaves;

@@ -45,8 +45,7 @@ pub struct Counts {
     pub unknown_kind: u64,
     /// With flags that are not known; decoded.
     pub unknown_flags: u64,
-    /// Bodies that end within a word or have an offset that is too late, of which what stands before is decoded; bodies of
-    /// words with a stride above 16, of which nothing is.
+    /// Bodies that end within a word or have an offset that is too late; what stands before is decoded.
     pub malformed: u64,
     /// Events on the array.
     pub events: u64,

@@ -8,11 +8,11 @@ mod taken;
 mod words;
 
 use super::counts::{Counts, Status};
-use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, LARGEST_STRIDE, Refused, START, STOP};
+use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Refused, START, STOP};
 use crate::vectors::Instructions;
-use crate::wire::columns::Table;
+use crate::wire::columns::{Columns, Laid, Room, Table};
 use crate::wire::silence::silence;
-use crate::{Array, Events, Marker, Result};
+use crate::{Array, Events, Marker, Result, problem};
 use held::Held;
 #[cfg(target_arch = "x86_64")]
 use run::Run;
@@ -149,6 +149,22 @@ impl Decoder {
     /// that was heard.
     #[inline]
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
+        self.push_table(datagram, arrived, out)
+    }
+
+    /// As [`Self::push`], into columns that the caller laid out, from their first row on.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where a column has fewer entries than [`stream_rows`] asks for, and nothing was read.
+    pub fn fill(&mut self, datagram: &[u8], arrived: Option<i64>, room: Room<'_>) -> Result<(Columns, Heard)> {
+        let mut laid = Laid::new(check_room(room, datagram.len())?);
+        let heard = self.push_table(datagram, arrived, &mut laid);
+        Ok((laid.end(), heard))
+    }
+
+    #[inline]
+    fn push_table(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Heard {
         let latest = self.latest;
         let taken = self.plain(std::iter::once(datagram), stream_rows(datagram.len()), out);
         match self.sessions.last() {
@@ -162,7 +178,7 @@ impl Decoder {
         }
     }
 
-    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
+    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Heard {
         match Header::read(datagram) {
             Ok((header, body)) => self.push_read(&header, body, arrived, out),
             Err(refused) => {
@@ -311,10 +327,6 @@ impl Decoder {
         match kind {
             Kind::Changes | Kind::Small | Kind::Large | Kind::SmallStates | Kind::LargeStates => {
                 let Some(word) = kind.layout() else { return };
-                if header.stride > LARGEST_STRIDE {
-                    self.counts.malformed += 1;
-                    return;
-                }
                 let meaning = match kind {
                     Kind::SmallStates | Kind::LargeStates if number.is_none() => Meaning::StaleStates,
                     Kind::SmallStates | Kind::LargeStates => Meaning::States,
@@ -365,6 +377,15 @@ impl Decoder {
             });
         }
     }
+}
+
+/// Columns with room for what so many bytes may give.
+pub(in crate::wire::v2) fn check_room(room: Room<'_>, bytes: usize) -> Result<Room<'_>> {
+    let most = stream_rows(bytes);
+    if room.len() < most {
+        return Err(problem!("columns have room for {} rows: {bytes} bytes may need {most}", room.len()));
+    }
+    Ok(room)
 }
 
 #[cfg(test)]

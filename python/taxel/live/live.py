@@ -5,31 +5,28 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
 from functools import partial
-from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import flag, instance, number, numbers, parameters, several, shown, text, whole
+from taxel._base.arguments import flag, number, numbers, parameters, text, whole
 from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.array import Array
-from taxel.detect import Readout
-from taxel.detections import Detections
 from taxel.live.lsl import LslInlet, LslOutlet
-from taxel.live.remote import Remote
-from taxel.live.sending import PORT
+from taxel.live.options import LiveOptions, takes
+from taxel.live.said import Said
+from taxel.live.summary import Summary, summary_of
 from taxel.recording.remarks import Zeroing
 from taxel.tare import Tare
-from taxel.wire import Registers
 
-__all__ = ["Live", "Said", "Summary", "delays", "heard"]
+__all__ = ["Live"]
 
 #: How what goes to, or comes from, the lab streaming layer begins.
 _LSL = "lsl:"
@@ -39,74 +36,6 @@ _MOST_PLACE = 2**16 - 1
 
 #: How long an iteration waits at a time.
 _WAIT_S = 0.5
-
-
-class Said(NamedTuple):
-    """Say what was detected, and when: all times but the last in us of the board's clock.
-
-    Attributes
-    ----------
-    label : str
-    t : int, us
-        When the event was: the crossing less the encoder's latency and the trained delay.
-    known : int, us
-        When it could first be said: the end of the board's frame in which the potential crosses.
-    slope : float, mV/ms
-        How steeply the potential crossed its threshold, as a measure of how sure.
-    said : int, us
-        When it was said, by the host's clock less the estimated offset between the clocks.
-    said_ns : int, ns since 1970
-        The same by the host's clock.
-    repaired : bool
-        Whether it may rest on values that states of wire version 2 repaired after a loss.
-    """
-
-    label: str
-    t: int
-    known: int
-    slope: float
-    said: int
-    said_ns: int
-    repaired: bool = False
-
-
-@dataclass(frozen=True)
-class Summary:
-    """Say how a `Live` ended.
-
-    Attributes
-    ----------
-    counters : dict
-        As `Live.counters`; its sums are closed.
-    verdict : str
-        One line: nothing lost after arrival, what was lost where, or that nothing came.
-    path : Path or None
-        The recording; none where nothing came: then an empty one is not kept, and an earlier one is not replaced.
-    tare : Tare or None
-        The fresh tare, where one was completed.
-    """
-
-    counters: dict[str, Any]
-    verdict: str
-    path: Path | None
-    tare: Tare | None
-
-    @property
-    def lost(self) -> int:
-        """How much was lost after it had arrived: messages in the kernel, datagrams in our queue; 0 is nothing.
-
-        Of a board of another computer also what was lost there and between the two.
-        """
-        boards = [self.counters, *(one for one in self.counters["sources"].values() if "capture" in one)]
-        lost = sum(int(one["capture"]["dropped_by_kernel"] + one["capture"]["dropped_by_queue"]) for one in boards)
-        bridged = self.counters["bridged"] or {}
-        return lost + sum(int(bridged.get(cause, 0)) for cause in ("missing", "dropped", "dropped_by_kernel"))
-
-    @property
-    def nothing_came(self) -> bool:
-        """Whether not even a datagram that was lost has come."""
-        capture = self.counters["capture"]
-        return not capture["messages"] + capture["dropped_by_kernel"]
 
 
 class Live:
@@ -199,97 +128,37 @@ class Live:
     Live(ended; nothing lost after arrival (version 1 of the wire cannot show what was lost before it))
     """
 
-    def __init__(
-        self,
-        port: int = PORT,
-        *,
-        host: str = "0.0.0.0",
-        remote: Remote | None = None,
-        array: Array | None = None,
-        registers: str | Registers | None = None,
-        differences: bool = False,
-        readout: Readout | None = None,
-        tare: Tare | float | None = None,
-        record: str | os.PathLike[str] | None = None,
-        record_later: bool = False,
-        name: str = "board",
-        sources: Mapping[str, str] | None = None,
-        compression: str = "none",
-        overwrite: bool = False,
-        guard_frames: float = 5.0,
-        gap_frames: float = 1.0,
-        say: Callable[[Said], object] | None = None,
-        lines: bool = False,
-        send: str | Sequence[str] = (),
-        kernel_buffer_bytes: int | None = None,
-        queue_bytes: int | None = None,
-        readout_events: int | None = None,
-        gro: bool | None = None,
-    ) -> None:
-        if readout is not None:
-            instance("readout", readout, Readout)
-        if remote is not None:
-            instance("remote", remote, Remote)
-            array = remote.array if array is None else array
-            registers = Registers._of(remote.registers, remote.array) if registers is None else registers
-            differences = flag("differences", differences) or remote.differences
-        if array is None and readout is not None:
-            array = readout.array
-        self.array = Array._of(array)
-        goes = [text("send", to) for to in ([send] if isinstance(send, str) else several("send", send))]
-        heard_of = _sources(sources)
+    @takes(LiveOptions)
+    def __init__(self, options: LiveOptions) -> None:
+        options = options.completed()
+        remote, readout, tare, say = options.remote, options.readout, options.tare, options.say
+        self.array = Array._of(options.array)
+        #: With what it can begin again on another address.
+        self._options = replace(options, array=self.array)
+        goes, heard_of = options.destinations(), options.named_sources()
         outlets = [LslOutlet(to.removeprefix(_LSL)) for to in goes if to.startswith(_LSL)]
         inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in heard_of if how.startswith(_LSL)}
         self._inlets = list(inlets.values())
-        registers = Registers(array=self.array) if registers is None else registers
-        sizes = {
-            "kernel_buffer_bytes": kernel_buffer_bytes,
-            "queue_bytes": queue_bytes,
-            "readout_events": readout_events,
-        }
-        options = {
-            "registers": _held(registers),
-            "differences": flag("differences", differences),
-            "guard_frames": number("guard_frames", guard_frames),
-            "gap_frames": number("gap_frames", gap_frames),
-            "gro": None if gro is None else flag("gro", gro),
-            "send": [to for to in goes if not to.startswith(_LSL)],
-            "name": text("name", name),
-            "record_later": flag("record_later", record_later),
-            "sources": [(what, _given(inlets[what]) if what in inlets else how) for what, how in heard_of],
-            **{what: None if size is None else whole(what, size, 0, 2**31 - 1) for what, size in sizes.items()},
-        }
-        #: What is needed to begin again on another address.
-        self._how: dict[str, Any] = {
-            "array": self.array, "registers": registers, "differences": differences, "readout": readout, "tare": tare,
-            "record": record, "record_later": record_later, "name": name, "sources": sources,
-            "compression": compression, "overwrite": overwrite, "guard_frames": guard_frames,
-            "gap_frames": gap_frames, "say": say, "lines": lines, "send": send,
-            "kernel_buffer_bytes": kernel_buffer_bytes, "queue_bytes": queue_bytes, "readout_events": readout_events,
-            "gro": gro,
-        }  # fmt: skip
         self._labels = None if readout is None else list(json.loads(readout.to_json())["neurons"])
-        if say is not None and not callable(say):
-            raise ProblemError(f"say is {shown(say)}: must be a function of a Said")
-        listeners: list[Callable[[Said], object]] = [*outlets, *([] if say is None else [say])]
-        if readout is None and tare is not None:
-            raise ProblemError("tare without a readout: nothing would use it")
-        recording = None
-        if record is not None:
-            recording = (checked_path("record", record), text("compression", compression), flag("overwrite", overwrite))
+        receivers: list[Callable[[Said], object]] = [*outlets, *([] if say is None else [say])]
         self._summary: Summary | None = None
-        feed = None if remote is None else remote._fed(queue_bytes)
+        feed = None if remote is None else remote._fed(options.queue_bytes)
         self._core = _core.Live(
-            text("host", host),
-            whole("port", port, 0, 65_535),
+            text("host", options.host),
+            whole("port", options.port, 0, 65_535),
             self.array._parts(),
-            parameters(options),
-            recording,
+            parameters(
+                options.for_rust(
+                    send=[to for to in goes if not to.startswith(_LSL)],
+                    sources=[(what, _given(inlets[what]) if what in inlets else how) for what, how in heard_of],
+                )
+            ),
+            options.recording(),
             None if readout is None else readout.to_json(),
             tare.to_json() if isinstance(tare, Tare) else None,
             None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
-            None if not listeners else lambda *said: [hear(Said(*said)) for hear in listeners],
-            flag("lines", lines),
+            None if not receivers else lambda *said: [receive(Said(*said)) for receive in receivers],
+            flag("lines", options.lines),
             feed,
         )
         self._remote, self._place = remote, self._core.place()
@@ -297,6 +166,11 @@ class Live:
             remote._begin(feed)
         for what, inlet in inlets.items():
             inlet.begin(partial(self._core.sample, what))
+
+    def _again(self, port: int, host: str, **changed: Any) -> Live:
+        """Return another one that works alike, of a board that sends to this address."""
+        options = replace(self._options, port=port, host=host, remote=None, **changed)
+        return Live(**{field.name: getattr(options, field.name) for field in fields(options)})
 
     @property
     def address(self) -> tuple[str, int]:
@@ -486,7 +360,7 @@ class Live:
         """
         place = checked_path("path", path)
         ended = self._core.record(place, text("compression", compression), flag("overwrite", overwrite))
-        return None if ended is None else _summary(ended)
+        return None if ended is None else summary_of(ended)
 
     def record_again(self) -> bool:
         """Have the recording that runs begin anew, where nothing came into it of any source; return whether it does."""
@@ -500,7 +374,7 @@ class Live:
         OSError : the disk was full before its end; what was written before stays readable
         ProblemError : nothing is recorded
         """
-        return _summary(self._core.end_recording())
+        return summary_of(self._core.end_recording())
 
     @property
     def records(self) -> bool:
@@ -508,19 +382,19 @@ class Live:
         return self._core.records()
 
     def stop(self) -> Summary:
-        """Work through what came, close the file, and say what was lost; once ended, say it again.
+        """Process what has arrived, close the file, and return what was lost; every call returns the same summary.
 
         Raises
         ------
-        OSError : the disk is full; what was written before stays readable
+        OSError : the disk is full, and what was written before stays readable; or the file was removed, renamed or
+            replaced while it was recorded, which names what is lost
+        ProblemError : called by `say`, in a forked child, or after an end by an error
         """
-        while self._inlets:
-            self._inlets.pop().close()
-        said = self._core.stop()
-        if said is not None:
-            self._summary = _summary(said)
+        inlets, self._inlets = self._inlets, []
+        for inlet in inlets:
+            inlet.close()
         if self._summary is None:
-            raise ProblemError("live: ended by an error, which was raised then")
+            self._summary = summary_of(self._core.stop())
         return self._summary
 
     def __enter__(self) -> Live:
@@ -542,27 +416,8 @@ class Live:
         return f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)"
 
 
-def _summary(said: str) -> Summary:
-    values = json.loads(said)
-    path = None if values["path"] is None else Path(values["path"])
-    taken = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
-    return Summary(values["counters"], values["verdict"], path, taken)
-
-
-def _sources(sources: Mapping[str, str] | None) -> list[tuple[str, str]]:
-    if sources is None:
-        return []
-    if not isinstance(sources, Mapping):
-        raise ProblemError(f'sources is {shown(sources)}: must be a mapping, as {{"imu": "serial:/dev/ttyACM0"}}')
-    return [(text("name of a source", name), text(f"source {name}", what)) for name, what in sources.items()]
-
-
 def _given(inlet: LslInlet) -> str:
     return f"given,columns={':'.join(inlet.columns)}"
-
-
-def _held(registers: str | Registers) -> object:
-    return json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
 
 
 def _stretch_us(seconds: float) -> int:
@@ -570,30 +425,3 @@ def _stretch_us(seconds: float) -> int:
     if not 1e-6 <= stretch <= 3600:
         raise ProblemError(f"tare is {stretch} s: must lie between 1 us and an hour, or be a taxel.Tare")
     return round(stretch * 1e6)
-
-
-def delays(measured: dict[str, Any]) -> str:
-    """Return median and 99 % of a latency of `Live.counters` in words, or that nothing was measured.
-
-    Examples
-    --------
-    >>> delays({"count": 5, "p50_us": 41.2, "p99_us": 1300.0, "max_us": 1300.0})
-    'p50 41 us, p99 1,300 us'
-    >>> delays({"count": 0, "p50_us": None, "p99_us": None, "max_us": None})
-    'nothing measured'
-    """
-    if not measured["count"]:
-        return "nothing measured"
-    return f"p50 {measured['p50_us']:,.0f} us, p99 {measured['p99_us']:,.0f} us"
-
-
-def heard(said: Sequence[Said]) -> Detections:
-    """Return what was said live as `Detections`."""
-    return Detections._of(
-        [s.label for s in said],
-        [s.t for s in said],
-        [s.known for s in said],
-        [s.slope for s in said],
-        [s.said for s in said],
-        [s.repaired for s in said],
-    )
