@@ -504,7 +504,7 @@ def schema(source: Table) -> str:
 
 MADE = {
     "crates/taxel-core/src/wire/registers/table.rs": rust,
-    "crates/taxel-live/web/registers.js": javascript,
+    "crates/taxel-panel/web/registers.js": javascript,
     "crates/taxel-live/src/recording/schemas/Registers.json": schema,
     "docs/registers.md": docs,
 }

@@ -28,8 +28,7 @@ use taxel_core::{Array, problem};
 use crate::bridged::Bridged;
 
 pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
-pub(crate) use mcap_reader::begin_with;
-pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks};
+pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks, begin_with};
 pub use mcap_writer::{Track, Writer};
 pub use output::OutputFile;
 pub use pictures::Pictures;

@@ -23,8 +23,7 @@ use super::{BoardChange, Change, Counts, Header, Samples, Topic, limits};
 use crate::clock::leaves;
 use crate::{Error, Result};
 use blocks::Blocks;
-pub use remarks::Remarks;
-pub(crate) use remarks::begin_with;
+pub use remarks::{Remarks, begin_with};
 use walk::Walk;
 
 /// A recording of the live format, opened.
