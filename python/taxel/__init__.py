@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from taxel.recording import BoardChange, Datagrams, Note, Recording, Zeroing
     from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's
     from taxel.recording.convert import convert
+    from taxel.recording.cut import cut
     from taxel.recording.health import Health, health
-    from taxel.recording.parts import cut, merge
+    from taxel.recording.merge import merge
 
 __version__ = "0.1.0"
 

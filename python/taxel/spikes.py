@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 from uuid import uuid4
 from warnings import catch_warnings, filterwarnings
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
+from taxel._base.archive import read_arrays
 from taxel._base.arguments import bare, column, floats, nth, number, shown, text, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept
@@ -439,10 +439,9 @@ class SpikeTrains(Columns):
         """
         place = checked_path("path", path)
         try:
-            with open(place, "rb") as file, np.load(file) as columns:
-                held = {name: columns[name] for name in columns.files}
+            held = read_arrays(place, ("times", "offsets", "start", "stop", "values"))
             return cls(held["times"], held["offsets"], held["start"].item(), held["stop"].item(), held.get("values"))
-        except (ValueError, KeyError, AttributeError, EOFError, BadZipFile, ProblemError) as error:
+        except (ValueError, KeyError, ProblemError, FormatError) as error:
             raise FormatError(f"{place}: holds no spike trains: {shown(str(error))}") from None
 
     def plot(self, ax: Axes | None = None) -> Axes:

@@ -7,7 +7,9 @@ use taxel_core::wire::Filled;
 use taxel_core::wire::v2::{self, Decoded, Decoder, Heard, StreamReader};
 use taxel_core::{Error, Events};
 
-use crate::convert::{ArrayParts, ColumnsIn, EventsOut, array, from_events, slice, to_array, to_room};
+use crate::convert::{
+    ArrayParts, ColumnsIn, EventsIn, EventsOut, array, from_events, slice, to_array, to_events, to_room,
+};
 use crate::enter::{Shared, enter};
 use crate::parameters::to_json;
 
@@ -87,6 +89,27 @@ fn decode_datagrams<'py>(
     Ok((rows, paired, repaired.map(|column| array(py, column)), markers, to_json(&counts)?, skipped))
 }
 
+/// What is added to times, where each datagram begins (and the last ends), bytes, a time of each; the numbers of events whose
+/// mark as repaired could not be written.
+type EncodedOut<'py> =
+    (i64, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>);
+
+/// Writes events as datagrams; `held` is what the taxels hold at first, by index.
+#[pyfunction]
+fn encode_datagrams<'py>(
+    py: Python<'py>,
+    events: EventsIn<'py>,
+    held: Option<PyReadonlyArray1<'py, u16>>,
+    promised: bool,
+) -> PyResult<EncodedOut<'py>> {
+    let events = to_events(events)?;
+    let events = events.view()?;
+    let held = held.as_ref().map(|held| slice("held", held)).transpose()?;
+    let encoded = enter(py, |_| v2::encode(events, held, promised))?;
+    let (offsets, bytes, times) = (encoded.offsets, encoded.bytes, encoded.times);
+    Ok((encoded.origin_us, array(py, offsets), array(py, bytes), array(py, times), array(py, encoded.unmarked)))
+}
+
 /// Cuts a stream into datagrams.
 #[pyclass(frozen, module = "taxel._core")]
 struct DatagramStream(Shared<StreamReader>);
@@ -128,5 +151,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<DatagramDecoder>()?;
     module.add_class::<DatagramStream>()?;
     module.add_function(wrap_pyfunction!(datagram_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(encode_datagrams, module)?)?;
     module.add_function(wrap_pyfunction!(decode_datagrams, module)?)
 }

@@ -22,10 +22,10 @@ from taxel._core import ProblemError
 from taxel.device import Cable, ports
 from taxel.labels import Labels, write_labels
 from taxel.recording import open_recording
+from taxel.recording.about import array_of
 from taxel.recording.convert import convert
+from taxel.recording.cut import cut
 from taxel.recording.health import Told, judged
-from taxel.recording.parts import cut
-from taxel.recording.remarks import array_of
 from taxel.wire import Command
 
 __all__ = ["Office", "own_addresses", "presets_path"]

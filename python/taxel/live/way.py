@@ -25,7 +25,7 @@ from taxel.detections import Detections
 from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.remote import Remote
 from taxel.live.sending import PORT
-from taxel.recording.remarks import Zeroing
+from taxel.recording.notes import Zeroing
 from taxel.tare import Tare
 from taxel.wire import Registers
 

@@ -3,13 +3,12 @@
 The root has the attribute ``taxel`` (1, the layout's version). Events are the data sets ``t`` (int64, us), ``x``, ``y``
 (uint16), ``p`` (bool) and where they came ``intensity`` (uint16, ticks), ``present`` and ``repaired`` (bool), with
 ``markers`` (int64, two columns: us, whether a start); pictures are ``values`` (float32, pictures x rows x columns)
-with ``t`` and ``unit`` (text). ``about`` is JSON: the sensor, where it came from, registers, notes, detections and
-what was lost.
+with ``t`` and ``unit`` (text). ``held`` (uint16, rows x columns, 65 535 where nothing is known) is what the taxels held
+at the beginning. ``about`` is JSON: the sensor, where it came from, registers, notes, detections and what was lost.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +18,8 @@ from numpy.typing import NDArray
 from taxel._base.limits import DESCRIPTION, unpacked
 from taxel._core import FormatError
 from taxel.array import Array
-from taxel.events import Events
-from taxel.frames import Frames
-from taxel.recording.remarks import Remarks
-from taxel.recording.tables import columns_of, table_of
+from taxel.recording.contents import Contents
+from taxel.recording.npz import TEXTS, columns_of, contents_of
 
 __all__ = ["is_ours", "read_h5", "write_h5"]
 
@@ -44,16 +41,14 @@ def is_ours(path: Path) -> bool:
         return False
 
 
-def write_h5(part: Path, table: Events | Frames, remarks: Remarks) -> None:
+def write_h5(part: Path, contents: Contents) -> None:
     """Write a .h5."""
     import h5py  # noqa: PLC0415  loads slowly
 
-    said = replace(remarks, array=table.array).to_json()
     with h5py.File(part, "w") as h5:
         h5.attrs["taxel"] = _VERSION
-        h5.create_dataset("about", data=said)
-        for name, column in columns_of(table).items():
-            if name == "unit":
+        for name, column in columns_of(contents).items():
+            if name in TEXTS:
                 h5.create_dataset(name, data=str(column))
                 continue
             row = max(1, column[:1].nbytes)
@@ -62,7 +57,7 @@ def write_h5(part: Path, table: Events | Frames, remarks: Remarks) -> None:
             h5.create_dataset(name, data=column, **packed)
 
 
-def read_h5(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:
+def read_h5(path: Path, array: Array | None) -> Contents:
     """Read a .h5 of ours.
 
     Raises
@@ -90,7 +85,7 @@ def read_h5(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:
     except Exception as error:
         said = (str(error).splitlines() or [""])[0][:200]
         raise FormatError(f"{path}: not a whole HDF5 file ({said})") from None
-    return table_of(path, columns, array)
+    return contents_of(path, "h5", columns, array)
 
 
 def _column(place: str, name: str, data: Any) -> NDArray[Any]:
@@ -98,7 +93,7 @@ def _column(place: str, name: str, data: Any) -> NDArray[Any]:
 
     if not isinstance(data, h5py.Dataset):
         raise FormatError(f"{place}: a group; must be a column")
-    if name in {"about", "unit"}:
+    if name in TEXTS:
         if data.shape != () or h5py.check_string_dtype(data.dtype) is None:
             raise FormatError(f"{place}: must be a text")
         text = data.asstr()[()]
