@@ -16,6 +16,7 @@ from taxel import _core
 from taxel._base.arguments import fields, nth, shown, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept, own
+from taxel._base.drawing import draw
 from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
 
@@ -304,14 +305,10 @@ class Detections(Columns):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw each label's detections as marks over time (s)."""
-        from taxel.plot import detections  # noqa: PLC0415  matplotlib loads slowly
-
-        return detections(self, ax)
+        return draw("detections", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def _parts(
         self,

@@ -19,6 +19,7 @@ from taxel._base.archive import read_arrays
 from taxel._base.arguments import bare, column, floats, nth, number, shown, text, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept
+from taxel._base.drawing import draw
 from taxel._base.files import whole_file, write_whole
 from taxel._core import FormatError, ProblemError
 
@@ -446,14 +447,10 @@ class SpikeTrains(Columns):
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes in another colour."""
-        from taxel.plot import raster  # noqa: PLC0415  matplotlib loads slowly
-
-        return raster(self, ax)
+        return draw("raster", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def _parts(self) -> tuple[Any, ...]:
         return self.times, self.offsets, self.values, self.start, self.stop

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import instance, several, shown, text, window
+from taxel._base.drawing import draw
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.calibration import Calibration
@@ -347,14 +348,10 @@ class Recording:
 
     def plot(self) -> Figure:
         """Draw what is in it: events (or the sum of pressure) over time, and where on the array."""
-        from taxel.plot import overview  # noqa: PLC0415  matplotlib loads slowly
-
-        return overview(self)
+        return draw("overview", self)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def __repr__(self) -> str:
         own = self._contents
