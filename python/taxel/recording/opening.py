@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ from taxel._base import arguments
 from taxel._base.arguments import flag, instance, text
 from taxel._core import FormatError
 from taxel.array import Array
-from taxel.clock import Clock
 from taxel.events import Events
 from taxel.formats import Trial
 from taxel.labels import Labels
@@ -87,7 +85,8 @@ def open_any(
     how: dict[str, Any] = {"array": array, "pairing": pairing, "differences": differences}
     if place.is_dir():
         return _folder(place, how)
-    if not _is_own(place) and place.exists() and (names := _formats(place)):
+    # What other people's files are called is asked first: a .h5 is read once more to know whose it is.
+    if place.exists() and (names := _formats(place)) and not _is_own(place):
         return [_of(trial, place, names[0]) for trial in formats.trials(place, names[0])]
     return open_recording(place, **how)
 
@@ -178,7 +177,7 @@ def _labelled(table: Path, named: list[tuple[Path, Recording]]) -> list[Recordin
 
 def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
     clock = recording.clock if recording.clock is not None and len(recording.clock.board_us) else None
-    times = labels.of(_Named(name, clock))
+    times = labels._of(name, lambda: clock)
     return sorted(
         (
             Note(label, int(t), 0 if clock is None else int(clock.host_ns(int(t))))
@@ -187,14 +186,6 @@ def _notes(labels: Labels, name: Path, recording: Recording) -> list[Note]:
         ),
         key=lambda note: note.t or 0,
     )
-
-
-@dataclass(frozen=True)
-class _Named:
-    """What labels look at: a recording under the name that its folder gives it."""
-
-    path: Path
-    clock: Clock | None
 
 
 def _of(trial: Trial, place: Path, kind: str) -> Recording:
