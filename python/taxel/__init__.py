@@ -70,7 +70,6 @@ __all__ = [
     "plot",
     "simulate",
     "wire",
-    "wire_v2",
 ]
 
 

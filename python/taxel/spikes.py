@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
 from taxel._base.archive import read_arrays
-from taxel._base.arguments import bare, column, floats, nth, number, shown, text, window
+from taxel._base.arguments import bare, column, floats, nth, number, several, shown, text, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept
 from taxel._base.drawing import draw
@@ -90,6 +90,7 @@ class SpikeTrains(Columns):
         self.times: NDArray[np.float64] = kept("times", times, np.float64, "ms")
         self.offsets: NDArray[np.int64] = kept("offsets", offsets, np.int64)
         self.values: NDArray[np.float32] | None = None if values is None else kept("values", values, np.float32)
+        _finite_values(self.values)
         self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
         _core.check_spikes(self._parts())
 
@@ -127,6 +128,7 @@ class SpikeTrains(Columns):
             signed, valued = _by_train("values", bare("values", values), np.float32)
             if valued != counts:
                 raise ProblemError("values: must have the lengths of the trains, one value a spike")
+            _finite_values(signed)
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # What is not finite is refused below, by its place.
@@ -494,10 +496,7 @@ class SpikeTrains(Columns):
 
 def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[NDArray[Any], list[int]]:
     """Return all entries, train after train, and how many each train has."""
-    try:
-        entries = list(lists)
-    except TypeError:
-        raise ProblemError(f"{name} is {shown(lists)}: must be one list a train") from None
+    entries = several(name, lists)
     if not entries:
         return np.empty(0, dtype), []
     try:
@@ -517,3 +516,10 @@ def _quiet_about_names() -> Iterator[None]:
     with catch_warnings():
         filterwarnings("ignore", category=UserWarning, module="pynwb|hdmf")
         yield
+
+
+def _finite_values(values: NDArray[np.float32] | None) -> None:
+    """Refuse a value of a spike that is not finite, by its place."""
+    if values is not None and not np.isfinite(values).all():
+        k = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise ProblemError(f"values[{k}] is {values[k]}: must be finite")

@@ -5,13 +5,12 @@ import pytest
 
 from taxel.demo.hearing import hear
 from taxel.demo.script import script
-from taxel.demo.shipped import described, shipped
-from taxel.demo.training import train
+from taxel.demo.shipped import described, shipped, trained
 
 
 @pytest.fixture(scope="module")
 def toy():
-    return train(boards=1, scenes=3)
+    return trained(boards=1, scenes=3)
 
 
 def test_a_toy_training_hears_other_scenes(toy):

@@ -477,6 +477,6 @@ def test_an_example_may_be_a_recording(folder: Path) -> None:
     ]
     assert trained[0] == trained[1]
     with pytest.raises(
-        taxel.ProblemError, match=r"example 0 is .*: must be an Example of a Recording, Events or Frames"
+        taxel.ProblemError, match=r"example 0 is .*: must be an Example of a Recording, Events, Frames or SpikeTrains"
     ):
         train([Example("1.npz", labels)], taxel.detect.Recipe.load(folder / "recipe.toml"))

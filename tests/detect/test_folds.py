@@ -9,7 +9,8 @@ from test_readout import recipe, tare, touches
 
 import taxel
 from taxel.detect import Example, choose, judge, run, score, train
-from taxel.detect.folds import folds
+from taxel.detect import Fold, Part
+from taxel.detect.folds import _folds as folds
 
 
 def examples(*seeds: int) -> list[Example]:
@@ -36,13 +37,13 @@ def test_of_one_recording_each_event_is_judged_once_by_what_never_heard_it(k: in
     ways, how = folds([data], k)
     assert how == f"{k} blocks of time"
     events = np.sort(np.concatenate(list(data.labels.values())))
-    held = [(stretch.start, stretch.stop) for way in ways for stretch in way.held]
+    held = [(stretch.start, stretch.stop) for way in ways for stretch in way.test]
     assert [sum(start <= t < stop for start, stop in held) for t in events] == [1] * len(events)
     sizes = [int(np.count_nonzero((events >= start) & (events < stop))) for start, stop in held]
     assert 2 * k * min(sizes) >= len(events), "about equally many"
     for way in ways:
-        (out,) = way.held
-        assert all(stretch.stop <= out.start or stretch.start >= out.stop for stretch in way.kept)
+        (out,) = way.test
+        assert all(stretch.stop <= out.start or stretch.start >= out.stop for stretch in way.train)
     judged = judge([data], recipe(), k, window_ms=10.0)
     assert judged.together.events == len(events)
     assert judged.together.missed == 0

@@ -103,14 +103,14 @@ def wait_for(done):
 
 
 def test_what_comes_after_time_went_on_is_counted_late():
-    board, decoder = Board(Registers(wire_version=2), version_2=Version2(states_us=0)), taxel.wire_v2.Decoder()
+    board, decoder = Board(Registers(wire_version=2), version_2=Version2(states_us=0)), taxel.wire.Decoder(2)
     with udp.socket(udp.AF_INET, udp.SOCK_DGRAM) as socket:
         for gap, late in ((1.0, True), (1e7, False)):
             readout = taxel.Readout(ChangeEvents(), {"a": (taxel.Neuron(), np.zeros(8192))})
             with taxel.live.Live(0, host="127.0.0.1", readout=readout, gap_frames=gap) as live:
                 sent = [d for k in range(20) for d in board.frame(np.full(4096, 20 + 10 * (k % 2), np.uint16))]
                 kept = sent.pop(len(sent) // 2)
-                in_it = len(decoder.push(kept).events)
+                in_it = len(decoder.push(kept))
                 for datagram in sent[:-1]:
                     socket.sendto(datagram, live.address)
                 wait_for(lambda: live.counters["decoded"] == len(sent) - 1)  # noqa: B023

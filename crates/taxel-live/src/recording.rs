@@ -7,16 +7,18 @@
 //! A file is readable at any moment: a chunk reaches it whole, at the latest [`FLUSH_EVERY`] after its first datagram,
 //! and the reader rebuilds the index by walking the records, whether the file was finished or not.
 
+mod base64;
 mod limits;
 mod lsa;
 mod mcap_reader;
 mod mcap_writer;
+mod output;
 mod picture;
+mod pictures;
 mod stream;
 mod topic;
 
 use std::collections::BTreeMap;
-use std::path::Path;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
@@ -29,6 +31,8 @@ pub use lsa::{DecodedLsa, LsaWriter, decode_lsa, numbered};
 pub(crate) use mcap_reader::begin_with;
 pub use mcap_reader::{Datagrams, Decoded, Ending, Message, Place, Reader, Rebuilt, Remarks};
 pub use mcap_writer::{Track, Writer};
+pub use output::OutputFile;
+pub use pictures::Pictures;
 pub use stream::{Samples, Stream, fields};
 pub use topic::Topic;
 
@@ -154,7 +158,7 @@ pub struct Counts {
 
 impl Header {
     /// Checks what a file says of itself.
-    fn check(&self) -> taxel_core::Result<()> {
+    pub(crate) fn check(&self) -> taxel_core::Result<()> {
         self.array.check()?;
         let (rows, columns) = (self.array.rows, self.array.columns);
         if self.array.len() > limits::TAXELS {
@@ -359,27 +363,4 @@ pub enum Change {
 pub fn now_ns() -> i64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     i64::try_from(since.as_nanos()).unwrap_or(i64::MAX)
-}
-
-/// Refuses a file that somebody protected from being written: from the superuser too, who may write everywhere.
-pub(crate) fn replaceable(path: &Path) -> crate::Result<()> {
-    match std::fs::metadata(path) {
-        Ok(file) if file.permissions().readonly() => {
-            Err(crate::Error::file(path)(std::io::Error::from_raw_os_error(libc::EACCES)))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// Opens a new file for writing; an existing one only where `overwrite` says so, and never one that is write-protected.
-fn create(path: &Path, overwrite: bool) -> crate::Result<std::fs::File> {
-    let mut options = std::fs::OpenOptions::new();
-    options.write(true).read(true);
-    if overwrite {
-        replaceable(path)?;
-        options.create(true).truncate(true);
-    } else {
-        options.create_new(true);
-    }
-    options.open(path).map_err(crate::Error::file(path))
 }

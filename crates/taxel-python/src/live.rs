@@ -1,7 +1,8 @@
 //! The pipeline from datagrams to detections, and the sender of the benchmarks.
 
+use std::cell::Cell;
 use std::path::PathBuf;
-use std::sync::{PoisonError, RwLock, RwLockReadGuard};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use numpy::PyArray1;
@@ -14,14 +15,15 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
 use taxel_live::capture::{self, Sender};
-use taxel_live::pipeline::{Ear, Handle, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink, Source};
+use taxel_live::pipeline::{Handle, Lines, Listener, Live as Pipeline, LiveOptions, Record, Said, Sink, Source};
 
 use crate::bridge::{Copies, Feed};
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core, live};
-use crate::guest;
 use crate::parameters::parsed;
+use crate::thread_state;
+use crate::threaded::Threaded;
 
 /// What Python may choose; everything else is as Rust has it.
 #[derive(Deserialize)]
@@ -74,21 +76,23 @@ fn said_parts(said: Said) -> SaidParts {
     (d.label, d.t, d.known, d.slope, said.said, said.said_ns, d.repaired)
 }
 
+thread_local! {
+    /// Whether this thread is calling a function that takes detections.
+    static IN_CALLBACK: Cell<bool> = const { Cell::new(false) };
+}
+
 /// Datagrams to detections, as they come.
 #[pyclass(frozen)]
 pub(crate) struct Live {
-    /// Never waited for while the GIL is held: whoever holds it may be asking for the GIL to look for Ctrl-C.
-    pipeline: RwLock<Option<Pipeline>>,
+    pipeline: Threaded<Pipeline>,
+    /// How it ended, as JSON, once it has; locked while it is being ended.
+    summary: Mutex<Option<String>>,
 }
 
 impl Live {
-    /// What the panel does with it.
+    /// What others may do with it while it runs.
     pub(crate) fn handle(&self, py: Python<'_>) -> PyResult<Handle> {
         self.with(py, |pipeline| Ok(pipeline.handle()))
-    }
-
-    fn held(&self) -> RwLockReadGuard<'_, Option<Pipeline>> {
-        self.pipeline.read().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn with<T: Send>(
@@ -96,10 +100,7 @@ impl Live {
         py: Python<'_>,
         work: impl FnOnce(&Pipeline) -> taxel_live::Result<T> + Send,
     ) -> PyResult<T> {
-        enter(py, |_| match self.held().as_ref() {
-            Some(pipeline) => work(pipeline),
-            None => Err(problem!("live: has been stopped; begin a new one").into()),
-        })
+        self.pipeline.with(py, work)
     }
 }
 
@@ -160,18 +161,27 @@ impl Live {
         }
         if let Some(say) = say {
             sinks.push(Box::new(move |said: &Said| {
-                guest::attach(|py| say.call1(py, said_parts(said.clone())).map(drop)).map_err(std::io::Error::other)
+                thread_state::attach(|py| {
+                    IN_CALLBACK.set(true);
+                    let outcome = say.call1(py, said_parts(said.clone()));
+                    IN_CALLBACK.set(false);
+                    outcome.map(drop)
+                })
+                .map_err(std::io::Error::other)
             }));
         }
         let readout = readout.map(Readout::from_json).transpose().map_err(core)?;
         let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
-        let ear = Ear::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
+        let listener = Listener::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
         let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
         let pipeline = enter(py, |_| match fed {
-            Some(receiver) => Pipeline::start_fed(receiver, options, ear, sinks),
-            None => Pipeline::start(of_host(host, port)?, options, ear, sinks),
+            Some(receiver) => Pipeline::start_fed(receiver, options, listener, sinks),
+            None => Pipeline::start(of_host(host, port)?, options, listener, sinks),
         })?;
-        Ok(Self { pipeline: RwLock::new(Some(pipeline)) })
+        Ok(Self {
+            pipeline: Threaded::new("live", "live: has been stopped; begin a new one", pipeline),
+            summary: Mutex::default(),
+        })
     }
 
     /// Host and port that it listens on.
@@ -199,7 +209,8 @@ impl Live {
     fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<SaidParts>> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
-        let said = enter(py, |stop| match self.held().as_ref() {
+        self.pipeline.check()?;
+        let said = enter(py, |stop| match self.pipeline.read().as_ref() {
             Some(pipeline) => pipeline.wait(timeout, stop),
             None => Ok(None),
         })?;
@@ -285,22 +296,24 @@ impl Live {
         self.with(py, |pipeline| pipeline.expect_version(version))
     }
 
-    /// Ends; gives counters, verdict and path as JSON, or None where it had ended before.
-    fn stop(&self, py: Python<'_>) -> PyResult<Option<String>> {
+    /// Ends; returns counters, verdict and path as JSON, the same at every call.
+    fn stop(&self, py: Python<'_>) -> PyResult<String> {
+        self.pipeline.check()?;
+        if IN_CALLBACK.get() {
+            let text =
+                "live: `stop` was called by its own `say`, and would wait for itself; call it from another thread";
+            return Err(ProblemError::new_err(text));
+        }
         enter(py, |_| {
-            // Whoever waits for a detection ends then, and lets go.
-            self.held().iter().for_each(Pipeline::end);
-            let pipeline = self.pipeline.write().unwrap_or_else(PoisonError::into_inner).take();
-            pipeline.map(|pipeline| Ok::<_, taxel_live::Error>(json!(pipeline.stop()?).to_string())).transpose()
+            // A thread that waits for a detection returns then, and releases the pipeline.
+            self.pipeline.read().iter().for_each(Pipeline::end);
+            let mut summary = self.summary.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(pipeline) = self.pipeline.take() {
+                *summary = Some(json!(pipeline.stop()?).to_string());
+            }
+            let ended = summary.clone();
+            ended.ok_or_else(|| taxel_live::Error::from(problem!("live: ended by an error, which was raised then")))
         })
-    }
-}
-
-impl Drop for Live {
-    fn drop(&mut self) {
-        let pipeline = self.pipeline.get_mut().unwrap_or_else(PoisonError::into_inner).take();
-        // Its threads may be about to call a Python function: they must be able to, or they never end.
-        Python::attach(|py| py.detach(|| drop(pipeline)));
     }
 }
 

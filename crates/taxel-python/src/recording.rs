@@ -8,16 +8,17 @@ use pyo3::types::PyBytes;
 use serde_json::json;
 use taxel_core::detect::Detection;
 use taxel_core::encode::Zeroing;
-use taxel_core::{Marker, problem, wire};
+use taxel_core::{Marker, wire};
 use taxel_live::clock::BoardClock;
 use taxel_live::recording::{
     BoardChange, Counts, Header, LsaWriter, Reader, Writer, WriterOptions, decode_lsa, numbered,
 };
 
 use crate::convert::{ArrayParts, EventsOut, array, from_events, slice, to_array};
-use crate::enter::{Shared, enter};
+use crate::enter::enter;
 use crate::errors::{core, live};
 use crate::parameters::parsed;
+use crate::threaded::Threaded;
 
 /// Events, counts as JSON, bad chunks; arrival ns, number and first event of each datagram; counts of version 2 as JSON; when
 /// each datagram could leave the board, us.
@@ -123,16 +124,12 @@ impl RecordingReader {
 
 /// A recording of the live format, being written.
 #[pyclass(frozen)]
-struct RecordingWriter(Shared<Option<Writer>>);
+struct RecordingWriter(Threaded<Writer>);
 
 impl RecordingWriter {
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&Writer) -> taxel_live::Result<T> + Send) -> PyResult<T> {
-        self.0.enter(py, |writer, _| work(writer.as_ref().ok_or_else(finished)?))
+        self.0.with(py, work)
     }
-}
-
-fn finished() -> taxel_live::Error {
-    problem!("the recording is finished: begin a new one").into()
 }
 
 #[pymethods]
@@ -143,7 +140,7 @@ impl RecordingWriter {
         let header: Header = parsed("header", header)?;
         let options = WriterOptions { compression: compression.parse().map_err(core)?, overwrite };
         let writer = enter(py, |_| Writer::create(&path, &header, options))?;
-        Ok(Self(Shared::new(Some(writer))))
+        Ok(Self(Threaded::new("recording", "the recording is finished: begin a new one", writer)))
     }
 
     /// Keeps datagrams: arrival ns, number, where each begins in `payload` (and where the last ends), bytes.
@@ -263,7 +260,11 @@ impl RecordingWriter {
     /// Ends the recording; counts in and out as JSON.
     fn finish(&self, py: Python<'_>, counts: &str) -> PyResult<String> {
         let counts: Counts = parsed("counts", counts)?;
-        let counts = self.0.enter(py, |writer, _| writer.take().ok_or_else(finished)?.finish(counts))?;
+        self.0.check()?;
+        let counts = enter(py, |_| match self.0.take() {
+            Some(writer) => writer.finish(counts),
+            None => Err(self.0.ended()),
+        })?;
         Ok(json!(counts).to_string())
     }
 }

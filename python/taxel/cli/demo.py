@@ -74,10 +74,9 @@ def demo(
 
 
 def _train(console: Console, place: Path) -> None:
-    from taxel.demo.shipped import described  # noqa: PLC0415
-    from taxel.demo.training import train  # noqa: PLC0415
+    from taxel.demo.shipped import described, trained  # noqa: PLC0415
 
     with console.status("training") as status:
-        readout = train(progress=status.update)
+        readout = trained(progress=status.update)
     readout.save(place)
     console.print(described(readout))

@@ -1,20 +1,24 @@
 """Spikes to detections, live and from recordings, and their score."""
 
-from taxel.detect.folds import Judged, choose, judge
+from taxel.detect.examples import Example
+from taxel.detect.folds import Fold, Judged, Part, Trained, choose, judge
 from taxel.detect.readout import Learner, Readout, ReadoutStream, run
 from taxel.detect.scoring import Score, Spread, score
 from taxel.detect.trained import TrainedNeuron
-from taxel.detect.training import Example, Recipe, train
+from taxel.detect.training import Recipe, train
 
 __all__ = [
     "Example",
+    "Fold",
     "Judged",
     "Learner",
+    "Part",
     "Readout",
     "ReadoutStream",
     "Recipe",
     "Score",
     "Spread",
+    "Trained",
     "TrainedNeuron",
     "choose",
     "judge",

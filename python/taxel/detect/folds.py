@@ -1,4 +1,4 @@
-"""What a recipe is worth on recordings that it was not trained on, and which of its points is best there."""
+"""Cross-validation of a recipe, and the choice among its points on held-out data."""
 
 from __future__ import annotations
 
@@ -11,99 +11,118 @@ from operator import add
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, flag, instance, number, whole
+from taxel._base.arguments import callback, finite, flag, instance, shown, whole
 from taxel._core import ProblemError
-from taxel.detect.readout import run
+from taxel.detect.examples import Example, array_of, checked
+from taxel.detect.readout import Readout, run
 from taxel.detect.scoring import Score, score, score_together
-from taxel.detect.training import Checked, Example, Pattern, Recipe, checked, encoded, learn
+from taxel.detect.training import Fitting, Recipe, encoded, fit, readout_of
 from taxel.detections import Detections
-from taxel.spikes import to_ms
+from taxel.learn import ConeR
+from taxel.spikes import SpikeTrains, to_ms
 
-__all__ = ["Judged", "choose", "judge"]
+__all__ = ["Fold", "Judged", "Part", "Trained", "choose", "judge"]
+
+#: Into how many folds the training data of a fold are split for a search, where nothing else is stated.
+_INNER = 3
 
 
-class _Stretch(NamedTuple):
-    """A part of an example, us."""
+class Part(NamedTuple):
+    """A whole example, or a stretch of one.
 
-    place: int
+    Attributes
+    ----------
+    example : int
+        Its place among the examples.
+    start, stop : float, us
+        What lies in ``start <= t < stop`` counts; all of it where they are left out.
+    """
+
+    example: int
     start: float = -np.inf
     stop: float = np.inf
 
-    def of(self, pattern: Pattern) -> Pattern:
-        """Return what of the example's pattern lies in it."""
-        trains, labels = pattern
-        start, stop = max(to_ms(self.start), trains.start), min(to_ms(self.stop), trains.stop)
-        kept = {label: times[(times >= self.start) & (times < self.stop)] for label, times in labels.items()}
-        return Pattern(trains.between(start, max(start, stop)), {label: t for label, t in kept.items() if len(t)})
+
+class Fold(NamedTuple):
+    """The parts that train and the parts that test.
+
+    Attributes
+    ----------
+    train, test : sequence of Part
+    inner : sequence of Fold
+        Folds of the training data that a search chooses in; three are made where there are none.
+
+    Examples
+    --------
+    >>> Fold(train=[Part(0), Part(1)], test=[Part(2, 0, 5_000_000)]).test[0].stop
+    5000000
+    """
+
+    train: Sequence[Part]
+    test: Sequence[Part]
+    inner: Sequence[Fold] = ()
 
 
-class _Fold(NamedTuple):
-    """What is trained on, and what is held out."""
+class Trained(NamedTuple):
+    """What one fold trained.
 
-    kept: list[_Stretch]
-    held: list[_Stretch]
+    Attributes
+    ----------
+    recipe : Recipe
+        With the points that a search chose.
+    learners : mapping of str to ConeR
+        The fitted learners, by label.
+    readout : Readout
+    """
+
+    recipe: Recipe
+    learners: Mapping[str, ConeR]
+    readout: Readout
 
 
 @dataclass(frozen=True)
 class Judged:
-    """Say what readouts said of what they were not trained on.
+    """How readouts did on data that they were not trained on.
 
     Attributes
     ----------
     scores : tuple of Score
-        One an example.
+        One an example that was tested, in the order of the examples.
     together : Score
         All of them.
     how : str
-        What was held out: recordings, or blocks of time.
+        What was held out: recordings, blocks of time, or the given folds.
+    trained : tuple of Trained
+        One a fold.
     """
 
     scores: tuple[Score, ...]
     together: Score
     how: str
-
-
-def folds(examples: Sequence[Example], k: int) -> tuple[list[_Fold], str]:
-    """Return `k` ways to hold something out, each thing once, and what is held out.
-
-    Of several examples whole ones are held out; of one alone stretches between its events, with about equally many
-    events each.
-
-    Raises
-    ------
-    ProblemError : more folds than examples, or than one example's events allow
-    """
-    sound, count = checked(examples), whole("folds", k, 2, 2**31)
-    if len(sound) == 1:
-        edges = [-np.inf, *_between_events(sound[0], count), np.inf]
-        blocks = [_Stretch(0, *both) for both in pairwise(edges)]
-        return [_Fold([b for b in blocks if b is not held], [held]) for held in blocks], f"{count} blocks of time"
-    if count > len(examples):
-        raise ProblemError(f"folds is {count}: must be 2 to {len(examples)}, the number of recordings")
-    everything = [_Stretch(n) for n in range(len(examples))]
-    ways = [_Fold([one for one in everything if one.place % count != n], everything[n::count]) for n in range(count)]
-    return ways, f"whole recordings, {count} folds"
+    trained: tuple[Trained, ...] = ()
 
 
 def judge(
     examples: Sequence[Example],
     recipe: Recipe,
-    k: int,
+    k: int | Sequence[Fold],
     *,
     search: bool = False,
     window_ms: float = 50.0,
     frame_us: float | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> Judged:
-    """Train as often as there are folds and judge each time what was held out.
+    """Train once a fold, and score the detections in the data that the fold tests.
 
     Parameters
     ----------
     examples : sequence of Example
     recipe : Recipe
-    k : int, 2 or more
-        How many folds: of several examples whole ones are held out, of one alone stretches of time.
+    k : int, 2 or more; or sequence of Fold
+        How many folds: of several examples whole ones are held out, of one alone stretches of time. Or the folds
+        themselves; no time of an example may be tested twice.
     search : bool
         Whether each neuron's point is chosen among the recipe's, inside the training data of each fold.
     window_ms : float, ms
@@ -111,6 +130,7 @@ def judge(
     frame_us : float, us, optional
         As in `taxel.detect.run`.
     progress : function of str, optional
+        Called with a line before each step.
 
     Returns
     -------
@@ -118,103 +138,252 @@ def judge(
 
     Raises
     ------
-    ProblemError : more folds than recordings, or than one recording's events allow; an event that is in one fold only
+    ProblemError : more folds than recordings, or than one recording's events allow; folds that make no sense; an event
+        that is in one fold only
+
+    Examples
+    --------
+    >>> from taxel.encode import LevelCrossing
+    >>> recipe = Recipe(LevelCrossing([1.0]), {"tau": 2.0, "ub": 2.0, "delay_ms": 1.0})
+    >>> examples = [Example(SpikeTrains.from_lists([[t]], stop=90.0), {"contact": [1000 * t]}) for t in (10, 20)]
+    >>> judge(examples, recipe, [Fold([Part(0)], [Part(1)])]).together.found
+    1
     """
-    examples, window = checked(examples), number("window_ms", window_ms)
-    told = (lambda _: None) if progress is None else callback("progress", progress)
+    examples, window = checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
+    if frame_us is not None:
+        finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
+    report = _reporting(progress)
     search = flag("search", search)
-    ways, how = folds(examples, k)
-    patterns = encoded(examples, instance("recipe", recipe, Recipe), told)
-    said: list[list[Detections]] = [[] for _ in examples]
-    for n, way in enumerate(ways):
-        told(f"fold {n + 1} of {len(ways)}")
-        kept = [stretch.of(patterns[stretch.place]) for stretch in way.kept]
-        array = examples[0].source.array
+    ways, how = _folds(examples, k)
+    patterns = encoded(examples, instance("recipe", recipe, Recipe), report)
+    array = array_of(examples)
+    found: dict[int, list[Detections]] = {}
+    trained = []
+    for n, fold in enumerate(ways):
+        report(f"fold {n + 1} of {len(ways)}")
         plan = recipe
         if search:
-            inner = [examples[place] for place in sorted({stretch.place for stretch in way.kept})]
-            if len(examples) == 1:
-                inner = [_piece(examples[0], stretch) for stretch in way.kept]
-            plan = choose(inner, recipe, window_ms=window, frame_us=frame_us, progress=told)
-        with warnings.catch_warnings():
-            # Of a readout that is not kept; its score says what it misses.
-            warnings.simplefilter("ignore", UserWarning)
-            readout = learn(kept, plan, array, told)
-        for place, start, stop in way.held:
-            found = run(readout, examples[place].source, tare=examples[place].tare, frame_us=frame_us)
-            said[place].append(found[(found.t >= start) & (found.t < stop)])
-    heard = [reduce(add, parts) for parts in said]
-    labels = recipe._labels(examples)
-    truths = [{label: example.labels.get(label, np.empty(0, np.int64)) for label in labels} for example in examples]
+            inner = fold.inner or _split(examples, fold.train, _INNER)
+            plan = _chosen(examples, patterns, recipe, inner, window, frame_us, report)
+        with _quiet():
+            learners = fit([_of(part, patterns) for part in fold.train], plan, report)
+        trained.append(Trained(plan, learners, readout_of(learners, plan, array)))
+        for part in fold.test:
+            found.setdefault(part.example, []).append(_found(trained[-1].readout, examples, part, frame_us))
+    heard = [reduce(add, found[place]) for place in sorted(found)]
+    truths = _truths(examples, ways, recipe._labels(examples))
     scores = tuple(score(*both, window) for both in zip(heard, truths, strict=True))
-    return Judged(scores, score_together(heard, truths, window), how)
+    return Judged(scores, score_together(heard, truths, window), how, tuple(trained))
 
 
 def choose(
     examples: Sequence[Example],
     recipe: Recipe,
     *,
-    k: int = 3,
+    k: int | Sequence[Fold] = _INNER,
     window_ms: float = 50.0,
     frame_us: float | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> Recipe:
     """Return the recipe with, for each neuron, the point of those that it lists which is best on held-out data.
 
-    Best is the fewest missed and false, then the smallest mean distance in time; of equals the first.
+    Best is the least `Score.rank`; of equals the first. Points that follow each other and differ in `lambdas` alone
+    are fitted to the same rows, each from the fit before.
 
     Parameters
     ----------
     examples, recipe, window_ms, frame_us, progress
         As in `judge`.
-    k : int, 2 or more
-        How many folds; of fewer examples than that, as many as there are.
+    k : int, 2 or more; or sequence of Fold
+        How many folds; of fewer examples than that, as many as there are. Or the folds themselves.
+
+    Returns
+    -------
+    Recipe
 
     Raises
     ------
     ProblemError : as `judge`
+
+    Examples
+    --------
+    >>> from taxel.encode import LevelCrossing
+    >>> search = [{"ub": 2.0}]
+    >>> recipe = Recipe(LevelCrossing([1.0]), {"tau": 2.0, "delay_ms": 1.0}, {"contact": {"ub": 0.1, "search": search}})
+    >>> examples = [Example(SpikeTrains.from_lists([[t]], stop=90.0), {"contact": [1000 * t]}) for t in (10, 20)]
+    >>> choose(examples, recipe, k=2).neurons
+    {'contact': {'ub': 2.0}}
     """
     instance("recipe", recipe, Recipe)
-    examples, count = checked(examples), whole("k", k, 2, 2**31)
-    told = (lambda _: None) if progress is None else callback("progress", progress)
+    examples, window = checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
+    if frame_us is not None:
+        finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
+    report = _reporting(progress)
+    if isinstance(k, int | np.integer):
+        k = whole("k", k, 2, 2**31)
+        k = min(k, len(examples)) if len(examples) > 1 else k
+    ways, _ = _folds(examples, k)
+    return _chosen(examples, encoded(examples, recipe, report), recipe, ways, window, frame_us, report)
+
+
+def _chosen(
+    examples: Sequence[Example],
+    patterns: Sequence[Example],
+    recipe: Recipe,
+    folds: Sequence[Fold],
+    window: float,
+    frame_us: float | None,
+    report: Callable[[str], object],
+) -> Recipe:
+    """Return the recipe with the best point of each neuron; `patterns` are the examples as spike trains."""
     best: dict[str, Mapping[str, Any]] = {}
     for label in recipe._labels(examples):
         points = recipe.points_of(label)
-        alone = [example._replace(labels=_only(example.labels, label)) for example in examples]
-        marks = []
-        for n, point in enumerate(points if len(points) > 1 else ()):
-            told(f"trying point {n + 1} of {len(points)} for {label}")
-            tried = replace(recipe, neurons={label: point})
-            ways = min(count, len(examples)) if len(examples) > 1 else count
-            marks.append(_mark(judge(alone, tried, ways, window_ms=window_ms, frame_us=frame_us).together))
-        best[label] = points[marks.index(min(marks))] if marks else points[0]
+        best[label] = points[0]
+        if len(points) > 1:
+            plans = [replace(recipe, neurons={label: point}) for point in points]
+            marks = _marks(
+                _only(examples, label), _only(patterns, label), plans, label, folds, window, frame_us, report
+            )
+            best[label] = points[marks.index(min(marks))]
     return replace(recipe, neurons=best)
 
 
-def _piece(example: Checked, stretch: _Stretch) -> Checked:
-    source = example.source.between(stretch.start, stretch.stop)
-    first = int(source.t[0]) if len(source) else 0
-    # What happened just before the first event of a piece was heard first in it.
-    labels = {
-        label: np.maximum(times[(times >= stretch.start) & (times < stretch.stop)], first)
-        for label, times in example.labels.items()
-    }
-    return Checked(source, {label: times for label, times in labels.items() if len(times)}, example.tare)
+def _marks(
+    examples: Sequence[Example],
+    patterns: Sequence[Example],
+    plans: Sequence[Recipe],
+    label: str,
+    folds: Sequence[Fold],
+    window: float,
+    frame_us: float | None,
+    report: Callable[[str], object],
+) -> list[tuple[int, float]]:
+    """Return what each of several recipes for one label comes to over all folds: its `Score.rank`."""
+    array = array_of(examples)
+    found: list[dict[int, list[Detections]]] = [{} for _ in plans]
+    for n, fold in enumerate(folds):
+        training = [_of(part, patterns) for part in fold.train]
+        rows: Fitting | None = None
+        for m, plan in enumerate(plans):
+            report(f"trying point {m + 1} of {len(plans)} for {label}, fold {n + 1} of {len(folds)}")
+            if rows is None or not rows.fits(plan):
+                rows = Fitting(training, plan, label, lambda _: None)
+            with _quiet():
+                readout = readout_of({label: rows.fit(plan)}, plan, array)
+            for part in fold.test:
+                found[m].setdefault(part.example, []).append(_found(readout, examples, part, frame_us))
+    truths = _truths(examples, folds, (label,))
+    return [score_together([reduce(add, of[place]) for place in sorted(of)], truths, window).rank for of in found]
 
 
-def _mark(one: Score) -> tuple[int, float]:
-    return one.missed + one.false, float(np.abs(one.errors_ms).mean()) if one.found else np.inf
+def _quiet() -> Any:
+    """Return a context without warnings of readouts that are not kept: their scores show what they miss."""
+    return warnings.catch_warnings(action="ignore", category=UserWarning)
 
 
-def _only(labels: Mapping[str, Any], label: str) -> dict[str, Any]:
-    return {label: labels[label]} if label in labels else {}
+def _found(readout: Readout, examples: Sequence[Example], part: Part, frame_us: float | None) -> Detections:
+    source, _, tare = examples[part.example]
+    found = run(readout, source, tare=tare, frame_us=frame_us)  # type: ignore[arg-type]
+    return found[(found.t >= part.start) & (found.t < part.stop)]
 
 
-def _between_events(example: Example, count: int) -> Iterator[float]:
-    """Yield where an example is cut: in the longest pause near each share of its events, us."""
-    times = np.sort(
-        np.concatenate([np.asarray(t, np.int64) for t in example.labels.values()] or [np.empty(0, np.int64)])
+def _of(part: Part, patterns: Sequence[Example]) -> Example:
+    """Return the part of an example's spike trains and labels."""
+    trains, labels, _ = pattern = patterns[part.example]
+    assert isinstance(trains, SpikeTrains)
+    start, stop = max(to_ms(part.start), trains.start), min(to_ms(part.stop), trains.stop)
+    inside = {label: _inside(times, part) for label, times in labels.items()}
+    return pattern._replace(
+        source=trains.between(start, max(start, stop)), labels={label: t for label, t in inside.items() if len(t)}
     )
+
+
+def _inside(times: NDArray[np.int64], part: Part) -> NDArray[np.int64]:
+    return times[(times >= part.start) & (times < part.stop)]
+
+
+def _truths(
+    examples: Sequence[Example], folds: Sequence[Fold], labels: Sequence[str]
+) -> list[dict[str, NDArray[np.int64]]]:
+    """Return, of each example that is tested, the events in its tested parts, by label."""
+    tested: dict[int, list[Part]] = {}
+    for part in (part for fold in folds for part in fold.test):
+        tested.setdefault(part.example, []).append(part)
+    nothing = np.empty(0, np.int64)
+    return [
+        {
+            label: np.sort(
+                np.concatenate([_inside(examples[place].labels.get(label, nothing), part) for part in tested[place]])
+            )
+            for label in labels
+        }
+        for place in sorted(tested)
+    ]
+
+
+def _only(examples: Sequence[Example], label: str) -> list[Example]:
+    return [one._replace(labels={name: t for name, t in one.labels.items() if name == label}) for one in examples]
+
+
+def _reporting(progress: Callable[[str], object] | None) -> Callable[[str], object]:
+    return (lambda _: None) if progress is None else callback("progress", progress)
+
+
+def _folds(examples: Sequence[Example], k: int | Sequence[Fold]) -> tuple[Sequence[Fold], str]:
+    """Return folds, made or given, and what they hold out."""
+    if isinstance(k, Sequence) and not isinstance(k, str):
+        _sound(k, len(examples))
+        return k, f"{len(k)} given folds"
+    count = whole("folds", k, 2, 2**31)
+    if len(examples) > 1 and count > len(examples):
+        raise ProblemError(f"folds is {count}: must be 2 to {len(examples)}, the number of recordings")
+    how = f"{count} blocks of time" if len(examples) == 1 else f"whole recordings, {count} folds"
+    return _split(examples, [Part(n) for n in range(len(examples))], count), how
+
+
+def _sound(folds: Sequence[Fold], examples: int) -> None:
+    """Refuse folds that make no sense."""
+    if not len(folds):
+        raise ProblemError("folds is empty: must be one Fold or more")
+    tested: dict[int, list[Part]] = {}
+    for n, fold in enumerate(folds):
+        if not isinstance(fold, Fold) or not fold.train or not fold.test:
+            raise ProblemError(f"fold {n} is {shown(fold)}: must be a Fold with parts to train on and parts to test")
+        for part in (*fold.train, *fold.test):
+            if not isinstance(part, Part) or not 0 <= whole(f"fold {n}: example", part.example) < examples:
+                raise ProblemError(f"fold {n}: {shown(part)} is no Part of {examples} examples")
+            if not part.start < part.stop:
+                raise ProblemError(f"fold {n}: {shown(part)} must start before it stops")
+        for part in fold.test:
+            if any(part.start < other.stop and other.start < part.stop for other in tested.get(part.example, ())):
+                raise ProblemError(f"fold {n}: {shown(part)} is tested twice")
+            tested.setdefault(part.example, []).append(part)
+        if fold.inner:
+            _sound(fold.inner, examples)
+
+
+def _split(examples: Sequence[Example], parts: Sequence[Part], count: int) -> list[Fold]:
+    """Return folds that test each part once.
+
+    Of several parts whole ones are tested; of one alone stretches between its events, with about equally many each.
+    """
+    if len(parts) == 1:
+        (part,) = parts
+        events = _only_inside(examples[part.example], part)
+        edges = [part.start, *_between_events(events, count), part.stop]
+        parts = [Part(part.example, *both) for both in pairwise(edges)]
+    count = min(count, len(parts))
+    return [Fold([one for k, one in enumerate(parts) if k % count != n], parts[n::count]) for n in range(count)]
+
+
+def _only_inside(example: Example, part: Part) -> NDArray[np.int64]:
+    """Return the times of all events in a part of an example, ascending."""
+    return np.sort(_inside(np.concatenate([*example.labels.values(), np.empty(0, np.int64)]), part))
+
+
+def _between_events(times: NDArray[np.int64], count: int) -> Iterator[float]:
+    """Yield where a part is cut: in the longest pause near each share of its events, us."""
     reach = max(1, len(times) // (2 * count))
     if len(times) < 2 * count:
         raise ProblemError(f"folds is {count}: one recording with {len(times)} events has room for {len(times) // 2}")

@@ -26,6 +26,7 @@ from taxel.frames import Frames
 from taxel.neuron import Neuron
 from taxel.recorded import recorded
 from taxel.recording import Recording
+from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
@@ -403,7 +404,7 @@ class ReadoutStream:
 
 def run(
     readout: Readout,
-    source: Recording | Events | Frames,
+    source: Recording | Events | Frames | SpikeTrains,
     *,
     frame_us: float | None = None,
     tare: Tare | None = None,
@@ -417,7 +418,9 @@ def run(
     Parameters
     ----------
     readout : Readout
-    source : Recording, Events or Frames
+    source : Recording, Events, Frames or SpikeTrains
+        Spike trains are those that the readout's encoder makes: a crossing is `known` when it happens, and nothing else
+        of this signature applies.
     frame_us : float, us, optional
         How long the board's frame lasts, at whose end a crossing is `known`. Left out: what the recording's registers
         say; of frames, their median distance; else 192, the board at reset.
@@ -456,13 +459,31 @@ def run(
             version = source.registers.wire_version if version is None else version
         zeroings = [(one.t, one.x, one.y, one.rest) for one in source.zeroings] if source.has_events else []
         source = recorded(source)
+    if isinstance(source, SpikeTrains):
+        return _run_spikes(readout, source)
     if isinstance(source, Events):
         period, version = FRAME_US if period is None else period, version or 1
         said = _core.readout_run_events(text, source._parts(), period, version, rest, zeroings)
         return Detections._from_parts(said)
     if not isinstance(source, Frames):
-        raise ProblemError(f"source is {shown(source)}: must be a taxel.Recording, taxel.Events or taxel.Frames")
+        raise ProblemError(
+            f"source is {shown(source)}: must be a taxel.Recording, taxel.Events, taxel.Frames or taxel.SpikeTrains"
+        )
     return Detections._from_parts(_core.readout_run_frames(text, source._parts(), period, rest))
+
+
+def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
+    """Return what the neurons of a readout detect in the spikes that its encoder made."""
+    trains = trains.split_by_sign() if trains.signed else trains
+    trains = trains.delayed(readout.delays_ms)
+    found = Detections([], [], [])
+    for label, one in readout.neurons.items():
+        spikes, slopes = one.neuron._run(one.weights, trains, readout.run_threshold)
+        t, known = (
+            np.rint(to_us(ms)).astype(np.int64) for ms in (spikes - (readout.encoder.latency_ms + one.delay_ms), spikes)
+        )
+        found += Detections([label] * len(spikes), t, known, slopes)
+    return found[np.argsort(found.known, kind="stable")]
 
 
 def _tare(tare: Tare | None) -> str | None:

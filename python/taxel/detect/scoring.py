@@ -100,6 +100,14 @@ class Score:
         return len(self.false_detections)
 
     @property
+    def rank(self) -> tuple[int, float]:
+        """Missed and false together, then the root mean square of `errors_ms` (ms): the less, the better.
+
+        `taxel.detect.choose` goes by it. The error is infinite where nothing was found.
+        """
+        return self.missed + self.false, float(np.sqrt(np.mean(self.errors_ms**2))) if self.found else np.inf
+
+    @property
     def found_share(self) -> float:
         """Found events as a share of all; NaN where there are none."""
         return self.found / self.events if self.events else float("nan")
@@ -212,7 +220,7 @@ def score_together(
 ) -> Score:
     """Score what was said of several recordings as one, with the events of each by the same labels (us)."""
     later = range(0, len(heard) * _APART_US, _APART_US)
-    moved = [Detections(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(heard, later, strict=True)]
+    moved = [Detections._of(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(heard, later, strict=True)]
     happened = {
         label: np.concatenate([truth[label] + by for truth, by in zip(truths, later, strict=True)])
         for label in truths[0]

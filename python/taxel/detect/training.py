@@ -8,26 +8,23 @@ import os
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, column, instance, mapping, number, parameters, several, shown, text
+from taxel._base.arguments import callback, finite, instance, mapping, number, parameters, several, shown, text
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import recipes
+from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.readout import Readout
 from taxel.encode import Encoder
-from taxel.events import Events
-from taxel.frames import Frames
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
-from taxel.recorded import Recorded, recorded
 from taxel.spikes import SpikeTrains, to_ms
-from taxel.tare import Tare
 
-__all__ = ["Example", "Recipe", "train"]
+__all__ = ["Recipe", "train"]
 
 
 #: How long after its last event something may still happen in an example, ms: a readout listens as long.
@@ -35,14 +32,6 @@ SILENCE_MS = 1000.0
 
 #: What a recipe's file says and a recipe does not hold: for which recordings it is, whose parameters other labels take.
 _OF_THE_FILE = ("fits", "other")
-
-
-class Example(NamedTuple):
-    """Something to learn from: events, frames or a recording, when what happened in it (us, by label), taxels' rest."""
-
-    source: Events | Frames | Recorded
-    labels: Mapping[str, Any]
-    tare: Tare | None = None
 
 
 @dataclass(frozen=True)
@@ -84,7 +73,8 @@ class Recipe:
 
     def __post_init__(self) -> None:
         instance("encoder", self.encoder, Encoder)
-        number("run_threshold", self.run_threshold)
+        if not finite("run_threshold", self.run_threshold) > 0:
+            raise ProblemError(f"run_threshold is {shown(self.run_threshold)}: must be above 0 and finite")
         text("about", self.about)
         text("source", self.source)
         if not isinstance(self.neurons, Mapping):
@@ -108,9 +98,9 @@ class Recipe:
         listed = several(f"neurons.{label}.search", own.pop("search", ()))
         return [own, *({**own, **mapping(f"neurons.{label}.search", point)} for point in listed)]
 
-    def _labels(self, patterns: Sequence[Pattern] | Sequence[Checked]) -> tuple[str, ...]:
-        """Return the labels that are learnt: the recipe's, or where it has none those of the patterns."""
-        return tuple(self.neurons) or tuple(sorted({label for pattern in patterns for label in pattern.labels}))
+    def _labels(self, examples: Sequence[Example]) -> tuple[str, ...]:
+        """Return the labels that are learnt: the recipe's, or where it has none those of the examples."""
+        return tuple(self.neurons) or tuple(sorted({label for example in examples for label in example.labels}))
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> Recipe:
@@ -243,75 +233,113 @@ def train(
     Readout(contact; LevelCrossing(levels=[5.0]) on 1 x 1 taxels; grid, keep)
     """
     sound = checked(examples)
-    told = (lambda _: None) if progress is None else callback("progress", progress)
-    return learn(encoded(sound, recipe, told), recipe, sound[0].source.array, told)
-
-
-class Pattern(NamedTuple):
-    """An example as a learner sees it: its spike trains, and when what happened (us, by label)."""
-
-    trains: SpikeTrains
-    labels: Mapping[str, NDArray[np.int64]]
-
-
-def encoded(examples: Sequence[Checked], recipe: Recipe, told: Callable[[str], object]) -> list[Pattern]:
-    """Return examples as a recipe's encoder turns them into spikes."""
+    report = (lambda _: None) if progress is None else callback("progress", progress)
     instance("recipe", recipe, Recipe)
-    arrays = [example.source.array for example in examples]
-    for k, array in enumerate(arrays):
-        if array != arrays[0]:
-            raise ProblemError(f"example {k} is of {array!r}, example 0 of {arrays[0]!r}: must be equal")
-    patterns = []
+    return readout_of(fit(encoded(sound, recipe, report), recipe, report), recipe, array_of(sound))
+
+
+def encoded(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> list[Example]:
+    """Return (checked) examples with the spike trains of the recipe's encoder as their sources."""
+    array_of(examples)
+    found = []
     for k, example in enumerate(examples):
-        told(f"encoding {k + 1} of {len(examples)}")
-        encoder = recipe.encoder if example.tare is None else recipe.encoder.with_tare(example.tare)
-        trains = encoder.encode(example.source)
-        patterns.append(Pattern(trains.split_by_sign() if trains.signed else trains, example.labels))
-    return patterns
+        trains = example.source
+        if not isinstance(trains, SpikeTrains):
+            report(f"encoding {k + 1} of {len(examples)}")
+            encoder = recipe.encoder if example.tare is None else recipe.encoder.with_tare(example.tare)
+            trains = encoder.encode(trains)
+        found.append(example._replace(source=trains.split_by_sign() if trains.signed else trains))
+    return found
 
 
-def learn(patterns: Sequence[Pattern], recipe: Recipe, array: Array, told: Callable[[str], object]) -> Readout:
-    """Train a recipe's neurons on patterns, which its encoder made of recordings of an array; see `train`."""
-    wanted = recipe._labels(patterns)
+def readout_of(learners: Mapping[str, ConeR], recipe: Recipe, array: Array | None) -> Readout:
+    """Return the readout of fitted learners, behind the encoder of the recipe that they were made by."""
+    delays = {label: recipe.learner_of(label)[1] for label in learners}
+    return Readout(recipe.encoder, learners, array=array, delay_ms=delays, run_threshold=float(recipe.run_threshold))
+
+
+def fit(examples: Sequence[Example], recipe: Recipe, report: Callable[[str], object]) -> dict[str, ConeR]:
+    """Fit the learner of each of a recipe's labels on encoded examples; see `train`."""
+    learners = {}
+    for label in _wanted(examples, recipe):
+        learners[label] = Fitting(examples, recipe, label, report).fit(recipe)
+    return learners
+
+
+def _wanted(examples: Sequence[Example], recipe: Recipe) -> tuple[str, ...]:
+    wanted = recipe._labels(examples)
     if not wanted:
         raise ProblemError("no label in any example: there is nothing to learn")
-    for label in {label for pattern in patterns for label in pattern.labels} - set(wanted):
+    for label in {label for example in examples for label in example.labels} - set(wanted):
         raise ProblemError(
             f"label {shown(label)} has no neuron: the recipe has {', '.join(map(repr, wanted))}; "
             f"give it [neurons.{label}], or leave it out of the labels"
         )
-    learners, delays = {}, {}
-    for label in wanted:
+    return wanted
+
+
+class Fitting:
+    """The rows of one label's learner on encoded examples, for a recipe and all others that differ in `lambdas` alone.
+
+    Raises
+    ------
+    ProblemError : no example has such an event, or one lies outside its example (names it)
+    """
+
+    def __init__(
+        self, examples: Sequence[Example], recipe: Recipe, label: str, report: Callable[[str], object]
+    ) -> None:
+        self._label = label
+        self._needs = _rows_of(recipe, label)
         learner, delay_ms = recipe.learner_of(label)
-        shift_ms = recipe.encoder.latency_ms + delay_ms
-        targets = []
-        for k, (trains, labels) in enumerate(patterns):
+        self._shift_ms = recipe.encoder.latency_ms + delay_ms
+        self._targets: list[NDArray[np.float64]] = []
+        trains = []
+        for k, (source, labels, _) in enumerate(examples):
+            assert isinstance(source, SpikeTrains)
             times = to_ms(np.sort(labels.get(label, np.empty(0, np.int64))))
-            outside = times[(times < trains.start) | (times > trains.stop + SILENCE_MS)]
+            outside = times[(times < source.start) | (times > source.stop + SILENCE_MS)]
             if len(outside):
                 raise ProblemError(
-                    f"example {k}: {label} at {outside[0]:g} ms lies outside it, {trains.start:g} to {trains.stop:g} ms"
+                    f"example {k}: {label} at {outside[0]:g} ms lies outside it, {source.start:g} to {source.stop:g} ms"
                 )
-            targets.append(times + shift_ms)
-        if not any(len(times) for times in targets):
+            self._targets.append(times + self._shift_ms)
+            trains.append(_until(source, self._targets[-1]))
+        count = sum(map(len, self._targets))
+        if not count:
             raise ProblemError(f"{label}: no example has such an event, so it cannot be learnt")
-        heard = [_until(pattern.trains, times) for pattern, times in zip(patterns, targets, strict=True)]
+        self._what = f"learning {label} from {count} events"
+        self._report = report
+        report(self._what)
+        self._rows = learner.prepare(trains, self._targets)
+        self._before: ConeR | None = None
+
+    def fits(self, recipe: Recipe) -> bool:
+        """Whether the learner that a recipe describes needs these rows."""
+        return self._needs == _rows_of(recipe, self._label)
+
+    def fit(self, recipe: Recipe) -> ConeR:
+        """Fit the learner that a recipe describes, beginning at the fit before, if any; warn in the words of events."""
+        cone, _ = recipe.learner_of(self._label)
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            learners[label] = learner.fit(heard, targets, progress=_telling(told, label, targets))
-        for text_of in _remarks(learners[label], targets, shift_ms, caught):
-            warnings.warn(f"{label}: {text_of}", stacklevel=3)
-        delays[label] = delay_ms
-    return Readout(recipe.encoder, learners, array=array, delay_ms=delays, run_threshold=float(recipe.run_threshold))
+            self._before = self._rows.fit(
+                cone,
+                start=self._before,
+                progress=lambda n, _rows, _objective, gap: self._report(
+                    f"{self._what}, round {n}: within {gap:.1e} of the least"
+                ),
+            )
+        for text_of in _remarks(cone, self._targets, self._shift_ms, caught):
+            warnings.warn(f"{self._label}: {text_of}", stacklevel=4)
+        return cone
 
 
-def _telling(
-    told: Callable[[str], object], label: str, targets: Sequence[NDArray[np.float64]]
-) -> Callable[[int, int, float, float], object]:
-    """Tell what is learnt, and how far each round of the fit came."""
-    what = f"learning {label} from {sum(map(len, targets))} events"
-    told(what)
-    return lambda n, _rows, _objective, gap: told(f"{what}, round {n}: within {gap:.1e} of the least")
+def _rows_of(recipe: Recipe, label: str) -> str:
+    """Return what the rows of a label's learner depend on, as text."""
+    cone, delay_ms = recipe.learner_of(label)
+    values = {name: value for name, value in cone.get_params().items() if name not in ("lambdas", "neuron")}
+    return parameters(values | {"delay_ms": delay_ms})
 
 
 def _remarks(
@@ -354,32 +382,3 @@ def learner_from(name: str, values: Mapping[str, Any]) -> tuple[ConeR, float]:
         "neuron__time": "grid"
     }
     return cone.set_params(**nested), delay_ms
-
-
-class Checked(Example):
-    """An example whose source is read and whose labels are columns of whole us."""
-
-    __slots__ = ()
-    source: Events | Frames
-    labels: Mapping[str, NDArray[np.int64]]
-
-
-def checked(examples: Sequence[Example]) -> list[Checked]:
-    """Return examples as they are learnt from; refuse what is none, by its place."""
-    if not isinstance(examples, Sequence) or not len(examples):
-        raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")
-    sound = []
-    for k, example in enumerate(examples):
-        whole = isinstance(example, tuple) and len(example) in (2, 3)
-        source = recorded(example[0]) if whole else None
-        if not isinstance(source, Events | Frames):
-            raise ProblemError(
-                f"example {k} is {shown(example)}: must be an Example of a Recording, Events or Frames, and labels"
-            )
-        _, labels, *rest = example
-        if not isinstance(labels, Mapping):
-            raise ProblemError(f"example {k}: labels is {shown(labels)}: must be times (us) by label")
-        times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
-        tare = rest[0] if rest else None
-        sound.append(Checked(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
-    return sound

@@ -13,7 +13,7 @@ from taxel._base.arguments import path as checked_path
 from taxel._core import ProblemError
 from taxel.device import Cable
 from taxel.live._office import Office
-from taxel.live.way import Live
+from taxel.live.live import Live
 
 __all__ = ["Panel"]
 
@@ -133,7 +133,7 @@ class Panel:
         """
         with self._anew:
             before = self._may_begin_anew("listen")
-            after = Live(port, host=host, **before._how)
+            after = before._again(port, host)
             self._core.attach(after._core)
             self._live = after
             before.stop()
@@ -151,18 +151,18 @@ class Panel:
         """
         with self._anew:
             before = self._may_begin_anew("delta_intensity")
-            if flag("on", on) == before._how["differences"]:
+            if flag("on", on) == before._options.differences:
                 return
             host, port = before.address
             before.stop()
-            after = Live(port, host=host, **{**before._how, "differences": on})
+            after = before._again(port, host, differences=on)
             self._core.attach(after._core)
             self._live = after
 
     def _may_begin_anew(self, what: str) -> Live:
         if self._live is None:
             raise ProblemError(f"{what}: this panel shows recordings only")
-        if self._live._how.get("record") is not None:
+        if self._live._options.record is not None:
             raise ProblemError(f"{what}: a recording was begun with this address; end it first")
         if self._live._remote is not None:
             raise ProblemError(f"{what}: the board is another computer's, which says where and how it is heard")

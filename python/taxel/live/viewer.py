@@ -18,8 +18,8 @@ from urllib.parse import urlsplit
 from taxel._base.arguments import instance, number, shown, text
 from taxel._core import ProblemError
 from taxel.encode import Encoder
+from taxel.live.live import Live
 from taxel.live.panel import Panel
-from taxel.live.way import Live
 
 __all__ = ["Viewer", "Viewing"]
 

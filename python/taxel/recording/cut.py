@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from taxel._base.arguments import instance, number, text, window
+from taxel._base.arguments import finite, instance, text, window
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -63,9 +63,9 @@ def cut(
     """
     instance("recording", recording, Recording)
     start_us, stop_us = window("us", start_us, stop_us)
-    around = (number("before_us", before_us), number("after_us", after_us))
-    if not min(around) >= 0 or not np.isfinite(around).all():
-        raise ProblemError(f"before_us and after_us are {around[0]:g} and {around[1]:g}: must be 0 or more")
+    around = [
+        finite(name, given, "us", least=0.0) for name, given in (("before_us", before_us), ("after_us", after_us))
+    ]
     whole = (start_us, stop_us) == (-np.inf, np.inf)
     kept = recording if whole else recording.between(start_us, stop_us)
     if label is None:

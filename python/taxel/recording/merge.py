@@ -203,7 +203,7 @@ def _detections(parts: Sequence[Contents], shifts: Sequence[int]) -> Detections:
         found += list(zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True))
     found.sort(key=lambda row: int(row[2]))
     label, t, known, slope, repaired = ([row[k] for row in found] for k in range(5))
-    return Detections(label, t, known, slope, repaired=repaired)
+    return Detections._of(label, t, known, slope, repaired=repaired)
 
 
 def _zeroings(

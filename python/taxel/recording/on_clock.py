@@ -90,7 +90,7 @@ def _moved(of: Contents, name: str, times: Times | None) -> Contents:
 
     def detections() -> Detections:
         own = of.detections
-        return Detections(own.label, times(own.t), times(own.known), own.slope, repaired=own.repaired)
+        return Detections._of(own.label, times(own.t), times(own.known), own.slope, repaired=own.repaired)
 
     def notes() -> tuple[Note, ...]:
         return tuple(replace(note, t=None if note.t is None else one(note.t)) for note in of.notes)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +16,6 @@ from taxel.recording.contents import Contents
 from taxel.recording.notes import Datagrams
 
 __all__ = ["cut_raw", "encoded", "write_mcap"]
-
-#: Bytes of a datagram at most, as the board sends them.
-_DATAGRAM_BYTES = 1400
-
-#: Between the pictures that a converted file shows to viewers, and at least between those around an event, us.
-_PICTURE_US, _NEAR_US = 100_000, 10_000
-
-#: The unit of the stamps of wire version 1, us.
-_STAMP_US = 100
 
 
 def write_mcap(part: Path, contents: Contents, compression: str, counts: dict[str, Any]) -> None:
@@ -127,27 +116,6 @@ def _add_datagrams(writer: Any, datagrams: Datagrams, arrived: NDArray[np.int64]
         )
 
 
-def _pictures(events: Events, around: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.uint16]]]:
-    """Give what the taxels hold: ten times a second where something came, and at whole 10 ms around `around`, us."""
-    if events.intensity is None or events.present is None:
-        return
-    there = np.flatnonzero(events.present)
-    order = there[np.argsort(events.t[there], kind="stable")]
-    if not len(order):
-        return
-    at, place, ticks = events.t[order], events.array.index(events.x[order], events.y[order]), events.intensity[order]
-    # Each event is in the first picture from it on.
-    tenths = -(-at // _PICTURE_US) * _PICTURE_US
-    near = -(-around // _NEAR_US) * _NEAR_US
-    near = np.concatenate([near - _NEAR_US, near])
-    times = np.union1d(tenths, near[(near >= at[0]) & (near <= tenths[-1])])
-    begins = [0, *np.searchsorted(at, times, side="right").tolist()]
-    now = np.zeros(events.array.rows * events.array.columns, np.uint16)
-    for t, (a, b) in zip(times.tolist(), pairwise(begins), strict=True):
-        now[place[a:b]] = ticks[a:b]
-        yield t, now
-
-
 def _add_remarks(writer: Any, events: Events, contents: Contents) -> None:
     clock = contents.clock if contents.clock is not None and len(contents.clock.board_us) else None
 
@@ -159,7 +127,7 @@ def _add_remarks(writer: Any, events: Events, contents: Contents) -> None:
     around = np.concatenate([found.t, found.known, np.array([*(t for t, _ in events.markers), *noted], np.int64)])
     for t, start in events.markers:
         writer.marker(at_ns(t), t, start)
-    for t, ticks in _pictures(events, around):
+    for t, ticks in _core.RecordingPictures(events._parts(), around):
         writer.picture(at_ns(t), t, events.array.columns, ticks)
     for note in contents.notes:
         writer.note(note.at_ns, note.t, note.text)
@@ -172,43 +140,7 @@ def _add_remarks(writer: Any, events: Events, contents: Contents) -> None:
 
 
 def cut_raw(raw: NDArray[np.uint8]) -> Datagrams:
-    """Cut raw bytes of wire version 1 into datagrams, never between a change and its intensity.
-
-    The bytes have no arrival times, so each datagram gets the board's time of its first stamp: what a reader needs to
-    unwrap time as it was before. It looks at times within half a turn, so a datagram is never longer than a second.
-    """
-    first = np.append(raw, np.uint8(0x80)) & 0x80 != 0
-    begins = np.flatnonzero(first[:-1])
-    ends = np.flatnonzero(first)[1:]
-    # Whole words that show a time: a change or a marker, not an intensity (Z2).
-    begins = begins[(ends - begins >= 5) & (raw[begins] & 0x20 == 0)]
-    # Steps back do not count: arrivals never step back.
-    at = np.maximum.accumulate(_stamps(raw, begins)) if len(begins) else begins
-    offsets, arrived = [0], []
-    while offsets[-1] < len(raw):
-        begin = offsets[-1]
-        k = int(np.searchsorted(begins, begin))
-        now = int(at[min(k, len(at) - 1)]) if len(at) else 0
-        late = int(np.searchsorted(at, now + 1_000_000, side="right")) if k < len(at) else len(at)
-        fits = int(np.searchsorted(begins, begin + _DATAGRAM_BYTES, side="right")) - 1
-        if begin + _DATAGRAM_BYTES >= len(raw):
-            fits = len(begins)
-        last = min(late, fits)
-        end = int(begins[last]) if last < len(begins) else len(raw)
-        if not begin < end <= begin + _DATAGRAM_BYTES:
-            end = min(begin + _DATAGRAM_BYTES, len(raw))
-        offsets.append(end)
-        arrived.append(now * 1000)
-    number = np.arange(len(arrived), dtype=np.uint64)
-    return Datagrams(np.array(arrived, np.int64), number, np.array(offsets, np.int64), np.ascontiguousarray(raw))
-
-
-def _stamps(raw: NDArray[np.uint8], begins: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Return the times of words (us) as their stamps alone show them."""
-    word = [raw[begins + k].astype(np.int64) for k in range(3)]
-    stamp = (word[0] & 3) << 14 | (word[1] & 0x7F) << 7 | word[2] & 0x7F
-    step = np.diff(stamp, prepend=stamp[:1]) % 65_536
-    # As the decoder reads it: up to 0.1 s behind is a step back.
-    step[step >= 64_536] -= 65_536
-    first = int(stamp[0]) if len(stamp) else 0
-    return np.asarray((first + np.cumsum(step)) * _STAMP_US)
+    """Cut raw bytes into datagrams; each has the board's time of its first stamp, as there are no arrival times."""
+    raw = np.ascontiguousarray(raw)
+    offsets, times = _core.wire_cut(raw)
+    return Datagrams(times * 1000, np.arange(len(times), dtype=np.uint64), offsets, raw)

@@ -4,18 +4,20 @@ mod held;
 #[cfg(target_arch = "x86_64")]
 mod run;
 mod session;
+mod taken;
 mod words;
 
 use super::counts::{Counts, Status};
-use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Layout, Refused, START, STOP};
+use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Refused, START, STOP};
 use crate::vectors::Instructions;
-use crate::wire::columns::Table;
+use crate::wire::columns::{Columns, Laid, Room, Table};
 use crate::wire::silence::silence;
-use crate::{Array, Events, Marker, Result};
+use crate::{Array, Events, Marker, Result, problem};
 use held::Held;
 #[cfg(target_arch = "x86_64")]
-use run::{Run, Taken};
+use run::Run;
 use session::{Session, WINDOW};
+use taken::Taken;
 pub use words::stream_rows;
 use words::{Body, Meaning};
 
@@ -147,6 +149,22 @@ impl Decoder {
     /// that was heard.
     #[inline]
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
+        self.push_table(datagram, arrived, out)
+    }
+
+    /// As [`Self::push`], into columns that the caller laid out, from their first row on.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where a column has fewer entries than [`stream_rows`] asks for, and nothing was read.
+    pub fn fill(&mut self, datagram: &[u8], arrived: Option<i64>, room: Room<'_>) -> Result<(Columns, Heard)> {
+        let mut laid = Laid::new(check_room(room, datagram.len())?);
+        let heard = self.push_table(datagram, arrived, &mut laid);
+        Ok((laid.end(), heard))
+    }
+
+    #[inline]
+    fn push_table(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Heard {
         let latest = self.latest;
         let taken = self.plain(std::iter::once(datagram), stream_rows(datagram.len()), out);
         match self.sessions.last() {
@@ -160,13 +178,14 @@ impl Decoder {
         }
     }
 
-    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
+    fn push_any(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut impl Table) -> Heard {
         match Header::read(datagram) {
             Ok((header, body)) => self.push_read(&header, body, arrived, out),
             Err(refused) => {
                 self.counts.datagrams += 1;
                 *match refused {
                     Refused::Short => &mut self.counts.short,
+                    Refused::Long => &mut self.counts.long,
                     Refused::Foreign => &mut self.counts.foreign,
                     Refused::Checksum => &mut self.counts.checksum,
                 } += 1;
@@ -308,17 +327,27 @@ impl Decoder {
         match kind {
             Kind::Changes | Kind::Small | Kind::Large | Kind::SmallStates | Kind::LargeStates => {
                 let Some(word) = kind.layout() else { return };
-                self.words(header, kind, word, body, base, out);
+                let meaning = match kind {
+                    Kind::SmallStates | Kind::LargeStates if number.is_none() => Meaning::StaleStates,
+                    Kind::SmallStates | Kind::LargeStates => Meaning::States,
+                    _ if header.flags & DIFFERENCES != 0 && word.value > 0 => Meaning::Differences,
+                    _ => Meaning::Changes,
+                };
+                self.words(Body::new(word, meaning, header, base, body), out);
             }
             Kind::Markers => {
                 self.counts.malformed += u64::from(!body.len().is_multiple_of(8));
                 for marker in body.chunks_exact(8) {
                     let offset = u32::from_le_bytes([marker[0], marker[1], marker[2], marker[3]]);
                     let code = u16::from_le_bytes([marker[4], marker[5]]);
-                    if code == START || code == STOP {
-                        self.counts.markers += 1;
-                        out.mark(Marker { t: base + i64::from(offset), start: code == START });
+                    if code != START && code != STOP {
+                        self.counts.unknown_marker += 1;
+                        continue;
                     }
+                    let t = base + i64::from(offset);
+                    self.counts.markers += 1;
+                    self.latest = self.latest.max(t);
+                    out.mark(Marker { t, start: code == START });
                 }
             }
             Kind::Status if body.len() < STATUS_BYTES => self.counts.malformed += 1,
@@ -334,18 +363,13 @@ impl Decoder {
         }
     }
 
-    fn words(&mut self, header: &Header, kind: Kind, layout: Layout, body: &[u8], base: i64, out: &mut impl Table) {
-        let states = matches!(kind, Kind::SmallStates | Kind::LargeStates);
-        let meaning = match states {
-            true => Meaning::States,
-            false if header.flags & DIFFERENCES != 0 && layout.value > 0 => Meaning::Differences,
-            false => Meaning::Changes,
-        };
-        let mut body = Body::new(layout, meaning, header, base, body);
+    fn words(&mut self, mut body: Body<'_>, out: &mut impl Table) {
+        let states = matches!(body.meaning, Meaning::States | Meaning::StaleStates);
+        let valued = body.layout.value > 0;
         let Self { instructions, held, counts, latest, .. } = self;
         // SAFETY: `words::decode` writes each row that it counts, and with `paired` its ticks and present.
         unsafe {
-            out.rows(words::most_rows(body.left()), layout.value > 0, states, |room, first, paired| {
+            out.rows(words::most_rows(body.left()), valued, states, |room, first, paired| {
                 body.rows = first;
                 words::decode(&mut body, *instructions, held, room, paired, counts);
                 *latest = body.latest.max(*latest);
@@ -353,6 +377,15 @@ impl Decoder {
             });
         }
     }
+}
+
+/// Columns with room for what so many bytes may give.
+pub(in crate::wire::v2) fn check_room(room: Room<'_>, bytes: usize) -> Result<Room<'_>> {
+    let most = stream_rows(bytes);
+    if room.len() < most {
+        return Err(problem!("columns have room for {} rows: {bytes} bytes may need {most}", room.len()));
+    }
+    Ok(room)
 }
 
 #[cfg(test)]

@@ -1,0 +1,84 @@
+"""The labelled example: what a readout learns from and is judged on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from taxel._base.arguments import column, instance, shown, text
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.recorded import Recorded, recorded
+from taxel.spikes import SpikeTrains
+from taxel.tare import Tare
+
+__all__ = ["Example", "array_of", "checked"]
+
+
+class Example(NamedTuple):
+    """A labelled recording, or a labelled part of one.
+
+    Attributes
+    ----------
+    source : Events, Frames, Recording or SpikeTrains
+        The signal. Spike trains are those that the recipe's encoder makes of it, with any tare already applied.
+    labels : mapping of str to int, shape (events,), us
+        The times of the labelled events, by label, by the clock of the source (spike trains count it in ms).
+    tare : Tare, optional
+        The rest of the taxels, where the encoder needs it.
+
+    Examples
+    --------
+    >>> spikes = SpikeTrains.from_lists([[10.0], [12.0]], stop=50.0)
+    >>> Example(spikes, {"contact": [10_000]}).labels
+    {'contact': [10000]}
+    """
+
+    source: Events | Frames | Recorded | SpikeTrains
+    labels: Mapping[str, Any]
+    tare: Tare | None = None
+
+
+def checked(examples: Sequence[Example]) -> list[Example]:
+    """Return the examples with their sources read and their labels as columns of whole us; refuse what is no example.
+
+    Raises
+    ------
+    ProblemError : no example at all, or one that makes no sense (names its place)
+    """
+    if not isinstance(examples, Sequence) or not len(examples):
+        raise ProblemError(f"examples is {shown(examples)}: must be one Example or more")
+    sound = []
+    for k, example in enumerate(examples):
+        whole = isinstance(example, tuple) and len(example) in (2, 3)
+        source = recorded(example[0]) if whole else None
+        if not isinstance(source, Events | Frames | SpikeTrains):
+            raise ProblemError(
+                f"example {k} is {shown(example)}: must be an Example of a Recording, Events, Frames or SpikeTrains, "
+                "and labels"
+            )
+        _, labels, *rest = example
+        if not isinstance(labels, Mapping):
+            raise ProblemError(f"example {k}: labels is {shown(labels)}: must be times (us) by label")
+        times = {text("label", label): column(f"labels[{label!r}]", t, np.int64, "us") for label, t in labels.items()}
+        tare = rest[0] if rest else None
+        sound.append(Example(source, times, None if tare is None else instance(f"example {k}: tare", tare, Tare)))
+    return sound
+
+
+def array_of(examples: Sequence[Example]) -> Array | None:
+    """Return the array that all (checked) examples are of; None of spike trains, which do not state theirs.
+
+    Raises
+    ------
+    ProblemError : examples of different arrays (names their places)
+    """
+    arrays = [None if isinstance(one.source, SpikeTrains) else one.source.array for one in examples]  # type: ignore[union-attr]
+    for k, array in enumerate(arrays):
+        if array != arrays[0]:
+            raise ProblemError(f"example {k} is of {array!r}, example 0 of {arrays[0]!r}: must be equal")
+    return arrays[0]
