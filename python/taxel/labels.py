@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from taxel._base.arguments import path as checked_path
 from taxel._base.arguments import shown
 from taxel._base.files import whole_file
+from taxel._base.header_table import HeaderTable, text_of
 from taxel._core import FormatError, ProblemError
 from taxel.clock import Clock
 from taxel.recorded import Recorded
@@ -76,19 +77,11 @@ class Labels:
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        place = checked_path("path", path)
-        try:
-            with open(place, newline="", encoding="utf-8-sig") as file:
-                table = csv.reader(file)
-                header = [name.strip() for name in next(table, [])]
-                known = {*_WANTED, *_OTHERS}
-                if not set(_WANTED) <= set(header) <= known or len(set(header)) < len(header):
-                    said = ",".join(header) or "nothing"
-                    raise FormatError(f"{place}, line 1: {said}; must be recording,label,t_us,host_ns or some of them")
-                rows = [_row(f"{place}, line {table.line_num}", header, cells) for cells in table if cells]
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise FormatError(f"{place}: not a table of text: {error}") from None
-        self.path, self.rows = Path(place), tuple(rows)
+        place = Path(checked_path("path", path))
+        table = HeaderTable.read(place, text_of(place))
+        table.has(_WANTED, _OTHERS)
+        rows = [_row(f"{place}, line {line}", cells) for line, cells in table]
+        self.path, self.rows = place, tuple(rows)
 
     @property
     def recordings(self) -> tuple[str, ...]:
@@ -183,10 +176,8 @@ def write_labels(path: str | os.PathLike[str], labels: Iterable[tuple[str, int]]
         table.writerows(rows)
 
 
-def _row(place: str, header: list[str], cells: list[str]) -> Label:
-    if len(cells) != len(header):
-        raise FormatError(f"{place}: {len(cells)} values; must be {len(header)}")
-    values = {name: cell.strip() for name, cell in zip(header, cells, strict=True)}
+def _row(place: str, cells: Mapping[str, str]) -> Label:
+    values = {name: cell.strip() for name, cell in cells.items()}
     times: dict[str, int] = {}
     for name in ("t_us", "host_ns"):
         said = values.get(name, "")
