@@ -278,7 +278,7 @@ def cut_to(m: Model, x0: int, x1: int, y0: int, y1: int) -> Model:
 
 
 def joined(m: Model, at: int, name: str) -> Model:
-    """Both sides of a time, merged again: all is as it was, but the bytes, and a note with its name where each begins."""
+    """Both sides of a time, merged again: as it was, but the bytes, and a note with its name where each begins."""
     left, right = [r[0] for r in m.rows if r[0] < at], [r[0] for r in m.rows if r[0] >= at]
     begins = [(name, min(side, default=0)) for side in (left, right)]
     both = replace(m, rows=sorted(m.rows, key=lambda r: r[0]), notes=m.notes + begins, datagrams=False)
@@ -337,7 +337,7 @@ def same(recording: taxel.Recording, m: Model, where: str) -> None:
 
 
 @pytest.mark.parametrize("seed", range(200))
-def test_in_any_chain_of_steps_nothing_goes_lost_unsaid(tmp_path: Path, seed: int) -> None:
+def test_in_any_chain_of_steps_nothing_goes_lost_unsaid(tmp_path: Path, seed: int) -> None:  # noqa: PLR0912, PLR0915
     draw = np.random.default_rng(seed)
     recording = taxel.open(write(tmp_path / "0.mcap", seed % 7))
     m, where = model_of(recording), "as recorded"
