@@ -10,15 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 from uuid import uuid4
 from warnings import catch_warnings, filterwarnings
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
+from taxel._base.archive import read_arrays
 from taxel._base.arguments import bare, column, floats, nth, number, several, shown, text, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept
+from taxel._base.drawing import draw
 from taxel._base.files import whole_file, write_whole
 from taxel._core import FormatError, ProblemError
 
@@ -441,22 +442,17 @@ class SpikeTrains(Columns):
         """
         place = checked_path("path", path)
         try:
-            with open(place, "rb") as file, np.load(file) as columns:
-                held = {name: columns[name] for name in columns.files}
+            held = read_arrays(place, ("times", "offsets", "start", "stop", "values"))
             return cls(held["times"], held["offsets"], held["start"].item(), held["stop"].item(), held.get("values"))
-        except (ValueError, KeyError, AttributeError, EOFError, BadZipFile, ProblemError) as error:
+        except (ValueError, KeyError, ProblemError, FormatError) as error:
             raise FormatError(f"{place}: holds no spike trains: {shown(str(error))}") from None
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes in another colour."""
-        from taxel.plot import raster  # noqa: PLC0415  matplotlib loads slowly
-
-        return raster(self, ax)
+        return draw("raster", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def _parts(self) -> tuple[Any, ...]:
         return self.times, self.offsets, self.values, self.start, self.stop

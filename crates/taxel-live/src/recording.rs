@@ -54,6 +54,15 @@ pub struct Header {
     /// What the board's registers held at the beginning, where that is known.
     #[serde(default)]
     pub registers: Option<Registers>,
+    /// The array that those registers drive, where the recording is a part of it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub driven: Option<Array>,
+    /// What was left behind on the way to this file, a line each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lost: Vec<String>,
+    /// The numbers of events that a state gave, in a file made of events whose datagrams do not say so.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub repaired: Vec<u64>,
     /// Whether intensity words are differences (the board's option) instead of values.
     #[serde(default)]
     pub difference: bool,
@@ -164,7 +173,9 @@ impl Header {
                 return Err(problem!("source {}: {n} columns of values, and {} taxels", self.name, self.array.len()));
             }
         }
-        self.registers.map_or(Ok(()), |registers| registers.check(&self.array))?;
+        let driven = self.driven.as_ref().unwrap_or(&self.array);
+        driven.check()?;
+        self.registers.map_or(Ok(()), |registers| registers.check(driven))?;
         if self.sources.len() >= limits::SOURCES {
             return Err(problem!("{} sources; a file holds at most {}", self.sources.len() + 1, limits::SOURCES));
         }
@@ -189,6 +200,9 @@ impl Header {
         Self {
             array,
             registers,
+            driven: None,
+            lost: vec![],
+            repaired: vec![],
             difference: false,
             origin_us: 0,
             source,

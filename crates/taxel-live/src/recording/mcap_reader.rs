@@ -148,6 +148,20 @@ impl Decoded {
     }
 }
 
+/// Marks events as repaired by their numbers; a number that is none of an event is left out.
+fn mark_repaired(events: &mut Events, numbers: &[u64]) {
+    if numbers.is_empty() || events.is_empty() {
+        return;
+    }
+    let n = events.len();
+    let marks = events.repaired.get_or_insert_with(|| vec![false; n]);
+    for &number in numbers {
+        if let Some(mark) = usize::try_from(number).ok().and_then(|number| marks.get_mut(number)) {
+            *mark = true;
+        }
+    }
+}
+
 impl Reader {
     /// Opens a file and rebuilds its index; a file that is still being written is read up to now.
     ///
@@ -378,6 +392,7 @@ impl Reader {
             Ok(())
         })?;
         sender.finish_into(&mut decoded.events);
+        mark_repaired(&mut decoded.events, &header.repaired);
         decoded.events.t.iter_mut().for_each(|t| *t += header.origin_us);
         decoded.events.markers.iter_mut().for_each(|m| m.t += header.origin_us);
         decoded.counts = *sender.counts();
