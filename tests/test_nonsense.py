@@ -61,9 +61,9 @@ NONSENSE: dict[str, Any] = {
     "half of a surrogate pair": "\ud800",
     "a masked value": np.ma.masked,
     "an array of which one number is repeated": np.broadcast_to(np.float64(1.0), 10**9),
-    "a list that holds itself": [1.0],
+    "a list that holds itself": [],
 }
-NONSENSE["a list that holds itself"] += [NONSENSE["a list that holds itself"]] * 2
+NONSENSE["a list that holds itself"].append(NONSENSE["a list that holds itself"])
 
 #: Drawn on again and again; where it is None a new one is made, which pyplot keeps.
 AXES = Figure().add_subplot()

@@ -204,7 +204,7 @@ class SpikeTrains(Columns):
         ProblemError : a number outside the trains
         """
         try:
-            chosen = np.atleast_1d(np.asarray(trains))
+            chosen = np.atleast_1d(np.asarray(bare("trains", trains)))
         except ValueError as error:
             raise ProblemError(f"trains: {error}") from None
         if chosen.dtype == bool:
