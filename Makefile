@@ -24,23 +24,24 @@ check:
 	@command -v cc >/dev/null || { echo "taxel needs a C compiler: on Debian, apt install build-essential"; exit 1; }
 
 # What taxel itself needs; what tests, lint, docs, benchmarks and wheels need is installed by the target that needs it.
-wanted = $(BIN)/python -c 'import sys, tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; print("\n".join(sum((p["optional-dependencies"][x] for x in sys.argv[1:]), p["dependencies"])))'
+# Of the studies, a distribution of their own in this repository, that is what they need beside taxel.
+wanted = $(BIN)/python -c 'import sys, tomllib; p, s = (tomllib.load(open(f, "rb"))["project"] for f in ("pyproject.toml", "studies/pyproject.toml")); extras = p["optional-dependencies"] | s["optional-dependencies"] | {"studies": s["dependencies"]}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), p["dependencies"]) if not x.startswith("taxel")))'
 install = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-$(VENV)/.installed: pyproject.toml | check
+$(VENV)/.installed: pyproject.toml studies/pyproject.toml | check
 	@echo "taxel: installing what it needs into $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
 	@$(wanted) > $(VENV)/wanted.txt
 	@$(install) "maturin>=1.16,<2" -r $(VENV)/wanted.txt
+	@$(install) --no-deps --editable studies
 	@touch $@
 
-# One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-bench, .for-dist.
+# One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-dist.
 EXTRAS_test := test studies foxglove neo nir nwb cluster bench
 EXTRAS_lint := lint
 EXTRAS_docs := docs
-EXTRAS_bench := bench test
 EXTRAS_dist := dist
-$(VENV)/.for-%: pyproject.toml | $(VENV)/.installed
+$(VENV)/.for-%: pyproject.toml studies/pyproject.toml | $(VENV)/.installed
 	@echo "taxel: installing what make $* needs"
 	@$(wanted) $(EXTRAS_$*) > $(VENV)/wanted-$*.txt
 	@$(install) -r $(VENV)/wanted-$*.txt
@@ -122,14 +123,20 @@ format: $(VENV)/.for-lint
 registers: setup
 	$(BIN)/python tools/registers.py
 
-# The peers that are large, or that want an older NumPy, are installed for the benchmarks alone.
-$(VENV)/.peers: $(VENV)/.installed
-	$(BIN)/python -c 'import tomllib; print("\n".join(tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"]))' > $(VENV)/peers.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/peers.txt
+# Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.
+PEERS := .venv-peers
+$(PEERS)/.installed: pyproject.toml studies/pyproject.toml | $(VENV)/.installed
+	@echo "taxel: installing its peers into $(PEERS)"
+	@$(PYTHON) -m venv $(PEERS)
+	@$(wanted) bench test studies peers > $(PEERS)/wanted.txt
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -r $(PEERS)/wanted.txt
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --editable studies
 	@touch $@
 
-bench: released bridge $(VENV)/.for-bench $(VENV)/.peers
-	$(BIN)/taxel bench all
+bench: released bridge $(PEERS)/.installed
+	@$(subst $(abspath $(VENV)),$(abspath $(PEERS)),$(develop))
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_bridge-*.whl
+	$(PEERS)/bin/taxel bench all
 
 docs: build $(VENV)/.for-docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
@@ -139,8 +146,9 @@ dist: $(VENV)/.for-dist
 	rm -rf dist
 	$(BIN)/maturin sdist --out dist
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/maturin build --release --zig --compatibility manylinux_2_28 --out dist
-	$(BIN)/auditwheel show dist/*.whl
+	$(BIN)/auditwheel show dist/taxel-*.whl
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist ./studies
 	@ls -l dist
 
 clean:
-	rm -rf target $(VENV) docs/_build dist
+	rm -rf target $(VENV) $(PEERS) docs/_build dist

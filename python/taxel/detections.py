@@ -7,13 +7,13 @@ import io
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import fields, nth, shown, window
+from taxel._base.arguments import column, fields, nth, shown, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept, own
 from taxel._base.files import write_whole
@@ -102,6 +102,37 @@ class Detections(Columns):
         said: ArrayLike | None = None,
         repaired: ArrayLike | None = None,
     ) -> None:
+        if slope is not None:
+            slopes = column("slope", slope, np.float64)
+            if not np.isfinite(slopes).all():
+                k = int(np.flatnonzero(~np.isfinite(slopes))[0])
+                raise ProblemError(f"slope[{k}] is {slopes[k]}: must be finite; leave slope out where it is not known")
+        self._hold(label, t, known, slope, said, repaired)
+
+    @classmethod
+    def _of(
+        cls,
+        label: ArrayLike,
+        t: ArrayLike,
+        known: ArrayLike,
+        slope: ArrayLike | None = None,
+        said: ArrayLike | None = None,
+        repaired: ArrayLike | None = None,
+    ) -> Self:
+        """Build from columns whose slope may be NaN, where a detection has none."""
+        found = cls.__new__(cls)
+        found._hold(label, t, known, slope, said, repaired)
+        return found
+
+    def _hold(
+        self,
+        label: ArrayLike,
+        t: ArrayLike,
+        known: ArrayLike,
+        slope: ArrayLike | None,
+        said: ArrayLike | None,
+        repaired: ArrayLike | None,
+    ) -> None:
         try:
             labels = np.asarray(label)
             labels = labels.astype(np.str_) if labels.size == 0 else labels
@@ -152,7 +183,7 @@ class Detections(Columns):
             raise ProblemError(f"detections: {shown(chosen)} has {places.ndim} dimensions, must have one")
         said = None if self.said is None else self.said[places]
         label, t, known, slope = self.label[places], self.t[places], self.known[places], self.slope[places]
-        return Detections(label, t, known, slope, said, self.repaired[places])
+        return Detections._of(label, t, known, slope, said, self.repaired[places])
 
     def between(self, start: float, stop: float) -> Detections:
         """Return the detections of ``start <= t < stop`` (us)."""
@@ -173,7 +204,7 @@ class Detections(Columns):
         order = np.argsort(np.concatenate([self.t, other.t]), kind="stable")
         names = ["label", "t", "known", "slope", "repaired"] + ([] if self.said is None else ["said"])
         columns = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}
-        return Detections(**columns)
+        return Detections._of(**columns)
 
     def to_pandas(self) -> Any:
         """Return a table ``label t_us known_us slope_mv_per_ms``; ``said_us`` where known, ``repaired`` where any is.
@@ -215,7 +246,7 @@ class Detections(Columns):
         """
         names = fields(records, ("label", "t", "known", "slope"))
         said, repaired = (records[name] if name in names else None for name in ("said", _REPAIRED))
-        return cls(records["label"], records["t"], records["known"], records["slope"], said, repaired)
+        return cls._of(records["label"], records["t"], records["known"], records["slope"], said, repaired)
 
     def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write a table ``label,t_us,known_us,slope_mv_per_ms[,said_us][,repaired]`` and return its path.
@@ -270,7 +301,7 @@ class Detections(Columns):
             raise FormatError(f"{path}: not a table of text: {error}") from None
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())
         repaired = [value != 0 for value in more[_REPAIRED]] if _REPAIRED in more else None
-        return cls(label, t, known, slope, more.get(_SAID), repaired)
+        return cls._of(label, t, known, slope, more.get(_SAID), repaired)
 
     def to_neo(self) -> Any:
         """Return a ``neo.Event`` at `t`, with the label of each, and `known` (us) and `slope` as array annotations.
@@ -300,7 +331,7 @@ class Detections(Columns):
         if notes is None or "known" not in notes:
             raise ProblemError(f"events is {shown(events)}: must be a neo.Event with the array annotation known (us)")
         t = np.rint(events.rescale("us").magnitude).astype(np.int64)
-        return cls(events.labels, t, notes["known"], notes.get("slope"), notes.get("said"), notes.get(_REPAIRED))
+        return cls._of(events.labels, t, notes["known"], notes.get("slope"), notes.get("said"), notes.get(_REPAIRED))
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw each label's detections as marks over time (s)."""
@@ -322,7 +353,7 @@ class Detections(Columns):
     def _from_parts(cls, parts: tuple[Any, ...]) -> Detections:
         label, *columns = parts
         t, known, slope, repaired = map(frozen, columns)
-        return cls(label, t, known, slope, repaired=repaired)
+        return cls._of(label, t, known, slope, repaired=repaired)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Detections):

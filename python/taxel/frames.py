@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -209,7 +210,10 @@ class Frames(Columns):
         return centre
 
     def _loaded(self, above: float) -> NDArray[np.bool_]:
-        return np.asarray(self.values > np.float64(number("above", above)))
+        threshold = number("above", above)
+        if math.isnan(threshold):
+            raise ProblemError("above is NaN: must be a number that values can be compared with")
+        return np.asarray(self.values > np.float64(threshold))
 
     def to_pandas(self) -> Any:
         """Return a table with a row a picture: its time ``t_us`` as the index, and a column a taxel, ``(row, column)``.

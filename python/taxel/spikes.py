@@ -89,6 +89,7 @@ class SpikeTrains(Columns):
         self.times: NDArray[np.float64] = kept("times", times, np.float64, "ms")
         self.offsets: NDArray[np.int64] = kept("offsets", offsets, np.int64)
         self.values: NDArray[np.float32] | None = None if values is None else kept("values", values, np.float32)
+        _finite_values(self.values)
         self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
         _core.check_spikes(self._parts())
 
@@ -126,6 +127,7 @@ class SpikeTrains(Columns):
             signed, valued = _by_train("values", bare("values", values), np.float32)
             if valued != counts:
                 raise ProblemError("values: must have the lengths of the trains, one value a spike")
+            _finite_values(signed)
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # What is not finite is refused below, by its place.
@@ -521,3 +523,10 @@ def _quiet_about_names() -> Iterator[None]:
     with catch_warnings():
         filterwarnings("ignore", category=UserWarning, module="pynwb|hdmf")
         yield
+
+
+def _finite_values(values: NDArray[np.float32] | None) -> None:
+    """Refuse a value of a spike that is not finite, by its place."""
+    if values is not None and not np.isfinite(values).all():
+        k = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise ProblemError(f"values[{k}] is {values[k]}: must be finite")

@@ -78,7 +78,7 @@ class Tare:
 
         Raises
         ------
-        ProblemError : events without intensities, or a stretch in which nothing was heard
+        ProblemError : events without intensities, or a stretch without an event
         """
         note = checked_text("note", note)
         window = (

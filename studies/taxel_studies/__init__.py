@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from taxel_studies.study import Study
 
-__all__ = ["STUDIES", "load"]
+__all__ = ["DRAWN", "FIGURES", "STUDIES", "load"]
 
 #: One line on every study, by name, in the order of the page; "fig6.1" lies in ``fig6_1.py``. They load when asked for.
 STUDIES = {
@@ -56,6 +56,31 @@ STUDIES = {
     "rivals": "how many spike times each rule learns, beside CONE-X",
     "tempotron": "which loads the Tempotron solves, and in how many epochs",
     "fig6.15": "SKIM against CONE on the gait recordings, in the same folds",
+}
+
+
+#: The study that holds each figure and table of the thesis which is no study's name.
+FIGURES = {
+    "fig3.6": "fig3.5",
+    "fig4.10": "fig4.8",
+    **dict.fromkeys(("fig5.1", "fig5.2", "fig5.3", "fig5.4", "table5.1", "table5.2"), "contact"),
+    **dict.fromkeys(("fig5.6", "fig5.8", "table5.3"), "fig5.5"),
+    **dict.fromkeys(("fig5.10", "fig5.14"), "drops"),
+    **dict.fromkeys(("fig5.12", "fig5.13"), "fig5.11"),
+    **dict.fromkeys(("fig6.12", "fig6.13", "fig6.14", "table6.2"), "gait"),
+    "table6.1": "fig6.1",
+    "table7.1": "asynchronous",
+}
+
+#: Where the others are: drawings, and tables of words.
+DRAWN = {
+    "fig4.1": "docs/sensor.md",
+    "fig4.2": "docs/sensor.md",
+    "fig4.4": "docs/sensor.md",
+    "fig4.5": "docs/sensor.md",
+    "fig5.9": "docs/sensor.md",
+    "table3.1": "docs/sensor.md",
+    "table4.1": "docs/sensor.md",
 }
 
 

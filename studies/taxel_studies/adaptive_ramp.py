@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel.simulate import circuit
 from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
@@ -265,5 +264,4 @@ STUDY = Study(
     statements=statements,
     draw=draw,
     tables=tables,
-    code=(circuit,),
 )

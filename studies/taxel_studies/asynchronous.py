@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import information, simulate
+from taxel import information
 from taxel.events import Events
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
@@ -250,5 +250,4 @@ STUDY = Study(
     statements=statements,
     draw=draw,
     tables=tables,
-    code=(simulate,),
 )

@@ -17,9 +17,9 @@ from taxel.encode import FA1
 from taxel.frames import Frames
 from taxel.simulate import Act, Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains
+from taxel.tare import Tare
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study, logarithmic
-from taxel.tare import Tare
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

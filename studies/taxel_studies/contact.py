@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from taxel.encode import FA1
 from taxel.frames import Frames
-from taxel.simulate import fem
 from taxel.simulate.fem import Course, KeptCourses, SamplingGrid, Yeoh, bodies
 from taxel.simulate.fem.solids import Solids
 from taxel_studies import indented
@@ -292,6 +291,5 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(fem, indented),
     courses=True,
 )

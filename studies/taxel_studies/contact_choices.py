@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from taxel import encode, information
 from taxel.encode import FA1
-from taxel.simulate import fem
 from taxel.simulate.fem import DRAGON_SKIN_10, Indentation, SamplingGrid, Yeoh
 from taxel_studies import indented
 from taxel_studies.runner import Task
@@ -201,6 +199,5 @@ STUDY = Study(
     statements=statements,
     tables=tables,
     draw=draw,
-    code=(fem, encode, information, indented),
     courses=True,
 )

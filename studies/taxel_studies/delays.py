@@ -7,11 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import learn
 from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
-from taxel_studies import capacity, mapping
 from taxel_studies.capacity import DURATION_MS, met, patterns, weakest
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
@@ -234,5 +232,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, capacity, mapping),
 )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sys
 from collections.abc import Mapping, Sequence
 from itertools import product
 from pathlib import Path
@@ -14,16 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from taxel import SceneError, simulate
+from taxel import SceneError
 from taxel.array import Array
 from taxel.encode import ChangeEvents
 from taxel.events import Events
 from taxel.frames import Frames
 from taxel.information import NearestNeighbours
+from taxel.report import write_whole
+from taxel.report.provenance import installed
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import to_ms
-from taxel_studies.runner import Task, code_digest
 from taxel.wire import FRAME_US, Registers
+from taxel_studies.runner import Task
 
 __all__ = [
     "ANSWERED",
@@ -171,7 +172,7 @@ def told(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS)
 
 def played(p: Mapping[str, Any], condition: Condition, seed: int, folder: Path, rig: Rig = IMPACTS) -> Drops:
     """Return a condition's drops from the folder, or drop the ball and keep them there."""
-    code = code_digest((simulate, sys.modules[__name__]))
+    code = installed("taxel_studies").digest(__name__)
     made_by = json.dumps([named(p), condition, rig, seed, code], sort_keys=True)
     digest = hashlib.sha256(made_by.encode()).hexdigest()[:16]
     b, h, s = condition

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import simulate
 from taxel.spikes import to_ms
+from taxel.wire import FRAME_US
 from taxel_studies import dropped
 from taxel_studies.dropped import FRAMES, REGION, Condition
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study
-from taxel.wire import FRAME_US
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -165,6 +164,5 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(simulate, dropped),
     courses=True,
 )

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import learn, neuron
 from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel_studies import capacity, mapping
@@ -271,5 +270,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, neuron, capacity, mapping),
 )

@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import encode, simulate
 from taxel.encode import ThresholdIzhikevich
-from taxel_studies import fabric_array
 from taxel_studies.fabric_array import ARRAY, PERIOD_US, SENSOR, depth_of, pressed, read
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study
@@ -153,5 +151,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(simulate, encode, fabric_array),
 )

@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import encode, learn, simulate
 from taxel.encode import ThresholdIzhikevich
 from taxel.learn import Tempotron
 from taxel.spikes import SpikeTrains
-from taxel_studies import fabric_array
 from taxel_studies.fabric_array import PERIOD_US, SENSOR, depth_of, pressed, read
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
@@ -280,5 +278,4 @@ STUDY = Study(
     statements=statements,
     draw=draw,
     tables=tables,
-    code=(simulate, encode, learn, fabric_array),
 )

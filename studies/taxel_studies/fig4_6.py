@@ -7,11 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel.simulate import circuit
 from taxel.simulate.circuit import Converter, Fabric, VirtualGround
+from taxel.wire import Registers
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study
-from taxel.wire import Registers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -173,5 +172,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(circuit,),
 )

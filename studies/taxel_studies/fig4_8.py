@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import information, simulate
 from taxel.information import confusion_matrix, nested_predictions, panzeri_treves
 from taxel_studies import dropped
 from taxel_studies.dropped import TENNIS, Condition
@@ -231,6 +230,5 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(simulate, information, dropped),
     courses=True,
 )

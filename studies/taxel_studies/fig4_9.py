@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import simulate
 from taxel_studies import dropped, fig4_8
 from taxel_studies.dropped import TENNIS
 from taxel_studies.runner import Task
@@ -148,6 +147,5 @@ STUDY = Study(
     statements=statements,
     draw=draw,
     needs=("sklearn",),
-    code=(simulate, dropped, fig4_8),
     courses=True,
 )

@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import encode, information, simulate
 from taxel.array import Array
 from taxel.information import panzeri_treves
 from taxel.information.bits import confusion_matrix
 from taxel.information.neighbours import distances_of
 from taxel.spikes import to_ms
+from taxel.wire import FRAME_US
 from taxel_studies import dropped, kept_bits
 from taxel_studies.dropped import LENGTH_MS, REGION
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
-from taxel.wire import FRAME_US
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -190,7 +189,6 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
                 "searched": [[tau, bits] for tau, bits in searched],
                 "any_phase_bits": asked["any phase"].result["bits"],
                 "absolute_bits": asked["absolute"].result["bits"] if "absolute" in asked else None,
-                "seconds": round(sum(row.seconds for row in here), 1),
                 **detail.result,
             }
         )
@@ -365,6 +363,5 @@ STUDY = Study(
     statements=statements,
     draw=draw,
     tables=tables,
-    code=(simulate, encode, information, dropped),
     courses=True,
 )

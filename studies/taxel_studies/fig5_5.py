@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import encode, information
 from taxel.encode import FA1
-from taxel.simulate import fem
 from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented, kept_bits
 from taxel_studies.runner import Task
@@ -170,7 +168,6 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
                 "alpha": detail.params["alpha"],
                 "searched": sorted([a, b] for a, b in searched.items()),
                 "even_bits": even.result["bits"],
-                "seconds": round(sum(row.seconds for row in here), 1),
                 **detail.result,
                 "by": {name: detail.result["by"][name] for name in VARIED if name in detail.result["by"]},
             }
@@ -331,6 +328,5 @@ STUDY = Study(
     statements=statements,
     draw=draw,
     tables=tables,
-    code=(fem, encode, information, indented),
     courses=True,
 )

@@ -8,9 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import encode, information
 from taxel.encode import FA1
-from taxel.simulate import fem
 from taxel.simulate.fem import SamplingGrid
 from taxel_studies import indented
 from taxel_studies.runner import Task
@@ -160,6 +158,5 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(fem, encode, information, indented),
     courses=True,
 )

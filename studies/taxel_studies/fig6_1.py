@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import learn, neuron
 from taxel.learn import ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
@@ -176,5 +175,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, neuron, mapping),
 )

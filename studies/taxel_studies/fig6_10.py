@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import learn, metrics, neuron
 from taxel_studies import waves
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study
@@ -156,5 +155,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, metrics, neuron),
 )

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import encode, formats, learn
-from taxel_studies.gait import folds, insole, pieces, protocols, sources
+from taxel_studies.gait import folds, protocols, sources
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.gait.realise import realise
 from taxel_studies.gait.recipes import NOTES, PRINTED
@@ -203,7 +202,6 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(sources, insole, pieces, folds, formats, encode, learn),
     data=tuple(SOURCES[name].folder for name in STANDS_FOR),
     unread=unread,
 )

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import learn, neuron
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
@@ -147,5 +146,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, neuron),
 )

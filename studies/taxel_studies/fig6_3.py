@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import learn
 from taxel.learn import ConeR, ConeX
 from taxel.neuron import Neuron
 from taxel.spikes import SpikeTrains
-from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study
@@ -252,5 +250,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, mapping),
 )

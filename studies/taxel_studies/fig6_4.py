@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import learn, neuron
 from taxel_studies import mapping
 from taxel_studies.mapping import LEARN, TABLE, realise
 from taxel_studies.runner import Task
@@ -174,5 +173,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, neuron),
 )

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import learn, neuron
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE, realise
 from taxel_studies.runner import Task
@@ -155,5 +154,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, neuron),
 )

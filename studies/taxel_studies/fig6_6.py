@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import learn, neuron
 from taxel_studies import mapping
 from taxel_studies.mapping import TABLE, realise, thresholds
 from taxel_studies.runner import Task
@@ -158,5 +157,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, neuron),
 )

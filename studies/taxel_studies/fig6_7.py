@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import learn
-from taxel_studies import mapping
 from taxel_studies.capacity import realise
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study
@@ -198,5 +196,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, mapping),
 )

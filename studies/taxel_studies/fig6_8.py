@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import learn, metrics, neuron
 from taxel.learn import ConeX
 from taxel.metrics import victor_purpura
 from taxel.neuron import Neuron
@@ -189,5 +188,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, metrics, neuron, waves),
 )

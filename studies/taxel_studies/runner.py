@@ -9,27 +9,49 @@ from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from time import process_time
-from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import joblib
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from taxel import _core
-from taxel._base import arguments
-from taxel._base.files import source_digest
 from taxel import DeviceError, ProblemError
 
-__all__ = ["BACKENDS", "HERE", "Results", "Task", "Workers", "code_digest", "run"]
+if TYPE_CHECKING:
+    import joblib
+
+__all__ = ["BACKENDS", "HERE", "Results", "Task", "Workers", "one_of", "run", "whole"]
 
 #: Who may run realisations: loky's processes on this machine, or a cluster's.
 BACKENDS = ("loky", "dask", "ray")
+
+
+def one_of(name: str, value: object, allowed: Collection[str]) -> str:
+    """Return a word of a closed list.
+
+    Raises
+    ------
+    ProblemError : any other value (names the parameter and the list)
+    """
+    if not isinstance(value, str) or value not in allowed:
+        raise ProblemError(f"{name} is {value!r}: must be one of {', '.join(map(repr, allowed))}")
+    return value
+
+
+def whole(name: str, value: object, least: int) -> int:
+    """Return a whole number that is not below the least one.
+
+    Raises
+    ------
+    ProblemError : any other value (names the parameter)
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+        raise ProblemError(f"{name} is {value!r}: must be a whole number, {least} or more")
+    return value
 
 
 @dataclass(frozen=True)
@@ -105,23 +127,6 @@ def _whole_lines(path: Path) -> list[str]:
     return whole.decode().splitlines()
 
 
-def code_digest(modules: Sequence[ModuleType]) -> str:
-    """Return a short digest of some modules' source (a package stands for its files) and of the compiled part.
-
-    Only what a realisation uses belongs in it: what lists the tasks or draws the report moves no result.
-
-    Examples
-    --------
-    >>> import taxel.formats
-    >>> len(code_digest([taxel.formats]))
-    16
-    """
-    files = [Path(str(module.__file__)) for module in (*modules, _core)]
-    return source_digest(
-        part for file in files for part in (sorted(file.parent.glob("*.py")) if file.name == "__init__.py" else [file])
-    )
-
-
 @dataclass(frozen=True)
 class Workers:
     """Say who runs realisations.
@@ -150,21 +155,28 @@ class Workers:
     scheduler: str | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "jobs", arguments.whole("jobs", self.jobs, 1))
-        arguments.text("backend", self.backend, BACKENDS)
+        object.__setattr__(self, "jobs", whole("jobs", self.jobs, 1))
+        one_of("backend", self.backend, BACKENDS)
         if self.scheduler is not None:
-            arguments.text("scheduler", self.scheduler)
+            if not isinstance(self.scheduler, str):
+                raise ProblemError(f"scheduler is {self.scheduler!r}: must be an address")
             if self.backend == "loky":
                 raise ProblemError('scheduler is for the backends "dask" and "ray": loky has its processes here')
-        package = {"dask": "distributed", "ray": "ray"}.get(self.backend)
-        if package is not None and find_spec(package) is None:
+        package, extra = {
+            "dask": ("distributed", "cluster"),
+            "ray": ("ray", "cluster"),
+            "loky": ("joblib", "studies"),
+        }[self.backend]
+        if (self.backend != "loky" or self.jobs > 1) and find_spec(package) is None:
             raise ProblemError(
-                f'backend "{self.backend}" needs the package {package}: install it by pip install "taxel[cluster]"'
+                f'backend "{self.backend}" needs the package {package}: install it by pip install "taxel[{extra}]"'
             )
 
     @contextmanager
     def joblib(self) -> Iterator[joblib.Parallel]:
         """Give joblib's way to them, for the time of a ``with`` block."""
+        import joblib  # noqa: PLC0415  what runs in one process does not need it
+
         if self.backend == "dask":
             with _dask(self.jobs, self.scheduler), joblib.parallel_config(backend="dask"):
                 yield joblib.Parallel(n_jobs=-1, return_as="generator_unordered", batch_size=1)
@@ -274,6 +286,8 @@ def _realised(
         for task in tasks:
             yield (task, *_one(realise, task))
         return
+    import joblib  # noqa: PLC0415  what runs in one process does not need it
+
     calls = [joblib.delayed(_numbered)(realise, k, task) for k, task in enumerate(tasks)]
     with workers.joblib() as parallel:
         # joblib gives Ray's results in a list at the end of a call only: a call for a few of them at a time.

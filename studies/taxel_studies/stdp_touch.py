@@ -8,12 +8,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import learn, simulate
 from taxel.array import Array
 from taxel.learn import STDP
 from taxel.simulate import Scene, Silence, play, truth
 from taxel.spikes import SpikeTrains, to_ms
-from taxel_studies import untold
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study
 from taxel_studies.untold import moved, threshold, unlearning
@@ -227,5 +225,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(simulate, learn, untold),
 )

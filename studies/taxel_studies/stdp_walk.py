@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import encode, formats, learn
 from taxel.learn import STDP
-from taxel_studies import untold
 from taxel_studies.gait import sources
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.runner import Task
@@ -216,7 +214,6 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(sources, formats, encode, learn, untold),
     data=(sources.SOURCES[SOURCE].folder,),
     unread=lambda _parameters, data: sources.unread(data, [SOURCE]),
 )

@@ -6,7 +6,6 @@ import base64
 import io
 import json
 import platform
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -14,14 +13,12 @@ from functools import partial
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any, BinaryIO
 
-from taxel import __version__
-from taxel._base import arguments
-from taxel._base.files import write_whole
-from taxel import FormatError, ProblemError
-from taxel_studies.runner import HERE, Results, Task, Workers, code_digest, run
+from taxel import FormatError, ProblemError, __version__
+from taxel.report import write_whole
+from taxel.report.provenance import installed
+from taxel_studies.runner import HERE, Results, Task, Workers, one_of, run, whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -137,8 +134,6 @@ class Study:
         The realisations that depend on what others gave: asked again until it lists nothing new.
     tables : function of (parameters, said), optional
         Tables below the picture.
-    code : tuple of modules
-        What a realisation uses beside its own file: when they change, results are reckoned anew.
     data : tuple of str
         Folders of recordings that it needs.
     courses : bool
@@ -162,7 +157,6 @@ class Study:
     draw: Callable[[Parameters, Said], Figure | Sequence[Figure]]
     then: Callable[..., Sequence[Task]] | None = None
     tables: Callable[[Parameters, Said], Sequence[Table]] | None = None
-    code: tuple[ModuleType, ...] = ()
     data: tuple[str, ...] = field(default=())
     courses: bool = False
     needs: tuple[str, ...] = ()
@@ -175,18 +169,27 @@ class Study:
         ------
         ProblemError : a size or a parameter that is none, or a value of another kind
         """
-        arguments.text("size", size, ("full", *self.sizes))
+        one_of("size", size, ("full", *self.sizes))
         values = {**self.parameters, **self.sizes.get(size, {})}
         for name, value in changes.items():
             if name not in values:
                 raise ProblemError(f"{self.name} has no parameter {name!r}: there are {', '.join(values)}")
             if not _alike(value, values[name]):
-                kind = f"{_kind(values[name])}, as {arguments.shown(values[name])}"
-                raise ProblemError(f"{name} is {arguments.shown(value)}: must be {kind}")
+                raise ProblemError(f"{name} is {value!r}: must be {_kind(values[name])}, as {values[name]!r}")
             values[name] = value
         if "realisations" in values:
-            arguments.whole("realisations", values["realisations"], 1)
+            whole("realisations", values["realisations"], 1)
         return values
+
+    @property
+    def code(self) -> str:
+        """The digest of what a realisation is computed by: when it changes, results are computed anew."""
+        return installed("taxel_studies").digest(self.realise.__module__)
+
+    @property
+    def made_of(self) -> dict[str, str]:
+        """The digest of every source that what it shows is computed from, by name."""
+        return installed("taxel_studies").parts(f"taxel_studies.{self.name.replace('.', '_')}")
 
     @property
     def lacks(self) -> str | None:
@@ -246,7 +249,7 @@ class Study:
         if self.courses:
             given["courses"] = report / "courses"
             given["courses"].mkdir(exist_ok=True)
-        results = Results(folder / "results.jsonl", code_digest((sys.modules[self.realise.__module__], *self.code)))
+        results = Results(folder / "results.jsonl", self.code)
         begun = time.time()
         rows: dict[str, Row] = {}
 
@@ -277,7 +280,7 @@ class Study:
             "said": said,
             "cpu_seconds": round(sum(row.seconds for row in rows.values()), 1),
             "wall_seconds": round(time.time() - begun, 1),
-            "code": results.code,
+            "made_of": self.made_of,
             **_machine(),
         }
         _write_section(folder, section, drawn(self, parameters, said))
@@ -329,8 +332,8 @@ def _machine() -> dict[str, Any]:
     return {
         "machine": f"{platform.machine()}, {cpu}",
         "versions": {
-            "taxel": __version__,
             "python": platform.python_version(),
+            "taxel": __version__,
             **{name: metadata.version(name) for name in ("numpy", "scipy", "matplotlib")},
         },
         "date": time.strftime("%Y-%m-%d", time.gmtime()),

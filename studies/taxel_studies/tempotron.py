@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel import learn
 from taxel.learn import Tempotron
 from taxel.spikes import SpikeTrains
 from taxel_studies.runner import Task
@@ -132,5 +131,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn,),
 )

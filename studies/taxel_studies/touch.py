@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel import detect, encode, information, labels, simulate
+from taxel import detect
 from taxel.detect import Example, Recipe, run, score
 from taxel.detect import train as train_readout
 from taxel.detections import Detections
@@ -30,9 +30,9 @@ from taxel.recording import open_recording
 from taxel.recording.convert import convert
 from taxel.simulate import Act, Contact, Scene, Silence, play, truth
 from taxel.spikes import to_ms, to_us
+from taxel.tare import Tare
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
-from taxel.tare import Tare
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -498,5 +498,4 @@ STUDY = Study(
     statements=statements,
     draw=draw,
     tables=tables,
-    code=(detect, encode, information, labels, simulate),
 )

@@ -11,10 +11,10 @@ from taxel import Array, ProblemError, SceneError, SpikeTrains
 from taxel.information.neighbours import distances_of
 from taxel.metrics import pairwise
 from taxel.spikes import to_ms
+from taxel.wire import FRAME_US
 from taxel_studies import dropped, drops, fig4_8, fig4_9, fig5_11
 from taxel_studies.dropped import FRAMES, REGION, TENNIS, Condition
 from taxel_studies.study import Row
-from taxel.wire import FRAME_US
 
 FEW, TENNIS_FEW = {**dropped.TABLE, "drops": 4}, {**dropped.TENNIS_TABLE, "drops": 3}
 SIDE, PERIOD_MS = 4, 0.5

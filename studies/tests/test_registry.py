@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from taxel import studies
+import taxel_studies as studies
 
 HERE = Path(__file__).parent
 
@@ -27,7 +27,7 @@ def named() -> set[str]:
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.ImportFrom) and node.module:
                 parts = [*node.module.split("."), *(alias.name for alias in node.names)]
-                found |= set(parts[2:]) if parts[:2] == ["taxel", "studies"] else set()
+                found |= set(parts[1:]) if parts[0] == "taxel_studies" else set()
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 found.add(module(node.value))
     return found
@@ -37,13 +37,13 @@ def test_every_file_with_a_study_is_in_the_registry() -> None:
     files = [m.name for m in pkgutil.iter_modules(studies.__path__)]
     there = {name for name in files if hasattr(import_module(f"taxel_studies.{name}"), "STUDY")}
     missing = sorted(there - {module(name) for name in studies.STUDIES})
-    assert not missing, f"taxel/studies/__init__.py: STUDIES lacks {', '.join(missing)}"
+    assert not missing, f"taxel_studies/__init__.py: STUDIES lacks {', '.join(missing)}"
 
 
 @pytest.mark.parametrize("name", studies.STUDIES)
 def test_a_study_has_a_test_of_its_own(name: str) -> None:
     assert module(name) in named(), (
-        f"no test of tests/studies imports or names {name}: add tests/studies/test_{module(name)}.py"
+        f"no test of studies/tests imports or names {name}: add studies/tests/test_{module(name)}.py"
     )
 
 

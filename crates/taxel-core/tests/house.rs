@@ -59,6 +59,7 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "recording",
                 "rivals",
                 "simulate",
+                "sources",
                 "wire",
                 "wire_v2",
             ],

@@ -4,6 +4,7 @@ mod convert;
 mod enter;
 mod errors;
 mod guest;
+mod instructions;
 mod knock;
 
 mod bridge;
@@ -24,6 +25,7 @@ mod pictures;
 mod recording;
 mod rivals;
 mod simulate;
+mod sources;
 mod wire;
 mod wire_v2;
 
@@ -33,6 +35,7 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
+    instructions::register(module)?;
     knock::register(module)?;
     nouns::register(module)?;
     bridge::register(module)?;
@@ -51,6 +54,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;
+    sources::register(module)?;
     wire::register(module)?;
     wire_v2::register(module)?;
     Ok(())

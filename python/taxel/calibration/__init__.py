@@ -346,6 +346,8 @@ class Calibration:
         if isinstance(given, Tare):
             _same(self.array, given.array, "the tare")
             given = given.rest
+        elif given is not None and np.isnan(numbers("rest", given, np.float64)).any():
+            raise ProblemError("rest holds NaN: must be finite; give a Tare where the rest of a taxel is not known")
         if given is not None:
             return _by_taxel("rest", given, self.array)
         if self.rest is not None:

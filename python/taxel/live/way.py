@@ -589,7 +589,7 @@ def delays(measured: dict[str, Any]) -> str:
 
 def heard(said: Sequence[Said]) -> Detections:
     """Return what was said live as `Detections`."""
-    return Detections(
+    return Detections._of(
         [s.label for s in said],
         [s.t for s in said],
         [s.known for s in said],

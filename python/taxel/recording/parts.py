@@ -126,7 +126,7 @@ def merge(recordings: Iterable[Recording], *, gap_us: float | None = None, besid
         found += list(zip(d.label, d.t + shift, d.known + shift, d.slope, d.repaired, strict=True))
     found.sort(key=lambda row: int(row[2]))
     label, t, known, slope, repaired = ([row[k] for row in found] for k in range(5))
-    detections = Detections(label, t, known, slope, repaired=repaired)
+    detections = Detections._of(label, t, known, slope, repaired=repaired)
     notes.sort(key=lambda note: (note.t is None, note.t or 0))
     source = ", ".join(part.name for part in parts)
     remarks = Remarks(array=array, source=f"merged of {source}", notes=tuple(notes), detections=detections)

@@ -1179,7 +1179,7 @@ class _OnClock(_Source):
     @property
     def detections(self) -> Detections:
         of = self.of.detections
-        return Detections(of.label, self._times(of.t), self._times(of.known), of.slope, repaired=of.repaired)
+        return Detections._of(of.label, self._times(of.t), self._times(of.known), of.slope, repaired=of.repaired)
 
     @property
     def clock(self) -> Clock:

@@ -174,7 +174,7 @@ def detections_of(said: Any) -> Detections:
     slopes = [float("nan") if row[4] is None else float(row[4]) for row in rows]
     repaired = [row[5] if len(row) > 5 else False for row in rows]
     label, t, known = ([row[k] for row in rows] for k in (1, 2, 3))
-    return Detections(label, t, known, slopes, repaired=repaired)
+    return Detections._of(label, t, known, slopes, repaired=repaired)
 
 
 def zeroings_of(said: Any) -> tuple[Zeroing, ...]:

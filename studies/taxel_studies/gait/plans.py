@@ -29,7 +29,7 @@ from taxel_studies.gait.recipes import (
 )
 from taxel_studies.gait.rules import RULES
 from taxel_studies.gait.sources import SOURCES, fingerprint
-from taxel_studies.runner import Task
+from taxel_studies.runner import Task, one_of
 from taxel_studies.study import Parameters, Row
 
 __all__ = [

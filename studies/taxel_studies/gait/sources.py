@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel import formats
-from taxel import FormatError
+from taxel import FormatError, formats
 from taxel.array import Array
 from taxel.encode import Encoder, RunningRange
 from taxel.formats import Trial, plate
@@ -23,7 +22,8 @@ from taxel.spikes import to_ms
 from taxel_studies.gait import insole
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.gait.recipes import RULE_ENCODERS
-from taxel_studies.study import one_of, refuse
+from taxel_studies.runner import one_of
+from taxel_studies.study import refuse
 
 __all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "readable", "readings", "unread"]
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from taxel import encode, formats, learn
-from taxel_studies.gait import folds, insole, pieces, plans, rules, sources
+from taxel_studies.gait import plans, sources
 from taxel_studies.gait.outcomes import summarise
 from taxel_studies.gait.pictures import draw
 from taxel_studies.gait.realise import realise
@@ -31,7 +30,6 @@ STUDY = Study(
     statements=statements,
     tables=tables,
     draw=draw,
-    code=(sources, insole, pieces, folds, rules, formats, encode, learn),
     data=tuple(source.folder for source in sources.SOURCES.values()),
     unread=plans.unread,
 )

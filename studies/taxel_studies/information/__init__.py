@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from taxel import encode, formats, information
 from taxel_studies.information import footfalls, grasps, postures
 from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
@@ -111,6 +110,5 @@ STUDY = Study(
     statements=statements,
     tables=tables,
     draw=draw,
-    code=(information, encode, formats, footfalls, grasps, postures),
     data=tuple(ASKED),
 )

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from taxel import learn
-from taxel_studies.rivals import protocols, rules
 from taxel_studies.rivals.protocols import realise
 from taxel_studies.rivals.rules import CHOSEN_ON, PUBLISHED, RULES
 from taxel_studies.runner import Task
@@ -194,5 +192,4 @@ STUDY = Study(
     summarise=summarise,
     statements=statements,
     draw=draw,
-    code=(learn, rules, protocols),
 )

@@ -16,6 +16,7 @@ from taxel._base.arguments import callback, instance, number
 from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
 from taxel.simulate.fem.contact import Contact
+from taxel.simulate.fem.interruptible import interruptible
 from taxel.simulate.fem.material import DRAGON_SKIN_10, Yeoh
 from taxel.simulate.fem.mesh import Mesh, block, half_disc
 from taxel.simulate.fem.solids import Solids
@@ -290,7 +291,7 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
     if progress is not None:
         callback("progress", progress)
     ground, indenter = bodies(i)
-    solids = Solids([(ground, i.silicone), (indenter, Yeoh.of_modulus(i.modulus_kpa))])
+    solids = interruptible(lambda: Solids([(ground, i.silicone), (indenter, Yeoh.of_modulus(i.modulus_kpa))]))
     top, arc = indenter.held + solids.first[1], indenter.touching + solids.first[1]
     contact = Contact(solids.nodes, ground.touching, arc, i.penalty * i.silicone.modulus_kpa / i.mesh_mm, i.friction)
     held = np.concatenate([_both(ground.held), _both(top)])

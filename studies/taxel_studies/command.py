@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from taxel.cli._app import App, app
-from taxel.cli._recordings import SET_HELP, assignments
-from taxel.studies import STUDIES, load
+from taxel import ProblemError
+from taxel.cli import SET_HELP, App, assignments
+from taxel_studies import DRAWN, FIGURES, STUDIES, load
 
 if TYPE_CHECKING:
-    from taxel.studies.runner import Workers
+    from taxel_studies.runner import Workers
 
-studies = App(help="Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.")
-app.add_typer(studies, name="study", no_args_is_help=True)
+__all__ = ["app"]
+
+app = App(no_args_is_help=True)
 
 Jobs = Annotated[int, typer.Option(help="Processes.")]
 Backend = Annotated[str, typer.Option(help="Who runs them: loky (processes here), dask or ray (a cluster).")]
@@ -34,15 +37,50 @@ Data = Annotated[
 Strict = Annotated[bool, typer.Option("--strict", help="A recording that cannot be read ends it; else it is left out.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and no progress.")]
 
+Figures = Annotated[Path, typer.Option("--figures", help="Folder of the kept figures: of a checkout.")]
+Confirm = Annotated[
+    bool,
+    typer.Option(
+        "--confirm",
+        help="Run it at size toy, hold it against the result kept beside its figure; where it is the same, the figure "
+        "counts as one of this code.",
+    ),
+]
+
 REPORT = Path("taxel-studies")
+KEPT = Path("benchmarks/results/figures")
 
 
-@studies.callback()
-def _studies() -> None:
-    """Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was."""
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    stale: Annotated[
+        bool, typer.Option("--stale", help="List the kept figures whose code has changed since, and what changed.")
+    ] = False,
+    figures: Figures = KEPT,
+) -> None:
+    """Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.
+
+    Figures and tables of the thesis are names too: fig5.6 runs the study that holds it.
+
+    Example: taxel study fig6.9 --size toy
+    """
+    if stale:
+        from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
+
+        found = stale_figures(figures)
+        for name, parts in found.items():
+            typer.echo(f"{name}: {', '.join(parts)}")
+        typer.echo(
+            f"{len(found)} kept figures are stale; taxel study NAME --confirm, or run them again"
+            if found
+            else "no kept figure is stale"
+        )
+    elif context.invoked_subcommand is None:
+        typer.echo(context.get_help())
 
 
-@studies.command(name="all")
+@app.command(name="all")
 def every(
     size: Size = "full",
     realisations: Realisations = None,
@@ -52,15 +90,24 @@ def every(
     scheduler: Scheduler = None,
     report: Report = REPORT,
     strict: Strict = False,
+    confirm: Confirm = False,
+    figures: Figures = KEPT,
     as_json: AsJson = False,
 ) -> None:
-    """Run every study and make one page of them.
+    """Run every study and make one page of them; with --confirm, confirm those whose kept figures are stale.
 
     Studies on recordings are left out, and said to be, where no recordings are; so are those whose packages are not
     installed.
 
     Example: taxel study all --report figures --jobs 2
     """
+    if confirm:
+        from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
+
+        for name in stale_figures(figures):
+            if _left_out(name, _data(data)) is None:
+                _confirm(name, figures, data, strict)
+        return
     changes = {} if realisations is None else {"realisations": realisations}
     said = {}
     try:
@@ -68,11 +115,7 @@ def every(
             study = load(name)
             own = {k: v for k, v in changes.items() if k in study.parameters}
             where = _data(data)
-            if study.data and (where is None or not any((where / folder).is_dir() for folder in study.data)):
-                typer.echo(f"{name}: left out, it needs any of {', '.join(study.data)} (--data)", err=True)
-                continue
-            if study.lacks is not None:
-                typer.echo(f"{name}: left out, {study.lacks}", err=True)
+            if _left_out(name, where) is not None:
                 continue
             said[name] = study.run(
                 report,
@@ -94,7 +137,24 @@ def every(
     typer.echo(f"page: {page}")
 
 
-def _add(name: str, title: str) -> None:
+def _left_out(name: str, data: Path | None) -> str | None:
+    """Say why a study cannot be run here; None where it can."""
+    study = load(name)
+    why = study.lacks
+    if study.data and (data is None or not any((data / folder).is_dir() for folder in study.data)):
+        why = f"it needs any of {', '.join(study.data)} (--data)"
+    if why is not None:
+        typer.echo(f"{name}: left out, {why}", err=True)
+    return why
+
+
+def _confirm(name: str, figures: Path, data: Path | None, strict: bool) -> None:
+    from taxel_studies.kept import confirm  # noqa: PLC0415  the command line starts quickly
+
+    typer.echo(f"{name}: {confirm(name, figures, data=_data(data), strict=strict)}")
+
+
+def _add(name: str, title: str) -> Callable[..., None]:
     def one(
         size: Size = "full",
         realisations: Realisations = None,
@@ -105,13 +165,19 @@ def _add(name: str, title: str) -> None:
         scheduler: Scheduler = None,
         report: Report = REPORT,
         strict: Strict = False,
+        confirm: Confirm = False,
+        figures: Figures = KEPT,
         as_json: AsJson = False,
     ) -> None:
+        if confirm:
+            _confirm(name, figures, data, strict)
+            return
         workers = _workers(jobs, backend, scheduler)
         _run(name, size, _changes(changes or [], realisations), data, workers, report, strict, as_json)
 
     text = f"{title[0].upper()}{title[1:]}.\n\nExample: taxel study {name} --report figures --jobs 2"
-    studies.command(name=name, help=text, short_help=title)(one)
+    app.command(name=name, help=text, short_help=title)(one)
+    return one
 
 
 def _run(
@@ -136,13 +202,13 @@ def _run(
 
 
 def _workers(jobs: int, backend: str, scheduler: str | None) -> Workers:
-    from taxel.studies.runner import Workers  # noqa: PLC0415  joblib loads slowly
+    from taxel_studies.runner import Workers  # noqa: PLC0415  joblib loads slowly
 
     return Workers(jobs, backend, scheduler)
 
 
 def _page(report: Path) -> Path | None:
-    from taxel.studies.page import write_page  # noqa: PLC0415  jinja2 loads slowly
+    from taxel_studies.page import write_page  # noqa: PLC0415  jinja2 loads slowly
 
     return write_page(report) if report.is_dir() else None
 
@@ -177,7 +243,7 @@ def _tell(section: dict[str, Any]) -> None:
         typer.echo(f"could not be read, so left out: {file}: {why}")
 
 
-@studies.command(short_help=STUDIES["gait"])
+@app.command(short_help=STUDIES["gait"])
 def gait(
     size: Size = "full",
     test: Annotated[
@@ -197,6 +263,8 @@ def gait(
     scheduler: Scheduler = None,
     report: Report = REPORT,
     strict: Strict = False,
+    confirm: Confirm = False,
+    figures: Figures = KEPT,
     as_json: AsJson = False,
 ) -> None:
     """Find gait events in walking recordings with one neuron an event (thesis 6.5, figures 6.12 to 6.14).
@@ -209,11 +277,32 @@ def gait(
 
     Example: taxel study gait --data recordings --jobs 2 --report figures
     """
+    if confirm:
+        _confirm("gait", figures, data, strict)
+        return
     named = {name: value for name, value in (("test", test), ("search", search), ("sources", only)) if value}
     workers = _workers(jobs, backend, scheduler)
     _run("gait", size, named | _changes(changes or [], None), data, workers, report, strict, as_json)
 
 
-for _name, _title in STUDIES.items():
-    if _name != "gait":
-        _add(_name, _title)
+def _add_figure(figure: str, study: str, run: Callable[..., None]) -> None:
+    @wraps(run)
+    def one(**given: Any) -> None:
+        typer.echo(f"{figure} is held by the study {study}", err=True)
+        run(**given)
+
+    app.command(name=figure, help=f"The study {study}, which holds {figure}.", hidden=True)(one)
+
+
+def _add_drawing(figure: str, where: str) -> None:
+    def one() -> None:
+        raise ProblemError(f"{figure} is no result but a drawing or a table of words: {where}")
+
+    app.command(name=figure, help=f"No study: {where}.", hidden=True)(one)
+
+
+_RUN = {"gait": gait} | {name: _add(name, title) for name, title in STUDIES.items() if name != "gait"}
+for _figure, _study in FIGURES.items():
+    _add_figure(_figure, _study, _RUN[_study])
+for _figure, _where in DRAWN.items():
+    _add_drawing(_figure, _where)
