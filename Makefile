@@ -49,7 +49,7 @@ $(VENV)/.for-%: pyproject.toml studies/pyproject.toml | $(VENV)/.installed
 
 # Two builds of one extension, of which one is in place: incremental, so that a change in one file takes seconds, and as
 # released, which tests and benchmarks use. They share what the crates of others compiled to.
-develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release
+develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --features test-hooks
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building: minutes the first time"
 	@CARGO_INCREMENTAL=1 $(develop) --config 'profile.release.package.taxel-core.codegen-units=256'
@@ -102,7 +102,7 @@ lint: build $(VENV)/.for-test $(VENV)/.for-lint
 	cargo fmt --all --check
 	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
-	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	cargo clippy --workspace --all-targets --all-features --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .

@@ -56,7 +56,7 @@ def test_a_set_that_is_there_caps_the_dispatch_and_changes_no_result(name: str) 
 def test_an_unknown_set_is_refused_in_one_line() -> None:
     done = run("avx3", "-c", "import taxel")
     assert done.returncode != 0
-    assert "TAXEL_INSTRUCTIONS is \"avx3\": must be plain, avx2, avx512, avx512_bytes" in done.stderr
+    assert 'TAXEL_INSTRUCTIONS is "avx3": must be plain, avx2, avx512, avx512_bytes' in done.stderr
     done = run("avx3", "-c", "from taxel_start import main; main()", "--help")
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1, done.stderr

@@ -56,7 +56,14 @@ NONSENSE: dict[str, Any] = {
     "a set": {1, 2},
     "another array": taxel.Array(3, 5),
     "other trains": taxel.SpikeTrains.from_lists([[1.0], [2.0]]),
+    "the least float": 5e-324,
+    "a span of time": np.timedelta64(5),
+    "half of a surrogate pair": "\ud800",
+    "a masked value": np.ma.masked,
+    "an array of which one number is repeated": np.broadcast_to(np.float64(1.0), 10**9),
+    "a list that holds itself": [1.0],
 }
+NONSENSE["a list that holds itself"] += [NONSENSE["a list that holds itself"]] * 2
 
 #: Drawn on again and again; where it is None a new one is made, which pyplot keeps.
 AXES = Figure().add_subplot()

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import bare, column, floats, nth, number, shown, text, window
+from taxel._base.arguments import bare, column, floats, nth, number, several, shown, text, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept
 from taxel._base.files import whole_file, write_whole
@@ -500,10 +500,7 @@ class SpikeTrains(Columns):
 
 def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[NDArray[Any], list[int]]:
     """Return all entries, train after train, and how many each train has."""
-    try:
-        entries = list(lists)
-    except TypeError:
-        raise ProblemError(f"{name} is {shown(lists)}: must be one list a train") from None
+    entries = several(name, lists)
     if not entries:
         return np.empty(0, dtype), []
     try:

@@ -34,7 +34,9 @@ class _Decoder(wire.Decoder):
         return _Heard(events, None if last is None else last.until, last is not None and last.intact)
 
 
-def _decode(data: Any, *, array: Array | None = None, columns: wire.Columns | None = None) -> tuple[Events, wire.Counts, int]:
+def _decode(
+    data: Any, *, array: Array | None = None, columns: wire.Columns | None = None
+) -> tuple[Events, wire.Counts, int]:
     """Decode a stream of datagrams (now `taxel.wire.decode(data, version=2)`); return events, counts, bytes skipped."""
     sensor, stream = Array._of(array), given_bytes(data)
     room, own = wire.Columns._asked_for(columns, _core.wire_rows(2, len(stream)))

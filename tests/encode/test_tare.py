@@ -73,7 +73,7 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: Tare.take(5), "int: a tare is taken from"),
+        (lambda: Tare.take(5), "int: a tare is measured from"),
         (lambda: Tare.take(EVENTS, start_us=1.5), "start_us is 1.5"),
         (lambda: Tare.take(EVENTS, stop_us=True), "stop_us is True"),
         (lambda: Tare.take(EVENTS, start_us=900, stop_us=900), "start must lie before stop"),

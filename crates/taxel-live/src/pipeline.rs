@@ -1,10 +1,10 @@
 //! Datagrams to detections, as they come.
 //!
-//! One thread receives, decodes and reads out; who has something to say leaves that to another one first. While something is
-//! recorded, which a disk may hold up, *receive*, *decode and record*, *encode and read out* have a thread each
-//! ([`crate::capture`]), and the last one has also where it is slower than what comes. What waits between two of them is bounded,
-//! and what finds no room is counted where it was lost. Who looks on gets copies ([`Live::counters`], [`Live::picture`]) and slows
-//! nothing.
+//! The stages are *receive*, *decode*, *record* and *read out* ([`stages`]). One thread runs them all, and gives them to another
+//! one before it calls a sink ([`threads`]). While something is recorded, which a disk may hold up, receiving ([`crate::capture`]),
+//! decoding with recording, and reading out have a thread each; reading out also has one where it is slower than what comes. The
+//! queues between them are bounded, and what finds no room is counted where it was lost. Viewers get copies ([`Live::counters`],
+//! [`Live::picture`]) and cannot slow the pipeline.
 
 mod ahead;
 mod copies;
@@ -12,19 +12,24 @@ mod counters;
 mod decode;
 mod handle;
 mod handover;
-mod lead;
+mod observers;
 mod options;
-mod read;
+mod output;
+mod read_out;
+mod reader;
+mod receive;
+mod record;
 mod recorder;
 mod rest;
 mod said;
-mod saying;
 mod sending;
 mod shared;
 mod source;
 mod sources;
+mod stages;
 mod stills;
 mod tap;
+mod threads;
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -35,7 +40,7 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use taxel_core::encode::Tare;
-use taxel_core::wire::{self, Decoder};
+use taxel_core::wire;
 use taxel_core::{Marker, Stop};
 
 use crate::capture::{Origin, Receiver};
@@ -43,27 +48,27 @@ use crate::locked::lock;
 use crate::{Error, Result, recording};
 pub use copies::{Copied, Copies};
 pub use counters::{Counters, SourceCounts, Summary};
-use decode::Work;
 pub use handle::Handle;
 use handover::Handover;
-use lead::Lead;
 pub use options::{LiveOptions, Record};
-pub use read::Ear;
-use read::Reader;
+use output::DetectionOutput;
+pub use reader::Listener;
+use reader::Reader;
 use recorder::{Host, Part, Recorder};
 pub use said::{Lines, Said, Sink};
-use saying::Saying;
 use sending::Sending;
 pub use sending::{Destination, Sent};
-use shared::{Shared, Shown};
+use shared::{Published, Shared};
 pub use source::{Place, Source, SourceKind};
 use sources::Others;
+use stages::Stages;
 pub use tap::{Change, Outlet, Piece, UNKNOWN};
+use threads::Threads;
 
-/// How long a wait lasts before it is asked whether to stop.
+/// How long a wait lasts before the caller is asked whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// How many detections wait for [`Live::next`]; more are counted and lost to it, not to the sinks.
+/// How many detections wait for [`Live::next`]; more are lost to it, and counted, but not lost to the sinks.
 const SAID_WAITING: usize = 1 << 14;
 
 /// Datagrams to detections, from [`Live::start`] until [`Live::stop`].
@@ -81,10 +86,15 @@ impl Live {
     ///
     /// `Socket` where the port is taken, `File` where the file exists or cannot be created, or a destination cannot be
     /// opened, `Core(Problem)` for options that make no sense.
-    pub fn start(address: SocketAddr, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+    pub fn start(
+        address: SocketAddr,
+        options: LiveOptions,
+        listener: Listener,
+        sinks: Vec<Box<dyn Sink>>,
+    ) -> Result<Self> {
         let capture = options.capture;
         // The socket is opened before the file: where the port is taken no empty file is left behind.
-        Self::start_from(|| Receiver::bind(address, capture), options, ear, sinks)
+        Self::start_from(|| Receiver::bind(address, capture), options, listener, sinks)
     }
 
     /// As [`Live::start`], from what another computer receives ([`Receiver::fed`]).
@@ -92,14 +102,19 @@ impl Live {
     /// # Errors
     ///
     /// As [`Live::start`], without those of the socket.
-    pub fn start_fed(receiver: Receiver, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
-        Self::start_from(|| Ok(receiver), options, ear, sinks)
+    pub fn start_fed(
+        receiver: Receiver,
+        options: LiveOptions,
+        listener: Listener,
+        sinks: Vec<Box<dyn Sink>>,
+    ) -> Result<Self> {
+        Self::start_from(|| Ok(receiver), options, listener, sinks)
     }
 
     fn start_from(
         receiver: impl FnOnce() -> Result<Receiver>,
         options: LiveOptions,
-        ear: Ear,
+        listener: Listener,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
@@ -112,14 +127,14 @@ impl Live {
                 taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
             );
         }
-        Self::begin(Box::new(receiver), options, ear, sinks, None)
+        Self::begin(Box::new(receiver), options, listener, sinks, None)
     }
 
     /// Begins; `host` is whose recording this one's is a part of.
     fn begin(
         receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
         options: LiveOptions,
-        ear: Ear,
+        listener: Listener,
         sinks: Vec<Box<dyn Sink>>,
         host: Option<Part>,
     ) -> Result<Self> {
@@ -133,15 +148,15 @@ impl Live {
         }
         wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
-        if let (Ear::Deaf, Some(to)) = (&ear, options.send.first()) {
+        if let (Listener::None, Some(to)) = (&listener, options.send.first()) {
             return Err(taxel_core::problem!("send to {to} without a readout: nothing would be said").into());
         }
-        match &ear {
-            Ear::Taring(stretch_us, _) if *stretch_us <= 0 => {
+        match &listener {
+            Listener::Taring(stretch_us, _) if *stretch_us <= 0 => {
                 return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
             }
-            Ear::Taring(_, readout) => readout.check()?,
-            Ear::Deaf | Ear::Reading(_) => {}
+            Listener::Taring(_, readout) => readout.check()?,
+            Listener::None | Listener::Reading(_) => {}
         }
         let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
         let receiver = receiver()?;
@@ -150,18 +165,18 @@ impl Live {
             (Some(record), None) => Some(Recorder::create(record, &options, receiver.place())?),
             (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, receiver.place())),
         };
-        let shown = Shown { picture: vec![0; options.array.len()], ..Shown::default() };
+        let published = Published { picture: vec![0; options.array.len()], ..Published::default() };
         let shared = Arc::new(Shared {
             receiver,
             handover: Handover::new(&options.array, options.readout_events),
-            shown: Mutex::new(shown),
+            published: Mutex::new(published),
             recorder: Mutex::new(recorder),
             broken: Mutex::default(),
-            wishes: Mutex::default(),
-            wished: AtomicBool::new(false),
-            happened: Mutex::default(),
+            requests: Mutex::default(),
+            requested: AtomicBool::new(false),
+            picture_times: Mutex::default(),
             records: AtomicBool::new(false),
-            listeners: Mutex::default(),
+            subscribers: Mutex::default(),
             sending: sending.iter().map(Sending::line).collect(),
             registers: Mutex::new(options.registers),
             options: options.clone(),
@@ -169,13 +184,11 @@ impl Live {
             expected: AtomicU8::new(0),
             ended: AtomicBool::new(false),
         });
-        let (say, said) = channel::bounded(SAID_WAITING);
-        let decoder = Decoder::new(options.array.clone()).differences(options.differences);
-        let sender = wire::Receiver::new(decoder, 1);
-        let listens = !matches!(ear, Ear::Deaf);
+        let (queue, said) = channel::bounded(SAID_WAITING);
+        let reads_out = !matches!(listener, Listener::None);
         let board = |address, own: LiveOptions, part| {
             let capture = own.capture;
-            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Ear::Deaf, vec![], Some(part))
+            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Listener::None, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing came: a new file is not left behind.
@@ -184,16 +197,16 @@ impl Live {
         })?;
         let others = Mutex::new(others);
         let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![], others };
-        // Who drives something is not to wait for a callback.
+        // A device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
-        let saying = Saying::new(sending.chain(sinks).collect(), say);
-        let reader = listens.then(|| Reader::new(ear, &options));
-        let work = Work::new(Arc::clone(&shared), sender, reader);
-        let names: &[&str] = if listens { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
-        let lead = Arc::new(Lead::new(work, saying, names.len()));
+        let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
+        let reader = reads_out.then(|| Reader::new(listener, &options));
+        let stages = Stages::new(&shared, reader);
+        let names: &[&str] = if reads_out { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
+        let threads = Arc::new(Threads::new(stages, output, names.len()));
         for name in names {
-            let (lead, shared) = (Arc::clone(&lead), Arc::clone(&shared));
-            live.spawn(name, move || lead.serve(&shared))?;
+            let (threads, shared) = (Arc::clone(&threads), Arc::clone(&shared));
+            live.spawn(name, move || threads.run(&shared))?;
         }
         Ok(live)
     }
@@ -204,7 +217,7 @@ impl Live {
         Ok(())
     }
 
-    /// The address that it listens on, the port that was found where 0 was asked for; unspecified, with port 0, where a
+    /// The address that it receives on, with the port that was found where 0 was asked for; unspecified, with port 0, where a
     /// bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
@@ -217,7 +230,7 @@ impl Live {
         self.shared.receiver.place()
     }
 
-    /// What others may do with it.
+    /// What others may do with it while it runs.
     #[must_use]
     pub fn handle(&self) -> Handle {
         Handle { shared: Arc::clone(&self.shared) }
@@ -227,14 +240,14 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// What ended the way early: the disk is full, the socket failed, the encoder cannot use what comes.
+    /// The error that ended the pipeline early: the disk is full, the socket failed, the encoder cannot use what comes.
     pub fn next(&self, timeout: Duration) -> Result<Option<Said>> {
         match self.said.recv_timeout(timeout) {
             Ok(said) => Ok(Some(said)),
             Err(channel::RecvTimeoutError::Timeout) => self.check().map(|()| None),
             Err(channel::RecvTimeoutError::Disconnected) => {
                 self.check()?;
-                // Without a readout nobody ever speaks: wait as asked, but not after the end.
+                // Without a readout there are no detections: wait as asked, but not after the end.
                 if !self.is_over() {
                     std::thread::sleep(timeout);
                 }
@@ -243,7 +256,7 @@ impl Live {
         }
     }
 
-    /// As [`Live::next`], but looks now and then whether to stop waiting; `None` then.
+    /// As [`Live::next`], but returns `None` as soon as `stop` asks for it.
     ///
     /// # Errors
     ///
@@ -252,7 +265,7 @@ impl Live {
         let until = Instant::now().checked_add(timeout);
         loop {
             let left = until.map_or(LOOK_EVERY, |t| t.saturating_duration_since(Instant::now()));
-            // Asked before: what ended it was then noted before, and `next` gives it.
+            // Before `next`: an error that ended the pipeline is then known, and `next` returns it.
             let over = self.is_over();
             let said = self.next(left.min(LOOK_EVERY))?;
             if said.is_some() || over || left.is_zero() || stop.asked() {
@@ -262,16 +275,16 @@ impl Live {
     }
 
     fn check(&self) -> Result<()> {
-        self.shared.shown().failed.take().map_or(Ok(()), Err)
+        self.shared.published().failed.take().map_or(Ok(()), Err)
     }
 
-    /// Whether the way has ended, by [`Live::end`] or by an error, and everything was worked through.
+    /// Whether the pipeline has ended, by [`Live::end`] or by an error, and everything was processed.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.shared.ended.load(Ordering::Acquire)
     }
 
-    /// What came and what became of it up to now.
+    /// What came, what became of it and what was lost, up to now.
     #[must_use]
     pub fn counters(&self) -> Counters {
         let others = lock(&self.others);
@@ -280,13 +293,14 @@ impl Live {
         Counters { sources: boards.chain(numbers).collect(), ..self.shared.counters() }
     }
 
-    /// Where another board of the recording is listened to; `None` where there is none of that name.
+    /// The address that another board of the recording sends to; `None` where there is none of that name.
     #[must_use]
     pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
         lock(&self.others).boards.iter().find(|(known, _)| known == name).map(|(_, board)| board.address())
     }
 
-    /// Keeps numbers of a source that is given, one for each of its columns, which came at `arrived_ns` (ns since 1970).
+    /// Records numbers of a source whose values a program gives, one for each of its columns, which came at `arrived_ns` (ns since
+    /// 1970).
     ///
     /// # Errors
     ///
@@ -299,25 +313,25 @@ impl Live {
         }
     }
 
-    /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 until a taxel was heard of.
+    /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 of a taxel without any event so far.
     #[must_use]
     pub fn picture(&self) -> Vec<u16> {
-        self.shared.shown().picture.clone()
+        self.shared.published().picture.clone()
     }
 
-    /// The tare that was taken, once it is complete.
+    /// The fresh tare, once it is complete.
     #[must_use]
     pub fn tare(&self) -> Option<Tare> {
-        self.shared.shown().tare.clone()
+        self.shared.published().tare.clone()
     }
 
-    /// The starts and stops that came since this was asked last.
+    /// The starts and stops that came since the last call.
     #[must_use]
     pub fn take_markers(&self) -> Vec<Marker> {
-        std::mem::take(&mut self.shared.shown().markers)
+        std::mem::take(&mut self.shared.published().markers)
     }
 
-    /// Writes something down in the recording, with the time of now.
+    /// Writes a note into the recording, with the time of now.
     ///
     /// # Errors
     ///
@@ -326,8 +340,8 @@ impl Live {
         self.shared.note(text, true)
     }
 
-    /// Says that the host told the board to speak this version of the wire (a write of REG0): what comes of it is believed
-    /// at once, not after a second.
+    /// Announces that the host told the board to speak this version of the wire (a write of REG0): datagrams of it are decoded at
+    /// once, not after a second.
     ///
     /// # Errors
     ///
@@ -340,8 +354,8 @@ impl Live {
         Ok(())
     }
 
-    /// Records what comes from here on, of all sources, beginning with the registers and what the taxels hold. A recording that
-    /// runs ends with what came before, and is given back: each datagram, and each line, belongs to one of them.
+    /// Records what comes from here on, of all sources, beginning with the registers and the values that the taxels hold. A recording
+    /// that runs ends with what came before, and is returned: each datagram, and each line, belongs to one of them.
     ///
     /// # Errors
     ///
@@ -353,25 +367,25 @@ impl Live {
         }
         let handle = self.handle();
         if !handle.records() {
-            // Else one that broke has not been heard of.
+            // An error that ended the last one was not returned yet.
             self.broken()?;
         }
         self.next_recording(Some(handle.reserve(record, self.shared.options.sources.clone())?))
     }
 
-    /// Has the recording that runs begin anew, where nothing came into it of any source; gives whether it does.
+    /// Lets the recording that runs begin anew, where no source has given anything; returns whether it does.
     #[must_use]
     pub fn record_again(&self) -> bool {
-        // Before the lock: who counts and who records must not wait for each other.
+        // Before the recorder is locked: counting and recording must not wait for each other.
         let now = self.shared.counters();
         lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.again(&now))
     }
 
-    /// Ends the recording that [`Live::record`] began: what came into it, and the file, where anything did.
+    /// Ends the recording that [`Live::record`] began; returns what came while it ran, and the file, where anything did.
     ///
     /// # Errors
     ///
-    /// What ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
+    /// The error that ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
     pub fn end_recording(&self) -> Result<Summary> {
         self.next_recording(None)?.ok_or_else(|| taxel_core::problem!("nothing is recorded").into())
     }
@@ -383,7 +397,7 @@ impl Live {
         self.handle().records() && others.boards.iter().all(|(_, board)| lock(&board.shared.broken).is_none())
     }
 
-    /// What ended a recording early, of this board or another.
+    /// The error that ended a recording early, of this board or another.
     fn broken(&self) -> Result<()> {
         let others = lock(&self.others);
         let all = others.boards.iter().map(|(_, board)| &board.shared).chain([&self.shared]);
@@ -426,16 +440,16 @@ impl Live {
         Ok(Some(Summary { counters: came, verdict, path, tare: self.tare() }))
     }
 
-    /// Asks all threads to end once they have worked through what came; [`Live::stop`] waits for them.
+    /// Asks all threads to end once they have processed what came; [`Live::stop`] waits for them.
     pub fn end(&self) {
         self.shared.receiver.stop();
     }
 
-    /// Ends: works through what came, closes the file, and says what was lost.
+    /// Ends: processes what came, closes the file, and returns what was lost.
     ///
     /// # Errors
     ///
-    /// What ended the way early, or `File` where the end of the recording cannot be written.
+    /// The error that ended the pipeline early, or `File` where the end of the recording cannot be written.
     pub fn stop(mut self) -> Result<Summary> {
         let others = lock(&self.others).stop(|board| Ok(board.stop()?.counters));
         let joined = self.join();
@@ -472,7 +486,7 @@ impl Live {
     }
 }
 
-/// What to say where nothing came, and what to look at.
+/// The verdict where nothing came, with what to check.
 fn nothing_came(place: &Origin, seconds: f64) -> String {
     let ask = match place {
         Origin::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),

@@ -3,9 +3,11 @@
 mod convert;
 mod enter;
 mod errors;
-mod guest;
 mod instructions;
-mod knock;
+#[cfg(feature = "test-hooks")]
+mod test_hooks;
+mod thread_state;
+mod threaded;
 
 mod bridge;
 mod calibration;
@@ -36,7 +38,8 @@ use pyo3::prelude::*;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
     instructions::register(module)?;
-    knock::register(module)?;
+    #[cfg(feature = "test-hooks")]
+    test_hooks::register(module)?;
     nouns::register(module)?;
     bridge::register(module)?;
     calibration::register(module)?;

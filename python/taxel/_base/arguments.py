@@ -43,8 +43,10 @@ T = TypeVar("T")
 
 #: Characters of a value in an error.
 _SHOWN = 60
-#: The most values that a parameter may hold, and that an iterable may give.
+#: The most values that a parameter may hold.
 _MOST = 10_000_000
+#: The most entries of an iterator, which may have no end.
+_MOST_GIVEN = 1_000_000
 #: The most values to which an array that NumPy repeats (`np.broadcast_to`) is copied.
 _MOST_REPEATED = 100_000_000
 
@@ -88,12 +90,14 @@ def instance(name: str, value: object, kind: type[T]) -> T:
 
 def several(name: str, values: object) -> list[Any]:
     """Return a list of what an iterable gives; refuse what is none, by name."""
+    _refuse_repeated(name, values)
     try:
-        found = list(islice(values, _MOST + 1))  # type: ignore[call-overload]
+        sized = hasattr(values, "__len__")
+        found = list(values) if sized else list(islice(values, _MOST_GIVEN + 1))  # type: ignore[call-overload]
     except TypeError:
         raise ProblemError(f"{name} is {shown(values)}: must be a sequence") from None
-    if len(found) > _MOST:
-        raise ProblemError(f"{name} is {shown(values)}: must have at most {_MOST} entries")
+    if not sized and len(found) > _MOST_GIVEN:
+        raise ProblemError(f"{name} is {shown(values)}: must give at most {_MOST_GIVEN} entries")
     return found
 
 
@@ -140,6 +144,8 @@ def bare(name: str, values: Any, unit: str | None = None) -> Any:
             return _converted(name, values, unit)
         # A list that holds itself twice would double at each level: each list is entered once a level.
         nested = {id(value): value for value in level if _is_nested(value)} if any(map(_may_nest, kinds)) else {}
+        for value in nested.values():
+            _refuse_repeated(name, value)
         level = list(chain.from_iterable(nested.values()))
         if not level:
             return values
@@ -154,7 +160,7 @@ def _refuse_masked(name: str, values: list[Any]) -> None:
 
 
 def _has_unit(kind: type[Any]) -> bool:
-    """Tell whether values of a class say what they are in; `dimensions` is Brian's word."""
+    """Return whether values of a class have a unit; `dimensions` is Brian's word."""
     return kind not in _PLAIN and any(hasattr(kind, word) for word in ("units", "unit", "dimensions"))
 
 

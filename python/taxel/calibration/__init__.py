@@ -257,7 +257,7 @@ class Calibration:
         """Fit a calibration to known loads laid on the array.
 
         The gain is the one with the least squares of relative error. Where the loads differ, the exponent of the curve
-        is fitted with it; where another exponent would do as well, a warning says which.
+        is fitted with it; where another exponent would do as well, a warning names it.
 
         Parameters
         ----------
@@ -266,12 +266,12 @@ class Calibration:
         unit : {"N", "kPa"}
             Of the calibration. Between N and kPa stands the pitch squared.
         start : Calibration, optional
-            Whose curve is taken (a law, a table); else a power of the reading.
+            The calibration whose curve (a law, a table) is fitted; else a power of the reading.
         exponent : float, above 0, optional
             Of the value by the reading's conductance or count, not to be fitted. Left out, it is 1 (of a law, its own)
             where all loads are alike.
         each : bool
-            A gain of its own for each taxel that a load says something of: uniform pressure (kPa), or a load on one
+            A gain of its own for each taxel that a load determines: uniform pressure (kPa), or a load on one
             taxel. The others keep the common one.
         rest : Tare or float64 of the array's shape, optional
             That of `start`, or 0, where it is left out.
@@ -320,12 +320,16 @@ class Calibration:
         ----------
         frames : Frames
             Readings as the sensor gives them, rest and all.
-        rest : Tare or float64 of the array's shape, optional
-            Today's; the calibration's own where it is left out.
+        rest : Tare or float64, a number or the array's shape, optional
+            Today's, finite; the calibration's own where it is left out.
+
+        Returns
+        -------
+        Frames, in the calibration's unit
 
         Raises
         ------
-        ProblemError : pictures of another array, or in another unit
+        ProblemError : pictures of another array, or in another unit; a rest that is not finite
         """
         _same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.of)
         return Frames(self._values(frames.values, self._rest(rest)), frames.t, unit=self.unit, array=frames.array)
@@ -567,8 +571,8 @@ def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]
     if alike:
         also = ", ".join(f"{exponent:.3g}" for exponent in alike)
         warnings.warn(
-            f"loads: an exponent of {best[1]:.3g} is taken, but {also} fits them as well; one more load, or exponent, "
-            "would tell",
+            f"loads: an exponent of {best[1]:.3g} is used, but {also} fits them as well; one more load, or exponent, "
+            "would decide",
             stacklevel=3,
         )
     return best[1]
@@ -581,7 +585,7 @@ def _gains(calibration: Calibration, laid: Sequence[_Laid], each: bool) -> tuple
     if not each:
         return gains, common
     if not any(one.alone for one in laid):
-        raise ProblemError("each: no load says what a single taxel bears; give a uniform pressure (kPa), or its taxel")
+        raise ProblemError("each: no load determines a single taxel; give a uniform pressure (kPa), or its taxel")
     share = np.array([one.by_taxel(calibration) / one.load for one in laid if one.alone])
     squares = (share**2).sum(axis=0)
     np.divide(share.sum(axis=0), squares, out=gains, where=squares > 0)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from taxel._base.arguments import callback, number, shown, whole
 from taxel._core import ProblemError
-from taxel.information._labels import belonging, one_label_a_group, words
+from taxel.information._labels import belonging, distinct, one_label_a_group, words
 from taxel.information.bits import (
     label_entropy,
     local_information,
@@ -172,7 +172,7 @@ def estimate(
     rounds, random = whole("redraws", redraws, 2), np.random.default_rng(whole("seed", seed, 0))
     if (truth.dtype.kind == "U") != (said.dtype.kind == "U"):
         raise ProblemError("labels and responses are of two kinds: must both be texts, or both numbers")
-    classes = np.unique(np.concatenate([truth, said.ravel()]))
+    classes = np.unique(np.concatenate([distinct(truth), distinct(said.ravel())]))
     row, column = np.searchsorted(classes, truth), np.searchsorted(classes, said)
     if len(np.unique(row)) < 2:
         raise ProblemError(
@@ -332,7 +332,8 @@ def _left_open(prior: NDArray[np.float64], wrong: float, trials: float, confiden
     from scipy.special import betaincinv  # noqa: PLC0415  loads slowly
 
     share = float(betaincinv(wrong + 1, max(trials - wrong, 1e-9), (1 + confidence) / 2))
-    even = share * (1 - np.eye(len(prior))) / (len(prior) - 1) + (1 - share) * np.eye(len(prior))
+    even = np.full((len(prior), len(prior)), share / (len(prior) - 1))
+    np.fill_diagonal(even, 1 - share)
     table = np.rint(_FINE * prior[:, None] * even)
     return float(label_entropy(table) - plug_in(table))
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from taxel._base.arguments import flag, instance, number, several, shown, text, window
+from taxel._base.arguments import finite, flag, instance, number, several, shown, text, window
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detections import Detections
@@ -65,13 +65,13 @@ def cut(
     """
     instance("recording", recording, Recording)
     start_us, stop_us = window("us", start_us, stop_us)
+    around = [
+        finite(name, given, "us", least=0.0) for name, given in (("before_us", before_us), ("after_us", after_us))
+    ]
     kept = recording.between(start_us, stop_us)
     if label is None:
         return [_region(kept, columns, rows)]
     text("label", label)
-    around = (number("before_us", before_us), number("after_us", after_us))
-    if not min(around) >= 0 or not np.isfinite(around).all():
-        raise ProblemError(f"before_us and after_us are {around[0]:g} and {around[1]:g}: must be 0 or more")
     times = [note.t for note in kept.notes if note.text == label and note.t is not None]
     return [_region(kept.between(t - around[0], t + around[1]), columns, rows) for t in times]
 

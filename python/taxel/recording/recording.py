@@ -631,6 +631,8 @@ def period_us(name: str, rate_hz: float) -> int:
     rate = number(name, rate_hz, "Hz")
     if not 0 < rate <= 1e6:
         raise ProblemError(f"{name} is {rate}: must be above 0, at most 1000000")
+    if rate < 1e-9:
+        raise ProblemError(f"{name} is {rate}: must be 1e-9 or more, a picture in 31 years")
     return round(1e6 / rate)
 
 

@@ -1,4 +1,4 @@
-"""What an emulated board may feel: a recording again."""
+"""A recording as the touch of an emulated board."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ __all__ = ["Replay"]
 
 
 class Replay:
-    """Let the board feel a recording again: its events as they were, or its pictures by the board's rules.
+    """Replay a recording to an emulated board: its events as they were, or its pictures by the board's rules.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-//! What others may do with a pipeline while it runs: look on, record, tell it of the board.
+//! What other parts may do with a pipeline while it runs: get its events, record, announce what was written to the board.
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use super::counters::Counters;
 use super::options::{LiveOptions, Record};
 use super::recorder::Recorder;
 use super::said::Said;
-use super::shared::{Ended, Shared, Wish};
+use super::shared::{Ended, Request, Shared};
 use super::source::Source;
 use super::tap::Outlet;
 use crate::Result;
@@ -38,7 +38,7 @@ impl Handle {
         &self.shared.options
     }
 
-    /// The address that it listens on; unspecified, with port 0, where a bridge feeds it.
+    /// The address that it receives on; unspecified, with port 0, where a bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()
@@ -62,26 +62,26 @@ impl Handle {
         self.shared.ended.load(Ordering::Acquire)
     }
 
-    /// What the registers hold, as far as it was told.
+    /// The board's registers, as far as they are known.
     #[must_use]
     pub fn registers(&self) -> Registers {
         *lock(&self.shared.registers)
     }
 
-    /// Tells what was written to the board's registers: the recording keeps it, and the version of the wire is expected.
+    /// Announces what was written to the board's registers: it is recorded, and the version of the wire is expected.
     pub fn wrote(&self, registers: Registers) {
         *lock(&self.shared.registers) = registers;
-        self.shared.wish(Wish::Registers(registers));
+        self.shared.request(Request::Registers(registers));
     }
 
-    /// Lets somebody look on, from the next batch on.
+    /// Gives a viewer the events from the next batch on.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where all is over.
+    /// `Core(Problem)` where the pipeline has ended.
     pub fn look(&self) -> Result<Outlet> {
         let (give, outlet) = channel::bounded(1);
-        self.shared.wish(Wish::Look(give));
+        self.shared.request(Request::Tap(give));
         self.wait(&outlet)
     }
 
@@ -89,19 +89,19 @@ impl Handle {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where all is over.
+    /// `Core(Problem)` where the pipeline has ended.
     pub fn copy(&self) -> Result<Copies> {
         let (give, parcels) = channel::bounded(1);
         let said = self.hear(COPIED_WAITING);
-        self.shared.wish(Wish::Copy(give));
+        self.shared.request(Request::Copy(give));
         Ok(Copies::new(Arc::clone(&self.shared), self.wait(&parcels)?, said))
     }
 
-    /// Hears detections as they are said; so many may wait, and who is too slow misses some.
+    /// Gives each detection from here on; so many may wait, and a slow receiver misses some.
     #[must_use]
     pub fn hear(&self, waiting: usize) -> channel::Receiver<Said> {
         let (say, said) = channel::bounded(waiting);
-        lock(&self.shared.listeners).push(say);
+        lock(&self.shared.subscribers).push(say);
         said
     }
 
@@ -114,7 +114,7 @@ impl Handle {
         if lock(&self.shared.recorder).is_some() {
             return Err(taxel_core::problem!("a recording runs already: stop it first").into());
         }
-        // What else is heard belongs to the recording that it was begun with.
+        // The other sources belong to a recording that began with the pipeline.
         let recorder = self.reserve(record, vec![])?;
         lock(&self.shared.broken).take();
         self.next_recording(Some(recorder)).map(drop)
@@ -126,12 +126,12 @@ impl Handle {
         Recorder::reserve(record, &header, self.place())
     }
 
-    /// Has what comes from here on go to this recording, or to none; gives the one that ran.
+    /// Records what comes from here on into this recording, or none; returns the one that ran.
     pub(super) fn next_recording(&self, next: Option<Recorder>) -> Result<Ended> {
-        // Who looks whether it goes on finds that it does.
+        // A caller who asks meanwhile whether something is recorded finds that it is.
         self.shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
         let (give, ended) = channel::bounded(1);
-        self.shared.wish(Wish::Record(next.map(Box::new), give));
+        self.shared.request(Request::Record(next.map(Box::new), give));
         let ended = self.wait(&ended).and_then(std::convert::identity);
         if ended.is_err() {
             self.shared.records.store(lock(&self.shared.recorder).is_some(), Ordering::Release);
@@ -139,11 +139,11 @@ impl Handle {
         ended
     }
 
-    /// Ends the recording that [`Handle::record`] began. Gives the file, where anything came, and what was lost, in a line.
+    /// Ends the recording that [`Handle::record`] began. Returns the file, where anything came, and what was lost, in a line.
     ///
     /// # Errors
     ///
-    /// What ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
+    /// The error that ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
     pub fn end_recording(&self) -> Result<(Option<PathBuf>, String)> {
         let (recorder, counters) = self.next_recording(None)?;
         if let Some(error) = lock(&self.shared.broken).take() {
@@ -171,7 +171,7 @@ impl Handle {
         self.shared.note(text, true)
     }
 
-    /// Writes down what holds for the whole recording, such as the name of a trial: a note without a time, which is no event.
+    /// Writes a note that holds for the whole recording, such as the name of a trial: a note without a time, which is no event.
     ///
     /// # Errors
     ///
@@ -180,30 +180,30 @@ impl Handle {
         self.shared.note(text, false)
     }
 
-    /// Takes what these taxels (column, row) hold now for their rest from now on, in the readout and in the recording's
-    /// pictures; the recording keeps when it was done, and the rests before and after. Never done but when asked for.
+    /// Takes the values that these taxels (column, row) hold for their rest from now on, in the readout and in the recording's
+    /// pictures; the recording states when that was, and the rests before and after. Only done on request.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where a taxel does not exist or was not heard of yet, a tare is being taken, or a `.lsa` is recorded, which
-    /// could not keep it: then none is zeroed. `File` where the disk is full.
+    /// `Core(Problem)` where a taxel does not exist or has had no event so far, a tare is being taken, or a `.lsa` is recorded, which
+    /// cannot hold it: then none is zeroed. `File` where the disk is full.
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let (give, zeroed) = channel::bounded(1);
-        self.shared.wish(Wish::Zero(taxels.to_vec(), give));
+        self.shared.request(Request::Zero(taxels.to_vec(), give));
         self.wait(&zeroed).and_then(std::convert::identity)
     }
 
-    /// What was zeroed last at each taxel that was, by taxel index; and how often something was.
+    /// The latest zeroing of each taxel that was zeroed, by taxel index; and how often taxels were.
     #[must_use]
     pub fn zeroed(&self) -> (Vec<Zeroing>, u64) {
-        let shown = self.shared.shown();
-        (shown.zeroed.values().copied().collect(), shown.zeroings)
+        let published = self.shared.published();
+        (published.zeroed.values().copied().collect(), published.zeroings)
     }
 
-    /// How often something was zeroed.
+    /// How often taxels were zeroed.
     #[must_use]
     pub fn zeroings(&self) -> u64 {
-        self.shared.shown().zeroings
+        self.shared.published().zeroings
     }
 
     fn wait<T>(&self, from: &channel::Receiver<T>) -> Result<T> {

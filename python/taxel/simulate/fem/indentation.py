@@ -1,4 +1,4 @@
-"""A half disc pressed on a block of silicone along a straight path: what is asked, and what the base then feels."""
+"""A half disc pressed on a block of silicone along a straight path: its parameters, and the stress at the base."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ class Course:
     cuts: int = 0
 
     def sensed_kpa(self, quantity: str = "nominal") -> NDArray[np.float64]:
-        """Return what the base feels by step and node, by one of three readings of "pressure".
+        """Return the pressure at the base by step and node, by one of three readings of "pressure".
 
         Parameters
         ----------
@@ -269,7 +269,7 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
     Returns
     -------
     Course
-        Where no equilibrium was found from some path on it ends there, and `fault` says so: nothing is filled in.
+        Where no equilibrium was found from some path on it ends there, and `fault` holds the reason: nothing is filled in.
 
     Raises
     ------

@@ -19,15 +19,15 @@ __all__ = ["State", "Stopped", "march"]
 #: A residual below this, mN by mm of thickness, counts as none.
 _TOLERANCE = 1e-8
 _ITERATIONS = 15
-#: Newton's first steps are taken whole; then that part of a step that leaves least.
+#: Newton's first steps are whole; then the part of a step that leaves the least residual.
 _FULL_STEPS = 3
 _PARTS = (1.0, 0.5, 0.25, 0.1)
 #: How often a step may be halved.
 _HALVINGS, _FIRST_HALVINGS = 9, 3
 
 
-class Stopped(ArithmeticError):  # noqa: N818  says what happened
-    """Tell that no equilibrium was found further on, and how far it came."""
+class Stopped(ArithmeticError):  # noqa: N818  no error of the caller's
+    """Raised where no equilibrium was found further on; its text holds the path so far."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,7 @@ use rand::rngs::StdRng;
 use rand::{Rng, SeedableRng};
 
 use super::*;
-use crate::neuron::{AfterSpike, Time};
+use crate::neuron::{AfterSpike, Neuron, Time};
 use crate::{Events, Intensities};
 
 /// Encodes each event as a signed spike of its taxel's train at its stamp, a picture as a spike of each loaded taxel.
