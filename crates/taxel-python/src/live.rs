@@ -15,7 +15,7 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
 use taxel_live::capture::{self, Sender};
-use taxel_live::pipeline::{Listener, Handle, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink, Source};
+use taxel_live::pipeline::{Handle, Lines, Listener, Live as Pipeline, LiveOptions, Record, Said, Sink, Source};
 
 use crate::bridge::{Copies, Feed};
 use crate::convert::{ArrayParts, array, to_array};
@@ -178,7 +178,10 @@ impl Live {
             Some(receiver) => Pipeline::start_fed(receiver, options, listener, sinks),
             None => Pipeline::start(of_host(host, port)?, options, listener, sinks),
         })?;
-        Ok(Self { pipeline: Threaded::new("live", "live: has been stopped; begin a new one", pipeline), summary: Mutex::default() })
+        Ok(Self {
+            pipeline: Threaded::new("live", "live: has been stopped; begin a new one", pipeline),
+            summary: Mutex::default(),
+        })
     }
 
     /// Host and port that it listens on.
@@ -297,7 +300,8 @@ impl Live {
     fn stop(&self, py: Python<'_>) -> PyResult<String> {
         self.pipeline.check()?;
         if IN_CALLBACK.get() {
-            let text = "live: `stop` was called by its own `say`, and would wait for itself; call it from another thread";
+            let text =
+                "live: `stop` was called by its own `say`, and would wait for itself; call it from another thread";
             return Err(ProblemError::new_err(text));
         }
         enter(py, |_| {

@@ -40,7 +40,8 @@ impl OutputFile {
                     return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, said)));
                 }
                 // A file system without locks, as some of networks: what is lost there is found at the end.
-                Err(TryLockError::Error(error)) if matches!(error.raw_os_error(), Some(libc::ENOLCK | libc::EOPNOTSUPP)) => {}
+                Err(TryLockError::Error(error))
+                    if matches!(error.raw_os_error(), Some(libc::ENOLCK | libc::EOPNOTSUPP)) => {}
                 Err(TryLockError::Error(error)) => return Err(Error::file(path)(error)),
             }
             let output = Self { path: path.to_owned(), file, new };
