@@ -364,6 +364,7 @@ impl ArrayState {
 
 #[cfg(test)]
 mod tests {
+    use super::super::time_columns::SPAN;
     use super::*;
 
     fn blank(taxels: usize) -> Keyframe {

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use taxel_core::wire::Command;
 use taxel_live::locked::lock;
-use taxel_live::pipeline::Record;
+use taxel_live::pipeline::{Record, Summary};
 use taxel_live::recording::Compression;
 
 use super::hub::Hub;
@@ -120,6 +120,9 @@ async fn record(hub: &Arc<Hub>, plan: &RecordingPlan) -> Result<String, String> 
     let path = hub.folder.file(&plan.file()).map_err(|error| error.to_string())?;
     let record = Record { path, compression: Compression::None, overwrite: false };
     let failed = || "failed within taxel; please report it".to_owned();
+    if live.handle.is_recording() {
+        return Err("a recording runs already: stop it first".to_owned());
+    }
     let handle = live.handle.clone();
     let begun = tokio::task::spawn_blocking(move || handle.record(&record)).await;
     begun.map_err(|_| failed())?.map_err(|error| error.to_string())?;
@@ -140,7 +143,7 @@ async fn record(hub: &Arc<Hub>, plan: &RecordingPlan) -> Result<String, String> 
     let handle = live.handle.clone();
     let ended = tokio::task::spawn_blocking(move || handle.end_recording()).await.map_err(|_| failed())?;
     match ended.map_err(|error| error.to_string())? {
-        (Some(_), verdict) => Ok(verdict),
-        (None, _) => Err("no datagrams arrived during the recording: no file was written".to_owned()),
+        Summary { path: Some(_), verdict, .. } => Ok(verdict),
+        Summary { path: None, .. } => Err("no datagrams arrived during the recording: no file was written".to_owned()),
     }
 }
