@@ -17,7 +17,7 @@ from taxel.spikes import SpikeTrains
 from taxel.tare import Tare
 
 if TYPE_CHECKING:
-    from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, wire, wire_v2
+    from taxel import detect, device, encode, formats, information, learn, live, metrics, plot, simulate, wire
     from taxel.detect import Readout
     from taxel.recording import BoardChange, Datagrams, Note, Recording, Zeroing
     from taxel.recording import open_any as open  # noqa: A004  taxel.open is a recording's

@@ -24,8 +24,8 @@ from taxel.device import Cable
 from taxel.labels import Labels, write_labels
 from taxel.recording import open_recording
 from taxel.recording.convert import convert
-from taxel.recording.health import Told, judged
 from taxel.recording.cut import cut
+from taxel.recording.health import Told, judged
 from taxel.wire import Command
 
 __all__ = ["RequestHandler", "own_addresses", "presets_path"]
