@@ -9,7 +9,6 @@ from test_readout import recipe, tare, touches
 
 import taxel
 from taxel.detect import Example, choose, judge, run, score, train
-from taxel.detect import Fold, Part
 from taxel.detect.folds import _folds as folds
 
 
