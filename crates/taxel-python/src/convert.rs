@@ -5,9 +5,7 @@
 
 use std::ops::Deref;
 
-use numpy::{
-    BorrowError, Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1,
-};
+use numpy::{BorrowError, Element, IntoPyArray, PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadwriteArray1};
 use pyo3::Borrowed;
 use pyo3::prelude::*;
 use taxel_core::wire::{Columns, Filled, Room};

@@ -42,8 +42,9 @@ impl Instructions {
     ///
     /// `Problem` where no set is called so, where this machine does not have it, or where another set is in use already.
     pub fn cap(name: &str) -> Result<()> {
-        let set = Self::named(name)
-            .ok_or_else(|| problem!("TAXEL_INSTRUCTIONS is {name:?}: must be {}", Self::ALL.map(Self::name).join(", ")))?;
+        let set = Self::named(name).ok_or_else(|| {
+            problem!("TAXEL_INSTRUCTIONS is {name:?}: must be {}", Self::ALL.map(Self::name).join(", "))
+        })?;
         let widest = Self::widest();
         if set > widest {
             return Err(problem!("TAXEL_INSTRUCTIONS is {name:?}: this machine has at most {}", widest.name()));

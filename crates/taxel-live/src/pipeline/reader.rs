@@ -65,7 +65,9 @@ impl Reader {
         let mode = match listener {
             Listener::None => Mode::Idle,
             Listener::Reading(stream) => Mode::Reading(Ahead::new(stream)),
-            Listener::Taring(stretch_us, readout) => Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array))),
+            Listener::Taring(stretch_us, readout) => {
+                Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array)))
+            }
         };
         Self { mode, found: vec![], events, zeroings: vec![], frames: options.frames() }
     }

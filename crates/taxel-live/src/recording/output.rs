@@ -20,7 +20,7 @@ pub struct OutputFile {
 }
 
 impl OutputFile {
-    /// Opens and locks a new file; or an existing one where `overwrite` says so, which keeps its contents until
+    /// Opens and locks a new file; or an existing one where `overwrite` is set, whose contents stay until
     /// [`OutputFile::begin`]. One that is write-protected is never replaced.
     ///
     /// # Errors
@@ -40,7 +40,8 @@ impl OutputFile {
                     return Err(Error::file(path)(IoError::new(ErrorKind::ResourceBusy, said)));
                 }
                 // A file system without locks, as some of networks: what is lost there is found at the end.
-                Err(TryLockError::Error(error)) if matches!(error.raw_os_error(), Some(libc::ENOLCK | libc::EOPNOTSUPP)) => {}
+                Err(TryLockError::Error(error))
+                    if matches!(error.raw_os_error(), Some(libc::ENOLCK | libc::EOPNOTSUPP)) => {}
                 Err(TryLockError::Error(error)) => return Err(Error::file(path)(error)),
             }
             let output = Self { path: path.to_owned(), file, new };
@@ -127,7 +128,7 @@ fn open(path: &Path, overwrite: bool) -> IoResult<(File, bool)> {
     options.create(true).truncate(false).open(path).map(|file| (file, new))
 }
 
-/// Refuses a file that somebody protected from being written: from the superuser too, who may write everywhere.
+/// Refuses a write-protected file, also to the superuser, who may write everywhere.
 fn replaceable(path: &Path) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(file) if file.permissions().readonly() => Err(Error::file(path)(IoError::from_raw_os_error(libc::EACCES))),
