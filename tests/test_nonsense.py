@@ -328,6 +328,11 @@ SOUND: dict[str, Sound] = {
     ),
     "taxel.detect.score": plain(taxel.detect.score, found=FOUND, truth={"a": [10], "b": [25]}, window_ms=50.0),
     "taxel.detect.Spread.of": plain(taxel.detect.Spread.of, values=[1.0, 2.0]),
+    "taxel.detect.Part": plain(taxel.detect.Part, **dict.fromkeys(inspect.signature(taxel.detect.Part).parameters)),
+    "taxel.detect.Fold": plain(taxel.detect.Fold, **dict.fromkeys(inspect.signature(taxel.detect.Fold).parameters)),
+    "taxel.detect.Trained": plain(
+        taxel.detect.Trained, **dict.fromkeys(inspect.signature(taxel.detect.Trained).parameters)
+    ),
     "taxel.detect.Recipe": plain(
         taxel.detect.Recipe,
         encoder=LEVELS,

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import floats, instance, number, parameters, shown, text, whole
 from taxel._base.arguments import path as checked_path
+from taxel._base.arguments import text as checked_text
 from taxel._base.files import write_whole
 from taxel._core import FormatError, NotFittedError, ProblemError
 from taxel.array import Array
@@ -189,7 +190,7 @@ class Readout:
         """
         if not isinstance(text, str):
             raise ProblemError(f"text is {shown(text)}: must be the text of a readout")
-        return cls._from_text(text)
+        return cls._from_text(checked_text("text", text))
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the readout to a JSON file, whole or not at all, and return its path.

@@ -269,7 +269,7 @@ class SpikeTrains(Columns):
         The window is the widest of theirs.
         """
         try:
-            foreign = [train for train in trains if not hasattr(train, "rescale")]
+            foreign = next(([train] for train in trains if not hasattr(train, "rescale")), [])
         except TypeError:
             foreign = [trains]
         if foreign:
