@@ -89,7 +89,7 @@ def wait_for(what: Callable[[], Any]) -> None:
 
 
 def stream(period_us: float, each: int, size: int, seconds: float, congestion: str) -> dict[str, Any]:
-    """Send, bridge and hear one stream."""
+    """Send, bridge and receive one stream."""
     with (
         Other() as other,
         Remote(f"zenoh:{other.place}", congestion=congestion, timeout=60.0) as remote,
@@ -151,7 +151,7 @@ def clocks(seconds: float) -> dict[str, Any]:
 
 
 def killed() -> dict[str, float]:
-    """Kill a bridge and begin it anew; return after how long that is noticed, and it is heard again, s."""
+    """Kill a bridge and begin it anew; return after how long that is noticed, and data arrives again, s."""
     with Other() as other:
         place = ["--listen", other.place]
         with Remote(f"zenoh:{other.place}", timeout=60.0) as remote, Live(remote=remote) as live:

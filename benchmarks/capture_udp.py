@@ -160,7 +160,7 @@ def faery(rate: float, seconds: float, port: int) -> dict[str, Any]:
     except subprocess.TimeoutExpired:
         receiver.kill()
         receiver.communicate()
-        return {"asked_events_per_s": rate, "failed": "its receiver never heard the end mark"}
+        return {"asked_events_per_s": rate, "failed": "its receiver never got the end mark"}
     sent, heard = json.loads(sender.stdout)["events"], json.loads(said.splitlines()[-1])
     return {
         "asked_events_per_s": rate,

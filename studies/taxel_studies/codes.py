@@ -115,8 +115,8 @@ def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
         for name, onsets in (("bits", np.zeros(len(rows))), ("slipped", -slips)):
             found = information.compare_codes(trials, labels, every, onsets_ms=onsets, folds=folds, seed=p["seed"])
             said[name][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in found.items()}
-        heard = np.mean([[np.count_nonzero(np.asarray(t) < window) for t in row.result] for row in rows])
-        said["spikes"][f"{window:g}"] = float(heard)
+        counted = np.mean([[np.count_nonzero(np.asarray(t) < window) for t in row.result] for row in rows])
+        said["spikes"][f"{window:g}"] = float(counted)
     return said
 
 

@@ -55,7 +55,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def delayed(params: dict[str, Any], drawn: Sequence[SpikeTrains], seed: int) -> list[SpikeTrains]:
-    """Return patterns as an arm hears them; the random delays are the same in all patterns of a realisation."""
+    """Return patterns as an arm delays them; random delays are the same in all patterns of a realisation."""
     arm, longest, inputs = params["arm"], params["longest_ms"], params["inputs"]
     if arm == "none":
         return list(drawn)
@@ -69,7 +69,7 @@ def delayed(params: dict[str, Any], drawn: Sequence[SpikeTrains], seed: int) -> 
 
 
 def fit(params: dict[str, Any], count: int, seed: int, lambdas: tuple[float, float, float]) -> ConeX:
-    """Learn so many patterns of a realisation as an arm hears them."""
+    """Learn so many patterns of a realisation, with the inputs of an arm."""
     drawn, targets = patterns(seed, params["inputs"], count, params["classes"])
     neuron = Neuron(**TABLE, time=params["time"])
     cone = ConeX(neuron=neuron, **LEARN, lambdas=lambdas, horizon=DURATION_MS)
@@ -219,7 +219,7 @@ STUDY = Study(
     where="ours; the thesis has no delays",
     protocol=(
         "Patterns and targets of 6.4.4: one spike an input on a random whole ms from 1 to 200, class c of C shall fire "
-        "once at 200 c / (C + 1) ms. Each input is heard as it is; or put off by one random delay of its own; or "
+        "once at 200 c / (C + 1) ms. Each input arrives as it is; or put off by one random delay of its own; or "
         "several times, at delays spaced evenly from 0 to the longest, each copy with a weight. Load: the largest p, a "
         "multiple of C, at which all realisations are feasible, p over inputs. Selection: at given loads the weights "
         "of least l1 norm; p over the weights that are not 0. Table 6.1, bounds ±0.3 mV a copy, silence at every "

@@ -1,4 +1,4 @@
-"""Figures 4.8 and 4.10: a tennis ball dropped on the array, its film, and its bits by sampling rate (thesis 4.4.2)."""
+"""Figures 4.8 and 4.10: a tennis ball dropped on the array: pictures, and bits by sampling rate (thesis 4.4.2)."""
 
 from __future__ import annotations
 
@@ -84,15 +84,15 @@ def films(
 
 
 def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
-    """List the bits by period; keep one drop's film."""
+    """List the bits by period; keep one drop's pictures."""
     asked = {(row.params["period_ms"], row.params["aligned"]): row for row in rows if "period_ms" in row.params}
     one = dropped.played(p, Condition(*p["drawn"]), p["seed"], courses, TENNIS).ticks[:1]
     frame_ms = TENNIS.frame_us / 1000
-    film = dropped.pictures(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
+    shown = dropped.pictures(one, frame_ms, np.zeros(1), TENNIS, TENNIS.length_ms)[0]
     shown = dropped.pictures(one, PICTURE_MS, np.zeros(1), TENNIS, (PICTURES + 1) * PICTURE_MS)[0]
     x = np.arange(TENNIS.region**2) % TENNIS.region - TENNIS.region // 2
     y = np.arange(TENNIS.region**2) // TENNIS.region - TENNIS.region // 2
-    most = np.clip(film[int(film.sum(1).argmax())], 0, None)
+    most = np.clip(shown[int(shown.sum(1).argmax())], 0, None)
     return {
         "lines": [
             {
@@ -103,7 +103,7 @@ def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
             for period in sorted(p["periods_ms"])
         ],
         "conditions": len(dropped.conditions(p)),
-        "sum": [[round(frame_ms * k, 3), round(float(total))] for k, total in enumerate(film.sum(1))],
+        "sum": [[round(frame_ms * k, 3), round(float(total))] for k, total in enumerate(shown.sum(1))],
         "middle": [round(float(np.average(of, weights=most)), 2) for of in (x, y)],
         "full": int(one.max()),
         "pictures": shown.round().astype(int).tolist(),
@@ -168,7 +168,7 @@ def _hz(line: dict[str, Any]) -> str:
 
 
 def draw(p: Parameters, said: Said) -> list[Figure]:
-    """Draw 4.8 (the film) and 4.10 (bits)."""
+    """Draw 4.8 (the pictures) and 4.10 (bits)."""
     return [_draw_film(p, said), _draw_bits(said)]
 
 
@@ -210,7 +210,7 @@ def _draw_bits(said: Said) -> Figure:
 
 STUDY = Study(
     name="fig4.8",
-    title="a tennis ball dropped on the array: its film, and its bits by sampling rate (4.8, 4.10)",
+    title="a tennis ball dropped on the array: its pictures, and its bits by sampling rate (4.8, 4.10)",
     where="thesis 4.4.2, figures 4.8 and 4.10",
     protocol=(
         "A tennis ball (65 mm, 56 g) falls from 40 and 80 cm on the emulated board at 2 kHz, level and tilted by 30 "

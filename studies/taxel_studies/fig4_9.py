@@ -26,7 +26,7 @@ PARAMETERS: dict[str, Any] = {
     "seed": 1,
 }
 TOY: dict[str, Any] = {**dropped.TENNIS_TOY, "rates_hz": [100.0, 1000.0], "perplexity": 5.0}
-#: How long a film is, ms.
+#: How long the pictures of a drop last, ms.
 LENGTH_MS = 20.0
 #: From here on the classes lie clearly apart, Hz.
 CLEAR_HZ = 500.0
@@ -134,9 +134,9 @@ STUDY = Study(
     title="drops of a tennis ball laid out by t-SNE, by sampling rate",
     where="thesis 4.4.2, figure 4.9",
     protocol=(
-        "The drops of the study fig4.8, the first 20 ms of each film, at the rates of the picture's panels by guess. "
-        "t-SNE of scikit-learn on all pictures of a film, begun at its principal components; beside each map, how many "
-        "of a film's 10 nearest neighbours in it are of its own class; and the same of films begun at any phase."
+        "The drops of the study fig4.8, the first 20 ms of each drop, at the rates of the picture's panels by guess. "
+        "t-SNE of scikit-learn on all pictures of a drop, begun at its principal components; beside each map, how many "
+        "of a drop's 10 nearest neighbours in it are of its own class; and the same of drops sampled from any phase on."
     ),
     parameters=PARAMETERS,
     sizes={"toy": TOY},

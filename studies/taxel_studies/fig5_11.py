@@ -10,8 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel.array import Array
-from taxel.information import panzeri_treves
-from taxel.information.bits import confusion_matrix
 from taxel.information.neighbours import distances_of
 from taxel.spikes import to_ms
 from taxel.wire import FRAME_US
@@ -154,21 +152,14 @@ def _bits(
 ) -> dict[str, Any]:
     """Return the information of what the neighbours say, and of each parameter in it."""
     said = dropped.named_by_neighbours(distances, y, params["neighbours"])
-    found: dict[str, Any] = {
-        "bits": round(float(panzeri_treves(confusion_matrix(y, said)[0])), 4),
-        "right": round(float(np.mean(y == said)), 4),
-    }
+    found: dict[str, Any] = kept_bits.information(y, said, "bits", "right")
     if by:
         all_of_them = dropped.conditions(params)
         found["by"] = {}
         for name in VARIED:
             values = np.array([f"{getattr(one, name):g}" for one in all_of_them])
             if len(set(values.tolist())) > 1:
-                counts, classes = confusion_matrix(values[y], values[said])
-                found["by"][name] = {
-                    "bits": round(float(panzeri_treves(counts)), 4),
-                    "most": round(float(np.log2(len(classes))), 4),
-                }
+                found["by"][name] = kept_bits.information(values[y], values[said], "bits", "most")
     return found
 
 
@@ -200,7 +191,6 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     lines, most = said["lines"], float(np.log2(said["conditions"]))
     by = {line["period_ms"]: line for line in lines}
     size = f"{said['conditions']} conditions, {p['drops']} drops each, {p['neighbours']} neighbours"
-    listed = ", ".join(f"{line['bits']:.2f} at {_ms(line['period_ms'])}" for line in lines)
     best = max(lines, key=lambda line: line["bits"])
     shorter = [line for line in lines if line["period_ms"] < PRINTED["period_ms"]]
     less = best["bits"] - max((line["bits"] for line in shorter), default=float("nan"))
@@ -208,7 +198,7 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
         Statement(
             "Figure 5.11: most information at a period of 1 ms, a little less below it.",
             "1 ms; ceiling 4.17 bits",
-            f"most at {_ms(best['period_ms'])}: {listed} bits; ceiling {most:.2f}; "
+            f"most at {_ms(best['period_ms'])}: {kept_bits.listed(lines)} bits; ceiling {most:.2f}; "
             + (f"{less:.3f} less at a shorter period" if shorter else "no shorter period was asked"),
             bool(best["period_ms"] == PRINTED["period_ms"] and less >= ALIKE) if shorter else None,
             f"below {ALIKE:g} bits are no loss; {size}; simulated drops vary less than drops by hand, which the thesis "
@@ -276,18 +266,16 @@ def _at_printed(p: Parameters, line: dict[str, Any] | None) -> str:
 
 
 def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> list[Statement]:
-    share = {name: kept_bits.shares((short, long), name) for name in VARIED if name in short["by"]}
-    if len(share) < len(VARIED):
+    lost, words = kept_bits.lost(short, long, VARIED)
+    if len(lost) < len(VARIED):
         return []
-    lost = {name: a - b for name, (a, b) in share.items()}
     worst, other = sorted(lost, key=lambda n: -lost[n])[:2]
     clear = lost[worst] - lost[other] >= ALIKE
     return [
         Statement(
             "Figure 5.12: the ball's radius is the most sensitive to the period.",
             "radius",
-            "; ".join(f"{VARIED[n]} {a:.2f} to {b:.2f}" for n, (a, b) in share.items())
-            + f" of what can be told, from {_ms(short['period_ms'])} to {_ms(long['period_ms'])}",
+            words,
             bool(worst == "ball_mm" and clear),
             f"{VARIED[worst]} loses most{'' if clear else f', {VARIED[other]} as much within {ALIKE:g}'}; {size}",
         )

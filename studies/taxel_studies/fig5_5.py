@@ -187,13 +187,12 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
     lines, most = said["lines"], np.log2(said["conditions"])
     bits = [line["bits"] for line in lines]
     size = f"{said['conditions']} conditions, {p['samples']} samples each, mesh {p['mesh_mm']:g} mm"
-    listed = ", ".join(f"{line['bits']:.2f} at {line['period_ms']:g} ms" for line in lines)
     short, long = lines[0], lines[-1]
     found = [
         Statement(
             "Figure 5.5: mutual information falls as the sampling period grows, with a large gap between .5 and 20 ms.",
             "falls; ceiling 8.23 bits",
-            f"{listed}; ceiling {most:.2f} bits",
+            f"{kept_bits.listed(lines)}; ceiling {most:.2f} bits",
             bool(all(b <= a + 0.02 for a, b in pairwise(bits)) and bits[0] - bits[-1] > 1),
             f"alpha {', '.join(format(line['alpha'], 'g') for line in lines)}; {size}",
         ),
@@ -221,17 +220,15 @@ def statements(p: Parameters, said: Said) -> list[Statement]:
 
 
 def _by_parameter(short: dict[str, Any], long: dict[str, Any], size: str) -> list[Statement]:
-    share = {name: kept_bits.shares((short, long), name) for name in short["by"]}
-    if not {"diameter_mm", "depth_mm"} <= set(share):
+    lost, words = kept_bits.lost(short, long, VARIED)
+    if not {"diameter_mm", "depth_mm"} <= set(lost):
         return []
-    lost = {name: a - b for name, (a, b) in share.items()}
     worst, least = max(lost, key=lambda n: lost[n]), min(lost, key=lambda n: lost[n])
     return [
         Statement(
             "Figure 5.6: radius suffers most from a long period, depth least.",
             "radius; depth",
-            "; ".join(f"{VARIED[n]} {a:.2f} to {b:.2f}" for n, (a, b) in share.items())
-            + f" of what can be told, from {short['period_ms']:g} to {long['period_ms']:g} ms",
+            words,
             worst == "diameter_mm" and least == "depth_mm",
             f"{VARIED[worst]} loses most, {VARIED[least]} least; {size}; 5 diameters and slants where the text says 4",
         )

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from taxel_studies import waves
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Said, Statement, Study
 from taxel_studies.waves import NOISES, READINGS, TRAINED_AT, realise
 
 if TYPE_CHECKING:
@@ -18,19 +17,14 @@ if TYPE_CHECKING:
 __all__ = ["STUDY"]
 
 PARAMETERS: dict[str, Any] = {
-    "realisations": 100,
+    **waves.TESTED,
     "ratios": [[0.0, 4.0], [1.0, 3.0], [2.0, 2.0], [3.0, 1.0], [4.0, 0.0]],
     "kappa": 1.08,
     "rest": [100.0, 100.0, 100.0],
-    "readings": ["targets", "B_max"],
-    "levels": {noise: list(levels) for noise, levels in waves.LEVELS.items()},
-    "repetitions": waves.REPETITIONS,
 }
 TOY: dict[str, Any] = {
-    "realisations": 2,
+    **waves.TESTED_TOY,
     "ratios": [[0.0, 4.0], [4.0, 0.0]],
-    "levels": {"jitter": [0, 3, 6], "background": [0, 3, 30], "shunting": [0, 3, 30]},
-    "repetitions": 5,
 }
 
 #: Units of the levels.
@@ -45,17 +39,12 @@ def tasks(p: Parameters) -> list[Task]:
     return waves.tasks(p, settings, settings, "cone_r")
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
-    """Average the distances."""
-    return {"curves": waves.curves(p, rows)}
-
-
 def statements(p: Parameters, said: Said) -> list[Statement]:
     """Judge what 6.4.7 says, in each reading of B."""
     found = []
     for reading in p["readings"]:
         curves = said["curves"][reading]
-        why = READINGS[reading] + (", which leaves kappa nearly powerless" if reading == "B_max" else "")
+        why = waves.why(reading)
         clean = curves["clean"]
         claims = (
             ("jitter", "dense is better against jitter", True, ANY),
@@ -152,7 +141,7 @@ STUDY = Study(
     sizes={"toy": TOY},
     tasks=tasks,
     realise=realise,
-    summarise=summarise,
+    summarise=waves.summarise,
     statements=statements,
     draw=draw,
 )

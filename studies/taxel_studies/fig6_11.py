@@ -22,7 +22,7 @@ PARAMETERS: dict[str, Any] = {
     "realisations": 100,
     "kappa": 1.04,
     "lambdas": [2.0, 2.0, 100.0, 100.0, 100.0],
-    "readings": ["targets", "B_max"],
+    "readings": list(READINGS),
     "trainings": ["clean", "jitter", "background", "shunting"],
     "bin_mv": 0.001,
     "repetitions": waves.REPETITIONS,

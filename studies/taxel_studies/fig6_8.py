@@ -46,7 +46,7 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Train a neuron on the clean pattern and let it hear each noise."""
+    """Train a neuron on the clean pattern and run it under each noise."""
     times = waves.pattern(seed)
     learnt = {name: params[name] for name in ("kappa", "lambdas")}
     cone = ConeX(neuron=Neuron(**waves.NEURON), **waves.LEARN, **learnt, divide_b_by="targets")
@@ -63,15 +63,15 @@ def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
         "noises": {},
     }
     for number, (noise, level) in enumerate(params["levels"].items()):
-        heard = waves.noisy(train, noise, level, np.random.default_rng([seed, 4, number]))
-        spikes = cone.neuron_.run(cone.weights_, heard)
+        disturbed = waves.noisy(train, noise, level, np.random.default_rng([seed, 4, number]))
+        spikes = cone.neuron_.run(cone.weights_, disturbed)
         told["noises"][noise] = {
-            "drawn": _drawn(heard, params, end),
+            "drawn": _drawn(disturbed, params, end),
             "spikes": spikes.round(3).tolist(),
             "distance": round(victor_purpura(spikes, train.targets, q=waves.Q), 3),
-            "count": len(heard.times),
+            "count": len(disturbed.times),
             # Spikes of a train lie 90 ms apart and keep their order.
-            "moved_sd_ms": round(float(np.std(heard.times - clean.times)), 3) if noise == "jitter" else None,
+            "moved_sd_ms": round(float(np.std(disturbed.times - clean.times)), 3) if noise == "jitter" else None,
             "of": len(clean.times),
             "stop": train.stop,
         }

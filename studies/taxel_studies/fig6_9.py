@@ -9,7 +9,7 @@ import numpy as np
 
 from taxel_studies import waves
 from taxel_studies.runner import Task
-from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.study import Parameters, Said, Statement, Study
 from taxel_studies.waves import NOISES, READINGS, realise
 
 if TYPE_CHECKING:
@@ -18,19 +18,14 @@ if TYPE_CHECKING:
 __all__ = ["STUDY"]
 
 PARAMETERS: dict[str, Any] = {
-    "realisations": 100,
+    **waves.TESTED,
     "kappas": [1.0, 1.04, 1.08, 1.16],
     "lambdas_clean": [2.0, 2.0, 200.0],
     "lambdas_noisy": [2.0, 2.0, 100.0, 100.0, 100.0],
-    "readings": ["targets", "B_max"],
-    "levels": {noise: list(levels) for noise, levels in waves.LEVELS.items()},
-    "repetitions": waves.REPETITIONS,
 }
 TOY: dict[str, Any] = {
-    "realisations": 2,
+    **waves.TESTED_TOY,
     "kappas": [1.0, 1.08],
-    "levels": {"jitter": [0, 3, 6], "background": [0, 3, 30], "shunting": [0, 3, 30]},
-    "repetitions": 5,
 }
 #: A distance a target by which two kappas count as different: one spike lost in twenty.
 SAME = 0.05
@@ -44,17 +39,12 @@ def tasks(p: Parameters) -> list[Task]:
     return waves.tasks(p, list(clean), list(noisy), "cone_x")
 
 
-def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
-    """Average the distances."""
-    return {"curves": waves.curves(p, rows)}
-
-
 def statements(p: Parameters, said: Said) -> list[Statement]:
     """Judge what 6.4.5 and 6.4.6 say, in each reading of B."""
     found = []
     for reading in p["readings"]:
         curves = said["curves"][reading]
-        why = READINGS[reading] + (", which leaves kappa nearly powerless" if reading == "B_max" else "")
+        why = waves.why(reading)
         for training, source in (("clean", "6.4.5"), ("noisy", "6.4.6")):
             trained = "noise-free training" if training == "clean" else "noisy training"
             found += [
@@ -180,7 +170,7 @@ STUDY = Study(
     sizes={"toy": TOY},
     tasks=tasks,
     realise=realise,
-    summarise=summarise,
+    summarise=waves.summarise,
     statements=statements,
     draw=draw,
 )

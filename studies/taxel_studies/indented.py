@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from taxel.encode import FA1
 from taxel.frames import Frames
-from taxel.information import FoldSums, folds, panzeri_treves, plug_in
-from taxel.information.bits import confusion_matrix
+from taxel.information import FoldSums, folds
 from taxel.simulate.fem import TABLE_5_1, Condition, Course, Indentation, KeptCourses, SamplingGrid, Table, paths
+from taxel_studies.kept_bits import information
 from taxel_studies.runner import Task
 from taxel_studies.study import Row
 
@@ -143,13 +143,7 @@ def bits_of(
     truth = np.repeat(sums.classes, samples)
     if merge is not None:
         truth = np.array([merge[k] for k in truth.tolist()])
-    counts, classes = confusion_matrix(truth, said)
-    return {
-        "bits": round(float(panzeri_treves(counts)), 4),
-        "plug_in": round(float(plug_in(counts)), 4),
-        "right": round(float(np.mean(truth == said)), 4),
-        "most": round(float(np.log2(len(classes))), 4),
-    }
+    return information(truth, said, "bits", "plug_in", "right", "most")
 
 
 def told_apart(x: NDArray[Any], folds: NDArray[np.int64]) -> NDArray[np.bool_]:

@@ -6,13 +6,40 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from taxel.information import confusion_matrix, panzeri_treves, plug_in
 from taxel_studies.study import Said, logarithmic
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["by_period_parameter_and_time", "shares"]
+__all__ = ["by_period_parameter_and_time", "information", "listed", "lost", "shares"]
+
+
+def information(truth: NDArray[Any], answers: NDArray[Any], *wanted: str) -> dict[str, float]:
+    """Return of answers ``bits`` (corrected), ``plug_in`` (as counted), ``right`` (share), ``most`` (bits)."""
+    counts, classes = confusion_matrix(truth, answers)
+    found = {
+        "bits": panzeri_treves(counts),
+        "plug_in": plug_in(counts),
+        "right": np.mean(truth == answers),
+        "most": np.log2(len(classes)),
+    }
+    return {name: round(float(found[name]), 4) for name in wanted}
+
+
+def listed(lines: Sequence[Mapping[str, Any]]) -> str:
+    """Return the bits by period, in words."""
+    return ", ".join(f"{line['bits']:.2f} at {line['period_ms']:g} ms" for line in lines)
+
+
+def lost(short: Mapping[str, Any], long: Mapping[str, Any], named: Mapping[str, str]) -> tuple[dict[str, float], str]:
+    """Return how much less can be told of each parameter at the longer of two periods, as a share, and in words."""
+    share = {name: shares((short, long), name) for name in named if name in short["by"]}
+    words = "; ".join(f"{named[name]} {a:.2f} to {b:.2f}" for name, (a, b) in share.items())
+    words += f" of what can be told, from {short['period_ms']:g} to {long['period_ms']:g} ms"
+    return {name: a - b for name, (a, b) in share.items()}, words
 
 
 def shares(lines: Sequence[Mapping[str, Any]], name: str) -> list[float]:

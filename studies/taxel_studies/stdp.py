@@ -1,4 +1,4 @@
-"""A neuron that finds a pattern which repeats, untold (Masquelier, Guyonneau and Thorpe 2008; thesis 3.6.2).
+"""A neuron that finds a pattern which repeats, without labels (Masquelier, Guyonneau and Thorpe 2008; thesis 3.6.2).
 
 Half of 2000 inputs play the same 50 ms a quarter of the time, hidden in noise of the same rate. Published: 96 of 100
 such runs end with a neuron that fires at nearly every pattern, early in it, and never else.
@@ -114,16 +114,16 @@ def tasks(p: Parameters) -> list[Task]:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Let one neuron hear a run; say how it ended, and when it was settled."""
+    """Give one neuron the spikes of a run; return what it found, and from when on it fired at the pattern alone."""
     rng = np.random.default_rng([seed, 2008])
     spikes, begin = part(params, rng)
-    stdp, heard = STDP(threshold=params["threshold"]), []
+    stdp, fired = STDP(threshold=params["threshold"]), []
     end = 1000.0 * params["seconds"]
     for k in range(params["parts"]):
         for piece in pieces(params, spikes, k * end):
             stdp.partial_fit(piece)
-            heard.append(stdp.spikes_)
-    times = np.concatenate(heard)
+            fired.append(stdp.spikes_)
+    times = np.concatenate(fired)
     section = np.searchsorted(begin, times % end, side="right") - 1
     since = times % end - begin[np.maximum(section, 0)]
     inside = (section >= 0) & (since <= params["pattern_ms"])
@@ -230,12 +230,12 @@ def draw(p: Parameters, said: Said) -> Figure:
 
 STUDY = Study(
     name="stdp",
-    title="a neuron finds a pattern that repeats in its inputs, without being told",
+    title="a neuron finds a pattern that repeats in its inputs, without labels",
     where="thesis 3.6.2, which calls for it; Masquelier, Guyonneau and Thorpe 2008, PLoS ONE 3:e1377",
     protocol="2000 inputs, Poisson at rates that wander between 0 and 90 Hz (speed within 1800 Hz/s, changed by up to "
     "360 Hz/s a ms), none silent for 50 ms. 50 ms of the first 1000 of them are played again in a quarter of the "
-    "sections of 50 ms, never twice in a row, each spike moved by 1 ms (sd). 10 Hz of noise on all. 150 s, heard three "
-    "times; judged by the last.",
+    "sections of 50 ms, never twice in a row, each spike moved by 1 ms (sd). 10 Hz of noise on all. 150 s, presented "
+    "three times; judged by the last.",
     parameters=PARAMETERS,
     sizes={
         "quick": {"runs": 4, "seconds": 50},

@@ -1,4 +1,4 @@
-"""A neuron that hears an array on which balls fall, untold (thesis 3.6.2 calls for such learning)."""
+"""A neuron that learns without labels when touches of an array begin (thesis 3.6.2 asks for such learning)."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ EDGE_MM, ASIDE_MM = 35.0, 20.0
 EVERY, NONE = 0.95, 0.1
 
 
-class Heard(NamedTuple):
-    """A play, as a neuron hears it."""
+class Play(NamedTuple):
+    """A play: the spikes that reach a neuron, and what truly happened."""
 
     spikes: SpikeTrains
     """Rises and falls of each taxel, beside each other."""
@@ -57,7 +57,7 @@ def tasks(p: Parameters) -> list[Task]:
     return [Task(shared, seed) for seed in range(p["boards"])]
 
 
-def played(p: Parameters, seed: int) -> Heard:
+def played(p: Parameters, seed: int) -> Play:
     """Drop balls on one board: often the same one on the same place, else any ball from any height on any place."""
     rng = np.random.default_rng([seed, 362])
     same = rng.random(p["touches"]) < p["same"]
@@ -70,7 +70,7 @@ def played(p: Parameters, seed: int) -> Heard:
     times = to_ms(events.t)
     spikes = SpikeTrains(times[order], offsets, 0.0, float(np.ceil(times[-1] + 1)))
     contacts = [to_ms(contact.start_us) for contact in truth(acts)[0] if contact.kind == "first"]
-    return Heard(spikes, np.array(contacts), same)
+    return Play(spikes, np.array(contacts), same)
 
 
 def _scene(rng: np.random.Generator, same: bool) -> Scene:
@@ -95,26 +95,26 @@ def _scene(rng: np.random.Generator, same: bool) -> Scene:
 
 
 def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
-    """Let a neuron hear half of the touches again and again, then the others; and another that learns nothing."""
-    heard = played(params, seed)
+    """Train a neuron on half of the touches, many times over; test it on the others, beside an untrained one."""
+    play = played(params, seed)
     # Whole, so that pieces end where the next ones begin; and between two touches.
-    half = float(np.floor(heard.contacts[params["touches"] // 2] - 20))
-    first, second = heard.spikes.between(0, half), heard.spikes.between(half, heard.spikes.stop)
+    half = float(np.floor(play.contacts[params["touches"] // 2] - 20))
+    first, second = play.spikes.between(0, half), play.spikes.between(half, play.spikes.stop)
     taus = {name: params[name] for name in ("tau_m", "tau_s", "tau_plus", "tau_minus")}
     stdp = STDP(threshold=threshold(first, params["untrained_hz"], taus), **taus)
     course: list[list[float]] = []
     for k in range(params["passes"]):
         stdp.partial_fit(moved(first, k * half))
-        late = latencies(stdp.spikes_ - k * half, heard.contacts)
-        course += [[len(heard.contacts) // 2 * k + n, round(float(t), 2)] for n, t in enumerate(late) if t < TOUCH_MS]
+        late = latencies(stdp.spikes_ - k * half, play.contacts)
+        course += [[len(play.contacts) // 2 * k + n, round(float(t), 2)] for n, t in enumerate(late) if t < TOUCH_MS]
     last = (params["passes"] - 1) * half
     stdp.partial_fit(moved(second, last))
     # As often, without learning: at another threshold.
-    hz = 1000 * len(stdp.spikes_) / (heard.spikes.stop - half)
-    deaf = unlearning(threshold(first, max(hz, params["untrained_hz"]), taus), taus).partial_fit(heard.spikes)
+    hz = 1000 * len(stdp.spikes_) / (play.spikes.stop - half)
+    untrained = unlearning(threshold(first, max(hz, params["untrained_hz"]), taus), taus).partial_fit(play.spikes)
     return {
-        "learnt": judged(stdp.spikes_ - last, heard, half),
-        "untrained": judged(deaf.spikes_[deaf.spikes_ >= half], heard, half),
+        "learnt": judged(stdp.spikes_ - last, play, half),
+        "untrained": judged(untrained.spikes_[untrained.spikes_ >= half], play, half),
         "strong": int(np.count_nonzero(stdp.weights_ > 0.5)),
         "course": course,
     }
@@ -130,16 +130,16 @@ def latencies(times: NDArray[np.float64], contacts: NDArray[np.float64]) -> NDAr
     return found
 
 
-def judged(times: NDArray[np.float64], heard: Heard, begin: float) -> dict[str, Any]:
+def judged(times: NDArray[np.float64], play: Play, begin: float) -> dict[str, Any]:
     """Return at which share of the touches from `begin` on a neuron fired, how soon, and how often beside them."""
-    there = heard.contacts >= begin
-    late = latencies(times, heard.contacts)
+    there = play.contacts >= begin
+    late = latencies(times, play.contacts)
     fired = np.isfinite(late)
-    touch = np.searchsorted(heard.contacts, times + STAMP_MS, side="right") - 1
-    beside = (touch < 0) | (times - heard.contacts[np.maximum(touch, 0)] >= TOUCH_MS)
+    touch = np.searchsorted(play.contacts, times + STAMP_MS, side="right") - 1
+    beside = (touch < 0) | (times - play.contacts[np.maximum(touch, 0)] >= TOUCH_MS)
     share = {
         name: round(float(np.mean(fired[there & which])), 4)
-        for name, which in (("same", heard.same), ("other", ~heard.same))
+        for name, which in (("same", play.same), ("other", ~play.same))
     }
     told = late[there & fired]
     return {
@@ -204,17 +204,17 @@ def draw(p: Parameters, said: Said) -> Figure:
     axes = figure.subplots()
     if said["course"]:
         axes.plot(*np.transpose(said["course"]), ".", markersize=3)
-    axes.set(xlabel="touches heard", ylabel="ms from contact to spike", ylim=(0, None))
+    axes.set(xlabel="touches presented", ylabel="ms from contact to spike", ylim=(0, None))
     return figure
 
 
 STUDY = Study(
     name="stdp_touch",
-    title="a neuron hears an array on which balls fall, untold, and comes to fire as a touch begins",
+    title="a neuron learns without labels, from an array on which balls fall, to fire as a touch begins",
     where="thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008",
     protocol="Balls fall on the emulated board: 35 % of them the same one from the same height on the same place (to "
     "2 mm and 1 mm, standard deviations), the others of any radius (25 to 35 mm), height (10 to 20 cm) and place. One "
-    "neuron hears the rises and falls of all taxels, 8192 trains, with the paper's constants: half of the touches "
+    "neuron receives the rises and falls of all taxels, 8192 trains, with the paper's constants: half of the touches "
     "four times, then the others for the first time, always learning; judged by these. Before it learns, its threshold "
     "lets it fire twice a second; a touch comes three times a second. Beside it a neuron that never learns and fires "
     "as often.",

@@ -1,4 +1,4 @@
-"""A neuron that hears a foot walk, untold, and comes to fire once a stride (thesis 3.6.2 calls for such learning)."""
+"""A neuron that learns without labels, from a foot that walks, to fire once a stride (thesis 3.6.2 asks for it)."""
 
 from __future__ import annotations
 
@@ -60,13 +60,13 @@ def _feet(data: Path, levels: Sequence[float]) -> Mapping[str, Piece]:
 
 
 def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
-    """Let a neuron hear a foot."""
+    """Train and test a neuron on one foot."""
     del seed
     return heard(_feet(data, params["levels"])[params["foot"]], params)
 
 
 def heard(foot: Piece, params: Parameters) -> dict[str, Any]:
-    """Let a neuron hear the first half of a walk again and again, then the second; and another that learns nothing."""
+    """Train a neuron on the first half of a walk, presented again and again, and test it on the second."""
     # Whole, so that pieces end where the next ones begin.
     half = float(foot.spikes.stop // 2)
     first, second = foot.spikes.between(0, half), foot.spikes.between(half, foot.spikes.stop)
@@ -185,7 +185,7 @@ def draw(p: Parameters, said: Said) -> Figure:
     left, right = figure.subplots(1, 2)
     if said["course"]:
         left.plot(*np.transpose(said["course"]), ".", markersize=2)
-    left.set(xlabel="s heard", ylabel="share of the stride", ylim=(-0.02, 1.02), title=said["shown"])
+    left.set(xlabel="s presented", ylabel="share of the stride", ylim=(-0.02, 1.02), title=said["shown"])
     for how, colour in (("untrained", "0.6"), ("learnt", "C0")):
         every = [one[how] for one in said["feet"] if one[how]["wanders_ms"] is not None]
         right.plot(
@@ -200,10 +200,10 @@ def draw(p: Parameters, said: Said) -> Figure:
 
 STUDY = Study(
     name="stdp_walk",
-    title="a neuron hears a foot walk, untold, and comes to fire once a stride",
+    title="a neuron learns without labels, from a foot that walks, to fire once a stride",
     where="thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008",
     protocol="Two minutes of walking a foot, eight force sensors (PhysioNet gaitpdb), as crossings of levels in shares "
-    "of the running range: 112 trains. One neuron a foot hears the first minute eight times, then the second for the "
+    "of the running range: 112 trains. One neuron a foot gets the first minute eight times, then the second for the "
     "first time, always learning; judged by that. Its threshold is such that before it learns it fires once in ten "
     "seconds. Time constants are longer than the paper's (50 ms for 10), as a step is longer than its pattern. Beside "
     "it a neuron that never learns, whose threshold lets it fire as often as the learnt one.",

@@ -1,4 +1,4 @@
-"""What studies of STDP share: thresholds by how often a neuron fires before it learns, and streams heard again."""
+"""What studies of STDP share: thresholds by how often a neuron fires before it learns, and streams presented again."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def moved(spikes: SpikeTrains, later_ms: float) -> SpikeTrains:
 
 
 def unlearning(level: float, taus: Mapping[str, float]) -> STDP:
-    """Return a neuron that hears and never learns."""
+    """Return a neuron that runs and never learns."""
     return STDP(threshold=level, a_plus=0.0, a_minus=0.0, **taus)
 
 

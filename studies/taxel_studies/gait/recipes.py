@@ -178,7 +178,7 @@ ENCODERS: dict[str, dict[str, list[Point]]] = {
 
 _RANGE = {"low": 28, "high": 95, "first_window": "itself"}
 
-#: What the plain rules hear.
+#: The encoders that give the plain rules their input.
 RULE_ENCODERS: dict[str, dict[str, dict[str, Any]]] = {
     "plate": dict.fromkeys(("contact", "heel_off", "foot_off"), crossing(1, 100)),
     "gaitpdb": dict.fromkeys(("contact", "foot_off"), _NEWTONS),

@@ -33,7 +33,7 @@ def grid(rule: str, levels: int, channels: int, largest: float) -> list[dict[str
     ----------
     rule : one of `RULES`
     levels, channels : int
-        Of the encoder whose spikes it hears.
+        Of the encoder whose spikes are its input.
     largest : float
         The largest value of the sum in training, for thresholds of "sum".
     """
