@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := Cargo.toml Cargo.lock $(shell find crates -not -path 'crates/taxel-bridge/*' -name '*.rs' -o -name Cargo.toml -o -path '*/web/*' -type f)
 
-.PHONY: help check setup build bridge demo test slow lint format registers bench docs dist clean
+.PHONY: help check setup build released aarch64 bridge demo test slow lint format registers bench docs dist clean
 
 help:
 	@echo "make demo   play scenes on the emulated board, find contact and lift-off, leave a report"
@@ -12,6 +12,7 @@ help:
 	@echo "make lint   format, lint, types, floors     make bench  ratios against peers, to benchmarks/results/"
 	@echo "make docs   the documentation, without warnings"
 	@echo "make bridge what carries a board to other computers: six minutes of a core, for those who have several"
+	@echo "make aarch64 the extension for ARM computers, where a cross compiler is installed; says what is missing"
 	@echo "make build  .venv and the extension, after a change in crates/     make format  formats"
 	@echo "make dist   a wheel for machines without cargo, and the source package, to dist/"
 
@@ -22,18 +23,42 @@ check:
 	@command -v cargo >/dev/null || { echo "taxel needs cargo 1.89 or later: install it from https://rustup.rs"; exit 1; }
 	@command -v cc >/dev/null || { echo "taxel needs a C compiler: on Debian, apt install build-essential"; exit 1; }
 
-$(VENV)/.installed: pyproject.toml | check
-	@echo "taxel: installing what it needs into $(VENV): over a hundred packages, minutes the first time"
+# What taxel itself needs; what tests, lint, docs, benchmarks and wheels need is installed by the target that needs it.
+# Of the studies, a distribution of their own in this repository, that is what they need beside taxel.
+wanted = $(BIN)/python -c 'import sys, tomllib; p, s = (tomllib.load(open(f, "rb"))["project"] for f in ("pyproject.toml", "studies/pyproject.toml")); extras = p["optional-dependencies"] | s["optional-dependencies"] | {"studies": s["dependencies"]}; print("\n".join(x for x in sum((extras[x] for x in sys.argv[1:]), p["dependencies"]) if not x.startswith("taxel")))'
+install = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+$(VENV)/.installed: pyproject.toml studies/pyproject.toml | check
+	@echo "taxel: installing what it needs into $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check "maturin>=1.16,<2"
-	@$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; e = p["optional-dependencies"]; print("\n".join(p["dependencies"] + sum((e[x] for x in ("test", "lint", "docs", "bench", "foxglove", "neo", "nir", "nwb", "cluster")), [])))' > $(VENV)/wanted.txt
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/wanted.txt
+	@$(wanted) > $(VENV)/wanted.txt
+	@$(install) "maturin>=1.16,<2" -r $(VENV)/wanted.txt
+	@$(install) --no-deps --editable studies
 	@touch $@
 
+# One place for each group of extras: $(VENV)/.for-test, .for-lint, .for-docs, .for-dist.
+EXTRAS_test := test studies foxglove neo nir nwb cluster bench
+EXTRAS_lint := lint
+EXTRAS_docs := docs
+EXTRAS_dist := dist
+$(VENV)/.for-%: pyproject.toml studies/pyproject.toml | $(VENV)/.installed
+	@echo "taxel: installing what make $* needs"
+	@$(wanted) $(EXTRAS_$*) > $(VENV)/wanted-$*.txt
+	@$(install) -r $(VENV)/wanted-$*.txt
+	@touch $@
+
+# Two builds of one extension, of which one is in place: incremental, so that a change in one file takes seconds, and as
+# released, which tests and benchmarks use. They share what the crates of others compiled to.
+develop = PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release --features test-hooks
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	@echo "taxel: building: minutes the first time"
-	@PIP_QUIET=1 PIP_DISABLE_PIP_VERSION_CHECK=1 VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/maturin develop --release
-	@touch $@
+	@CARGO_INCREMENTAL=1 $(develop) --config 'profile.release.package.taxel-core.codegen-units=256'
+	@rm -f $(VENV)/.released && touch $@
+
+$(VENV)/.released: $(VENV)/.installed $(SOURCES)
+	@echo "taxel: building as it is released: minutes"
+	@$(develop)
+	@rm -f $(VENV)/.built && touch $@
 
 # Outside the workspace: 260 crates for those only who have more than one computer.
 BRIDGE := --release --manifest-path crates/taxel-bridge/Cargo.toml --target-dir target/bridge
@@ -42,27 +67,42 @@ $(VENV)/.bridge: $(VENV)/.installed $(shell find crates/taxel-bridge -type f)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_bridge-*.whl
 	@touch $@
 
+# For boards like a Jetson or a Raspberry Pi: the extension for their processor, made on this machine. No test runs there.
+ARM := aarch64-unknown-linux-gnu
+aarch64:
+	@missing=; needs() { echo "make aarch64 needs $$1"; missing=1; }; \
+	command -v $${CARGO:-cargo} >/dev/null || needs "cargo 1.89 or later: install it from https://rustup.rs"; \
+	test -n "$$(ls "$$($${RUSTC:-rustc} --print target-libdir --target $(ARM) 2>/dev/null)" 2>/dev/null)" || needs "Rust's library for $(ARM): rustup target add $(ARM), or on Debian dpkg --add-architecture arm64, apt install libstd-rust-web-dev:arm64 and RUSTC=/usr/bin/rustc CARGO=/usr/bin/cargo"; \
+	if command -v aarch64-linux-gnu-gcc >/dev/null; \
+	then echo '#include <stdlib.h>' | aarch64-linux-gnu-gcc -E - >/dev/null 2>&1 || needs "the C library of $(ARM): on Debian, apt install libc6-dev-arm64-cross"; \
+	else needs "aarch64-linux-gnu-gcc: on Debian, apt install gcc-aarch64-linux-gnu libc6-dev-arm64-cross"; fi; \
+	test -z "$$missing"
+	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc PYO3_CROSS_PYTHON_VERSION=3.11 \
+		$${CARGO:-cargo} build --release --target $(ARM) -p taxel-core -p taxel-live -p taxel-python
+	@echo "taxel: built for $(ARM), not tested there: target/$(ARM)/release/lib_core.so"
+
 setup: $(VENV)/.installed
 build: $(VENV)/.built
+released: $(VENV)/.released
 bridge: $(VENV)/.bridge
 
 demo: build
 	$(BIN)/taxel demo
 
-test: build
+test: released $(VENV)/.for-test
 	cargo test --release --workspace --quiet
 	$(BIN)/python -m pytest -q -n 2 --dist loadfile -m "not slow"
 
-slow: build dist bridge
+slow: released $(VENV)/.for-test dist bridge
 	cargo test --release --workspace --quiet -- --ignored
 	cargo check --manifest-path fuzz/Cargo.toml --quiet
 	$(BIN)/python -m pytest -q -m slow
 
-lint: build
+lint: build $(VENV)/.for-test $(VENV)/.for-lint
 	cargo fmt --all --check
 	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
-	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	cargo clippy --workspace --all-targets --all-features --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
@@ -72,7 +112,7 @@ lint: build
 	$(BIN)/python -m mypy.stubtest taxel._core --allowlist tests/stubtest-allowed.txt
 	$(BIN)/python tools/page_types.py
 
-format:
+format: $(VENV)/.for-lint
 	cargo fmt --all
 	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml
 	rustfmt --edition 2024 crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs
@@ -83,30 +123,32 @@ format:
 registers: setup
 	$(BIN)/python tools/registers.py
 
-# The peers that are large, or that want an older NumPy, are installed for the benchmarks alone.
-$(VENV)/.peers: $(VENV)/.installed
-	$(BIN)/python -c 'import tomllib; print("\n".join(tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["peers"]))' > $(VENV)/peers.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/peers.txt
+# Benchmarks have an environment of their own, taxel beside its peers: these are large, and one wants an older NumPy.
+PEERS := .venv-peers
+$(PEERS)/.installed: pyproject.toml studies/pyproject.toml | $(VENV)/.installed
+	@echo "taxel: installing its peers into $(PEERS)"
+	@$(PYTHON) -m venv $(PEERS)
+	@$(wanted) bench test studies peers > $(PEERS)/wanted.txt
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -r $(PEERS)/wanted.txt
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --editable studies
 	@touch $@
 
-bench: build bridge $(VENV)/.peers
-	$(BIN)/taxel bench all
+bench: released bridge $(PEERS)/.installed
+	@$(subst $(abspath $(VENV)),$(abspath $(PEERS)),$(develop))
+	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps --force-reinstall target/bridge/wheels/taxel_bridge-*.whl
+	$(PEERS)/bin/taxel bench all
 
-docs: build
+docs: build $(VENV)/.for-docs
 	$(BIN)/sphinx-build -W --keep-going -b html docs docs/_build/html
 
 # Zig links against the glibc of 2018 (2.28), whatever this machine has; auditwheel looks whether that is so.
-$(VENV)/.dist: $(VENV)/.installed
-	$(BIN)/python -c 'import tomllib; print("\n".join(tomllib.load(open("pyproject.toml", "rb"))["project"]["optional-dependencies"]["dist"]))' > $(VENV)/dist.txt
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r $(VENV)/dist.txt
-	@touch $@
-
-dist: $(VENV)/.dist
+dist: $(VENV)/.for-dist
 	rm -rf dist
 	$(BIN)/maturin sdist --out dist
 	PATH="$(abspath $(BIN)):$$PATH" $(BIN)/maturin build --release --zig --compatibility manylinux_2_28 --out dist
-	$(BIN)/auditwheel show dist/*.whl
+	$(BIN)/auditwheel show dist/taxel-*.whl
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist ./studies
 	@ls -l dist
 
 clean:
-	rm -rf target $(VENV) docs/_build dist
+	rm -rf target $(VENV) $(PEERS) docs/_build dist

@@ -14,7 +14,7 @@ from _rounds import measure, ratio, stamp
 from taxel import Array, SpikeTrains
 from taxel.information.neighbours import distances_of
 from taxel.metrics import pairwise
-from taxel.studies.dropped import REGION, smoothed, spatial_grams
+from taxel_studies.dropped import REGION, smoothed, spatial_grams
 
 PERIOD_MS, SAMPLES, SPIKES = 1.0, 50, 740
 TAUS_MS = [round(0.1 * k, 1) for k in range(1, 21)]

@@ -16,8 +16,8 @@ from taxel import SpikeTrains
 from taxel.detect.training import learner_from
 from taxel.learn import ConeR, OnlineConeR
 from taxel.neuron import Neuron
-from taxel.studies.gait.recipes import NOTES
-from taxel.studies.gait.sources import encoded
+from taxel_studies.gait.recipes import NOTES
+from taxel_studies.gait.sources import encoded
 
 WINDOW = 200
 

@@ -26,7 +26,7 @@ import numpy as np
 from _rounds import measure, ratio, stamp
 from numpy.typing import NDArray
 
-from taxel import wire, wire_v2
+from taxel import wire
 from taxel.simulate import Board, Pictures, Scene, Silence, Version2, play
 from taxel.wire import FRAME_US, Registers
 
@@ -146,21 +146,21 @@ def run(*, quick: bool) -> dict[str, Any]:
     runs: dict[str, Callable[[], Any]] = {}
     for name in scenes:
         one, two = data[name, 1], data[name, 2]
-        runs[f"version 2, {name}"] = lambda two=two: wire_v2.decode(two.data, columns=room)
+        runs[f"version 2, {name}"] = lambda two=two: wire.decode(two.data, 2, columns=room)
         runs[f"version 1, {name}"] = lambda one=one: wire.decode(one.data, columns=room)
         runs[f"version 1 by datagrams, {name}"] = lambda one=one: wire.decode(
             one.data, lengths=one.lengths, columns=room
         )
-        runs[f"version 2, {name}, new memory"] = lambda two=two: wire_v2.decode(two.data)
+        runs[f"version 2, {name}, new memory"] = lambda two=two: wire.decode(two.data, 2)
         runs[f"version 1, {name}, new memory"] = lambda one=one: wire.decode(one.data)
         runs[f"version 1 by datagrams, {name}, new memory"] = lambda one=one: wire.decode(one.data, lengths=one.lengths)
-        assert len(wire_v2.decode(two.data)[0]) == two.events
+        assert len(wire.decode(two.data, 2)) == two.events
         assert len(wire.decode(one.data, lengths=one.lengths)) == one.events
     results = measure(runs, rounds=rounds)
     for how, result in results.items():
         result["rate"] *= data[how.split(", ")[1], int(how[8])].events
     silent = data["drop", 2].heartbeats
-    empty = measure({"heartbeats of the drop": lambda: wire_v2.decode(silent, columns=room)}, rounds=rounds)
+    empty = measure({"heartbeats of the drop": lambda: wire.decode(silent, 2, columns=room)}, rounds=rounds)
     empty["heartbeats of the drop"]["rate"] *= len(silent) // (EMPTY + 2)
     results |= empty
     ratios: dict[str, Any] = {}

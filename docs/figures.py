@@ -3,42 +3,44 @@
 python docs/figures.py            judges all statements and draws all pictures again
 python docs/figures.py REPORT     takes the numbers of a report (taxel study all --report REPORT) first, with the commit
 
-A report is taken as long as the code that ran it is the commit's: its digest is held against the checkout's.
+A report is taken as long as the code that ran it is the commit's: the digests of its sources are the checkout's. Beside
+each figure of a report its coarse result is kept, with which `taxel study NAME --confirm` holds it against later code.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from taxel.studies import STUDIES, load
-from taxel.studies.runner import code_digest
-from taxel.studies.study import drawn
+from taxel_studies import STUDIES, load
+from taxel_studies.kept import changed, keep_coarse
+from taxel_studies.study import drawn
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
 
 
-def keep(report: Path) -> None:
-    """Copy the numbers of a report; its tables are made of them again where they are shown."""
+def keep(report: Path, data: Path | None = None) -> None:
+    """Copy the numbers of a report, and run it at coarse size; its tables are made again where they are shown."""
     for name in STUDIES:
         summary = report / name / "summary.json"
         if summary.exists():
             section = json.loads(summary.read_text())
             section.pop("tables")
-            section["commit"] = commit(name, section["code"])
+            section["commit"] = commit(name, section)
             (FIGURES / f"{name}.json").write_text(json.dumps(section) + "\n")
+            keep_coarse(name, FIGURES, data=data)
 
 
-def commit(name: str, code: str) -> str:
+def commit(name: str, section: dict[str, Any]) -> str:
     """Return the commit whose code ran a study; end where that is not the one that is checked out, unchanged."""
-    study = load(name)
-    if code_digest((sys.modules[study.realise.__module__], *study.code)) != code:
+    if changed(section):
         sys.exit(f"{name}: other code than is here ran it; run it again, or check that code out")
-    if git("status", "--porcelain", "--untracked-files=no", "--", ":/python", ":/crates"):
+    if git("status", "--porcelain", "--untracked-files=no", "--", ":/python", ":/studies", ":/crates"):
         sys.exit(f"{name}: the code here is not committed; commit it first")
     return git("rev-parse", "--short", "HEAD")
 
@@ -69,6 +71,6 @@ def draw(name: str) -> list[str]:
 
 if __name__ == "__main__":
     for place in sys.argv[1:]:
-        keep(Path(place))
+        keep(Path(place), Path(os.environ["TAXEL_DATA"]) if "TAXEL_DATA" in os.environ else None)
     for found in sorted(FIGURES.glob("*.json")):
         print(*draw(found.stem))

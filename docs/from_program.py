@@ -19,7 +19,8 @@ from sphinx.application import Sphinx
 from taxel import learn
 from taxel._base.parameters import Parameters
 from taxel.cli import app as command_line
-from taxel.studies import STUDIES
+from taxel_studies import STUDIES
+from taxel_studies.kept import changed
 
 FIGURES = Path(__file__).resolve().parents[1] / "benchmarks" / "results" / "figures"
 VERDICTS = {True: "holds", False: "**does not hold**", None: "not judged"}
@@ -83,6 +84,9 @@ def study(section: dict[str, Any]) -> list[str]:
         f"*{section['where']}.* Made by ``taxel study {name}{options} --report figures`` {made};",
         f"numbers: :download:`{name}.json <{where}/{name}.json>`.",
     ]
+    parts = changed(section)
+    if parts:
+        lines += ["", f"**Stale**: made by other code than this one; changed since: {literal(', '.join(parts))}.", ""]
     for picture in section["pictures"]:
         lines += ["", f".. image:: {where}/{picture}", f"   :alt: {name}: {section['title']}", "   :width: 100%", ""]
     rows = [[s["says"], s["published"], s["ours"], VERDICTS[s["holds"]], s["why"]] for s in section["statements"]]
@@ -109,8 +113,9 @@ class Commands(FromProgram):
 
     def lines(self) -> list[str]:
         """Return a section a command."""
-        commands = typer.main.get_command(command_line).commands
-        return [line for name, one in sorted(commands.items()) for line in command(f"taxel {name}", one)]
+        group = typer.main.get_command(command_line)
+        commands = {name: group.get_command(None, name) for name in sorted(group.list_commands(None))}
+        return [line for name, one in commands.items() for line in command(f"taxel {name}", one)]
 
 
 def command(name: str, one: Any) -> list[str]:
@@ -128,12 +133,14 @@ def command(name: str, one: Any) -> list[str]:
     lines += table(["", ""], rows, "30 70") if rows else []
     if hasattr(one, "commands"):
         seen: list[list[str]] = []
-        for inner, each in one.commands.items():
+        for inner, each in ((name, each) for name, each in one.commands.items() if not each.hidden):
             options = [option for parameter in each.params for option in parameter.opts]
             if options not in seen:
                 seen.append(options)
                 alike = [
-                    other for other, its in one.commands.items() if [o for p in its.params for o in p.opts] == options
+                    other
+                    for other, its in one.commands.items()
+                    if not its.hidden and [o for p in its.params for o in p.opts] == options
                 ]
                 lines += command(f"{name} {inner}" if len(alike) == 1 else f"{name} NAME", each)
                 if len(alike) > 1:

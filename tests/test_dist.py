@@ -24,7 +24,7 @@ def the(pattern: str) -> Path:
 
 
 def test_the_wheel_is_for_any_python_from_3_11_and_any_glibc_from_2_28() -> None:
-    wheel = the("*.whl")
+    wheel = the("taxel-*.whl")
     assert re.fullmatch(r"taxel-[\d.]+-cp311-abi3-manylinux_2_28_x86_64\.whl", wheel.name)
     auditwheel = Path(sys.executable).with_name("auditwheel")
     said = subprocess.run([auditwheel, "show", str(wheel)], capture_output=True, text=True, check=True).stdout
@@ -35,7 +35,7 @@ def test_the_wheel_is_for_any_python_from_3_11_and_any_glibc_from_2_28() -> None
 
 
 def test_the_wheel_holds_all_that_is_no_python() -> None:
-    inside = zipfile.ZipFile(the("*.whl")).namelist()
+    inside = zipfile.ZipFile(the("taxel-*.whl")).namelist()
     data = [path.relative_to(ROOT / "python") for path in (ROOT / "python").rglob("*") if path.is_file()]
     wanted = {str(path) for path in data if path.suffix not in (".pyc", ".so")}
     assert wanted <= set(inside)
@@ -47,40 +47,64 @@ def test_the_source_package_holds_what_a_build_needs_and_no_more() -> None:
         inside = {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     needed = {
-        path for path in tracked if path.startswith(("crates/taxel-core/src", "crates/taxel-live/src", "python/taxel/"))
+        path
+        for path in tracked
+        if path.startswith(
+            (
+                "crates/taxel-core/src",
+                "crates/taxel-live/src",
+                "crates/taxel-panel/src",
+                "crates/taxel-panel/web",
+                "python/taxel/",
+            )
+        )
     }
     assert needed | {"Cargo.lock", "pyproject.toml", "README.md", "LICENSE"} <= inside
     assert not {name for name in inside if name.startswith((".venv", "target"))}
 
 
+class Bare:
+    """An environment that has nothing but pip, and no view of the checkout."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.bin = folder, folder / "bare" / "bin"
+        venv.create(folder / "bare", with_pip=True)
+        kept = {k: v for k, v in os.environ.items() if "proxy" in k.lower() or k.startswith(("PIP_", "SSL_"))}
+        self.environment = {"PATH": "/usr/bin:/bin", "HOME": str(folder), **kept}
+
+    def run(self, program: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run a program of this environment."""
+        command = [str(self.bin / program), *arguments]
+        given = {"env": self.environment, "cwd": self.folder, "timeout": 600}
+        return subprocess.run(command, capture_output=True, text=True, check=False, **given)  # type: ignore[call-overload,no-any-return]
+
+    def install(self, *wanted: str) -> None:
+        """Install packages."""
+        done = self.run("python", "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted)
+        assert done.returncode == 0, done.stderr
+
+
 def test_the_wheel_runs_the_demo_in_a_bare_environment(tmp_path: Path) -> None:
-    venv.create(tmp_path / "bare", with_pip=True)
-    python = tmp_path / "bare" / "bin" / "python"
-    bare = {
-        "PATH": "/usr/bin:/bin",
-        "HOME": str(tmp_path),
-        **{k: v for k, v in os.environ.items() if "proxy" in k.lower()},
-    }
-    bare |= {name: value for name, value in os.environ.items() if name.startswith(("PIP_", "SSL_"))}
-    installed = subprocess.run(
-        [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", str(the("*.whl"))],
-        capture_output=True,
-        text=True,
-        check=False,
-        env=bare,
-        cwd=tmp_path,
-    )
-    assert installed.returncode == 0, installed.stderr
-    command = [python.with_name("taxel"), "demo", "--no-clock", "--scenes", "2", "--seed", "1", "--folder", "report"]
-    ended = subprocess.run(command, capture_output=True, text=True, check=False, env=bare, cwd=tmp_path, timeout=600)
+    bare = Bare(tmp_path)
+    bare.install(str(the("taxel-*.whl")))
+    ended = bare.run("taxel", "demo", "--no-clock", "--scenes", "2", "--seed", "1", "--folder", "report")
     assert ended.returncode == 0, ended.stderr
     assert (tmp_path / "report" / "report.html").stat().st_size > 100_000
-    where = subprocess.run(
-        [python, "-c", "import taxel; print(taxel.__file__)"],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=bare,
-        cwd=tmp_path,
-    )
+    where = bare.run("python", "-c", "import taxel; print(taxel.__file__)")
     assert where.stdout.startswith(str(tmp_path))
+    program = "from taxel import _core; print(hasattr(_core, 'Live'), hasattr(_core, 'test_hook'))"
+    hooks = bare.run("python", "-c", program)
+    assert hooks.stdout == "True False\n", "what only tests call does not ship"
+    without = bare.run("taxel", "study", "fig6.1", "--size", "toy")
+    assert without.returncode == 2
+    assert without.stderr == 'taxel: taxel study is not installed: pip install "taxel[studies]"\n'
+
+
+def test_the_studies_install_beside_the_wheel(tmp_path: Path) -> None:
+    bare = Bare(tmp_path)
+    the("taxel_studies-*.whl")
+    bare.install("--find-links", str(DIST), "taxel[studies]")
+    ended = bare.run("taxel", "study", "fig6.1", "--size", "toy", "--report", "report")
+    assert ended.returncode == 0, ended.stderr
+    assert "fig6.1, size toy" in ended.stdout
+    assert (tmp_path / "report" / "index.html").exists()

@@ -25,33 +25,33 @@ from taxel import _core
     ],
 )
 def test_each_kind_of_error_has_its_class(what, kind):
-    with pytest.raises(kind, match="said by knock") as caught:
-        _core.knock(what)
+    with pytest.raises(kind, match="raised by a test hook") as caught:
+        _core.test_hook(what)
     assert type(caught.value) is kind
     assert isinstance(caught.value, taxel.Error)
 
 
 def test_a_panic_is_an_error_that_asks_for_a_report(capfd):
-    with pytest.raises(taxel.Error, match="a bug in taxel, please report it: said by knock") as caught:
-        _core.knock("panic")
+    with pytest.raises(taxel.Error, match="a bug in taxel, please report it: raised by a test hook") as caught:
+        _core.test_hook("panic")
     assert type(caught.value) is taxel.Error
     capfd.readouterr()
 
 
 def test_a_call_that_was_told_to_stop_raises_keyboard_interrupt():
     with pytest.raises(KeyboardInterrupt):
-        _core.knock("interrupted")
+        _core.test_hook("interrupted")
 
 
 def test_ctrl_c_ends_a_long_call_promptly():
-    program = "import sys; from taxel import _core; print('in', flush=True); _core.knock('wait')"
+    program = "import sys; from taxel import _core; print('in', flush=True); _core.test_hook('wait')"
     with subprocess.Popen(
         [sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as child:
         assert child.stdout.readline() == "in\n"
         time.sleep(0.3)
         child.send_signal(signal.SIGINT)
-        _, said = child.communicate(timeout=30)  # the knock alone would wait a minute
+        _, said = child.communicate(timeout=30)  # the hook alone would wait a minute
     assert "KeyboardInterrupt" in said
 
 
@@ -66,7 +66,7 @@ def test_another_thread_runs_while_a_call_waits():
     timer = threading.Timer(0.2, interrupt)
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        _core.knock("wait")
+        _core.test_hook("wait")
     timer.join()
     assert woken
 
@@ -123,7 +123,7 @@ def test_a_decoder_of_version_2_may_be_used_from_several_threads():
     for value in range(40, 60):
         ticks[:] = value
         datagrams += board.frame(ticks)
-    decoder = taxel.wire_v2.Decoder()
+    decoder = taxel.wire.Decoder(2)
 
     def push(number):
         for datagram in datagrams[number::6]:
@@ -140,7 +140,7 @@ def test_a_stream_of_version_2_may_be_used_from_several_threads():
     board = taxel.simulate.Board(taxel.wire.Registers(wire_version=2))
     sent = board.frame(np.full(4096, 40, np.uint16))
     data = b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent)
-    reader, found = taxel.wire_v2.StreamReader(), []
+    reader, found = taxel.wire.StreamReader(), []
 
     def push(_):
         for _ in range(20):
@@ -180,6 +180,81 @@ def test_a_window_may_be_used_from_several_threads():
 
     together(add)
     assert window.patterns_ == 30
+
+
+def test_columns_that_two_threads_share_are_one_clear_error():
+    """Memory that one thread fills is refused to the others: events, or `ProblemError`, and nothing else."""
+    data = bytes.fromhex("c000050304") * 1_000_000
+    columns, refused = taxel.wire.Columns(1_000_010), []
+    views = taxel.wire.Decoder().push_into(columns, data[:50])
+
+    def push(number):
+        for _ in range(10):
+            try:
+                if number % 3:
+                    taxel.wire.Decoder().push_into(columns, data)
+                else:
+                    taxel.wire.encode(views)
+            except taxel.ProblemError as error:
+                refused.append(str(error))
+
+    together(push)
+    assert refused
+    assert set(refused) == {
+        "columns: another thread is using them; give each thread Columns of its own, or copies of the events"
+    }
+
+
+def forked(work):
+    """Return what a forked child prints: what `work` raises in it; a child that hangs is killed."""
+    read, write = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            work()
+            said = "nothing was raised"
+        except BaseException as error:
+            said = f"{type(error).__name__}: {error}"
+        os.write(write, said.encode())
+        os._exit(0)
+    os.close(write)
+    timer = threading.Timer(20.0, lambda: os.kill(child, signal.SIGKILL))
+    timer.start()
+    with os.fdopen(read) as pipe:
+        said = pipe.read()
+    os.waitpid(child, 0)
+    timer.cancel()
+    return said
+
+
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+@pytest.mark.parametrize("what", ["stop", "counters", "next", "note", "zeroed", "picture"])
+def test_a_forked_child_that_uses_its_parents_live_gets_one_clear_error(what):
+    with taxel.live.Live(0, host="127.0.0.1") as live:
+        calls = {
+            "stop": live.stop,
+            "counters": lambda: live.counters,
+            "next": lambda: live.next(0.1),
+            "note": lambda: live.note("here"),
+            "zeroed": lambda: live.zeroed,
+            "picture": lambda: live.picture,
+        }
+        said = forked(calls[what])
+    assert said == (
+        f"ProblemError: live: belongs to process {os.getpid()}, whose threads a forked child has not; "
+        "begin a new one in the child"
+    )
+    assert live.stop().nothing_came
+
+
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+def test_a_forked_child_neither_writes_its_parents_recording_nor_waits_for_it(tmp_path):
+    header = {"array": taxel.Array.thesis()._geometry(), "source": "test"}
+    writer = _core.RecordingWriter(tmp_path / "one.mcap", json.dumps(header), "none", False)
+    assert forked(lambda: writer.finish("{}")).startswith("ProblemError: recording: belongs to process ")
+    writer.datagram(0, 0, bytes.fromhex("c000050304"))
+    writer.finish(json.dumps({"received": 1, "recorded": 1}))
+    assert len(taxel.open(tmp_path / "one.mcap").events) == 1
 
 
 def test_what_progress_raises_ends_a_fit_that_keeps_its_best():

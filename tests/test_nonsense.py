@@ -56,7 +56,14 @@ NONSENSE: dict[str, Any] = {
     "a set": {1, 2},
     "another array": taxel.Array(3, 5),
     "other trains": taxel.SpikeTrains.from_lists([[1.0], [2.0]]),
+    "the least float": 5e-324,
+    "a span of time": np.timedelta64(5),
+    "half of a surrogate pair": "\ud800",
+    "a masked value": np.ma.masked,
+    "an array of which one number is repeated": np.broadcast_to(np.float64(1.0), 10**9),
+    "a list that holds itself": [],
 }
+NONSENSE["a list that holds itself"].append(NONSENSE["a list that holds itself"])
 
 #: Drawn on again and again; where it is None a new one is made, which pyplot keeps.
 AXES = Figure().add_subplot()
@@ -589,7 +596,6 @@ SOUND: dict[str, Sound] = {
     "taxel.live.Source.push": method(
         taxel.live.Source(ARRAY, 100.0, to="127.0.0.1:9"), "push", frame=np.zeros((4, 4), np.int64)
     ),
-    "taxel.wire_v2.decode": plain(taxel.wire_v2.decode, data=b"", array=ARRAY, columns=taxel.wire.Columns(100)),
     "taxel.wire.described": plain(taxel.wire.described, registers=REGISTERS),
     "taxel.wire.Registers.from_words": plain(
         taxel.wire.Registers.from_words, words=list(REGISTERS.words), array=None, channels=16
@@ -600,14 +606,12 @@ SOUND: dict[str, Sound] = {
     "taxel.wire.Columns": plain(taxel.wire.Columns, rows=100),
     "taxel.wire.Command": plain(taxel.wire.Command, register=1, value=300),
     "taxel.wire.Command.from_bytes": plain(taxel.wire.Command.from_bytes, data=taxel.wire.Command(1, 300).to_bytes()),
-    "taxel.wire.Decoder": plain(taxel.wire.Decoder, array=ARRAY, pairing="direct", differences=False),
+    "taxel.wire.Decoder": plain(taxel.wire.Decoder, version=1, array=ARRAY, pairing="direct", differences=False),
     "taxel.wire.Decoder.push": fresh(taxel.wire.Decoder, "push", data=BYTES, arrived=5),
     "taxel.wire.Decoder.push_into": fresh(
         taxel.wire.Decoder, "push_into", columns=taxel.wire.Columns(100), data=BYTES, arrived=5
     ),
-    "taxel.wire_v2.Decoder": plain(taxel.wire_v2.Decoder, array=ARRAY),
-    "taxel.wire_v2.Decoder.push": fresh(taxel.wire_v2.Decoder, "push", datagram=BYTES, arrived=5),
-    "taxel.wire_v2.StreamReader.push": fresh(taxel.wire_v2.StreamReader, "push", data=BYTES),
+    "taxel.wire.StreamReader.push": fresh(taxel.wire.StreamReader, "push", data=BYTES),
     "taxel.wire.Registers": plain(taxel.wire.Registers, array=None, noise_floor=4, line_period=3.0),
     "taxel.wire.Registers.commands_to": method(REGISTERS, "commands_to", target=REGISTERS),
     "taxel.wire.Registers.preset": plain(taxel.wire.Registers.preset, name="2 kHz", array=None),
@@ -616,6 +620,7 @@ SOUND: dict[str, Sound] = {
     "taxel.wire.decode": plain(
         taxel.wire.decode,
         data=BYTES,
+        version=1,
         array=ARRAY,
         pairing="direct",
         differences=False,
@@ -1021,10 +1026,9 @@ LEFT_OUT = {
     "taxel.simulate.EmulatorReport": "a result",
     "taxel.simulate.emulate": "plays in real time; its arguments are those of play, tried there",
     "taxel.wire.Counts": "a result",
-    "taxel.wire_v2.Counts": "a result",
-    "taxel.wire_v2.Heard": "a result",
-    "taxel.wire_v2.Status": "a result",
-    "taxel.wire_v2.StreamReader": "takes nothing",
+    "taxel.wire.Received": "a result",
+    "taxel.wire.Status": "a result",
+    "taxel.wire.StreamReader": "takes nothing",
 }
 
 

@@ -20,7 +20,7 @@ PAGE = (Path(__file__).parents[1] / "docs" / "terms.md").read_text()
 NAMES, OPTIONS = PAGE.split("## Names")[1].split("## Options of the command line")
 #: What `import taxel` shows, and the rooms that are imported by their own names.
 ROOMS = [*(f"taxel.{n}" for n in taxel.__all__ if isinstance(getattr(taxel, n), ModuleType)), "taxel"]
-ROOMS += ["taxel.report", "taxel.simulate.circuit", "taxel.simulate.fem", "taxel.studies"]
+ROOMS += ["taxel.report", "taxel.simulate.circuit", "taxel.simulate.fem", "taxel_studies"]
 
 
 def first_cells(part: str) -> set[str]:
@@ -41,7 +41,8 @@ def registered() -> set[str]:
 
 def options(command: Any) -> set[str]:
     """Return the long options of a command and of those below it."""
-    below = getattr(command, "commands", {}).values()
+    names = command.list_commands(None) if hasattr(command, "list_commands") else []
+    below = [command.get_command(None, name) for name in names]
     own = {said for p in command.params for said in (*p.opts, *p.secondary_opts) if said.startswith("--")}
     return own.union(*(options(one) for one in below)) - {"--help"}
 

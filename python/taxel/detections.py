@@ -7,16 +7,18 @@ import io
 import os
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, overload
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import fields, nth, shown, window
+from taxel._base.arguments import bare, column, fields, nth, shown, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept, own
+from taxel._base.drawing import draw
 from taxel._base.files import write_whole
+from taxel._base.header_table import HeaderTable, text_of
 from taxel._core import FormatError, ProblemError
 
 if TYPE_CHECKING:
@@ -102,8 +104,39 @@ class Detections(Columns):
         said: ArrayLike | None = None,
         repaired: ArrayLike | None = None,
     ) -> None:
+        if slope is not None:
+            slopes = column("slope", slope, np.float64)
+            if not np.isfinite(slopes).all():
+                k = int(np.flatnonzero(~np.isfinite(slopes))[0])
+                raise ProblemError(f"slope[{k}] is {slopes[k]}: must be finite; leave slope out where it is not known")
+        self._hold(label, t, known, slope, said, repaired)
+
+    @classmethod
+    def _of(
+        cls,
+        label: ArrayLike,
+        t: ArrayLike,
+        known: ArrayLike,
+        slope: ArrayLike | None = None,
+        said: ArrayLike | None = None,
+        repaired: ArrayLike | None = None,
+    ) -> Self:
+        """Build from columns whose slope may be NaN, where a detection has none."""
+        found = cls.__new__(cls)
+        found._hold(label, t, known, slope, said, repaired)
+        return found
+
+    def _hold(
+        self,
+        label: ArrayLike,
+        t: ArrayLike,
+        known: ArrayLike,
+        slope: ArrayLike | None,
+        said: ArrayLike | None,
+        repaired: ArrayLike | None,
+    ) -> None:
         try:
-            labels = np.asarray(label)
+            labels = np.asarray(bare("label", label))
             labels = labels.astype(np.str_) if labels.size == 0 else labels
         except (TypeError, ValueError) as error:
             raise ProblemError(f"label: {error}") from None
@@ -152,7 +185,7 @@ class Detections(Columns):
             raise ProblemError(f"detections: {shown(chosen)} has {places.ndim} dimensions, must have one")
         said = None if self.said is None else self.said[places]
         label, t, known, slope = self.label[places], self.t[places], self.known[places], self.slope[places]
-        return Detections(label, t, known, slope, said, self.repaired[places])
+        return Detections._of(label, t, known, slope, said, self.repaired[places])
 
     def between(self, start: float, stop: float) -> Detections:
         """Return the detections of ``start <= t < stop`` (us)."""
@@ -173,7 +206,7 @@ class Detections(Columns):
         order = np.argsort(np.concatenate([self.t, other.t]), kind="stable")
         names = ["label", "t", "known", "slope", "repaired"] + ([] if self.said is None else ["said"])
         columns = {name: np.concatenate([getattr(self, name), getattr(other, name)])[order] for name in names}
-        return Detections(**columns)
+        return Detections._of(**columns)
 
     def to_pandas(self) -> Any:
         """Return a table ``label t_us known_us slope_mv_per_ms``; ``said_us`` where known, ``repaired`` where any is.
@@ -215,7 +248,7 @@ class Detections(Columns):
         """
         names = fields(records, ("label", "t", "known", "slope"))
         said, repaired = (records[name] if name in names else None for name in ("said", _REPAIRED))
-        return cls(records["label"], records["t"], records["known"], records["slope"], said, repaired)
+        return cls._of(records["label"], records["t"], records["known"], records["slope"], said, repaired)
 
     def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write a table ``label,t_us,known_us,slope_mv_per_ms[,said_us][,repaired]`` and return its path.
@@ -248,29 +281,22 @@ class Detections(Columns):
         FormatError : another header, or a value that makes no sense (names the line)
         FileNotFoundError : no such file
         """
+        place = Path(checked_path("path", path))
+        table = HeaderTable.read(place, text_of(place))
+        more: dict[str, list[int]] = {name: [] for name in (_SAID, _REPAIRED) if name in table.header}
+        if table.header != (*_CSV, *more):
+            raise FormatError(f"{place}, line 1: {','.join(table.header) or 'nothing'}; must be {','.join(_CSV)}")
         rows: list[tuple[str, int, int, float]] = []
-        more: dict[str, list[int]] = {}
-        try:
-            with open(checked_path("path", path), newline="", encoding="utf-8") as file:
-                table = csv.reader(file)
-                header = tuple(next(table, ()))
-                more = {name: [] for name in (_SAID, _REPAIRED) if name in header}
-                if header != (*_CSV, *more):
-                    raise FormatError(f"{path}, line 1: {','.join(header) or 'nothing'}; must be {','.join(_CSV)}")
-                for row in table:
-                    if len(row) != len(header):
-                        raise FormatError(f"{path}, line {table.line_num}: {len(row)} values; must be {len(header)}")
-                    try:
-                        rows.append((row[0], int(row[1]), int(row[2]), float(row[3])))
-                        for name, value in zip(more, row[4:], strict=True):
-                            more[name].append(int(value))
-                    except ValueError as error:
-                        raise FormatError(f"{path}, line {table.line_num}: {error}") from None
-        except (UnicodeDecodeError, csv.Error) as error:
-            raise FormatError(f"{path}: not a table of text: {error}") from None
+        for line, row in table.rows:
+            try:
+                rows.append((row[0], int(row[1]), int(row[2]), float(row[3])))
+                for name, value in zip(more, row[4:], strict=True):
+                    more[name].append(int(value))
+            except ValueError as error:
+                raise FormatError(f"{place}, line {line}: {error}") from None
         label, t, known, slope = zip(*rows, strict=True) if rows else ((), (), (), ())
         repaired = [value != 0 for value in more[_REPAIRED]] if _REPAIRED in more else None
-        return cls(label, t, known, slope, more.get(_SAID), repaired)
+        return cls._of(label, t, known, slope, more.get(_SAID), repaired)
 
     def to_neo(self) -> Any:
         """Return a ``neo.Event`` at `t`, with the label of each, and `known` (us) and `slope` as array annotations.
@@ -300,18 +326,14 @@ class Detections(Columns):
         if notes is None or "known" not in notes:
             raise ProblemError(f"events is {shown(events)}: must be a neo.Event with the array annotation known (us)")
         t = np.rint(events.rescale("us").magnitude).astype(np.int64)
-        return cls(events.labels, t, notes["known"], notes.get("slope"), notes.get("said"), notes.get(_REPAIRED))
+        return cls._of(events.labels, t, notes["known"], notes.get("slope"), notes.get("said"), notes.get(_REPAIRED))
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw each label's detections as marks over time (s)."""
-        from taxel.plot import detections  # noqa: PLC0415  matplotlib loads slowly
-
-        return detections(self, ax)
+        return draw("detections", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def _parts(
         self,
@@ -322,7 +344,7 @@ class Detections(Columns):
     def _from_parts(cls, parts: tuple[Any, ...]) -> Detections:
         label, *columns = parts
         t, known, slope, repaired = map(frozen, columns)
-        return cls(label, t, known, slope, repaired=repaired)
+        return cls._of(label, t, known, slope, repaired=repaired)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, Detections):

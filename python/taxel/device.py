@@ -31,13 +31,13 @@ T = TypeVar("T")
 _AGAIN_S = 0.05
 #: Start and stop of a recording: REG7[16] (Table 5.5).
 _RECORD = 1 << 16
-#: Lines that are kept for `Cable.said`.
+#: Lines that are stored for `Cable.said`.
 _KEPT = 256
 
 #: Where the noise floor stands: REG5[15:8] (Table 5.5).
 _FLOOR_REGISTER, _FLOOR_MASK = 5, 0xFF00
 
-#: What a board says at its reset, and where it is asked what it is.
+#: The line that a board sends at its reset, and when it is asked for it.
 _GREETING = re.compile(r"taxel-board v(\d) (\d+)x(\d+) (\d+)ch")
 
 _SPEEDS = {
@@ -52,7 +52,7 @@ _SPEEDS = {
 
 @dataclass(frozen=True)
 class Port:
-    """Name a serial port that the system knows.
+    """Name a serial port of the system.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class Port:
         As "/dev/ttyUSB0": what `Cable` and `Device` take.
     kind : {"usb", "pci", "bluetooth", "other"}
     product, maker, serial : str or None
-        What a USB device says of itself.
+        The description of a USB device.
     usb : (int, int) or None
         Vendor and product numbers of a USB device.
     """
@@ -74,7 +74,7 @@ class Port:
 
 
 def ports() -> list[Port]:
-    """Return the serial ports that the system knows, USB devices first.
+    """Return the serial ports of the system, USB devices first.
 
     Pseudo-terminals, as `taxel emulate --line` makes, are not among them: give their name.
 
@@ -88,7 +88,7 @@ def ports() -> list[Port]:
 
 @dataclass(frozen=True)
 class Greeting:
-    """Say what a board says of itself.
+    """Hold the line in which a board describes itself.
 
     Parameters
     ----------
@@ -121,9 +121,9 @@ class Cable:
     Attributes
     ----------
     faults : dict
-        How often each fault has come, as far as it was heard.
+        How often each fault has come, as far as its line was received.
     resets : int
-        How often the board greeted without being asked, as far as it was heard: at a reset, and where one connects.
+        How often the board greeted without being asked, as far as its line was received: at a reset, and on connecting.
 
     Raises
     ------
@@ -160,7 +160,7 @@ class Cable:
                 settings = termios.tcgetattr(self._file)
                 settings[4] = settings[5] = _SPEEDS[baud]
                 termios.tcsetattr(self._file, termios.TCSANOW, settings)
-                # What was said before is no answer to what is asked now.
+                # Lines that came before are no answer to this request.
                 termios.tcflush(self._file, termios.TCIFLUSH)
             except termios.error as error:
                 self.close()
@@ -175,7 +175,7 @@ class Cable:
         os.set_blocking(self._file, False)
 
     def command(self, command: Command) -> int:
-        """Write a register and return what the board says that it holds; the board's other lines are passed over.
+        """Write a register and return the value that the board reports; the board's other lines are skipped.
 
         Raises
         ------
@@ -194,7 +194,7 @@ class Cable:
         raise self._silence()
 
     def greeting(self) -> Greeting:
-        """Ask the board what it is (a write of 8 to REG6), as what it says at reset may not have been heard.
+        """Ask the board what it is (a write of 8 to REG6), as its line at reset may not have been received.
 
         Raises
         ------
@@ -209,7 +209,7 @@ class Cable:
         raise self._silence()
 
     def listen(self) -> dict[str, int]:
-        """Take what the board has said meanwhile, and return how often each fault has come so far ("queue": 3).
+        """Read the lines that have come meanwhile, and return how often each fault has come so far ("queue": 3).
 
         Raises
         ------
@@ -298,7 +298,7 @@ class Cable:
         return f"Cable({self.place})"
 
     def _answers(self, command: Command) -> Iterator[str]:
-        """Send a command; yield what the board says then."""
+        """Send a command; yield the lines that the board sends then."""
         self._require()
         os.write(self._file, command.to_bytes())
         return self._lines(self.timeout)
@@ -311,7 +311,7 @@ class Cable:
         return DeviceError(f"{self.place}: no answer within {self.timeout:g} s: is this the board's serial line?")
 
     def _lines(self, seconds: float) -> Iterator[str]:
-        """Yield what the board says, line by line, until it has been silent for too long; note faults on the way."""
+        """Yield the board's lines until none has come for too long; record faults among them."""
         self._require()
         until = time.monotonic() + seconds
         while True:
@@ -346,7 +346,7 @@ class Device:
     place : str
         A serial device (`ports` finds them), or host:port.
     array : Array, optional
-        The sensor; of the size that the board says where it is left out.
+        The sensor; of the size that the board reports where it is left out.
     baud : int
     timeout : float, s
         How long the board may take to answer.
@@ -444,7 +444,7 @@ class Device:
 
     @property
     def faults(self) -> dict[str, int]:
-        """How often each fault has come since the board was found, as it says so: "queue", "comparator", "command"."""
+        """How often each fault has come since the board was found, by its lines: "queue", "comparator", "command"."""
         return self._try(self.cable.listen)
 
     def close(self) -> None:

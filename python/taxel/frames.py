@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from taxel import _core
 from taxel._base.arguments import instance, number, shown, text, whole, window
 from taxel._base.columns import Columns, frozen, kept, kept_numbers
+from taxel._base.drawing import draw
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.events import Events
@@ -209,7 +211,10 @@ class Frames(Columns):
         return centre
 
     def _loaded(self, above: float) -> NDArray[np.bool_]:
-        return np.asarray(self.values > np.float64(number("above", above)))
+        threshold = number("above", above)
+        if math.isnan(threshold):
+            raise ProblemError("above is NaN: must be a number that values can be compared with")
+        return np.asarray(self.values > np.float64(threshold))
 
     def to_pandas(self) -> Any:
         """Return a table with a row a picture: its time ``t_us`` as the index, and a column a taxel, ``(row, column)``.
@@ -230,14 +235,10 @@ class Frames(Columns):
 
     def plot(self, at: int | None = None, ax: Axes | None = None) -> Axes:
         """Draw the pressure map at `at` us, or of the picture with the largest sum."""
-        from taxel.plot import pressure_map  # noqa: PLC0415  matplotlib loads slowly
-
-        return pressure_map(self, at, ax)
+        return draw("pressure_map", self, at, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def _parts(self) -> _core._Frames:
         """Return what the compiled part reads in place."""

@@ -34,7 +34,7 @@ class Tare:
     ----------
     array : Array
     rest : float64, shape (rows, columns), in the sensor's unit
-        NaN where a taxel was never heard of.
+        NaN for a taxel without any event.
     start_us, stop_us : int, us
         The stretch.
     note : str
@@ -58,7 +58,7 @@ class Tare:
     _text: str
 
     def __init__(self) -> None:
-        raise ProblemError("a tare is taken (Tare.take) or loaded (Tare.load), not built")
+        raise ProblemError("a tare is measured (Tare.take) or loaded (Tare.load), not built")
 
     @classmethod
     def take(
@@ -78,7 +78,7 @@ class Tare:
 
         Raises
         ------
-        ProblemError : events without intensities, or a stretch in which nothing was heard
+        ProblemError : events without intensities, or a stretch without an event
         """
         note = checked_text("note", note)
         window = (
@@ -90,10 +90,10 @@ class Tare:
             return cls.from_json(_core.tare_of_events(x._parts(), *window, note))
         if isinstance(x, Frames):
             return cls.from_json(_core.tare_of_frames(x._parts(), *window, note))
-        raise ProblemError(f"{type(x).__name__}: a tare is taken from taxel.Events or taxel.Frames")
+        raise ProblemError(f"{type(x).__name__}: a tare is measured from taxel.Events or taxel.Frames")
 
     def off(self, frames: Frames) -> Frames:
-        """Return pictures with each taxel's rest taken off: 0 where it reads less, or where its rest is not known.
+        """Return pictures with each taxel's rest subtracted: 0 where it reads less, or where its rest is not known.
 
         Raises
         ------
@@ -162,6 +162,6 @@ class Tare:
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        heard = int(np.count_nonzero(~np.isnan(self.rest)))
+        known = int(np.count_nonzero(~np.isnan(self.rest)))
         note = f", {self.note}" if self.note else ""
-        return f"Tare({heard} of {self.array.taxels} taxels, {self.start_us} to {self.stop_us} us{note})"
+        return f"Tare({known} of {self.array.taxels} taxels, {self.start_us} to {self.stop_us} us{note})"

@@ -73,15 +73,15 @@ EVENTS = Events([0, 500], [0, 0], [0, 0], [1, 1], array=Array(1, 1), intensity=[
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda: Tare.take(5), "int: a tare is taken from"),
+        (lambda: Tare.take(5), "int: a tare is measured from"),
         (lambda: Tare.take(EVENTS, start_us=1.5), "start_us is 1.5"),
         (lambda: Tare.take(EVENTS, stop_us=True), "stop_us is True"),
         (lambda: Tare.take(EVENTS, start_us=900, stop_us=900), "start must lie before stop"),
-        (lambda: Tare.take(EVENTS, stop_us=-5), "nothing was heard"),
+        (lambda: Tare.take(EVENTS, stop_us=-5), "no event came"),
         (lambda: Tare.take(EVENTS, note=3), "note is 3"),
         (lambda: Tare.take(Events([0], [0], [0], [1], array=Array(1, 1))), "without intensities"),
         (lambda: Tare.take(Frames(np.full((2, 1, 1), np.nan), [0, 1])), "values must be finite"),
-        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must lie before stop|nothing was heard"),
+        (lambda: Tare.take(Frames(np.ones((1, 1, 1)), [0])), "start must lie before stop|no event came"),
         (Tare, "is taken"),
         (lambda: Tare.from_json(5), "must be JSON text"),
         (lambda: Tare.from_json("[1"), "tare: "),

@@ -66,7 +66,7 @@ def test_lanes_give_the_bits_of_one_pair_after_the_other(vectors, q):
         wide = [_core.pairwise(metric, a, other, 1, vectors, None) for other in (None, b)]
     except ProblemError as error:
         pytest.skip(str(error))
-    plain = [_core.pairwise(metric, a, other, 1, "none", None) for other in (None, b)]
+    plain = [_core.pairwise(metric, a, other, 1, "plain", None) for other in (None, b)]
     assert np.array_equal(wide[0], plain[0])
     assert np.array_equal(wide[1], plain[1])
     assert wide[0].reshape(79, 79)[0, 5] == taxel.metrics.victor_purpura(trains[0], trains[5], q=q)

@@ -253,7 +253,7 @@ def test_taxels_whose_rest_is_not_known_or_that_are_not_there_bear_nothing():
         (lambda: Calibration.fit([Load(frames(1.0), -1.0)]), "load 1 is -1.0: must be above 0"),
         (lambda: Calibration.fit([Load(frames(1.0), 1.0, "kg")]), "unit is 'kg': must be one of 'N', 'kPa'"),
         (lambda: Calibration.fit([Load(frames(1.0), 1.0, "N", (9, 0))]), "x reaches from 9 to 9"),
-        (lambda: Calibration.fit([Load(frames(1.0), 1.0)], each=True), "each: no load says what a single taxel bears"),
+        (lambda: Calibration.fit([Load(frames(1.0), 1.0)], each=True), "each: no load determines a single taxel"),
         (
             lambda: Calibration.fit([Load(frames(1.0), 1.0), Load(frames(1.0, "ticks"), 1.0)]),
             "pictures of load 2: in ticks; the calibration takes counts",

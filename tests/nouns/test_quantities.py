@@ -193,9 +193,7 @@ def test_whole_us_stay_whole_through_seconds(us: list[int]) -> None:
 
 
 def test_what_holds_no_quantity_comes_back_as_it_is() -> None:
-    endless: list[Any] = []
-    endless.append(endless)
-    for value in (None, 5, "s", [], [[1.0], (2, [3])], np.arange(3), {"a": 1}, endless, np.array([None, "a"], object)):
+    for value in (None, 5, "s", [], [[1.0], (2, [3])], np.arange(3), {"a": 1}, np.array([None, "a"], object)):
         assert bare("a", value, "ms") is value
 
 
@@ -205,3 +203,10 @@ def test_a_row_of_trains_keeps_what_from_lists_promises() -> None:
         SpikeTrains.from_lists([[1.0] * MS, [1.0] * V])
     lists = [np.array([1.0, 2.0]) * MS, [], [0.003 * S]]
     assert list(map(list, SpikeTrains.from_lists(lists))) == [[1.0, 2.0], [], [3.0]]
+
+
+def test_a_list_that_holds_itself_is_refused() -> None:
+    endless: list[Any] = []
+    endless.append(endless)
+    with pytest.raises(ProblemError, match="must be nested less than 65 times"):
+        bare("a", endless, "ms")

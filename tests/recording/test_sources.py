@@ -421,7 +421,7 @@ def test_version_2_begun_in_mid_stream_says_what_the_whole_says(tmp_path: Path, 
     """With what the taxels held its events are the whole's; without, differences have no value until one is told."""
     draw, ticks = np.random.default_rng(3), np.full(16, 40)
     registers = taxel.wire.Registers(array=SMALL, wire_version=2)
-    board, whole = Board(registers, SMALL, intensity=intensity), taxel.wire_v2.Decoder(array=SMALL)
+    board, whole = Board(registers, SMALL, intensity=intensity), taxel.wire.Decoder(2, array=SMALL)
     heard, at = [], 40
     writer = _core.RecordingWriter(tmp_path / "mid.mcap", json.dumps({"array": SMALL._geometry()}), "none", True)
     for k in range(100):
@@ -432,7 +432,7 @@ def test_version_2_begun_in_mid_stream_says_what_the_whole_says(tmp_path: Path, 
                 if knows:
                     writer.held(1_700_000_000_000_000_000, None, held)
                 at = -1
-            events = whole.push(datagram).events
+            events = whole.push(datagram)
             if at < 0:
                 heard.append(events)
                 writer.datagram(1_700_000_000_000_000_000 + 192_000 * k, k, datagram)

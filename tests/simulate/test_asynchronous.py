@@ -17,11 +17,10 @@ from taxel.wire import Registers
 def heard(board: Board, frames: np.ndarray) -> taxel.Events:
     """What a host decodes of frames."""
     sent = [datagram for picture in frames for datagram in board.frame(picture)]
-    events, counts, skipped = taxel.wire_v2.decode(
-        b"".join(len(d).to_bytes(2, "little") + d for d in sent), array=board.array
-    )
-    assert (counts.intact, counts.missing, skipped) == (len(sent), 0, 0)
-    return events
+    decoder = taxel.wire.Decoder(2, array=board.array)
+    pieces = [decoder.push(datagram) for datagram in sent]
+    assert (decoder.counts.intact, decoder.counts.missing) == (len(sent), 0)
+    return sum(pieces[1:], pieces[0])
 
 
 def cut(frames: np.ndarray, registers: Registers, columns: int) -> list[tuple[float, int, int, bool, int]]:
@@ -64,7 +63,7 @@ def test_each_step_is_told_when_a_straight_line_reaches_it(seed):
 def test_what_a_host_holds_is_within_the_floor_and_steps_are_no_larger():
     random, array = np.random.default_rng(1), taxel.Array(3, 3)
     registers = Registers(array=array, wire_version=2, noise_floor=4)
-    board, decoder = Board(registers, array, asynchronous=True), taxel.wire_v2.Decoder(array=array)
+    board, decoder = Board(registers, array, asynchronous=True), taxel.wire.Decoder(2, array=array)
     walk = random.integers(0, 151, (200, 9)).astype(np.uint16)
     for picture in [*walk, walk[-1], walk[-1]]:
         for datagram in board.frame(picture):
@@ -138,7 +137,7 @@ def test_a_board_alone_and_in_a_play_read_through_the_circuit():
     ideal = Circuit(readout=VirtualGround().ideal(), converter=plain)
     values = {}
     for name, circuit in (("none", None), ("ideal", ideal), ("shared", Circuit(readout=lines, converter=plain))):
-        decoder, board = taxel.wire_v2.Decoder(), Board(Registers(wire_version=2), circuit=circuit)
+        decoder, board = taxel.wire.Decoder(2), Board(Registers(wire_version=2), circuit=circuit)
         for datagram in [d for _ in range(2) for d in board.frame(pressed)]:
             decoder.push(datagram)
         values[name] = decoder.held

@@ -181,8 +181,8 @@ def test_a_recording_is_played_again_as_it_was(listener):
     first = play([Silence(60.0)], seed=4, tare_ms=20.0).events
     heard = Heard(listener)
     emulate(heard.to, Replay(first, speed=2.0), registers=Registers(noise_floor=0, wire_version=2))
-    decoder = taxel.wire_v2.Decoder()
-    pieces = [decoder.push(datagram).events for datagram in heard.all()]
+    decoder = taxel.wire.Decoder(2)
+    pieces = [decoder.push(datagram) for datagram in heard.all()]
     again = sum(pieces[1:], pieces[0])
     again = again if again.repaired is None else again[~again.repaired]
     # Of several events of a taxel within a frame the last is played, and one that changes nothing is none.
@@ -239,10 +239,10 @@ def test_another_sensors_frames_come_through_a_pipe(listener, tmp_path):
         threading.Thread(target=lambda: (sink.write(frames.tobytes()), sink.close())).start()
         report = emulate(heard.to, pipe, version_2=Version2(states_us=0))
     assert report.frames == 30
-    decoder = taxel.wire_v2.Decoder(array=pipe.array)
+    decoder = taxel.wire.Decoder(2, array=pipe.array)
     shown = []
     for datagram in heard.all():
-        events = decoder.push(datagram).events
+        events = decoder.push(datagram)
         shown += list(events)
     times = sorted({e.t for e in shown})
     assert np.allclose(np.diff(times), 10_000, atol=2)
@@ -312,7 +312,7 @@ def test_a_network_with_faults_is_noticed_by_the_host(listener):
     heard = Heard(listener)
     faults = Faults(lost=0.1, repeated=0.1, reordered=0.1, cut=0.1, corrupted=0.1, seed=5)
     report = emulate(heard.to, [Silence(60.0)], seed=4, tare_ms=50.0, wire=2, faults=faults)
-    decoder = taxel.wire_v2.Decoder()
+    decoder = taxel.wire.Decoder(2)
     for datagram in heard.all():
         decoder.push(datagram)
     network, counts = report.network, decoder.counts
@@ -336,7 +336,7 @@ def test_resets_and_a_drifting_clock(listener):
     sessions = [int.from_bytes(d[14:16], "little") for d in heard.all()]
     assert sorted(set(sessions)) == [90, 91, 92]
     assert {int.from_bytes(d[2:4], "little") for d in heard.datagrams} == {7}
-    decoder = taxel.wire_v2.Decoder()
+    decoder = taxel.wire.Decoder(2)
     for datagram in heard.datagrams:
         decoder.push(datagram)
     assert decoder.counts.resets == 2
@@ -348,7 +348,7 @@ def test_taxels_have_flaws_by_their_own_seeds(listener):
     still = taxel.Frames(np.full((3, 64, 64), 100.0), [0, 1000, 2000], unit="ticks")
     flaws = Flaws(dead=0.1, stuck=0.05, seeds={"dead": 3, "stuck": 4})
     emulate(heard.to, Replay(still), wire=2, flaws=flaws)
-    decoder = taxel.wire_v2.Decoder()
+    decoder = taxel.wire.Decoder(2)
     for datagram in heard.all():
         decoder.push(datagram)
     held = decoder.held
@@ -374,7 +374,7 @@ def test_taxels_that_share_a_switch_pull_each_other_down(listener, switch_ohm):
     assert wanted == 140 if switch_ohm == 0 else wanted < 135
     lines = VirtualGround(gain=None, switch_ohm=switch_ohm)
     emulate(heard.to, Replay(still), wire=2, circuit=Circuit(readout=lines, converter=plain))
-    decoder = taxel.wire_v2.Decoder()
+    decoder = taxel.wire.Decoder(2)
     for datagram in heard.all():
         decoder.push(datagram)
     assert (decoder.held[:, 5] == wanted).all()
@@ -405,8 +405,8 @@ def test_a_source_of_frames_is_heard_as_a_board_is(tmp_path):
         summary = live.stop()
     assert summary.verdict == "nothing lost"
     board = Board(source.registers, array)
-    expected = taxel.wire_v2.Decoder(array=array)
-    straight = [expected.push(d).events for frame in frames for d in board.frame(frame.astype(np.uint16))]
+    expected = taxel.wire.Decoder(2, array=array)
+    straight = [expected.push(d) for frame in frames for d in board.frame(frame.astype(np.uint16))]
     assert taxel.open(path).events == sum(straight[1:], straight[0])
     for wrong in (np.full((4, 6), -1), np.full((4, 6), 70_000), np.zeros(23)):
         with pytest.raises(ProblemError):

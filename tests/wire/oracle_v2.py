@@ -58,8 +58,8 @@ def markers(*given):
 
 
 NAMES = (
-    "datagrams intact repeated short foreign checksum missing unknown_kind unknown_flags malformed events repaired "
-    "states outside markers dropped resets unknown_value"
+    "datagrams intact repeated short long foreign checksum missing unknown_kind unknown_flags malformed events "
+    "repaired states stale outside markers unknown_marker dropped resets unknown_value"
 )
 
 
@@ -71,6 +71,7 @@ class Reader:
         self.counts = dict.fromkeys(NAMES.split(), 0)
         self.events, self.markers = [], []
         self.board, self.seen, self.offset, self.latest = None, {}, {}, 0
+        self.sessions = []
         self.held, self.held_at, self.whole = {}, {}, False
 
     def refused(self, data):
@@ -78,6 +79,8 @@ class Reader:
             return "foreign"
         if len(data) < 24:
             return "short"
+        if len(data) > 1400:
+            return "long"
         if crc32c(data[:-4]) != int.from_bytes(data[-4:], "little"):
             return "checksum"
         number = int.from_bytes(data[2:4], "little")
@@ -93,9 +96,10 @@ class Reader:
         sequence, base = int.from_bytes(data[4:8], "little"), int.from_bytes(data[8:14], "little")
         session, span = (int.from_bytes(data[a:b], "little") for a, b in ((14, 16), (-6, -4)))
         stride, line, flags = data[16] % 32, data[16] // 32 + 8 * (data[17] // 16), data[17] % 16
-        if session not in self.seen:
-            self.offset[session] = self.latest - base if self.seen else 0
-            self.counts["resets"] += bool(self.seen)
+        if session not in self.sessions:
+            self.offset[session] = self.latest - base if self.sessions else 0
+            self.counts["resets"] += bool(self.sessions)
+            self.sessions = [*self.sessions[-3:], session]
             # From the board's reset on a taxel holds 0; who joins later has to be told.
             self.held, self.held_at, self.whole = {}, {}, sequence == 0
             self.seen[session] = set()
@@ -108,40 +112,66 @@ class Reader:
         self.counts["unknown_flags"] += flags > 7
         base += self.offset[session]
         self.latest = max(self.latest, base)
-        self.body(data[1] & 15, data[18:-6], base, stride, line, flags)
-        self.latest = max(self.latest, base + span if span else 0)
+        late = session != self.sessions[-1]
+        since = self.held, self.held_at, self.whole
+        if late:
+            self.held, self.held_at, self.whole = {}, {}, False
+        self.body(data[1] & 15, data[18:-6], base, stride, line, flags, late)
+        if late:
+            self.held, self.held_at, self.whole = since
+        self.latest = max(self.latest, base + span if span else base)
 
-    def body(self, kind, body, base, stride, line, flags):
+    def body(self, kind, body, base, stride, line, flags, late):
         if kind == 3:
-            for k in range(0, len(body), 8):
-                late, code, _ = struct.unpack("<IHH", body[k : k + 8])
-                if code in (1, 2):
-                    self.markers.append((base + late, code == 1))
-        elif kind in LAYOUT:
-            size, s, v = LAYOUT[kind]
-            self.counts["malformed"] += len(body) % size > 0
-            given = iter(int.from_bytes(body[k : k + size], "little") for k in range(0, len(body) - size + 1, size))
-            t, position = base, (line << stride) - 1
-            for bits in given:
-                p, skip, value = bits >> (s + v), bits >> v & (2**s - 1), bits & (2**v - 1)
-                if skip < 2**s - 1:
-                    position += skip + 1
-                    self.event(kind, t, position >> stride, position & (2**stride - 1), p, value, flags)
-                elif p:
-                    t, position = base + next(given), -1
-                else:
-                    position += (value + 1) << (s - 1)
-        elif kind != 4:
+            self.marked(body, base)
+        elif kind == 4:
+            self.counts["malformed"] += len(body) < 40
+        elif kind not in LAYOUT:
             self.counts["unknown_kind"] += 1
+        else:
+            self.words(kind, body, base, stride, line, flags, late)
 
-    def event(self, kind, t, x, y, p, value, flags):
+    def marked(self, body, base):
+        self.counts["malformed"] += len(body) % 8 > 0
+        for k in range(0, len(body) - 7, 8):
+            offset, code, _ = struct.unpack("<IHH", body[k : k + 8])
+            if code in (1, 2):
+                self.markers.append((base + offset, code == 1))
+                self.latest = max(self.latest, base + offset)
+            else:
+                self.counts["unknown_marker"] += 1
+
+    def words(self, kind, body, base, stride, line, flags, late):
+        size, s, v = LAYOUT[kind]
+        malformed = len(body) % size > 0
+        given = iter(int.from_bytes(body[k : k + size], "little") for k in range(0, len(body) - size + 1, size))
+        t, position = base, (line << stride) - 1
+        for bits in given:
+            p, skip, value = bits >> (s + v), bits >> v & (2**s - 1), bits & (2**v - 1)
+            if skip < 2**s - 1:
+                position += skip + 1
+                self.event(kind, t, position >> stride, position & (2**stride - 1), p, value, flags, late)
+            elif p:
+                offset = next(given, 2**32)
+                if offset > 32_511:
+                    malformed = True
+                    break
+                t, position = base + offset, -1
+            else:
+                position += (value + 1) << (s - 1)
+        self.counts["malformed"] += malformed
+
+    def event(self, kind, t, x, y, p, value, flags, late):
         if x >= self.columns or y >= self.rows:
             self.counts["outside"] += 1
             return
         before, newest = self.held.get((x, y)), t >= self.held_at.get((x, y), t)
         if kind >= 6:
             self.counts["states"] += 1
-            if before == value or not newest:
+            if late or not newest:
+                self.counts["stale"] += 1
+                return
+            if before == value:
                 return
             self.counts["repaired"] += 1
             p = value >= (before or 0)

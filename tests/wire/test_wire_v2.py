@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import taxel
+from taxel import wire
 from taxel.simulate import Board
-from taxel.wire import Columns, Registers
-from taxel.wire_v2 import Decoder, StreamReader, decode
+from taxel.wire import Columns, Counts, Registers, StreamReader, decode
 
 from .oracle_v2 import Reader, datagram, markers, words
 
@@ -22,9 +22,12 @@ DATA = Path(__file__).parent.parent / "data" / "wire_v2"
 VECTORS = sorted(path.stem for path in DATA.glob("*.json"))
 
 
+def Decoder(**arguments):  # noqa: N802  of this page's version
+    return wire.Decoder(2, **arguments)
+
+
 def rows(heard):
-    for h in heard:
-        e = h.events
+    for e in heard:
         values = [None] * len(e)
         if e.intensity is not None:
             values = [int(ticks) if there else None for ticks, there in zip(e.intensity, e.present, strict=True)]
@@ -43,7 +46,7 @@ def test_a_vector_means_what_its_json_says(name):
     decoder = Decoder(array=taxel.Array(meaning["rows"], meaning["columns"]))
     heard = [decoder.push(d) for d in given_]
     assert [list(row) for row in rows(heard)] == meaning["events"]
-    assert [list(m) for h in heard for m in h.events.markers] == meaning["markers"]
+    assert [list(m) for e in heard for m in e.markers] == meaning["markers"]
     counts = asdict(decoder.counts)
     assert {name: counts[name] for name in meaning["counts"]} == meaning["counts"]
 
@@ -88,9 +91,13 @@ def test_a_whole_stream_says_what_the_slow_reader_hears(seed, valued_from, state
         noise = draw.choice([b"\xff" * draw.randrange(4), draw.randrange(30, 1400).to_bytes(2, "little") + b"\x54\x21"])
         stream, skipped = stream + noise + len(sent).to_bytes(2, "little") + sent, skipped + len(noise)
     reader = StreamReader()
-    pieces = len(reader.push(stream)) + len(reader.finish())
-    assert (pieces, reader.skipped) == (12, skipped)
-    events, counts, none = decode(stream, array=taxel.Array(16, 16))
+    pieces = reader.push(stream) + reader.finish()
+    assert (len(pieces), reader.skipped) == (12, skipped)
+    array, one = taxel.Array(16, 16), Decoder(array=taxel.Array(16, 16))
+    events = decode(stream, 2, array=array)
+    for sent in pieces:
+        one.push(sent)
+    counts = one.counts
     ticks = [-1] * len(events)
     if events.intensity is not None:
         ticks = [int(v) if there else -1 for v, there in zip(events.intensity, events.present, strict=True)]
@@ -98,18 +105,17 @@ def test_a_whole_stream_says_what_the_slow_reader_hears(seed, valued_from, state
     columns = (events.t, events.x, events.y, events.p)
     heard = list(zip(*(c.tolist() for c in columns), ticks, marked.tolist(), strict=True))
     assert heard == [(*e[:4], -1 if e[4] is None else e[4], e[5]) for e in slow.events]
-    assert (list(events.markers), none) == (slow.markers, skipped)
+    assert list(events.markers) == slow.markers
     assert (counts.intact, counts.events, counts.repaired) == (12, len(events), int(marked.sum()))
     assert (events.repaired is None) == (not marked.any())
     with pytest.raises(ValueError, match="read-only"):
         events.t[:] = 0
     room = Columns(len(stream) // 2 + 32)
-    again, counts_again, _ = decode(stream, array=taxel.Array(16, 16), columns=room)
+    again = decode(stream, 2, array=array, columns=room)
     assert again == events
-    assert counts_again == counts
     assert np.shares_memory(again.t, room.t) == (len(again) > 0)
     with pytest.raises(taxel.ProblemError, match=f"bytes may need {len(room)}"):
-        decode(stream, array=taxel.Array(16, 16), columns=Columns(len(room) - 1))
+        decode(stream, 2, array=array, columns=Columns(len(room) - 1))
 
 
 @given(data=st.binary(max_size=80), sealed=st.booleans())
@@ -120,10 +126,66 @@ def test_any_bytes_are_survived_and_counted(data, sealed):
             data[0] & 15, data[20:], base=base, stride=data[8] & 31, line=data[10] & 127, flags=data[9] & 15
         )
     decoder = Decoder()
-    heard = decoder.push(data)
+    decoder.push(data)
     c = decoder.counts
-    assert heard.intact == (c.intact == 1)
-    assert c.datagrams == 1 == c.intact + c.repeated + c.old + c.short + c.foreign + c.checksum
+    assert decoder.last.intact == (c.intact == 1)
+    assert c.datagrams == 1 == c.intact + c.repeated + c.old + c.short + c.long + c.foreign + c.checksum
+
+
+@given(seed=st.integers(0, 2**32 - 1), sessions=st.integers(1, 6), plain=st.booleans())
+@settings(max_examples=300)
+def test_any_order_of_any_sessions_reads_as_the_slow_reader_does(seed, sessions, plain):
+    """Late datagrams of earlier sessions, states, first values of 0, and bodies that break the page's rules."""
+    draw, sent = random.Random(seed), []
+    for session in range(sessions):
+        flags = draw.choice([0, 1, 2]) | draw.choice([0, 0, 4, 8])
+        for sequence in range(draw.randrange(1, 8)):
+            kind = draw.choice([0, 1, 1, 2, 3, 4, 5, 6, 6, 7])
+            base, stride = (
+                draw.randrange(200),
+                4 if plain or draw.random() < 0.8 else draw.choice([0, 3, 9, 16, 17, 31]),
+            )
+            if kind == 3:
+                body = markers(*((draw.choice([0, 5, 2**31]), draw.randrange(4), 9) for _ in range(draw.randrange(4))))
+            elif kind in (4, 5):
+                body = bytes(draw.choice([0, 39, 40, 48]))
+            else:
+                times = [0, 0, 1, 50, 32_511] if plain else [0, 1, 50, 32_511, 32_512, 40_000, 65_535]
+                events = [
+                    (base + t, draw.randrange(17), draw.randrange(16), draw.random() < 0.5, draw.choice([0, 0, 7, 200]))
+                    for t in sorted(draw.choice(times) for _ in range(draw.randrange(12)))
+                ]
+                body = words(kind, events, base=base, stride=min(stride, 4))
+            body += b"" if plain else bytes(draw.choice([0, 0, 0, 1, 2, 1400 - 24 - len(body), 1401 - 24 - len(body)]))
+            data = datagram(
+                kind,
+                body,
+                session=session,
+                sequence=sequence,
+                base=base,
+                stride=stride,
+                flags=flags,
+                span=draw.choice([0, 9]),
+            )
+            # Sessions begin in turn; any datagram may come late, or never.
+            sent.append((session + (draw.choice([0, 0, 0, 1, 2]) if sequence else 0), draw.random(), data))
+    given_ = [data for _, _, data in sorted(sent, key=lambda s: s[:2]) if draw.random() < 0.9]
+    decoder, slow = Decoder(array=taxel.Array(16, 16)), Reader(16, 16)
+    for data in given_:
+        before = len(slow.events), len(slow.markers)
+        heard = decoder.push(data)
+        slow.push(data)
+        assert list(rows([heard])) == slow.events[before[0] :]
+        assert list(heard.markers) == slow.markers[before[1] :]
+        held = np.full((16, 16), -1)
+        for (x, y), value in slow.held.items():
+            held[y, x] = value
+        assert (decoder.held == held).all()
+    counts = asdict(decoder.counts)
+    told = {"missing", "events", "markers"}
+    assert {name: counts[name] for name in slow.counts if name not in told} == {
+        name: count for name, count in slow.counts.items() if name not in told
+    }
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -162,7 +224,7 @@ def test_a_large_board_is_heard():
     assert board.greeting.strip() == "taxel-board v2 128x128 64ch"
     decoder, ticks = Decoder(array=array), np.random.default_rng(1).integers(30, 1000, 16_384).astype(np.uint16)
     heard = [decoder.push(d) for d in board.frame(ticks)]
-    assert sum(len(h.events) for h in heard) == 16_384
+    assert sum(len(e) for e in heard) == 16_384
     assert (decoder.held.reshape(-1) == ticks).all()
 
 
@@ -207,7 +269,7 @@ def test_the_boards_totals_close_the_sums():
 
 
 def test_nonsense_is_one_line():
-    with pytest.raises(taxel.ProblemError, match=r"datagram is|data is"):
+    with pytest.raises(taxel.ProblemError, match="data is"):
         Decoder().push("text")
     with pytest.raises(taxel.ProblemError, match="array"):
         Decoder(array=3)
@@ -215,3 +277,48 @@ def test_nonsense_is_one_line():
         Decoder().push(b"", arrived=1.5)
     with pytest.raises(taxel.ProblemError, match="data is"):
         StreamReader().push(3)
+    with pytest.raises(taxel.ProblemError, match="version is 3"):
+        wire.Decoder(3)
+    for wrong in ({"pairing": "taxel"}, {"differences": True}):
+        with pytest.raises(taxel.ProblemError, match="of version 1"):
+            Decoder(**wrong)
+    with pytest.raises(taxel.ProblemError, match="lengths"):
+        decode(b"", 2, lengths=[0])
+
+
+def test_both_versions_have_one_decoder():
+    """The same counts, with 0 for causes that a version does not have, and what the last datagram was."""
+    one, two, made = wire.Decoder(), Decoder(), datagram(1, b"", span=192)
+    assert (one.last, one.status, two.last, two.status) == (None, None, None, None)
+    one.push(bytes.fromhex("c000050304 e000280304"))
+    two.push(made)
+    two.push(made)
+    assert one.counts == Counts(bytes=10, words=2, changes=1, intensities=1)
+    assert two.counts == Counts(datagrams=2, intact=1, repeated=1)
+    assert two.last == wire.Received(until=None, intact=False)
+    two.push(datagram(1, b"", sequence=1, base=1000, span=192))
+    assert two.last == wire.Received(until=1192, intact=True)
+    assert (one.held == -1).all()
+    summed = wire.Decoder(differences=True)
+    summed.push(bytes.fromhex("c000050304 e000280304"))
+    assert (summed.held[4, 3], summed.held.sum()) == (40, 40)
+    assert len(two.finish()) == len(two.end_of_datagram()) == 0
+
+
+def test_the_old_names_of_version_2_work_and_name_the_new_ones():
+    board = Board(Registers(wire_version=2))
+    sent = board.frame(np.full(4096, 40, np.uint16))
+    stream = b"".join(len(d).to_bytes(2, "little") + d for d in sent)
+    with pytest.warns(DeprecationWarning, match=r"taxel.wire_v2.Decoder is now taxel.wire.Decoder\(version=2\)"):
+        decoder = taxel.wire_v2.Decoder()
+    heard = [decoder.push(d) for d in sent]
+    assert sum(len(h.events) for h in heard) == 4096
+    assert (heard[-1].intact, heard[-1].until) == (decoder.last.intact, decoder.last.until)
+    with pytest.warns(DeprecationWarning, match="taxel.wire.decode"):
+        events, counts, skipped = taxel.wire_v2.decode(stream)
+    assert events == decode(stream, 2)
+    assert (counts, skipped) == (decoder.counts, 0)
+    with pytest.warns(DeprecationWarning, match="taxel.wire.StreamReader"):
+        assert taxel.wire_v2.StreamReader is StreamReader
+    with pytest.raises(AttributeError, match="no attribute 'decoders'"):
+        _ = taxel.wire_v2.decoders

@@ -1,4 +1,4 @@
-//! What a parameter may be, and what is said where it is not: a table for each noun that has parameters.
+//! The allowed values of parameters and the messages for others: a table for each noun that has parameters.
 //!
 //! Checks and their messages read it, and so do the documentation of the Python classes and the tests that try wrong
 //! values.
@@ -7,7 +7,7 @@ use std::fmt;
 
 use crate::{Result, problem};
 
-/// From which value to which; infinity that is not in asks for a finite value.
+/// A range of values. An end at infinity that does not belong to the range means that the value must be finite.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
     pub(crate) least: f64,
@@ -74,7 +74,7 @@ impl Range {
 /// As an error words it behind "must be".
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let (least, most) = (said(self.least), said(self.most));
+        let (least, most) = (written(self.least), written(self.most));
         let lower = if self.least_in { format!("{least} or more") } else { format!("above {least}") };
         let upper = if self.most_in { format!("at most {most}") } else { format!("below {most}") };
         match (self.least.is_finite(), self.most.is_finite()) {
@@ -90,7 +90,7 @@ impl fmt::Display for Range {
 }
 
 /// A number as a reader writes it.
-fn said(value: f64) -> String {
+fn written(value: f64) -> String {
     if value != 0.0 && value.is_finite() && !(1e-3..1e7).contains(&value.abs()) {
         format!("{value:e}")
     } else {
@@ -121,7 +121,7 @@ impl Parameter {
             if outcome.is_ok() && !self.range.holds(value) {
                 let place = place.map_or(String::new(), |k| format!("[{k}]"));
                 let (name, unit, range) = (self.name, self.unit, self.range);
-                let value = said(value);
+                let value = written(value);
                 outcome = Err(match unit.strip_prefix('1') {
                     Some(per) => problem!("{name}{place} is {value}{per}: must be {range}"),
                     None if unit.is_empty() => problem!("{name}{place} is {value}: must be {range}"),
@@ -135,7 +135,7 @@ impl Parameter {
 
 /// The numbers in a parameter, with their places where it is a list.
 pub trait Numbers {
-    /// Shows each to `look`.
+    /// Calls `look` with each number and its place.
     fn each(&self, look: &mut dyn FnMut(Option<usize>, f64));
 }
 

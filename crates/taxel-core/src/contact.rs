@@ -1,7 +1,7 @@
 //! Simulated touch: what a ball on foam does to the taxels beneath, frame by frame.
 //!
-//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] says ([`motion`]), pushed back by a law worked out once
-//! ([`push`]). What lies under them is reckoned in one of two ways, which a scene chooses: `layer`, foam bonded to the
+//! Bodies ([`body`], [`shape`]) move over foam as a [`scene`] describes ([`motion`], [`trajectory`]), pushed back by a law that is tabulated once
+//! ([`push`]). The foam under them has one of two models, which a scene chooses: `layer`, foam bonded to the
 //! board, for any bodies ([`bonded`]); `columns`, independent columns whose pressure the layer smooths, for one ball that
 //! moves straight up and down on foam that hardly widens (Poisson ratio up to 0.1): there it lies within a few per cent
 //! of the layer, and is the fastest ([`foam`], [`footprint`]). Fabric, amplifier and ramp turn stress at the foam's base
@@ -11,31 +11,38 @@
 use crate::allowed::{Parameter, Range};
 use crate::{Error, Result};
 
+pub mod act;
 pub mod body;
 pub mod bonded;
 pub mod foam;
 pub mod footprint;
 pub mod layer;
 pub mod motion;
+pub mod narrow;
 pub mod push;
 pub mod scene;
 pub mod sensor;
 pub mod shape;
 pub mod stage;
+pub mod touch;
+mod trajectory;
 mod waves;
 
+pub use act::{Act, Pictures};
 pub use body::{Along, Body, Ending, Material, Move, Press};
 pub use bonded::Bonded;
 pub use foam::Foam;
 pub use footprint::Footprint;
-pub use motion::{Contact, Motion, Narrow, TouchKind, Track};
+pub use motion::{Motion, Track};
+pub use narrow::Narrow;
 pub use push::Push;
 pub use scene::{Scene, Surface};
 pub use sensor::{Sensor, Taxels};
 pub use shape::Shape;
-pub use stage::{Act, Pictures, Prepared, Stage};
+pub use stage::{Prepared, Stage};
+pub use touch::{Contact, TouchKind};
 
-/// Refuses a value of a scene that lies outside; `place` says whose it is.
+/// Refuses a value of a scene that lies outside its range; `place` names its owner.
 fn within(place: &str, name: &'static str, value: f64, unit: &'static str, range: Range) -> Result<()> {
     Parameter { name, unit, range }.check(&value).map_err(|error| match error {
         Error::Problem(text) => Error::Scene(format!("{place}: {text}")),

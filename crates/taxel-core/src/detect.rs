@@ -14,18 +14,18 @@ pub use trained::TrainedNeuron;
 
 use serde::{Deserialize, Serialize};
 
-/// What a readout said.
+/// A detection of a readout.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Detection {
-    /// Which of the readout's neurons spoke.
+    /// The label of the neuron that fired.
     pub label: String,
     /// When the event was, us of the board's clock: the crossing less the encoder's latency and the trained delay.
     pub t: i64,
-    /// When it could first be said, us of the board's clock: the end of the frame in which the potential crosses.
+    /// When it could first be known, us of the board's clock: the end of the frame in which the potential crosses.
     pub known: i64,
     /// How steeply the potential rose above its threshold, mV/ms: a measure of how sure.
     pub slope: f64,
-    /// Whether it may rest on values that states of version 2 repaired: then what it tells may have happened before `t`.
+    /// Whether it may rest on values that states of version 2 repaired: then the event may have happened before `t`.
     pub repaired: bool,
 }
 

@@ -35,7 +35,7 @@ macro_rules! encoders {
         $(pub mod $name;)*
         $(pub use $name::$Kind;)*
 
-        /// Any encoder with its parameters; in JSON an object whose `name` says which.
+        /// Any encoder with its parameters; in JSON an object with its `name`.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(tag = "name", rename_all = "snake_case")]
         pub enum Encoder {
@@ -84,11 +84,11 @@ encoders! {
     threshold_izhikevich: ThresholdIzhikevich,
     /// The FA-1 afferent of equations 5.1 to 5.5.
     fa1: Fa1,
-    /// The SA-1 afferent, which tells how hard is pressed as long as it is.
+    /// The SA-1 afferent, whose rate follows the force as long as a taxel is pressed.
     sa1: Sa1,
-    /// The SA-2 afferent, which tells a held load steadily.
+    /// The SA-2 afferent, which fires steadily under a held load.
     sa2: Sa2,
-    /// The FA-2 afferent, which tells vibration and the moment of contact.
+    /// The FA-2 afferent, which responds to vibration and to the moment of contact.
     fa2: Fa2,
     /// Afferents of all four types in places of their own.
     skin: Skin,
@@ -152,13 +152,13 @@ impl Encoder {
         self.law().latency_ms()
     }
 
-    /// On how many trains the encoder speaks for an array.
+    /// The number of spike trains that the encoder makes of an array.
     #[must_use]
     pub fn trains(&self, array: &Array) -> usize {
         self.law().trains(array)
     }
 
-    /// Whether its spikes carry a signed value, so that a neuron hears each train as two, ON and OFF.
+    /// Whether its spikes carry a signed value, so that a neuron receives each train as two, ON and OFF.
     #[must_use]
     pub fn signed(&self) -> bool {
         self.law().signed()

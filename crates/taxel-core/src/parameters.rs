@@ -5,7 +5,7 @@ use serde_json::{Map, Value};
 
 use crate::allowed::Parameter;
 
-/// The parameters of a noun: what each is where it is left out, which must be given, which values they may have.
+/// The parameters of a noun: their defaults, those without a default, and their ranges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Described {
     /// The defaults by name.
@@ -17,7 +17,7 @@ pub struct Described {
 }
 
 impl Described {
-    /// Describes a noun by one that has all its defaults; what stands in `required` has none, whatever it is there.
+    /// Describes a noun by one that has all its defaults; names in `required` have no default, whatever the noun holds there.
     #[must_use]
     pub fn by(defaults: &impl Serialize, required: &[&'static str], ranges: &[Parameter]) -> Self {
         // Parameters are plain structs of numbers, words and lists: nothing in them can fail to be written.
@@ -31,14 +31,14 @@ impl Described {
         Self { defaults, required: required.to_vec(), ranges: ranges.to_vec() }
     }
 
-    /// The same with one more, which is nothing where it is left out.
+    /// The same with one more parameter, which is null where it is left out.
     #[must_use]
     pub fn or_nothing(mut self, name: &'static str) -> Self {
         self.defaults.insert(name.to_owned(), Value::Null);
         self
     }
 
-    /// The same with one more.
+    /// The same with one more parameter.
     #[must_use]
     pub fn with(mut self, parameter: Parameter, default: impl Into<Value>) -> Self {
         self.defaults.insert(parameter.name.to_owned(), default.into());
@@ -54,18 +54,18 @@ impl Described {
             .ranges
             .iter()
             .map(|Parameter { name, unit, range }| {
-                let mut said = serde_json::json!({ "unit": unit, "must_be": range.to_string() });
+                let mut entry = serde_json::json!({ "unit": unit, "must_be": range.to_string() });
                 if range.most_in && range.most.is_infinite() {
-                    said["infinite"] = true.into();
+                    entry["infinite"] = true.into();
                 }
                 for (end, value, is_in) in [("least", range.least, range.least_in), ("most", range.most, range.most_in)]
                 {
                     if value.is_finite() {
-                        said[end] = value.into();
-                        said[format!("{end}_in")] = is_in.into();
+                        entry[end] = value.into();
+                        entry[format!("{end}_in")] = is_in.into();
                     }
                 }
-                ((*name).to_owned(), said)
+                ((*name).to_owned(), entry)
             })
             .collect();
         serde_json::json!({ "defaults": self.defaults, "required": self.required, "ranges": ranges })

@@ -5,6 +5,7 @@
 
 mod columns;
 pub mod command;
+mod cut;
 pub mod decoder;
 pub mod receiver;
 pub mod registers;
@@ -12,9 +13,10 @@ mod silence;
 pub mod v1;
 pub mod v2;
 
-pub use columns::{Filled, Room};
+pub use columns::{Columns, Filled, Room};
 pub use command::{Command, CommandReader};
-pub use decoder::{Counts, Decoder, Pairing, decode};
+pub use cut::{Cut, cut};
+pub use decoder::{Counts, Decoder, Pairing, decode, most_rows};
 pub use receiver::{Receiver, Took};
 pub use registers::{Refusal, Registers};
 pub use v1::{STAMP_US, WORD_BYTES, Word, encode};

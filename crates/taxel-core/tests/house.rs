@@ -9,7 +9,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Floors from the ground up; those of one line do not know of each other.
-const FLOORS: [(&str, &[&[&str]]); 3] = [
+const FLOORS: [(&str, &[&[&str]]); 4] = [
     (
         "taxel-core",
         &[
@@ -34,14 +34,31 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
             &["recording"],
             &["capture"],
             &["emulate", "pipeline"],
-            &["panel"],
+        ],
+    ),
+    (
+        "taxel-panel",
+        &[
+            &["assets", "clients", "connections", "limits", "options", "request", "time_columns"],
+            &["array_state", "encoded_spikes", "recorder", "taxel_history"],
+            &["keyframe_index"],
+            &["folder", "handler", "player"],
+            &["labels", "picture", "presets"],
+            &["live_source"],
+            &["messages"],
+            &["hub"],
+            &["recording_session", "registers"],
+            &["requests"],
+            &["session"],
+            &["server"],
         ],
     ),
     (
         "taxel-python",
         &[
             &["errors"],
-            &["enter", "guest", "convert", "parameters"],
+            &["enter", "thread_state", "convert", "parameters"],
+            &["threaded"],
             &["bridge"],
             &[
                 "calibration",
@@ -49,15 +66,17 @@ const FLOORS: [(&str, &[&[&str]]); 3] = [
                 "cone_x",
                 "detect",
                 "encode",
-                "knock",
                 "learn",
                 "live",
                 "metrics",
                 "neuron",
                 "nouns",
+                "pictures",
                 "recording",
                 "rivals",
                 "simulate",
+                "sources",
+                "test_hooks",
                 "wire",
                 "wire_v2",
             ],

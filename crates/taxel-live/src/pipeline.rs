@@ -1,10 +1,10 @@
 //! Datagrams to detections, as they come.
 //!
-//! One thread receives, decodes and reads out; who has something to say leaves that to another one first. While something is
-//! recorded, which a disk may hold up, *receive*, *decode and record*, *encode and read out* have a thread each
-//! ([`crate::capture`]), and the last one has also where it is slower than what comes. What waits between two of them is bounded,
-//! and what finds no room is counted where it was lost. Who looks on gets copies ([`Live::counters`], [`Live::picture`]) and slows
-//! nothing.
+//! The stages are *receive*, *decode*, *record* and *read out* ([`stages`]). One thread runs them all, and gives them to another
+//! one before it calls a sink ([`threads`]). While something is recorded, which a disk may hold up, receiving ([`crate::capture`]),
+//! decoding with recording, and reading out have a thread each; reading out also has one where it is slower than what comes. The
+//! queues between them are bounded, and what finds no room is counted where it was lost. Viewers get copies ([`Live::counters`],
+//! [`Live::picture`]) and cannot slow the pipeline.
 
 mod ahead;
 mod copies;
@@ -12,58 +12,65 @@ mod counters;
 mod decode;
 mod handle;
 mod handover;
-mod lead;
+mod observers;
 mod options;
-mod read;
+mod output;
+mod read_out;
+mod reader;
+mod receive;
+mod record;
 mod recorder;
+mod recordings;
 mod rest;
 mod said;
-mod saying;
 mod sending;
 mod shared;
 mod source;
 mod sources;
+mod stages;
 mod stills;
 mod tap;
+mod threads;
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use taxel_core::encode::Tare;
-use taxel_core::wire::{self, Decoder};
+use taxel_core::wire;
 use taxel_core::{Marker, Stop};
 
 use crate::capture::{Origin, Receiver};
 use crate::locked::lock;
-use crate::{Error, Result, recording};
+use crate::{Error, Result};
 pub use copies::{Copied, Copies};
 pub use counters::{Counters, SourceCounts, Summary};
-use decode::Work;
 pub use handle::Handle;
 use handover::Handover;
-use lead::Lead;
 pub use options::{LiveOptions, Record};
-pub use read::Ear;
-use read::Reader;
-use recorder::{Host, Part, Recorder};
+use output::DetectionOutput;
+pub use reader::Listener;
+use reader::Reader;
+use recorder::{Part, Recorder};
+use recordings::Recordings;
 pub use said::{Lines, Said, Sink};
-use saying::Saying;
 use sending::Sending;
 pub use sending::{Destination, Sent};
-use shared::{Shared, Shown};
+use shared::{Published, Shared};
 pub use source::{Place, Source, SourceKind};
 use sources::Others;
+use stages::Stages;
 pub use tap::{Change, Outlet, Piece, UNKNOWN};
+use threads::Threads;
 
-/// How long a wait lasts before it is asked whether to stop.
+/// How long a wait lasts before the caller is asked whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// How many detections wait for [`Live::next`]; more are counted and lost to it, not to the sinks.
+/// How many detections wait for [`Live::next`]; more are lost to it, and counted, but not lost to the sinks.
 const SAID_WAITING: usize = 1 << 14;
 
 /// Datagrams to detections, from [`Live::start`] until [`Live::stop`].
@@ -72,6 +79,7 @@ pub struct Live {
     said: channel::Receiver<Said>,
     threads: Vec<JoinHandle<()>>,
     others: Mutex<Others<Live>>,
+    recordings: Arc<Recordings>,
 }
 
 impl Live {
@@ -81,10 +89,15 @@ impl Live {
     ///
     /// `Socket` where the port is taken, `File` where the file exists or cannot be created, or a destination cannot be
     /// opened, `Core(Problem)` for options that make no sense.
-    pub fn start(address: SocketAddr, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
+    pub fn start(
+        address: SocketAddr,
+        options: LiveOptions,
+        listener: Listener,
+        sinks: Vec<Box<dyn Sink>>,
+    ) -> Result<Self> {
         let capture = options.capture;
         // The socket is opened before the file: where the port is taken no empty file is left behind.
-        Self::start_from(|| Receiver::bind(address, capture), options, ear, sinks)
+        Self::start_from(|| Receiver::bind(address, capture), options, listener, sinks)
     }
 
     /// As [`Live::start`], from what another computer receives ([`Receiver::fed`]).
@@ -92,14 +105,19 @@ impl Live {
     /// # Errors
     ///
     /// As [`Live::start`], without those of the socket.
-    pub fn start_fed(receiver: Receiver, options: LiveOptions, ear: Ear, sinks: Vec<Box<dyn Sink>>) -> Result<Self> {
-        Self::start_from(|| Ok(receiver), options, ear, sinks)
+    pub fn start_fed(
+        receiver: Receiver,
+        options: LiveOptions,
+        listener: Listener,
+        sinks: Vec<Box<dyn Sink>>,
+    ) -> Result<Self> {
+        Self::start_from(|| Ok(receiver), options, listener, sinks)
     }
 
     fn start_from(
         receiver: impl FnOnce() -> Result<Receiver>,
         options: LiveOptions,
-        ear: Ear,
+        listener: Listener,
         sinks: Vec<Box<dyn Sink>>,
     ) -> Result<Self> {
         if options.record_later && options.record.is_some() {
@@ -112,14 +130,14 @@ impl Live {
                 taxel_core::problem!("source {} without a recording: nothing would keep it", source.name).into()
             );
         }
-        Self::begin(Box::new(receiver), options, ear, sinks, None)
+        Self::begin(Box::new(receiver), options, listener, sinks, None)
     }
 
     /// Begins; `host` is whose recording this one's is a part of.
     fn begin(
         receiver: Box<dyn FnOnce() -> Result<Receiver> + '_>,
         options: LiveOptions,
-        ear: Ear,
+        listener: Listener,
         sinks: Vec<Box<dyn Sink>>,
         host: Option<Part>,
     ) -> Result<Self> {
@@ -133,15 +151,15 @@ impl Live {
         }
         wire::v2::checked_stride(&options.array)?;
         options.registers.check(&options.array)?;
-        if let (Ear::Deaf, Some(to)) = (&ear, options.send.first()) {
+        if let (Listener::None, Some(to)) = (&listener, options.send.first()) {
             return Err(taxel_core::problem!("send to {to} without a readout: nothing would be said").into());
         }
-        match &ear {
-            Ear::Taring(stretch_us, _) if *stretch_us <= 0 => {
+        match &listener {
+            Listener::Taring(stretch_us, _) if *stretch_us <= 0 => {
                 return Err(taxel_core::problem!("tare of {stretch_us} us: must be above 0").into());
             }
-            Ear::Taring(_, readout) => readout.check()?,
-            Ear::Deaf | Ear::Reading(_) => {}
+            Listener::Taring(_, readout) => readout.check()?,
+            Listener::None | Listener::Reading(_) => {}
         }
         let sending = options.send.iter().map(Sending::open).collect::<Result<Vec<_>>>()?;
         let receiver = receiver()?;
@@ -150,18 +168,18 @@ impl Live {
             (Some(record), None) => Some(Recorder::create(record, &options, receiver.place())?),
             (Some(record), Some(host)) => Some(Recorder::join(host, record, &options, receiver.place())),
         };
-        let shown = Shown { picture: vec![0; options.array.len()], ..Shown::default() };
+        let published = Published { picture: vec![0; options.array.len()], ..Published::default() };
         let shared = Arc::new(Shared {
             receiver,
             handover: Handover::new(&options.array, options.readout_events),
-            shown: Mutex::new(shown),
+            published: Mutex::new(published),
             recorder: Mutex::new(recorder),
             broken: Mutex::default(),
-            wishes: Mutex::default(),
-            wished: AtomicBool::new(false),
-            happened: Mutex::default(),
+            requests: Mutex::default(),
+            requested: AtomicBool::new(false),
+            picture_times: Mutex::default(),
             records: AtomicBool::new(false),
-            listeners: Mutex::default(),
+            subscribers: Mutex::default(),
             sending: sending.iter().map(Sending::line).collect(),
             registers: Mutex::new(options.registers),
             options: options.clone(),
@@ -169,31 +187,32 @@ impl Live {
             expected: AtomicU8::new(0),
             ended: AtomicBool::new(false),
         });
-        let (say, said) = channel::bounded(SAID_WAITING);
-        let decoder = Decoder::new(options.array.clone()).differences(options.differences);
-        let sender = wire::Receiver::new(decoder, 1);
-        let listens = !matches!(ear, Ear::Deaf);
+        let (queue, said) = channel::bounded(SAID_WAITING);
+        let reads_out = !matches!(listener, Listener::None);
         let board = |address, own: LiveOptions, part| {
             let capture = own.capture;
-            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Ear::Deaf, vec![], Some(part))
+            Self::begin(Box::new(move || Receiver::bind(address, capture)), own, Listener::None, vec![], Some(part))
         };
         let others = Others::start(&shared, board).inspect_err(|_| {
             // Nothing came: a new file is not left behind.
             let recorder = lock(&shared.recorder).take();
             drop(recorder.map(|recorder| recorder.finish(&Counters::default())));
         })?;
+        let boards = others.boards.iter().map(|(name, board)| (name.clone(), Arc::clone(&board.shared)));
+        let recordings = Recordings::new(Arc::clone(&shared), boards.collect(), others.numbers.clone());
         let others = Mutex::new(others);
-        let mut live = Self { shared: Arc::clone(&shared), said, threads: vec![], others };
-        // Who drives something is not to wait for a callback.
+        let mut live =
+            Self { shared: Arc::clone(&shared), said, threads: vec![], others, recordings: Arc::new(recordings) };
+        // A device that detections drive must not wait for a callback.
         let sending = sending.into_iter().map(|one| Box::new(one) as Box<dyn Sink>);
-        let saying = Saying::new(sending.chain(sinks).collect(), say);
-        let reader = listens.then(|| Reader::new(ear, &options));
-        let work = Work::new(Arc::clone(&shared), sender, reader);
-        let names: &[&str] = if listens { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
-        let lead = Arc::new(Lead::new(work, saying, names.len()));
+        let output = DetectionOutput::new(sending.chain(sinks).collect(), queue);
+        let reader = reads_out.then(|| Reader::new(listener, &options));
+        let stages = Stages::new(&shared, reader);
+        let names: &[&str] = if reads_out { &["taxel-decode", "taxel-readout"] } else { &["taxel-decode"] };
+        let threads = Arc::new(Threads::new(stages, output, names.len()));
         for name in names {
-            let (lead, shared) = (Arc::clone(&lead), Arc::clone(&shared));
-            live.spawn(name, move || lead.serve(&shared))?;
+            let (threads, shared) = (Arc::clone(&threads), Arc::clone(&shared));
+            live.spawn(name, move || threads.run(&shared))?;
         }
         Ok(live)
     }
@@ -204,7 +223,7 @@ impl Live {
         Ok(())
     }
 
-    /// The address that it listens on, the port that was found where 0 was asked for; unspecified, with port 0, where a
+    /// The address that it receives on, with the port that was found where 0 was asked for; unspecified, with port 0, where a
     /// bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
@@ -217,24 +236,24 @@ impl Live {
         self.shared.receiver.place()
     }
 
-    /// What others may do with it.
+    /// What others may do with it while it runs.
     #[must_use]
     pub fn handle(&self) -> Handle {
-        Handle { shared: Arc::clone(&self.shared) }
+        Handle { shared: Arc::clone(&self.shared), recordings: Arc::clone(&self.recordings) }
     }
 
     /// The next detection; `None` after `timeout` without one, or at once when all is over.
     ///
     /// # Errors
     ///
-    /// What ended the way early: the disk is full, the socket failed, the encoder cannot use what comes.
+    /// The error that ended the pipeline early: the disk is full, the socket failed, the encoder cannot use what comes.
     pub fn next(&self, timeout: Duration) -> Result<Option<Said>> {
         match self.said.recv_timeout(timeout) {
             Ok(said) => Ok(Some(said)),
             Err(channel::RecvTimeoutError::Timeout) => self.check().map(|()| None),
             Err(channel::RecvTimeoutError::Disconnected) => {
                 self.check()?;
-                // Without a readout nobody ever speaks: wait as asked, but not after the end.
+                // Without a readout there are no detections: wait as asked, but not after the end.
                 if !self.is_over() {
                     std::thread::sleep(timeout);
                 }
@@ -243,7 +262,7 @@ impl Live {
         }
     }
 
-    /// As [`Live::next`], but looks now and then whether to stop waiting; `None` then.
+    /// As [`Live::next`], but returns `None` as soon as `stop` asks for it.
     ///
     /// # Errors
     ///
@@ -252,7 +271,7 @@ impl Live {
         let until = Instant::now().checked_add(timeout);
         loop {
             let left = until.map_or(LOOK_EVERY, |t| t.saturating_duration_since(Instant::now()));
-            // Asked before: what ended it was then noted before, and `next` gives it.
+            // Before `next`: an error that ended the pipeline is then known, and `next` returns it.
             let over = self.is_over();
             let said = self.next(left.min(LOOK_EVERY))?;
             if said.is_some() || over || left.is_zero() || stop.asked() {
@@ -262,16 +281,16 @@ impl Live {
     }
 
     fn check(&self) -> Result<()> {
-        self.shared.shown().failed.take().map_or(Ok(()), Err)
+        self.shared.published().failed.take().map_or(Ok(()), Err)
     }
 
-    /// Whether the way has ended, by [`Live::end`] or by an error, and everything was worked through.
+    /// Whether the pipeline has ended, by [`Live::end`] or by an error, and everything was processed.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.shared.ended.load(Ordering::Acquire)
     }
 
-    /// What came and what became of it up to now.
+    /// What came, what became of it and what was lost, up to now.
     #[must_use]
     pub fn counters(&self) -> Counters {
         let others = lock(&self.others);
@@ -280,13 +299,14 @@ impl Live {
         Counters { sources: boards.chain(numbers).collect(), ..self.shared.counters() }
     }
 
-    /// Where another board of the recording is listened to; `None` where there is none of that name.
+    /// The address that another board of the recording sends to; `None` where there is none of that name.
     #[must_use]
     pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
         lock(&self.others).boards.iter().find(|(known, _)| known == name).map(|(_, board)| board.address())
     }
 
-    /// Keeps numbers of a source that is given, one for each of its columns, which came at `arrived_ns` (ns since 1970).
+    /// Records numbers of a source whose values a program gives, one for each of its columns, which came at `arrived_ns` (ns since
+    /// 1970).
     ///
     /// # Errors
     ///
@@ -299,25 +319,25 @@ impl Live {
         }
     }
 
-    /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 until a taxel was heard of.
+    /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 of a taxel without any event so far.
     #[must_use]
     pub fn picture(&self) -> Vec<u16> {
-        self.shared.shown().picture.clone()
+        self.shared.published().picture.clone()
     }
 
-    /// The tare that was taken, once it is complete.
+    /// The fresh tare, once it is complete.
     #[must_use]
     pub fn tare(&self) -> Option<Tare> {
-        self.shared.shown().tare.clone()
+        self.shared.published().tare.clone()
     }
 
-    /// The starts and stops that came since this was asked last.
+    /// The starts and stops that came since the last call.
     #[must_use]
     pub fn take_markers(&self) -> Vec<Marker> {
-        std::mem::take(&mut self.shared.shown().markers)
+        std::mem::take(&mut self.shared.published().markers)
     }
 
-    /// Writes something down in the recording, with the time of now.
+    /// Writes a note into the recording, with the time of now.
     ///
     /// # Errors
     ///
@@ -326,8 +346,8 @@ impl Live {
         self.shared.note(text, true)
     }
 
-    /// Says that the host told the board to speak this version of the wire (a write of REG0): what comes of it is believed
-    /// at once, not after a second.
+    /// Announces that the host told the board to speak this version of the wire (a write of REG0): datagrams of it are decoded at
+    /// once, not after a second.
     ///
     /// # Errors
     ///
@@ -340,8 +360,8 @@ impl Live {
         Ok(())
     }
 
-    /// Records what comes from here on, of all sources, beginning with the registers and what the taxels hold. A recording that
-    /// runs ends with what came before, and is given back: each datagram, and each line, belongs to one of them.
+    /// Records what comes from here on, of all sources, beginning with the registers and the values that the taxels hold. A recording
+    /// that runs ends with what came before, and is returned: each datagram, and each line, belongs to one of them.
     ///
     /// # Errors
     ///
@@ -351,91 +371,42 @@ impl Live {
         if !self.shared.options.record_later {
             return Err(taxel_core::problem!("a recording while listening: begin without one, for later ones").into());
         }
-        let handle = self.handle();
-        if !handle.records() {
-            // Else one that broke has not been heard of.
-            self.broken()?;
-        }
-        self.next_recording(Some(handle.reserve(record, self.shared.options.sources.clone())?))
+        self.handle().record(record)
     }
 
-    /// Has the recording that runs begin anew, where nothing came into it of any source; gives whether it does.
+    /// Lets the recording that runs begin anew, where no source has given anything; returns whether it does.
     #[must_use]
     pub fn record_again(&self) -> bool {
-        // Before the lock: who counts and who records must not wait for each other.
+        // Before the recorder is locked: counting and recording must not wait for each other.
         let now = self.shared.counters();
         lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.again(&now))
     }
 
-    /// Ends the recording that [`Live::record`] began: what came into it, and the file, where anything did.
+    /// As [`Handle::end_recording`].
     ///
     /// # Errors
     ///
-    /// What ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
+    /// As [`Handle::end_recording`].
     pub fn end_recording(&self) -> Result<Summary> {
-        self.next_recording(None)?.ok_or_else(|| taxel_core::problem!("nothing is recorded").into())
+        self.handle().end_recording()
     }
 
-    /// Whether a recording that began while listening runs, and has not been ended by an error.
+    /// As [`Handle::records`].
     #[must_use]
     pub fn records(&self) -> bool {
-        let others = lock(&self.others);
-        self.handle().records() && others.boards.iter().all(|(_, board)| lock(&board.shared.broken).is_none())
+        self.handle().records()
     }
 
-    /// What ended a recording early, of this board or another.
-    fn broken(&self) -> Result<()> {
-        let others = lock(&self.others);
-        let all = others.boards.iter().map(|(_, board)| &board.shared).chain([&self.shared]);
-        let errors: Vec<Error> = all.filter_map(|shared| lock(&shared.broken).take()).collect();
-        errors.into_iter().next().map_or(Ok(()), Err)
-    }
-
-    fn next_recording(&self, next: Option<Recorder>) -> Result<Option<Summary>> {
-        let others = lock(&self.others);
-        let mut sources = BTreeMap::new();
-        let mut ended = vec![];
-        for (name, board) in &others.boards {
-            let host: Weak<dyn Host> = Arc::<Shared>::downgrade(&self.shared);
-            let part = Part { host, name: name.clone() };
-            let part =
-                next.as_ref().map(|next| next.part_of(part, &board.shared.options, board.place())).transpose()?;
-            let (recorder, counts) = board.handle().next_recording(part)?;
-            let counters =
-                recorder.as_ref().and_then(Recorder::since).map_or_else(Counters::default, |s| counts.since(s));
-            sources.insert(name.clone(), SourceCounts::Board(Box::new(counters)));
-            ended.push((recorder, counts));
-        }
-        for (name, numbers) in &others.numbers {
-            let track = next.as_ref().map(|next| next.writer(name)).transpose()?;
-            sources.insert(name.clone(), numbers.keep_in(track));
-        }
-        let (recorder, counters) = self.handle().next_recording(next)?;
-        // Parts end before the whole.
-        for (part, counts) in ended {
-            part.map_or(Ok(None), |part| part.finish(&counts))?;
-        }
-        drop(others);
-        self.broken()?;
-        let Some(recorder) = recorder else { return Ok(None) };
-        let came =
-            Counters { sources, ..recorder.since().map_or_else(Counters::default, |since| counters.since(since)) };
-        let losses = recorder.losses(&counters);
-        let path = recorder.finish(&counters)?;
-        let verdict = self.verdict(&came, came.nothing_came(), losses);
-        Ok(Some(Summary { counters: came, verdict, path, tare: self.tare() }))
-    }
-
-    /// Asks all threads to end once they have worked through what came; [`Live::stop`] waits for them.
+    /// Asks all threads to end once they have processed what came; [`Live::stop`] waits for them.
     pub fn end(&self) {
         self.shared.receiver.stop();
     }
 
-    /// Ends: works through what came, closes the file, and says what was lost.
+    /// Ends: processes what came, closes the file, and returns what was lost.
     ///
     /// # Errors
     ///
-    /// What ended the way early, or `File` where the end of the recording cannot be written.
+    /// The error that ended the pipeline early, or `File` where the end of the recording cannot be written.
     pub fn stop(mut self) -> Result<Summary> {
         let others = lock(&self.others).stop(|board| Ok(board.stop()?.counters));
         let joined = self.join();
@@ -443,22 +414,12 @@ impl Live {
         let counters = Counters { sources, ..self.shared.counters() };
         let recorder = lock(&self.shared.recorder).take();
         let path = recorder.map_or(Ok(None), |recorder| recorder.finish(&counters))?;
-        let verdict = self.verdict(&counters, counters.nothing_came(), recorder::losses(&counters, None));
+        let lost = recorder::losses(&counters, None);
+        let verdict = recordings::verdict(self.place(), &counters, counters.nothing_came(), &lost);
         joined?;
         self.check()?;
         ended?;
         Ok(Summary { counters, verdict, path, tare: self.tare() })
-    }
-
-    /// One line: what was lost, or that nothing came.
-    fn verdict(&self, counters: &Counters, nothing: bool, losses: recording::Counts) -> String {
-        let verdict = if nothing { nothing_came(self.place(), counters.seconds) } else { losses.verdict() };
-        let others = counters.sources.iter().filter_map(|(name, counts)| match counts {
-            SourceCounts::Board(counts) => Some(format!("{name}: {}", recorder::losses(counts, None).verdict())),
-            SourceCounts::Numbers { strange: 0, .. } => None,
-            SourceCounts::Numbers { strange, .. } => Some(format!("{name}: {strange} lines could not be read")),
-        });
-        std::iter::once(verdict).chain(others).collect::<Vec<_>>().join("; ")
     }
 
     fn join(&mut self) -> Result<()> {
@@ -470,15 +431,6 @@ impl Live {
         }
         Ok(())
     }
-}
-
-/// What to say where nothing came, and what to look at.
-fn nothing_came(place: &Origin, seconds: f64) -> String {
-    let ask = match place {
-        Origin::Udp(address) => format!("does the board send to this machine, and to port {}?", address.port()),
-        Origin::Bridge(_) => "does the board send to the computer that bridges it?".to_owned(),
-    };
-    format!("nothing arrived at {place} in {seconds:.1} s: {ask}")
 }
 
 impl Drop for Live {

@@ -8,7 +8,7 @@ use taxel_core::{Array, Stop};
 use taxel_live::bridged::Bridged;
 use taxel_live::capture::{Feed, Receiver, ReceiverOptions, Sender};
 use taxel_live::host_clock::RoundTrip;
-use taxel_live::pipeline::{Copied, Ear, Live, LiveOptions, Record, Summary};
+use taxel_live::pipeline::{Copied, Listener, Live, LiveOptions, Record, Summary};
 use taxel_live::recording::{Compression, Reader, Topic, now_ns};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -88,10 +88,10 @@ fn bridged(
 ) -> (Scratch, Summary, Scratch, Summary) {
     let (near, far) = (Scratch::new(&format!("{name}-near.mcap")), Scratch::new(&format!("{name}-far.mcap")));
     let since = now_ns() - 60_000_000_000;
-    let source = Live::start(ANY, near.options(), Ear::Deaf, vec![]).expect("a port");
+    let source = Live::start(ANY, near.options(), Listener::None, vec![]).expect("a port");
     let mut copies = source.handle().copy().expect("it runs");
     let (receiver, feed) = Receiver::fed("zenoh:there/left", ReceiverOptions::default());
-    let live = Live::start_fed(receiver, far.options(), Ear::Deaf, vec![]).expect("nothing to refuse");
+    let live = Live::start_fed(receiver, far.options(), Listener::None, vec![]).expect("nothing to refuse");
     feed.meet();
     compare(&feed, since);
     let to = source.address();
@@ -181,9 +181,9 @@ fn what_is_lost_repeated_or_spoilt_on_the_way_is_counted() {
 #[test]
 fn a_bridge_that_is_begun_anew_is_met_anew_and_goes_on() {
     let (receiver, feed) = Receiver::fed("zenoh:there", ReceiverOptions::default());
-    let live = Live::start_fed(receiver, LiveOptions::new(Array::thesis()), Ear::Deaf, vec![]).expect("begun");
+    let live = Live::start_fed(receiver, LiveOptions::new(Array::thesis()), Listener::None, vec![]).expect("begun");
     for session in 0..3 {
-        let source = Live::start(ANY, LiveOptions::new(Array::thesis()), Ear::Deaf, vec![]).expect("a port");
+        let source = Live::start(ANY, LiveOptions::new(Array::thesis()), Listener::None, vec![]).expect("a port");
         let mut copies = source.handle().copy().expect("it runs");
         let mut sender = Sender::open(source.address(), false).expect("a socket");
         sender.push(&datagrams(1)[0]).expect("sent");

@@ -15,7 +15,7 @@ use taxel_core::wire::{Command, Decoder, Registers};
 use taxel_core::{Array, Events, Stop};
 use taxel_live::capture::Sender;
 use taxel_live::emulate::{self, Emulator, Report, Touch};
-use taxel_live::pipeline::{Ear, Live, LiveOptions, Record, Said, Sink, Summary};
+use taxel_live::pipeline::{Listener, Live, LiveOptions, Record, Said, Sink, Summary};
 use taxel_live::recording::{Compression, Reader, Topic};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -103,8 +103,8 @@ fn of(encoder: &str, one: TrainedNeuron) -> Readout {
     }
 }
 
-fn reading(readout: &Readout) -> Ear {
-    Ear::Reading(Box::new(readout.stream(&Array::thesis(), 192.0, None).expect("a sound readout")))
+fn reading(readout: &Readout) -> Listener {
+    Listener::Reading(Box::new(readout.stream(&Array::thesis(), 192.0, None).expect("a sound readout")))
 }
 
 fn options(record: Option<&Scratch>) -> LiveOptions {
@@ -152,7 +152,7 @@ fn recorded(path: &Scratch) -> (Events, Vec<Detection>) {
 #[test]
 fn a_recording_holds_the_events_that_the_board_sent() {
     let path = Scratch::new("events.mcap");
-    let live = Live::start(ANY, options(Some(&path)), Ear::Deaf, vec![]).expect("a port and a file");
+    let live = Live::start(ANY, options(Some(&path)), Listener::None, vec![]).expect("a port and a file");
     let report = emulate(live.address(), false, presses(3000, 3000));
     let summary = live.stop().expect("a sound way");
     assert_closed(&summary, &report);
@@ -166,7 +166,7 @@ fn a_recording_holds_the_events_that_the_board_sent() {
 #[test]
 fn a_raw_recording_holds_the_bytes_and_is_complete_at_the_end() {
     let path = Scratch::new("bytes.lsa");
-    let live = Live::start(ANY, options(Some(&path)), Ear::Deaf, vec![]).expect("a port and a file");
+    let live = Live::start(ANY, options(Some(&path)), Listener::None, vec![]).expect("a port and a file");
     let report = emulate(live.address(), false, presses(1000, 1000));
     wait_for(&live, |live| live.counters().wire.bytes == report.sent.bytes);
     assert!(!path.0.with_extension("lss").exists(), "not complete yet");
@@ -261,7 +261,7 @@ fn in_silence_time_moves_on_by_the_hosts_clock() {
 
 #[test]
 fn damaged_and_reordered_datagrams_are_counted_and_close_the_sum_of_bytes() {
-    let live = Live::start(ANY, options(None), Ear::Deaf, vec![]).expect("a port");
+    let live = Live::start(ANY, options(None), Listener::None, vec![]).expect("a port");
     let mut datagrams: Vec<Vec<u8>> = vec![];
     let mut board = Board::new(Registers::default(), &Array::thesis()).expect("a valid preset");
     let mut touch = presses(800, 800);
@@ -354,7 +354,7 @@ fn who_is_slow_to_listen_holds_up_neither_what_comes_nor_what_is_read_out() {
 fn a_file_that_exists_is_kept_and_its_port_is_let_go() {
     let path = Scratch::new("kept.mcap");
     std::fs::write(&path.0, "mine").expect("written");
-    let error = Live::start(ANY, options(Some(&path)), Ear::Deaf, vec![]).err().expect("refused");
+    let error = Live::start(ANY, options(Some(&path)), Listener::None, vec![]).err().expect("refused");
     assert!(matches!(&error, taxel_live::Error::File { .. }), "{error}");
     assert_eq!(std::fs::read(&path.0).expect("still there"), b"mine");
 }
@@ -362,15 +362,15 @@ fn a_file_that_exists_is_kept_and_its_port_is_let_go() {
 #[test]
 fn a_port_that_is_taken_leaves_no_file_behind() {
     let path = Scratch::new("unborn.mcap");
-    let holder = Live::start(ANY, options(None), Ear::Deaf, vec![]).expect("a port");
-    let error = Live::start(holder.address(), options(Some(&path)), Ear::Deaf, vec![]).err().expect("refused");
+    let holder = Live::start(ANY, options(None), Listener::None, vec![]).expect("a port");
+    let error = Live::start(holder.address(), options(Some(&path)), Listener::None, vec![]).err().expect("refused");
     assert!(matches!(&error, taxel_live::Error::Socket { .. }), "{error}");
     assert!(!path.0.exists());
 }
 
 #[test]
 fn a_stop_ends_also_while_datagrams_pour_in() {
-    let live = Live::start(ANY, options(None), Ear::Deaf, vec![]).expect("a port");
+    let live = Live::start(ANY, options(None), Listener::None, vec![]).expect("a port");
     let to = live.address();
     let done = Arc::new(std::sync::atomic::AtomicBool::new(false));
     let theirs = Arc::clone(&done);
@@ -395,7 +395,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_w
     let neuron = Neuron { tau: 0.5, refractory: 15.0, ..Neuron::default() };
     let readout = of(r#"{"name": "contact_area"}"#, TrainedNeuron { neuron, delay_ms: 0.0, weights });
     let path = Scratch::new("tare.mcap");
-    let ear = Ear::Taring(1_000_000, Box::new(readout.clone()));
+    let ear = Listener::Taring(1_000_000, Box::new(readout.clone()));
     let live = Live::start(ANY, options(Some(&path)), ear, vec![]).expect("a port");
     wait_for(&live, |live| live.counters().taring);
     let array = Array::thesis();
@@ -429,7 +429,7 @@ fn a_tare_is_made_of_the_stretch_before_the_start_marker_and_the_readout_hears_w
 
 #[test]
 fn the_board_takes_commands_and_answers() {
-    let live = Live::start(ANY, options(None), Ear::Deaf, vec![]).expect("a port");
+    let live = Live::start(ANY, options(None), Listener::None, vec![]).expect("a port");
     let array = Array::thesis();
     let board = Board::new(Registers::default(), &array).expect("a valid preset");
     let control = Some(ANY);

@@ -10,7 +10,7 @@ use taxel_core::encode::Encoder;
 use taxel_core::neuron::{Neuron, Time};
 use taxel_core::wire::{Pairing, Registers, v2};
 use taxel_core::{Array, Events, Stop};
-use taxel_live::pipeline::{Ear, Live, LiveOptions, Record};
+use taxel_live::pipeline::{Listener, Live, LiveOptions, Record};
 use taxel_live::recording::{Compression, Reader};
 
 const ANY: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(Ipv4Addr::LOCALHOST), 0);
@@ -91,7 +91,7 @@ fn a_large_array_is_recorded_and_every_loss_is_counted() {
     let mut sent = datagrams(&array, registers, 300);
     for lossy in [false, true] {
         let path = Scratch::new(if lossy { "lossy.mcap" } else { "whole.mcap" });
-        let live = Live::start(ANY, options(&array, registers, Some(&path)), Ear::Deaf, vec![]).expect("a port");
+        let live = Live::start(ANY, options(&array, registers, Some(&path)), Listener::None, vec![]).expect("a port");
         let mut lost = 0;
         if lossy {
             let whole = std::mem::take(&mut sent);
@@ -144,7 +144,7 @@ fn in_silence_time_moves_on_by_the_boards_promises() {
         delays_ms: vec![0.0],
         neurons: [("touch".to_owned(), one)].into(),
     };
-    let ear = Ear::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));
+    let ear = Listener::Reading(Box::new(readout.stream(&array, 192.0, None).expect("a sound readout")));
     let live = Live::start(ANY, options(&array, registers, None), ear, vec![]).expect("a port");
     let mut board = Board::new(registers, &array).expect("sound registers");
     let socket = UdpSocket::bind(ANY).expect("a socket");

@@ -10,7 +10,7 @@ use crate::enter::enter;
 use crate::parameters::parsed;
 
 type Values<'py> = Bound<'py, PyArray1<f64>>;
-/// us; V of the line, the comparator's input and the ramp; what the comparator says.
+/// Times, us; voltages of the line, the comparator's input and the ramp, V; the comparator's output.
 type TraceOut<'py> = (Values<'py>, Values<'py>, Values<'py>, Values<'py>, Bound<'py, PyArray1<bool>>);
 
 /// Gives conductances in uS of forces in N; or, `back`, forces of conductances.
@@ -79,7 +79,7 @@ fn circuit_volts<'py>(
     Ok(array(py, out))
 }
 
-/// Gives what each conductance would make by itself.
+/// Gives the voltage that each conductance would make by itself.
 #[pyfunction]
 fn circuit_volts_alone<'py>(
     py: Python<'py>,
@@ -127,7 +127,7 @@ fn converter_ramp<'py>(
     Ok(array(py, given.iter().map(one).collect()))
 }
 
-/// Gives what an oscilloscope sees of one comparator.
+/// Gives the signals of one comparator, as an oscilloscope would show them.
 #[pyfunction]
 fn converter_trace<'py>(
     py: Python<'py>,

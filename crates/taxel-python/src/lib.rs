@@ -3,8 +3,11 @@
 mod convert;
 mod enter;
 mod errors;
-mod guest;
-mod knock;
+mod instructions;
+#[cfg(feature = "test-hooks")]
+mod test_hooks;
+mod thread_state;
+mod threaded;
 
 mod bridge;
 mod calibration;
@@ -20,9 +23,11 @@ mod neuron;
 mod nouns;
 mod panel;
 mod parameters;
+mod pictures;
 mod recording;
 mod rivals;
 mod simulate;
+mod sources;
 mod wire;
 mod wire_v2;
 
@@ -32,7 +37,9 @@ use pyo3::prelude::*;
 #[pymodule]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     errors::register(module)?;
-    knock::register(module)?;
+    instructions::register(module)?;
+    #[cfg(feature = "test-hooks")]
+    test_hooks::register(module)?;
     nouns::register(module)?;
     bridge::register(module)?;
     calibration::register(module)?;
@@ -46,9 +53,11 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     neuron::register(module)?;
     described::register(module)?;
     panel::register(module)?;
+    pictures::register(module)?;
     recording::register(module)?;
     rivals::register(module)?;
     simulate::register(module)?;
+    sources::register(module)?;
     wire::register(module)?;
     wire_v2::register(module)?;
     Ok(())

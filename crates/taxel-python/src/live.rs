@@ -1,7 +1,8 @@
 //! The pipeline from datagrams to detections, and the sender of the benchmarks.
 
+use std::cell::Cell;
 use std::path::PathBuf;
-use std::sync::{PoisonError, RwLock, RwLockReadGuard};
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use numpy::PyArray1;
@@ -14,20 +15,21 @@ use taxel_core::wire::Registers;
 use taxel_core::{Array, problem};
 use taxel_live::address::of_host;
 use taxel_live::capture::{self, Sender};
-use taxel_live::pipeline::{Ear, Handle, Lines, Live as Pipeline, LiveOptions, Record, Said, Sink, Source};
+use taxel_live::pipeline::{Handle, Lines, Listener, Live as Pipeline, LiveOptions, Record, Said, Sink, Source};
 
 use crate::bridge::{Copies, Feed};
 use crate::convert::{ArrayParts, array, to_array};
 use crate::enter::enter;
 use crate::errors::{ProblemError, core, live};
-use crate::guest;
 use crate::parameters::parsed;
+use crate::thread_state;
+use crate::threaded::Threaded;
 
-/// What Python may choose; everything else is as Rust has it.
+/// The options that Python sets; all others have Rust's defaults.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Chosen {
-    /// A preset's name, or what the registers hold.
+    /// A preset's name, or the registers.
     registers: Value,
     differences: bool,
     guard_frames: f64,
@@ -38,11 +40,11 @@ struct Chosen {
     gro: Option<bool>,
     /// Where detections go as lines.
     send: Vec<String>,
-    /// What the board is called in a recording.
+    /// The board's name in a recording.
     name: String,
-    /// What else the recording holds: what it is called, and what it is.
+    /// The other sources of the recording: name, and description.
     sources: Vec<(String, String)>,
-    /// Whether recordings begin and end while all is heard.
+    /// Whether recordings begin and end while it runs.
     record_later: bool,
 }
 
@@ -74,21 +76,23 @@ fn said_parts(said: Said) -> SaidParts {
     (d.label, d.t, d.known, d.slope, said.said, said.said_ns, d.repaired)
 }
 
+thread_local! {
+    /// Whether this thread is calling a function that takes detections.
+    static IN_CALLBACK: Cell<bool> = const { Cell::new(false) };
+}
+
 /// Datagrams to detections, as they come.
 #[pyclass(frozen)]
 pub(crate) struct Live {
-    /// Never waited for while the GIL is held: whoever holds it may be asking for the GIL to look for Ctrl-C.
-    pipeline: RwLock<Option<Pipeline>>,
+    pipeline: Threaded<Pipeline>,
+    /// How it ended, as JSON, once it has; locked while it is being ended.
+    summary: Mutex<Option<String>>,
 }
 
 impl Live {
-    /// What the panel does with it.
+    /// What others may do with it while it runs.
     pub(crate) fn handle(&self, py: Python<'_>) -> PyResult<Handle> {
         self.with(py, |pipeline| Ok(pipeline.handle()))
-    }
-
-    fn held(&self) -> RwLockReadGuard<'_, Option<Pipeline>> {
-        self.pipeline.read().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn with<T: Send>(
@@ -96,10 +100,7 @@ impl Live {
         py: Python<'_>,
         work: impl FnOnce(&Pipeline) -> taxel_live::Result<T> + Send,
     ) -> PyResult<T> {
-        enter(py, |_| match self.held().as_ref() {
-            Some(pipeline) => work(pipeline),
-            None => Err(problem!("live: has been stopped; begin a new one").into()),
-        })
+        self.pipeline.with(py, work)
     }
 }
 
@@ -132,8 +133,9 @@ impl Live {
         };
         let usual = LiveOptions::new(to_array(parts)?);
         let sources = enter(py, |_| {
-            let said = chosen.sources.iter();
-            said.map(|(name, what)| Ok(Source { name: name.clone(), kind: what.parse()? }))
+            let sources = chosen.sources.iter();
+            sources
+                .map(|(name, what)| Ok(Source { name: name.clone(), kind: what.parse()? }))
                 .collect::<taxel_live::Result<_>>()
         })?;
         let options = LiveOptions {
@@ -160,21 +162,30 @@ impl Live {
         }
         if let Some(say) = say {
             sinks.push(Box::new(move |said: &Said| {
-                guest::attach(|py| say.call1(py, said_parts(said.clone())).map(drop)).map_err(std::io::Error::other)
+                thread_state::attach(|py| {
+                    IN_CALLBACK.set(true);
+                    let outcome = say.call1(py, said_parts(said.clone()));
+                    IN_CALLBACK.set(false);
+                    outcome.map(drop)
+                })
+                .map_err(std::io::Error::other)
             }));
         }
         let readout = readout.map(Readout::from_json).transpose().map_err(core)?;
         let tare = tare.map(Tare::from_json).transpose().map_err(core)?;
-        let ear = Ear::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
+        let listener = Listener::of(readout, tare.as_ref(), tare_us, &options).map_err(core)?;
         let fed = feed.map(|feed| feed.receiver()).transpose().map_err(live)?;
         let pipeline = enter(py, |_| match fed {
-            Some(receiver) => Pipeline::start_fed(receiver, options, ear, sinks),
-            None => Pipeline::start(of_host(host, port)?, options, ear, sinks),
+            Some(receiver) => Pipeline::start_fed(receiver, options, listener, sinks),
+            None => Pipeline::start(of_host(host, port)?, options, listener, sinks),
         })?;
-        Ok(Self { pipeline: RwLock::new(Some(pipeline)) })
+        Ok(Self {
+            pipeline: Threaded::new("live", "live: has been stopped; begin a new one", pipeline),
+            summary: Mutex::default(),
+        })
     }
 
-    /// Host and port that it listens on.
+    /// Host and port that it receives on.
     fn address(&self, py: Python<'_>) -> PyResult<(String, u16)> {
         let address = self.with(py, |pipeline| Ok(pipeline.address()))?;
         Ok((address.ip().to_string(), address.port()))
@@ -185,7 +196,7 @@ impl Live {
         self.with(py, |pipeline| Ok(pipeline.place().to_string()))
     }
 
-    /// What the board's registers hold, as far as it was told: JSON.
+    /// The board's registers, as far as they are known: JSON.
     fn registers(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |pipeline| Ok(json!(pipeline.handle().registers()).to_string()))
     }
@@ -199,19 +210,20 @@ impl Live {
     fn next(&self, py: Python<'_>, timeout: f64) -> PyResult<Option<SaidParts>> {
         let timeout = Duration::try_from_secs_f64(timeout)
             .map_err(|_| ProblemError::new_err(format!("timeout is {timeout} s: must be 0 or more")))?;
-        let said = enter(py, |stop| match self.held().as_ref() {
+        self.pipeline.check()?;
+        let said = enter(py, |stop| match self.pipeline.read().as_ref() {
             Some(pipeline) => pipeline.wait(timeout, stop),
             None => Ok(None),
         })?;
         Ok(said.map(said_parts))
     }
 
-    /// Whether the way has ended.
+    /// Whether the pipeline has ended.
     fn is_over(&self, py: Python<'_>) -> bool {
         self.with(py, |pipeline| Ok(pipeline.is_over())).unwrap_or(true)
     }
 
-    /// What came and what became of it: JSON.
+    /// Counts of what came and what became of it: JSON.
     fn counters(&self, py: Python<'_>) -> PyResult<String> {
         self.with(py, |pipeline| Ok(json!(pipeline.counters()).to_string()))
     }
@@ -221,86 +233,88 @@ impl Live {
         Ok(array(py, self.with(py, |pipeline| Ok(pipeline.picture()))?))
     }
 
-    /// The tare that was taken, as JSON, once it is complete.
+    /// The fresh tare, as JSON, once it is complete.
     fn tare(&self, py: Python<'_>) -> PyResult<Option<String>> {
         self.with(py, |pipeline| Ok(pipeline.tare().map(|tare| tare.to_json())))
     }
 
-    /// Starts and stops that came since this was asked last: (t us, start).
+    /// Starts and stops that came since the last call: (t us, start).
     fn take_markers(&self, py: Python<'_>) -> PyResult<Vec<(i64, bool)>> {
         self.with(py, |pipeline| Ok(pipeline.take_markers().iter().map(|m| (m.t, m.start)).collect()))
     }
 
-    /// Host and port that another board of the recording is listened to on; None where there is none of that name.
+    /// Host and port that another board of the recording sends to; None where there is none of that name.
     fn source_address(&self, py: Python<'_>, name: &str) -> PyResult<Option<(String, u16)>> {
         let address = self.with(py, |pipeline| Ok(pipeline.source_address(name)))?;
         Ok(address.map(|address| (address.ip().to_string(), address.port())))
     }
 
-    /// Keeps numbers of a source that is given; `arrived_ns` is now where it is left out.
+    /// Records numbers of a source whose values a program gives; `arrived_ns` is now where it is left out.
     fn sample(&self, py: Python<'_>, name: &str, values: Vec<f64>, arrived_ns: Option<i64>) -> PyResult<()> {
         let arrived_ns = arrived_ns.unwrap_or_else(taxel_live::recording::now_ns);
         self.with(py, |pipeline| pipeline.sample(name, arrived_ns, &values))
     }
 
-    /// Takes what taxels (column, row) hold for their rest from now on: t in us, column, row, rest after and before.
+    /// Takes the values that taxels (column, row) hold for their rest from now on: t in us, column, row, rest after and before.
     fn zero(&self, py: Python<'_>, taxels: Vec<(u16, u16)>) -> PyResult<Vec<ZeroingOut>> {
         self.with(py, |pipeline| pipeline.handle().zero(&taxels)).map(|all| all.into_iter().map(zeroing_out).collect())
     }
 
-    /// What was zeroed last at each taxel that was.
+    /// The latest zeroing of each taxel that was zeroed.
     fn zeroed(&self, py: Python<'_>) -> PyResult<Vec<ZeroingOut>> {
         self.with(py, |pipeline| Ok(pipeline.handle().zeroed().0)).map(|all| all.into_iter().map(zeroing_out).collect())
     }
 
-    /// Writes something down in the recording.
+    /// Writes a note into the recording.
     fn note(&self, py: Python<'_>, text: &str) -> PyResult<()> {
         self.with(py, |pipeline| pipeline.note(text))
     }
 
-    /// Records what comes from here on; gives how a recording that ran ended, as JSON.
+    /// Records what comes from here on; returns how a recording that ran ended, as JSON.
     fn record(&self, py: Python<'_>, path: PathBuf, compression: &str, overwrite: bool) -> PyResult<Option<String>> {
         let record = to_record(path, compression, overwrite)?;
         let ended = self.with(py, |pipeline| pipeline.record(&record))?;
         Ok(ended.map(|summary| json!(summary).to_string()))
     }
 
-    /// Has the recording that runs begin anew where nothing came into it; gives whether it does.
+    /// Lets the recording that runs begin anew where it holds nothing; returns whether it does.
     fn record_again(&self, py: Python<'_>) -> PyResult<bool> {
         self.with(py, |pipeline| Ok(pipeline.record_again()))
     }
 
-    /// Ends the recording that runs; gives how, as JSON.
+    /// Ends the recording that runs; returns how, as JSON.
     fn end_recording(&self, py: Python<'_>) -> PyResult<String> {
         Ok(json!(self.with(py, Pipeline::end_recording)?).to_string())
     }
 
-    /// Whether a recording that began while listening runs.
+    /// Whether a recording that `record` began runs.
     fn records(&self, py: Python<'_>) -> bool {
         self.with(py, |pipeline| Ok(pipeline.records())).unwrap_or(false)
     }
 
-    /// Says that the host told the board to speak this version of the wire.
+    /// Announces that the host told the board to speak this version of the wire.
     fn expect_version(&self, py: Python<'_>, version: u8) -> PyResult<()> {
         self.with(py, |pipeline| pipeline.expect_version(version))
     }
 
-    /// Ends; gives counters, verdict and path as JSON, or None where it had ended before.
-    fn stop(&self, py: Python<'_>) -> PyResult<Option<String>> {
+    /// Ends; returns counters, verdict and path as JSON, the same at every call.
+    fn stop(&self, py: Python<'_>) -> PyResult<String> {
+        self.pipeline.check()?;
+        if IN_CALLBACK.get() {
+            let text =
+                "live: `stop` was called by its own `say`, and would wait for itself; call it from another thread";
+            return Err(ProblemError::new_err(text));
+        }
         enter(py, |_| {
-            // Whoever waits for a detection ends then, and lets go.
-            self.held().iter().for_each(Pipeline::end);
-            let pipeline = self.pipeline.write().unwrap_or_else(PoisonError::into_inner).take();
-            pipeline.map(|pipeline| Ok::<_, taxel_live::Error>(json!(pipeline.stop()?).to_string())).transpose()
+            // A thread that waits for a detection returns then, and releases the pipeline.
+            self.pipeline.read().iter().for_each(Pipeline::end);
+            let mut summary = self.summary.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(pipeline) = self.pipeline.take() {
+                *summary = Some(json!(pipeline.stop()?).to_string());
+            }
+            let ended = summary.clone();
+            ended.ok_or_else(|| taxel_live::Error::from(problem!("live: ended by an error, which was raised then")))
         })
-    }
-}
-
-impl Drop for Live {
-    fn drop(&mut self) {
-        let pipeline = self.pipeline.get_mut().unwrap_or_else(PoisonError::into_inner).take();
-        // Its threads may be about to call a Python function: they must be able to, or they never end.
-        Python::attach(|py| py.detach(|| drop(pipeline)));
     }
 }
 
@@ -311,7 +325,7 @@ fn serial_ports(py: Python<'_>) -> PyResult<String> {
     Ok(json!(ports).to_string())
 }
 
-/// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; gives what was sent as JSON.
+/// Sends datagrams over and over, `each` of them every `period_us`, for `seconds`; returns the counts as JSON.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 fn send(

@@ -81,20 +81,11 @@ fn distance<'py>(py: Python<'py>, metric: &str, a: PatternsIn<'py>, b: PatternsI
     enter(py, |stop| metric.distance(&a, &b, stop))
 }
 
-/// Vector instructions by their names; the widest of the machine where none is named.
+/// Vector instructions by their names; the widest that may be used where none is named.
 fn to_instructions(name: Option<&str>) -> PyResult<Instructions> {
-    let instructions = match name {
-        None => Instructions::best(),
-        Some("none") => Instructions::Plain,
-        Some("avx2") => Instructions::Avx2,
-        Some("avx512") => Instructions::Avx512,
-        Some(other) => return Err(core(problem!("vectors is {other:?}: must be none, avx2 or avx512"))),
-    };
-    if instructions.present() {
-        Ok(instructions)
-    } else {
-        Err(core(problem!("vectors: this machine has no {instructions:?}")))
-    }
+    let Some(name) = name else { return Ok(Instructions::best()) };
+    let named = Instructions::named(name).ok_or_else(|| core(problem!("vectors is {name:?}: no such instructions")))?;
+    named.checked().map_err(core)
 }
 
 /// The distances of all patterns from all others, row by row.

@@ -1,4 +1,4 @@
-//! Simulated touch, and the board that feels it, as fast as it goes.
+//! Simulated touch, and the board that reads it, as fast as it goes.
 
 use std::os::fd::BorrowedFd;
 use std::path::PathBuf;
@@ -21,7 +21,7 @@ use crate::enter::{Shared, enter, enter_telling};
 use crate::errors::core;
 use crate::parameters::parsed;
 
-/// An act as Python hands it over: silence in ms, a scene as JSON, or pictures with their period in us.
+/// An act as Python passes it: silence in ms, a scene as JSON, or pictures with their period in us.
 #[derive(FromPyObject)]
 enum ActIn<'py> {
     Silence(f64),
@@ -51,13 +51,13 @@ fn to_sensor(json: &str) -> PyResult<Sensor> {
     reading::from_text(json).map_err(|unfit| core(Error::Scene(unfit.of("sensor"))))
 }
 
-/// Touches as Python gets them: kind, start and stop in us, speed in m/s, peak force in N.
+/// Touches as Python receives them: kind, start and stop in us, speed in m/s, peak force in N.
 type ContactsOut = Vec<(String, f64, f64, f64, f64)>;
 
-/// By body: place in mm, depth in mm and force in N at even steps; touches; what is said of one that is too narrow.
+/// By body: place in mm, depth in mm and force in N at even steps; touches; the warning of one that is too narrow.
 type MotionOut<'py> = (Vec<[Bound<'py, PyArray1<f32>>; 4]>, ContactsOut, Option<String>);
 
-/// By number of an act what is said of a touch that is narrower than its cells resolve.
+/// By number of an act the warning of a touch that is narrower than its cells resolve.
 type NarrowOut = Vec<(usize, String)>;
 
 fn from_narrow(narrow: &[(usize, Narrow)]) -> NarrowOut {
@@ -75,7 +75,7 @@ fn draw_scene(parts: ArrayParts, seed: u64, index: u32, left_to_rest: bool) -> P
     serde_json::to_string(&scene).map_err(|error| core(Error::Scene(error.to_string())))
 }
 
-/// Refuses a scene that makes no sense on an array, and taxels that make none; nothing is worked out.
+/// Refuses a scene or taxels that make no sense on an array, without computing the scene.
 #[pyfunction]
 fn check_scene(parts: ArrayParts, json: &str, sensor: &str) -> PyResult<()> {
     let felt = to_array(parts)?;
@@ -83,11 +83,11 @@ fn check_scene(parts: ArrayParts, json: &str, sensor: &str) -> PyResult<()> {
     to_sensor(sensor)?.check().map_err(core)
 }
 
-/// Works a scene out: each body's way at even steps, and the touches.
+/// Works a scene out: each body's trajectory at even steps, and the touches.
 #[pyfunction]
 fn motion<'py>(py: Python<'py>, parts: ArrayParts, json: &str, step_us: f64) -> PyResult<MotionOut<'py>> {
     let felt = to_array(parts)?;
-    let motion = enter(py, |_| Motion::of(&scene(json)?, &felt, step_us))?;
+    let motion = enter(py, |stop| Motion::of(&scene(json)?, &felt, step_us, stop))?;
     let (contacts, narrow) = (from_contacts(&motion.contacts), motion.narrow.map(|narrow| narrow.to_string()));
     let column = |values| array(py, values);
     let out = |t: Track| [t.x_mm, t.y_mm, t.depth_mm, t.force_n].map(column);
@@ -107,11 +107,15 @@ fn truth<'py>(
     let (circuit, asynchronous, tare_ms) = (None, false, 0.0);
     let acts = to_acts(acts)?;
     let play = Play { array: array_felt, registers, sensor, seed: 0, acts, tare_ms, circuit, asynchronous };
-    let stage = enter(py, |_| play.stage())?;
-    Ok((from_contacts(stage.contacts()), array(py, stage.force_n()), from_narrow(stage.narrow())))
+    let (stage, force_n) = enter(py, |stop| {
+        let stage = play.stage(stop)?;
+        let force_n = stage.force_n()?;
+        Ok::<_, Error>((stage, force_n))
+    })?;
+    Ok((from_contacts(stage.contacts()), array(py, force_n), from_narrow(stage.narrow())))
 }
 
-/// How a board that is played to works.
+/// The circuit of a board that is played to, and whether it is asynchronous.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PlayedBy {
@@ -122,7 +126,7 @@ struct PlayedBy {
 /// Plays acts to a board that arms, is tared and starts; gives what a host decodes of its datagrams, and how many they
 /// were, with their words and bytes. `registers` and `options` are JSON.
 ///
-/// `watch` hears, once a second of the board's, what share is played; what it raises ends the play.
+/// `watch` is called once a second of the board's with the share that is played; an exception of it ends the play.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 fn play<'py>(
@@ -145,7 +149,7 @@ fn play<'py>(
     Ok((from_events(py, events), datagrams, words, bytes, from_narrow(&narrow)))
 }
 
-/// What an emulated board feels, as Python hands it over.
+/// The touch of an emulated board, as Python passes it.
 #[derive(FromPyObject)]
 enum TouchIn<'py> {
     /// Events and the speed at which they are played.
@@ -158,7 +162,7 @@ enum TouchIn<'py> {
     Acts(Py<PyAny>),
 }
 
-/// How an emulated board works.
+/// The options of an emulated board.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Chosen {
@@ -200,7 +204,7 @@ impl Iterator for Acts {
     }
 }
 
-/// A touch of any kind; of acts the touches that are known are told.
+/// A touch of any kind; acts also give the touches that are known so far.
 enum Felt {
     Scenes(Box<Scenes>),
     Other(Box<dyn Touch>),
@@ -230,11 +234,11 @@ impl Touch for Felt {
     }
 }
 
-/// Lets an emulated board feel something and send its datagrams to `to`, in real time (frames of a pipe as they come); gives
+/// Plays a touch to an emulated board that sends its datagrams to `to`, in real time (frames of a pipe as they come); gives
 /// the report.
 ///
-/// `options` is JSON. `begun` hears where commands are taken once the board is ready, `watch` a report, as JSON, and the
-/// touches that became known, ten times a second. What either raises ends the play.
+/// `options` is JSON. `begun` is called with the address for commands once the board is ready, `watch` ten times a second
+/// with a report, as JSON, and the touches that became known. An exception of either ends the play.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 fn emulate(
@@ -330,7 +334,8 @@ impl Layer {
     fn new(py: Python<'_>, parts: ArrayParts, foam: &str, cells_per_pitch: u16, tolerance: f64) -> PyResult<Self> {
         let foam: Foam = reading::from_text(foam).map_err(|unfit| core(Error::Scene(unfit.of("foam"))))?;
         let array = to_array(parts)?;
-        let layer = enter(py, |_| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch)?.to_within(tolerance)))?;
+        let layer =
+            enter(py, |stop| Ok::<_, Error>(Bonded::new(&foam, &array, cells_per_pitch, stop)?.to_within(tolerance)))?;
         Ok(Self(Shared::new(layer)))
     }
 
@@ -352,17 +357,17 @@ impl Layer {
     /// Pressure on the face and stress at the base, MPa, by taxel, where a body has sunk by so many mm at each cell.
     fn press<'py>(&self, py: Python<'py>, sunk: PyReadonlyArray1<'py, f64>) -> PyResult<TwoOut<'py, f64, f32>> {
         let sunk = slice("sunk", &sunk)?;
-        let (pressure, base) = self.0.enter(py, |layer, _| {
+        let (pressure, base) = self.0.enter(py, |layer, stop| {
             let cells = layer.under(sunk);
-            let pressure = layer.press(&cells).to_vec();
+            let pressure = layer.press(&cells, stop)?.to_vec();
             let mut base = vec![];
-            layer.arrive(&cells, &pressure, &mut base);
+            layer.arrive(&cells, &pressure, &mut base, stop)?;
             Ok::<_, Error>((layer.on_array(&cells, &pressure), base))
         })?;
         Ok((array(py, pressure), array(py, base)))
     }
 
-    /// Forgets what was pressed before.
+    /// Forgets the latest touches.
     fn forget(&self, py: Python<'_>) -> PyResult<()> {
         self.0.enter(py, |layer, _| {
             layer.forget();

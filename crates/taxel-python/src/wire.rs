@@ -2,84 +2,162 @@
 
 use std::borrow::Cow;
 
-use numpy::PyReadonlyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use serde::Deserialize;
 use taxel_core::board::{Board, Crossed, IntensityWord, Previous, Version2};
 use taxel_core::circuit::Chain;
-use taxel_core::wire::{self, Command, Counts, Decoder, Filled, Pairing, Registers};
-use taxel_core::{Error, Marker};
+use taxel_core::wire::v2::{self, Heard};
+use taxel_core::wire::{self, Command, Cut, Decoder, Pairing, Registers};
+use taxel_core::{Error, Events, problem};
 
-use crate::convert::{ArrayParts, ColumnsIn, EventsIn, EventsOut, from_events, slice, to_array, to_events, to_room};
+use crate::convert::{
+    ArrayParts, ColumnsIn, EventsIn, EventsOut, FilledOut, array, from_events, from_filled, slice, to_array, to_events,
+    to_room,
+};
 use crate::enter::{Shared, enter};
 use crate::errors::core;
 use crate::parameters::{parsed, to_json};
 
-/// How many rows were filled, whether ticks were, and the markers on the way.
-type FilledOut = (usize, bool, Vec<(i64, bool)>);
-
-fn filled_out((Filled { rows, paired }, markers): (Filled, Vec<Marker>)) -> FilledOut {
-    (rows, paired, markers.iter().map(|m| (m.t, m.start)).collect())
+/// A decoder of either version, and what the last datagram of version 2 was.
+enum Either {
+    One(Decoder),
+    Two(v2::Decoder, Option<Heard>),
 }
 
-/// Turns bytes into events as they come.
+/// Turns bytes of version 1, or datagrams of version 2, into events as they come.
 #[pyclass(module = "taxel._core", frozen)]
-struct WireDecoder(Shared<Decoder>);
+struct WireDecoder(Shared<Either>);
 
 #[pymethods]
 impl WireDecoder {
+    /// `pairing` and `differences` are of version 1 alone: datagrams of version 2 say both themselves.
     #[new]
-    fn new(array: ArrayParts, pairing: &str, differences: bool) -> PyResult<Self> {
-        let pairing: Pairing = parsed("pairing", &format!("{pairing:?}"))?;
-        Ok(Self(Shared::new(Decoder::new(to_array(array)?).pairing(pairing).differences(differences))))
+    fn new(version: u8, array: ArrayParts, pairing: &str, differences: bool) -> PyResult<Self> {
+        let (array, pairing): (_, Pairing) = (to_array(array)?, parsed("pairing", &format!("{pairing:?}"))?);
+        Ok(Self(Shared::new(match version {
+            1 => Either::One(Decoder::new(array).pairing(pairing).differences(differences)),
+            _ => Either::Two(v2::Decoder::new(array), None),
+        })))
     }
 
-    /// Fills columns from their first row on, and ends the stream with the `last` bytes; returns rows, whether ticks were
-    /// written, markers.
-    fn fill(
+    /// Fills columns from their first row on with the events of bytes or of a datagram; ends a stream of version 1 with the
+    /// `last` bytes.
+    fn fill<'py>(
         &self,
-        py: Python<'_>,
+        py: Python<'py>,
         data: PyReadonlyArray1<'_, u8>,
         arrived: Option<i64>,
         mut columns: ColumnsIn<'_>,
         last: bool,
-    ) -> PyResult<FilledOut> {
+    ) -> PyResult<FilledOut<'py>> {
         let data = slice("data", &data)?;
         let room = to_room(&mut columns)?;
-        Ok(filled_out(self.0.enter(py, |decoder, stop| decoder.fill(data, arrived, room, last, stop))?))
+        let columns = self.0.enter(py, |decoder, stop| match decoder {
+            Either::One(decoder) => decoder.fill(data, arrived, room, last, stop),
+            Either::Two(decoder, heard) => {
+                let (columns, what) = decoder.fill(data, arrived, room)?;
+                *heard = Some(what);
+                Ok(columns)
+            }
+        })?;
+        Ok(from_filled(py, columns))
     }
 
-    /// As `fill`, of datagrams that lie one behind the other, each by itself, as a host hears them; ends the stream.
-    fn fill_datagrams(
+    /// As `fill`, of datagrams of version 1 that lie one behind the other, each decoded by itself, as a host receives them;
+    /// ends the stream.
+    fn fill_datagrams<'py>(
         &self,
-        py: Python<'_>,
+        py: Python<'py>,
         data: PyReadonlyArray1<'_, u8>,
         lengths: PyReadonlyArray1<'_, i64>,
         mut columns: ColumnsIn<'_>,
-    ) -> PyResult<FilledOut> {
+    ) -> PyResult<FilledOut<'py>> {
         let (data, lengths, room) = (slice("data", &data)?, slice("lengths", &lengths)?, to_room(&mut columns)?);
-        Ok(filled_out(self.0.enter(py, |decoder, stop| decoder.fill_datagrams(data, lengths, room, stop))?))
+        let columns = self.0.enter(py, |decoder, stop| match decoder {
+            Either::One(decoder) => decoder.fill_datagrams(data, lengths, room, stop),
+            Either::Two(..) => Err(problem!("lengths: datagrams of version 2 have theirs before them")),
+        })?;
+        Ok(from_filled(py, columns))
     }
 
     /// Releases the change that waits for its intensity.
     fn end_of_datagram<'py>(&self, py: Python<'py>) -> EventsOut<'py> {
-        from_events(py, self.0.look(py, Decoder::end_of_datagram))
+        let events = self.0.look(py, |decoder| match decoder {
+            Either::One(decoder) => decoder.end_of_datagram(),
+            Either::Two(decoder, _) => Events::empty(decoder.array().clone()),
+        });
+        from_events(py, events)
     }
 
     /// Ends the stream; returns the rest.
     fn finish<'py>(&self, py: Python<'py>) -> PyResult<EventsOut<'py>> {
-        let events = self.0.enter(py, |decoder, _| Ok::<_, Error>(decoder.finish()))?;
+        let events = self.0.enter(py, |decoder, _| {
+            Ok::<_, Error>(match decoder {
+                Either::One(decoder) => decoder.finish(),
+                Either::Two(decoder, _) => Events::empty(decoder.array().clone()),
+            })
+        })?;
         Ok(from_events(py, events))
     }
 
-    /// The counts, in the order of `wire_count_names`.
-    fn counts(&self, py: Python<'_>) -> [u64; 11] {
-        let counts = self.0.look(py, |decoder| *decoder.counts());
-        let Counts { bytes, words, skipped, short, changes, intensities, .. } = counts;
-        let Counts { unpaired, markers, contradictory, outside, back, .. } = counts;
-        [bytes, words, skipped, short, changes, intensities, unpaired, markers, contradictory, outside, back]
+    /// The version's counts as JSON.
+    fn counts(&self, py: Python<'_>) -> PyResult<String> {
+        self.0.look(py, |decoder| match decoder {
+            Either::One(decoder) => to_json(decoder.counts()),
+            Either::Two(decoder, _) => to_json(&decoder.counts()),
+        })
     }
+
+    /// Of the last datagram of version 2: until when nothing comes any more, us, and whether it was decoded.
+    fn last(&self, py: Python<'_>) -> Option<(Option<i64>, bool)> {
+        self.0.look(py, |decoder| match decoder {
+            Either::One(_) => None,
+            Either::Two(_, heard) => heard.map(|heard| match heard {
+                Heard::Intact { until, .. } => (until, true),
+                Heard::Repeated | Heard::Refused(_) => (None, false),
+            }),
+        })
+    }
+
+    /// The totals that the board last sent, as JSON.
+    fn status(&self, py: Python<'_>) -> PyResult<Option<String>> {
+        let status = self.0.look(py, |decoder| match decoder {
+            Either::One(_) => None,
+            Either::Two(decoder, _) => decoder.status().copied(),
+        });
+        status.map(|status| to_json(&status)).transpose()
+    }
+
+    /// What each taxel holds by index, -1 where that is not known.
+    fn held<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
+        let held = self.0.look(py, |decoder| match decoder {
+            Either::One(decoder) => decoder.held(),
+            Either::Two(decoder, _) => decoder.held(),
+        });
+        array(py, held.iter().map(|held| held.map_or(-1, i32::from)).collect())
+    }
+}
+
+/// How many rows bytes of a version may need: of a stream of version 1, of a datagram or a stream of version 2.
+#[pyfunction]
+fn wire_rows(version: u8, length: usize) -> usize {
+    match version {
+        1 => wire::most_rows(length),
+        _ => v2::stream_rows(length),
+    }
+}
+
+/// Where datagrams begin into which bytes of version 1 are cut, and where the last one ends; the board's time of each, us.
+#[pyfunction]
+fn wire_cut<'py>(
+    py: Python<'py>,
+    data: PyReadonlyArray1<'_, u8>,
+) -> PyResult<(Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>)> {
+    let data = slice("data", &data)?;
+    let Cut { offsets, times } = enter(py, |_| Ok::<_, Error>(wire::cut(data)))?;
+    Ok((array(py, offsets.into_iter().map(|at| at as i64).collect()), array(py, times)))
 }
 
 /// Events as bytes.
@@ -176,6 +254,12 @@ fn registers_check(registers: &str, array: ArrayParts) -> PyResult<Vec<String>> 
 fn registers_words(registers: &str) -> PyResult<(Vec<u32>, f64)> {
     let registers: Registers = parsed("registers", registers)?;
     Ok(((0..8).map(|n| registers.word(n)).collect(), registers.frame_us()))
+}
+
+/// What the eight 32-bit registers of a board of so many channels hold, as JSON, whatever the rules say.
+#[pyfunction]
+fn registers_of_words(words: [u32; 8], channels: u8) -> PyResult<String> {
+    to_json(&Registers::of_words(&words, channels))
 }
 
 /// The writes that lead from one set to another.
@@ -287,6 +371,8 @@ impl WireBoard {
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<WireDecoder>()?;
     module.add_class::<WireBoard>()?;
+    module.add_function(wrap_pyfunction!(wire_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(wire_cut, module)?)?;
     module.add_function(wrap_pyfunction!(wire_encode, module)?)?;
     module.add_function(wrap_pyfunction!(command_bytes, module)?)?;
     module.add_function(wrap_pyfunction!(command_read, module)?)?;
@@ -299,5 +385,6 @@ pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(registers_with, module)?)?;
     module.add_function(wrap_pyfunction!(registers_check, module)?)?;
     module.add_function(wrap_pyfunction!(registers_words, module)?)?;
+    module.add_function(wrap_pyfunction!(registers_of_words, module)?)?;
     module.add_function(wrap_pyfunction!(registers_commands, module)?)
 }

@@ -1,76 +1,19 @@
-//! Version 2 of the wire.
+//! Streams of version 2 of the wire: datagrams, each behind its length.
 
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use taxel_core::wire::Filled;
-use taxel_core::wire::v2::{self, Decoded, Decoder, Heard, StreamReader};
-use taxel_core::{Error, Events};
+use taxel_core::Error;
+use taxel_core::wire::v2::{self, Decoded, StreamReader};
 
-use crate::convert::{ArrayParts, ColumnsIn, EventsOut, array, from_events, slice, to_array, to_room};
+use crate::convert::{
+    ArrayParts, ColumnsIn, EventsIn, FilledOut, array, from_filled, slice, to_array, to_events, to_room,
+};
 use crate::enter::{Shared, enter};
 use crate::parameters::to_json;
 
-/// Events, and of the last datagram: until when nothing comes any more, and whether it was decoded.
-type HeardOut<'py> = (EventsOut<'py>, Option<i64>, bool);
-
-/// Turns one board's datagrams into events.
-#[pyclass(frozen, module = "taxel._core")]
-struct DatagramDecoder(Shared<Decoder>);
-
-#[pymethods]
-impl DatagramDecoder {
-    #[new]
-    fn new(array: ArrayParts) -> PyResult<Self> {
-        Ok(Self(Shared::new(Decoder::new(to_array(array)?))))
-    }
-
-    /// Takes a datagram.
-    fn push<'py>(
-        &self,
-        py: Python<'py>,
-        datagram: PyReadonlyArray1<'_, u8>,
-        arrived: Option<i64>,
-    ) -> PyResult<HeardOut<'py>> {
-        let bytes = slice("datagram", &datagram)?;
-        let (events, heard) = self.0.enter(py, |decoder, _| {
-            let mut events = Events::empty(decoder.array().clone());
-            let heard = decoder.push(bytes, arrived, &mut events);
-            Ok::<_, Error>((events, heard))
-        })?;
-        let (until, intact) = match heard {
-            Heard::Intact { until, .. } => (until, true),
-            Heard::Repeated | Heard::Refused(_) => (None, false),
-        };
-        Ok((from_events(py, events), until, intact))
-    }
-
-    /// The counts as JSON.
-    fn counts(&self, py: Python<'_>) -> PyResult<String> {
-        to_json(&self.0.look(py, |decoder| decoder.counts()))
-    }
-
-    /// What the board last said of itself, as JSON.
-    fn status(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        self.0.look(py, |decoder| decoder.status().copied()).map(|status| to_json(&status)).transpose()
-    }
-
-    /// What each taxel holds, -1 where nothing was heard of it.
-    fn held<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i32>> {
-        let held = |decoder: &mut Decoder| decoder.held().iter().map(|held| held.map_or(-1, i32::from)).collect();
-        array(py, self.0.look(py, held))
-    }
-}
-
-/// How far columns were filled, whether ticks were, which rows states gave, the markers; counts as JSON, and how many bytes
-/// belonged to no datagram.
-type DecodedOut<'py> = (usize, bool, Option<Bound<'py, PyArray1<bool>>>, Vec<(i64, bool)>, String, u64);
-
-/// How many rows a stream of so many bytes may need.
-#[pyfunction]
-fn datagram_rows(length: usize) -> usize {
-    v2::stream_rows(length)
-}
+/// What was filled; counts as JSON, and how many bytes belonged to no datagram.
+type DecodedOut<'py> = (FilledOut<'py>, String, u64);
 
 /// Decodes a whole stream of datagrams, each behind its length, into columns.
 #[pyfunction]
@@ -82,9 +25,29 @@ fn decode_datagrams<'py>(
 ) -> PyResult<DecodedOut<'py>> {
     let (bytes, sensor, room) = (slice("data", &data)?, to_array(sensor)?, to_room(&mut columns)?);
     let decoded = enter(py, |stop| v2::decode(bytes, sensor, room, stop))?;
-    let Decoded { filled: Filled { rows, paired }, repaired, markers, counts, skipped } = decoded;
-    let markers = markers.iter().map(|m| (m.t, m.start)).collect();
-    Ok((rows, paired, repaired.map(|column| array(py, column)), markers, to_json(&counts)?, skipped))
+    let Decoded { columns, counts, skipped } = decoded;
+    Ok((from_filled(py, columns), to_json(&counts)?, skipped))
+}
+
+/// What is added to times, where each datagram begins (and the last ends), bytes, a time of each; the numbers of events whose
+/// mark as repaired could not be written.
+type EncodedOut<'py> =
+    (i64, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>);
+
+/// Writes events as datagrams; `held` is what the taxels hold at first, by index.
+#[pyfunction]
+fn encode_datagrams<'py>(
+    py: Python<'py>,
+    events: EventsIn<'py>,
+    held: Option<PyReadonlyArray1<'py, u16>>,
+    promised: bool,
+) -> PyResult<EncodedOut<'py>> {
+    let events = to_events(events)?;
+    let events = events.view()?;
+    let held = held.as_ref().map(|held| slice("held", held)).transpose()?;
+    let encoded = enter(py, |_| v2::encode(events, held, promised))?;
+    let (offsets, bytes, times) = (encoded.offsets, encoded.bytes, encoded.times);
+    Ok((encoded.origin_us, array(py, offsets), array(py, bytes), array(py, times), array(py, encoded.unmarked)))
 }
 
 /// Cuts a stream into datagrams.
@@ -125,8 +88,7 @@ impl DatagramStream {
 }
 
 pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_class::<DatagramDecoder>()?;
     module.add_class::<DatagramStream>()?;
-    module.add_function(wrap_pyfunction!(datagram_rows, module)?)?;
+    module.add_function(wrap_pyfunction!(encode_datagrams, module)?)?;
     module.add_function(wrap_pyfunction!(decode_datagrams, module)?)
 }

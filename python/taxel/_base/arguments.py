@@ -7,7 +7,7 @@ import math
 import operator
 import os
 from collections.abc import Collection, Mapping
-from itertools import chain
+from itertools import chain, islice
 from typing import Any, SupportsIndex, TypeVar
 
 import numpy as np
@@ -20,6 +20,7 @@ __all__ = [
     "callback",
     "column",
     "fields",
+    "finite",
     "flag",
     "floats",
     "instance",
@@ -40,13 +41,44 @@ __all__ = [
 T = TypeVar("T")
 
 
+#: Characters of a value in an error.
+_SHOWN = 60
+#: The most values that a parameter may hold.
+_MOST = 10_000_000
+#: The most entries of an iterator, which may have no end.
+_MOST_GIVEN = 1_000_000
+#: The most values to which an array that NumPy repeats (`np.broadcast_to`) is copied.
+_MOST_REPEATED = 100_000_000
+
+
 def shown(value: object) -> str:
-    """Return what a value looks like in an error: one line, not long."""
+    """Return the representation of a value for an error: one line, at most 60 characters."""
     try:
-        said = " ".join(repr(value).split())
-    except Exception:  # a class of the caller's may fail in any way, and a list may hold itself too deeply
+        words = " ".join(repr(_beginning(value)).split())
+    except Exception:  # a class of the caller's may fail in any way
         return f"a {type(value).__name__} that cannot be shown"
-    return said if len(said) <= 60 else f"{said[:57]}..."
+    words = words.encode("ascii", "backslashreplace").decode() if _lone_surrogate(words) else words
+    return words if len(words) <= _SHOWN else f"{words[: _SHOWN - 3]}..."
+
+
+def _beginning(value: object, depth: int = 3) -> object:
+    """Return as much of a long value as an error shows: each entry takes at least one character."""
+    if type(value) in (str, bytes):
+        return value[: _SHOWN + 1]  # type: ignore[index]
+    if type(value) is list and depth:
+        return [_beginning(entry, depth - 1) for entry in value[: _SHOWN + 1]]
+    if type(value) is tuple and depth:
+        return tuple(_beginning(entry, depth - 1) for entry in value[: _SHOWN + 1])
+    return value
+
+
+def _lone_surrogate(value: str) -> bool:
+    """Return whether a text holds half of a surrogate pair, which UTF-8 cannot hold."""
+    try:
+        value.encode()
+    except UnicodeEncodeError:
+        return True
+    return False
 
 
 def instance(name: str, value: object, kind: type[T]) -> T:
@@ -58,10 +90,15 @@ def instance(name: str, value: object, kind: type[T]) -> T:
 
 def several(name: str, values: object) -> list[Any]:
     """Return a list of what an iterable gives; refuse what is none, by name."""
+    _refuse_repeated(name, values)
     try:
-        return list(values)  # type: ignore[call-overload, no-any-return]
+        sized = hasattr(values, "__len__")
+        found = list(values) if sized else list(islice(values, _MOST_GIVEN + 1))  # type: ignore[call-overload]
     except TypeError:
         raise ProblemError(f"{name} is {shown(values)}: must be a sequence") from None
+    if not sized and len(found) > _MOST_GIVEN:
+        raise ProblemError(f"{name} is {shown(values)}: must give at most {_MOST_GIVEN} entries")
+    return found
 
 
 def callback(name: str, value: T) -> T:
@@ -101,16 +138,29 @@ def bare(name: str, values: Any, unit: str | None = None) -> Any:
     level = [values]
     for _ in range(DEPTH):
         kinds = set(map(type, level))
+        if any(issubclass(kind, np.ma.MaskedArray) for kind in kinds):
+            _refuse_masked(name, level)
         if any(map(_has_unit, kinds)):
             return _converted(name, values, unit)
-        level = list(chain.from_iterable(filter(_is_nested, level))) if any(map(_may_nest, kinds)) else []
+        # A list that holds itself twice would double at each level: each list is entered once a level.
+        nested = {id(value): value for value in level if _is_nested(value)} if any(map(_may_nest, kinds)) else {}
+        for value in nested.values():
+            _refuse_repeated(name, value)
+        level = list(chain.from_iterable(nested.values()))
         if not level:
-            break
-    return values
+            return values
+    raise ProblemError(f"{name} is {shown(values)}: must be nested less than {DEPTH} times")
+
+
+def _refuse_masked(name: str, values: list[Any]) -> None:
+    """Refuse masked entries, behind which NumPy would give whatever value lies there."""
+    for value in values:
+        if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+            raise ProblemError(f"{name} is {shown(value)}: must have no masked entry")
 
 
 def _has_unit(kind: type[Any]) -> bool:
-    """Tell whether values of a class say what they are in; `dimensions` is Brian's word."""
+    """Return whether values of a class have a unit; `dimensions` is Brian's word."""
     return kind not in _PLAIN and any(hasattr(kind, word) for word in ("units", "unit", "dimensions"))
 
 
@@ -153,7 +203,7 @@ def number(name: str, value: object, unit: str | None = None) -> float:
     """Return a float, of a quantity the one in `unit`; refuse what is none, by name."""
     if _has_unit(type(value)):
         value = _one(bare(name, value, unit))
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+    if isinstance(value, bool | np.timedelta64) or not isinstance(value, int | float | np.integer | np.floating):
         raise ProblemError(f"{name} is {shown(value)}: must be a number")
     try:
         return float(value)
@@ -161,12 +211,25 @@ def number(name: str, value: object, unit: str | None = None) -> float:
         raise ProblemError(f"{name} is {shown(value)}: must fit a float") from None
 
 
+def finite(
+    name: str, value: object, unit: str | None = None, *, least: float = -math.inf, most: float = math.inf
+) -> float:
+    """Return a finite float from `least` to `most`; refuse any other, by name."""
+    real = number(name, value, unit)
+    if not (math.isfinite(real) and least <= real <= most):
+        low, high = math.isfinite(least), math.isfinite(most)
+        right = f"from {least:g} to {most:g}" if low and high else f"{least:g} or more and finite" if low else "finite"
+        raise ProblemError(f"{name} is {shown(value)}: must be {right}")
+    return real
+
+
 def whole(name: str, value: object, least: int = -(2**63), most: int = 2**63 - 1, unit: str | None = None) -> int:
     """Return a whole number within limits, of a quantity the one in `unit`; a float without a fraction will do."""
     if _has_unit(type(value)):
         value = _one(bare(name, value, unit))
     real = isinstance(value, float | np.floating) and float(value).is_integer()
-    if isinstance(value, bool) or not (real or isinstance(value, int | np.integer)) or not least <= value <= most:  # type: ignore[operator]
+    is_whole = real or (isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64))
+    if not is_whole or not least <= value <= most:  # type: ignore[operator]
         low, high = ("-2^63" if least == -(2**63) else least), ("2^63 - 1" if most == 2**63 - 1 else most)
         raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {low} to {high}")
     return int(value)  # type: ignore[call-overload, no-any-return]
@@ -184,15 +247,21 @@ def text(name: str, value: object, among: Collection[str] = ()) -> str:
     if not isinstance(value, str) or (among and value not in among):
         wanted = f"one of {', '.join(map(repr, among))}" if among else "a text"
         raise ProblemError(f"{name} is {shown(value)}: must be {wanted}")
+    if _lone_surrogate(value):
+        raise ProblemError(f"{name} is {shown(value)}: must be a text without lone surrogates")
     return value
 
 
 def path(name: str, value: object) -> str:
     """Return a file's name; refuse what cannot be one (a number would be an open file to Python)."""
-    said = os.fspath(value) if isinstance(value, str | os.PathLike) else None
-    if not isinstance(said, str) or not said or "\0" in said:
+    named = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    try:
+        encoded = os.fsencode(named) if isinstance(named, str) else b""
+    except UnicodeEncodeError:  # half of a surrogate pair, which no file's name holds
+        encoded = b""
+    if not isinstance(named, str) or not encoded or b"\0" in encoded:
         raise ProblemError(f"{name} is {shown(value)}: must be a path")
-    return said
+    return named
 
 
 def window(unit: str, start: object, stop: object) -> tuple[float, float]:
@@ -209,6 +278,7 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
     Quantities are converted to `unit` (`bare`).
     """
     plain = bare(name, values, unit)
+    _refuse_repeated(name, plain)
     try:
         given = np.asarray(plain)
         if given.size == 0 and given.dtype.kind not in "biuf":
@@ -236,6 +306,12 @@ def numbers(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = N
     return array
 
 
+def _refuse_repeated(name: str, values: object) -> None:
+    """Refuse an array that NumPy repeats so often that its copy would take all memory."""
+    if isinstance(values, np.ndarray) and values.size > _MOST_REPEATED and 0 in values.strides:
+        raise ProblemError(f"{name} holds {values.size} values, repeated: must be at most {_MOST_REPEATED}")
+
+
 def column(name: str, values: ArrayLike, dtype: type[Any], unit: str | None = None) -> NDArray[Any]:
     """Return a contiguous array of one dimension; refuse what would change its value on the way."""
     array = numbers(name, values, dtype, unit)
@@ -252,7 +328,7 @@ def floats(name: str, values: ArrayLike, unit: str | None = None) -> NDArray[np.
 def rows(name: str, chosen: object, length: int) -> NDArray[Any]:
     """Return a mask over all rows, or numbers of rows, as an index; refuse what is neither, by name."""
     try:
-        index = np.asarray(chosen)
+        index = np.asarray(bare(name, chosen))
     except ValueError:
         index = np.empty(0, object)
     if index.size == 0 and index.ndim == 1 and index.dtype.kind in "fi":
@@ -290,24 +366,33 @@ def fields(records: object, wanted: tuple[str, ...]) -> tuple[str, ...]:
 
 def parameters(values: Mapping[str, object]) -> str:
     """Return parameters as JSON for the compiled part, which checks them; JSON has no NaN, so those end here."""
+    left = _MOST
 
-    def plain(name: str, value: object) -> object:
+    def plain(name: str, value: object, depth: int) -> object:
+        nonlocal left
         value = bare(name, value)
-        if not isinstance(value, float):
-            if value is None or isinstance(value, str | bool | np.bool_):
-                return bool(value) if isinstance(value, np.bool_) else value
-            if isinstance(value, int | np.integer):
-                return whole(name, value)
+        if isinstance(value, Mapping | list | tuple | np.ndarray):
+            left -= value.size if isinstance(value, np.ndarray) else len(value)
+            if left < 0:
+                raise ProblemError(f"{name} is {shown(value)}: must have at most {_MOST} entries")
+            if depth == DEPTH:
+                raise ProblemError(f"{name[:_SHOWN]}...: must be nested less than {DEPTH} times")
             if isinstance(value, Mapping):
-                return {str(key): plain(f"{name}.{key}", entry) for key, entry in value.items()}
-            if isinstance(value, list | tuple | np.ndarray):
-                return [
-                    plain(f"{name}[{k}]", entry)
-                    for k, entry in enumerate(np.atleast_1d(value) if isinstance(value, np.ndarray) else value)
-                ]
+                return {
+                    text(f"a name in {name}", key): plain(f"{name}.{key}", entry, depth + 1)
+                    for key, entry in value.items()
+                }
+            entries = np.atleast_1d(value) if isinstance(value, np.ndarray) else value
+            return [plain(f"{name}[{k}]", entry, depth + 1) for k, entry in enumerate(entries)]
+        if value is None or isinstance(value, bool | np.bool_):
+            return None if value is None else bool(value)
+        if isinstance(value, str):
+            return text(name, value)
+        if isinstance(value, int | np.integer):
+            return whole(name, value)
         real = number(name, value)
         if not math.isfinite(real):
             raise ProblemError(f"{name} is {real}: must be finite")
         return real
 
-    return json.dumps({name: plain(name, value) for name, value in values.items()})
+    return json.dumps({name: plain(name, value, 0) for name, value in values.items()})

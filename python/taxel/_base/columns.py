@@ -1,4 +1,4 @@
-"""A noun's columns: arrays that nobody can change, so that they need not be copied to be read."""
+"""A noun's columns: read-only arrays, which need not be copied to be read."""
 
 from __future__ import annotations
 

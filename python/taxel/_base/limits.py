@@ -1,4 +1,4 @@
-"""What a file may hold at most: asked before memory is asked for, named in the error, told in docs/files.md.
+"""What a file may hold at most: checked before memory is allocated, named in the error, listed in docs/files.md.
 
 Files come from strangers and from damaged disks: a few bytes can claim 10^12 values. The limits lie well above what
 sensors of today record. Those of .mcap stand beside its reader (crates/taxel-live/src/recording/limits.rs).
@@ -36,4 +36,4 @@ def unpacked(place: str, size: int, most: int = UNPACKED) -> None:
     FormatError : more bytes than `most`
     """
     if size > most:
-        raise FormatError(f"{place}: says that it holds {size} bytes, unpacked; at most {most} are read")
+        raise FormatError(f"{place}: claims {size} bytes, unpacked; at most {most} are read")

@@ -20,7 +20,7 @@ __all__ = ["Parameters", "Value", "defaults", "described", "ranges"]
 
 @cache
 def described(kind: str) -> dict[str, Any]:
-    """Return what the compiled part says of a noun's parameters.
+    """Return the compiled part's description of a noun's parameters.
 
     ``defaults`` by name, the names that are ``required``, and the ``ranges`` of numbers by name, with their ``unit``
     and the words of an error, ``must_be``.
@@ -48,8 +48,8 @@ def ranges(kind: str) -> dict[str, Any]:
 class Parameters:
     """Hold the parameters of the constructor under their own names, just as they were given.
 
-    A subclass says the `_kind` under which the compiled part knows it, and which of its parameters hold parameters
-    themselves (`_nested`). It is checked when it is made and when parameters are set.
+    A subclass has the name under which the compiled part knows it (`_kind`), and names the parameters that hold
+    parameters themselves (`_nested`). It is checked when it is made and when parameters are set.
 
     The manners are scikit-learn's, which is never imported: `get_params`, `set_params`, nested names (``neuron__tau``),
     tags.
@@ -176,8 +176,8 @@ class Parameters:
 
     def __repr__(self) -> str:
         default = {name: entry.default for name, entry in signature(type(self)).parameters.items()}
-        told = (f"{name}={value!r}" for name, value in self._values().items() if not _same(value, default[name]))
-        return f"{type(self).__name__}({', '.join(told)})"
+        given = (f"{name}={value!r}" for name, value in self._values().items() if not _same(value, default[name]))
+        return f"{type(self).__name__}({', '.join(given)})"
 
 
 class Value(Parameters):

@@ -257,7 +257,7 @@ class Calibration:
         """Fit a calibration to known loads laid on the array.
 
         The gain is the one with the least squares of relative error. Where the loads differ, the exponent of the curve
-        is fitted with it; where another exponent would do as well, a warning says which.
+        is fitted with it; where another exponent would do as well, a warning names it.
 
         Parameters
         ----------
@@ -266,12 +266,12 @@ class Calibration:
         unit : {"N", "kPa"}
             Of the calibration. Between N and kPa stands the pitch squared.
         start : Calibration, optional
-            Whose curve is taken (a law, a table); else a power of the reading.
+            The calibration whose curve (a law, a table) is fitted; else a power of the reading.
         exponent : float, above 0, optional
             Of the value by the reading's conductance or count, not to be fitted. Left out, it is 1 (of a law, its own)
             where all loads are alike.
         each : bool
-            A gain of its own for each taxel that a load says something of: uniform pressure (kPa), or a load on one
+            A gain of its own for each taxel that a load determines: uniform pressure (kPa), or a load on one
             taxel. The others keep the common one.
         rest : Tare or float64 of the array's shape, optional
             That of `start`, or 0, where it is left out.
@@ -320,12 +320,16 @@ class Calibration:
         ----------
         frames : Frames
             Readings as the sensor gives them, rest and all.
-        rest : Tare or float64 of the array's shape, optional
-            Today's; the calibration's own where it is left out.
+        rest : Tare or float64, a number or the array's shape, optional
+            Today's, finite; the calibration's own where it is left out.
+
+        Returns
+        -------
+        Frames, in the calibration's unit
 
         Raises
         ------
-        ProblemError : pictures of another array, or in another unit
+        ProblemError : pictures of another array, or in another unit; a rest that is not finite
         """
         _same(self.array, instance("frames", frames, Frames).array, "the pictures", frames.unit, self.of)
         return Frames(self._values(frames.values, self._rest(rest)), frames.t, unit=self.unit, array=frames.array)
@@ -346,6 +350,8 @@ class Calibration:
         if isinstance(given, Tare):
             _same(self.array, given.array, "the tare")
             given = given.rest
+        elif given is not None and np.isnan(numbers("rest", given, np.float64)).any():
+            raise ProblemError("rest holds NaN: must be finite; give a Tare where the rest of a taxel is not known")
         if given is not None:
             return _by_taxel("rest", given, self.array)
         if self.rest is not None:
@@ -357,6 +363,18 @@ class Calibration:
         read = np.asarray(readings, np.float64)
         loaded = (read > known + self.floor) & ~np.isnan(rest) & _there(self.array)
         return _32_bits(np.where(loaded, self.gain * self._curve.values(read, known), 0.0))
+
+    def _region(self, columns: slice, rows: slice) -> Calibration:
+        """Return the calibration of a rectangle of the array."""
+        (left, right), (top, bottom) = self.array.region(columns, rows)
+        exists = None if self.array.exists is None else self.array.exists[top:bottom, left:right]
+        small = Array(bottom - top, right - left, self.array.pitch_mm, exists, self.array.name)
+        curve, rest = self._curve, None if self.rest is None else self.rest[top:bottom, left:right]
+        if isinstance(curve, Table) and curve.x.ndim == 3:
+            curve = Table(curve.x[:, top:bottom, left:right], curve.y)
+        gain = self.gain[top:bottom, left:right]
+        said = {name: getattr(self, name) for name in ("floor", "date", "residual", "loads", "note")}
+        return self._made(small, curve, self.unit, self.of, {**said, "gain": gain, "rest": rest})
 
     def to_json(self) -> str:
         """Return the calibration as JSON that people can read."""
@@ -565,8 +583,8 @@ def _best_exponent(calibration: Calibration, curve: Curve, laid: Sequence[_Laid]
     if alike:
         also = ", ".join(f"{exponent:.3g}" for exponent in alike)
         warnings.warn(
-            f"loads: an exponent of {best[1]:.3g} is taken, but {also} fits them as well; one more load, or exponent, "
-            "would tell",
+            f"loads: an exponent of {best[1]:.3g} is used, but {also} fits them as well; one more load, or exponent, "
+            "would decide",
             stacklevel=3,
         )
     return best[1]
@@ -579,7 +597,7 @@ def _gains(calibration: Calibration, laid: Sequence[_Laid], each: bool) -> tuple
     if not each:
         return gains, common
     if not any(one.alone for one in laid):
-        raise ProblemError("each: no load says what a single taxel bears; give a uniform pressure (kPa), or its taxel")
+        raise ProblemError("each: no load determines a single taxel; give a uniform pressure (kPa), or its taxel")
     share = np.array([one.by_taxel(calibration) / one.load for one in laid if one.alone])
     squares = (share**2).sum(axis=0)
     np.divide(share.sum(axis=0), squares, out=gains, where=squares > 0)

@@ -15,9 +15,10 @@ from typing import Any, NoReturn
 import typer
 
 from taxel._core import DeviceError, Error
-from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, app
+from taxel.cli._app import OUTSIDE, STOPPED, WRONG_INPUT, App, app
+from taxel.cli._recordings import SET_HELP, assignments
 
-__all__ = ["app", "main"]
+__all__ = ["SET_HELP", "App", "app", "assignments", "main"]
 
 #: What typer makes of words that cannot be a command line: the class is of its own copy of click.
 _UsageError: Any = typer.BadParameter.__base__
@@ -116,7 +117,6 @@ for _command in (
     "merge",
     "record",
     "simulate",
-    "study",
     "train",
     "view",
 ):

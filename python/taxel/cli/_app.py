@@ -11,6 +11,7 @@ import typer
 from typer.core import TyperCommand
 
 from taxel._core import Error
+from taxel.cli._added import WithAdded
 
 __all__ = ["OUTSIDE", "STOPPED", "WRONG_INPUT", "App", "SecondsOption", "app"]
 
@@ -67,7 +68,16 @@ class _Command(TyperCommand):
 
 
 class App(typer.Typer):
-    """A group of such commands."""
+    """A group of such commands: no colours, no completion, no traceback of its own."""
+
+    def __init__(self, **options: Any) -> None:
+        plain: dict[str, Any] = {
+            "add_completion": False,
+            "pretty_exceptions_enable": False,
+            "rich_markup_mode": None,
+            "context_settings": {"help_option_names": ["-h", "--help"]},
+        }
+        super().__init__(**(plain | options))
 
     def command(self, *names: Any, **options: Any) -> Callable[[Any], Any]:
         """Register a command."""
@@ -76,10 +86,7 @@ class App(typer.Typer):
 
 app = App(
     name="taxel",
+    cls=WithAdded,
     help="Touch as events: from the bytes of a tactile array to decisions that say when.",
     no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
 )

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, flag, instance, number, shown, whole
+from taxel._base.arguments import callback, finite, flag, instance, shown, whole
 from taxel._core import ProblemError
 from taxel.detect.examples import Example, array_of, checked
 from taxel.detect.readout import Readout, run
@@ -149,7 +149,9 @@ def judge(
     >>> judge(examples, recipe, [Fold([Part(0)], [Part(1)])]).together.found
     1
     """
-    examples, window = checked(examples), number("window_ms", window_ms)
+    examples, window = checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
+    if frame_us is not None:
+        finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
     report = _reporting(progress)
     search = flag("search", search)
     ways, how = _folds(examples, k)
@@ -213,7 +215,9 @@ def choose(
     {'contact': {'ub': 2.0}}
     """
     instance("recipe", recipe, Recipe)
-    examples, window = checked(examples), number("window_ms", window_ms)
+    examples, window = checked(examples), finite("window_ms", window_ms, "ms", least=0.0, most=3.6e6)
+    if frame_us is not None:
+        finite("frame_us", frame_us, "us", least=1.0, most=3.6e9)
     report = _reporting(progress)
     if isinstance(k, int | np.integer):
         k = whole("k", k, 2, 2**31)

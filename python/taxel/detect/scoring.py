@@ -220,7 +220,7 @@ def score_together(
 ) -> Score:
     """Score what was said of several recordings as one, with the events of each by the same labels (us)."""
     later = range(0, len(heard) * _APART_US, _APART_US)
-    moved = [Detections(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(heard, later, strict=True)]
+    moved = [Detections._of(list(f.label), f.t + by, f.known + by, f.slope) for f, by in zip(heard, later, strict=True)]
     happened = {
         label: np.concatenate([truth[label] + by for truth, by in zip(truths, later, strict=True)])
         for label in truths[0]

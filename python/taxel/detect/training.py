@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from taxel._base.arguments import callback, instance, mapping, number, parameters, several, shown, text
+from taxel._base.arguments import callback, finite, instance, mapping, number, parameters, several, shown, text
 from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import recipes
@@ -70,7 +70,8 @@ class Recipe:
 
     def __post_init__(self) -> None:
         instance("encoder", self.encoder, Encoder)
-        number("run_threshold", self.run_threshold)
+        if not finite("run_threshold", self.run_threshold) > 0:
+            raise ProblemError(f"run_threshold is {shown(self.run_threshold)}: must be above 0 and finite")
         text("about", self.about)
         text("source", self.source)
         if not isinstance(self.neurons, Mapping):

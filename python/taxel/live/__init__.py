@@ -1,19 +1,23 @@
 """From a board's datagrams to detections, while they come, and what a browser is shown of them."""
 
 from taxel.live.bridge import Bridge
+from taxel.live.client import PanelClient
+from taxel.live.live import Live
 from taxel.live.panel import Panel
 from taxel.live.remote import Remote
+from taxel.live.said import Said, heard
 from taxel.live.sending import PORT, send
 from taxel.live.source import Source
+from taxel.live.summary import Summary
+from taxel.live.summary import delays as delays
 from taxel.live.viewer import Viewer, Viewing
-from taxel.live.way import Live, Said, Summary, heard
-from taxel.live.way import delays as delays
 
 __all__ = [
     "PORT",
     "Bridge",
     "Live",
     "Panel",
+    "PanelClient",
     "Remote",
     "Said",
     "Source",

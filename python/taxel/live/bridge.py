@@ -16,8 +16,8 @@ from typing import Any
 from taxel import _core
 from taxel._base.arguments import number, text
 from taxel._core import DeviceError, ProblemError
+from taxel.live.live import Live
 from taxel.live.remote import told, wheel
-from taxel.live.way import Live
 
 __all__ = ["PLACE", "Bridge"]
 
@@ -170,4 +170,4 @@ def _refused(place: str) -> None:
 def _about(live: Live) -> str:
     """Return what those who ask are told of the sensor."""
     held = json.loads(live._core.registers())
-    return json.dumps({"array": live.array._geometry(), "registers": held, "differences": live._how["differences"]})
+    return json.dumps({"array": live.array._geometry(), "registers": held, "differences": live._options.differences})

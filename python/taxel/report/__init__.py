@@ -1,6 +1,7 @@
 """Pages with pictures, each one file that needs no other."""
 
+from taxel._base.files import write_whole
 from taxel.report.information import write_information
 from taxel.report.listening import Listened, write_listening
 
-__all__ = ["Listened", "write_information", "write_listening"]
+__all__ = ["Listened", "write_information", "write_listening", "write_whole"]

@@ -15,9 +15,9 @@ __all__ = ["render"]
 
 
 @cache
-def _environment() -> jinja2.Environment:
+def _environment(package: str) -> jinja2.Environment:
     return jinja2.Environment(
-        loader=jinja2.PackageLoader("taxel", "."),
+        loader=jinja2.ChoiceLoader([jinja2.PackageLoader(name, ".") for name in dict.fromkeys((package, "taxel"))]),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
@@ -25,13 +25,15 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def render(template: str, **values: Any) -> str:
+def render(template: str, *, package: str = "taxel", **values: Any) -> str:
     """Return a page.
 
     Parameters
     ----------
     template : str
-        By package, such as "demo/report.html.j2"; it extends "report/page.html.j2".
+        A Jinja template in the package, such as "demo/report.html.j2"; it extends "report/page.html.j2" of taxel.
+    package : str
+        Name of the installed package that the template is part of.
     values
         What the template shows; figures as `taxel.report.charts.chart` makes them.
     """
@@ -42,7 +44,7 @@ def render(template: str, **values: Any) -> str:
     own = files("taxel.report").joinpath("charts.js").read_text(encoding="utf-8")
     licence = _core.page_file("vendor/uPlot.LICENSE").decode()
     return (
-        _environment()
+        _environment(package)
         .get_template(template)
         .render(
             uplot_css=Markup(_core.page_file("vendor/uPlot.css").decode()),

@@ -1,6 +1,6 @@
-"""Simulated touch: bodies on foam, and the emulated board that feels them.
+"""Simulated touch: bodies on foam, and the emulated board that reads them.
 
-A scene says what happens to the bodies. `play` lets a board feel acts as fast as it goes, `emulate` in real time over
+A scene says what happens to the bodies. `play` plays acts to a board as fast as it goes, `emulate` in real time over
 UDP: acts, a recording again, or the frames of any other sensor. `Board` is the board alone, a frame at a time.
 `taxel.simulate.circuit` is what lies between touch and board: fabric, lines, converter.
 """

@@ -29,7 +29,7 @@ class Contact(NamedTuple):
     speed_m_s: float
     """How fast it began."""
     peak_n: float
-    """The largest force; 0 where nobody knows it."""
+    """The largest force; 0 where it is not known."""
 
 
 class Track(NamedTuple):
@@ -71,7 +71,7 @@ class Silence:
 
 
 class Scene:
-    """Describe bodies over foam on the array, and what becomes of them.
+    """Describe bodies over foam on the array, and their motions.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class Scene:
     -----
     Gibson and Ashby's foam with Hunt and Crossley's damping and a dashpot; the layer's base stress reaches the taxels.
     Modulus, damping, dashpot and friction are guesses. A body moves by the force that it would meet alone; bodies that
-    press side by side are reckoned together in what the taxels feel.
+    press side by side are solved together in the stress that the taxels sense.
 
     Examples
     --------
@@ -132,24 +132,64 @@ class Scene:
         ----------
         seed, index : int, 0 or more
         left_to_rest : bool
-            Nobody catches the ball; else it is caught after 2 to 4 impacts and pressed by hand.
+            Whether the ball is left to come to rest; else it is caught after 2 to 4 impacts and pressed by hand.
         array : Array, optional
             The thesis' 64 x 64 taxels where it is left out.
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        SceneError : an array too small to keep 36 mm from its edge
+        ProblemError : a seed or an index that is no whole number
+
+        Examples
+        --------
+        >>> Scene.draw(seed=1, index=3) == Scene.draw(seed=1, index=3)
+        True
         """
         parts = Array._of(array)._parts()
         seed, index = whole("seed", seed, 0), whole("index", index, 0, 1_000_000)
         return cls(json.loads(_core.draw_scene(parts, seed, index, flag("left_to_rest", left_to_rest))))
 
     def replace(self, **changes: Any) -> Scene:
-        """Return the scene with parameters changed; a mapping changes some of a part, as ``foam={"dashpot_ms": 0}``."""
+        """Return the scene with parameters changed; a mapping changes some of a part, as ``foam={"dashpot_ms": 0}``.
+
+        Raises
+        ------
+        ProblemError : a parameter that a scene does not have
+
+        Examples
+        --------
+        >>> Scene.draw(seed=1).replace(lead_ms=5.0).parameters["lead_ms"]
+        5.0
+        """
         return Scene(_replaced("a scene", self.parameters, changes, ("cells_per_pitch",)))
 
     def body(self, n: int = 0, **changes: Any) -> Scene:
         """Return the scene with parameters of body `n` changed, as ``x_mm=80``; a mapping changes some of a part.
 
+        Parameters
+        ----------
+        n : int, 0 or more
+            The body's number.
+        **changes
+            Parameters of a body.
+
+        Returns
+        -------
+        Scene
+
         Raises
         ------
-        ProblemError : no such body, or a parameter that it has not
+        ProblemError : no such body, or a parameter that it does not have
+
+        Examples
+        --------
+        >>> Scene.draw(seed=1).body(0, x_mm=80.0).parameters["bodies"][0]["x_mm"]
+        80.0
         """
         bodies = list(self.parameters["bodies"])
         n = whole("n", n, 0, len(bodies) - 1)
@@ -157,7 +197,30 @@ class Scene:
         return Scene({**self.parameters, "bodies": bodies})
 
     def motion(self, step_us: float = 48.0, *, array: Array | None = None) -> Motion:
-        """Work the scene out; by default in quarters of a frame of 5208 Hz, over the thesis' array."""
+        """Work the scene out; by default in quarters of a frame of 5208 Hz, over the thesis' array.
+
+        Parameters
+        ----------
+        step_us : float, us, above 0, at most 1000
+            From one entry of a track to the next.
+        array : Array, optional
+            The thesis' 64 x 64 taxels where it is left out.
+
+        Returns
+        -------
+        Motion
+
+        Raises
+        ------
+        SceneError : a parameter of the scene that makes no sense, a body off the array, or more than 2e7 steps
+        ProblemError : a step that is no number
+
+        Examples
+        --------
+        >>> motion = Scene.draw(seed=1).motion(step_us=100.0)
+        >>> round(float(motion.force_n.max()), 1), len(motion.contacts)
+        (24.6, 5)
+        """
         step = number("step_us", step_us, "us")
         tracks, contacts, narrow = _core.motion(Array._of(array)._parts(), self._part(), step)
         self._warn(narrow)
@@ -167,7 +230,7 @@ class Scene:
         return parameters(self.parameters)
 
     def _warn(self, narrow: str | None) -> None:
-        """Say once of a scene that a touch is too narrow."""
+        """Warn once a scene that a touch is too narrow."""
         if narrow is not None and not self._warned:
             self._warned = True
             warnings.warn(narrow, stacklevel=3)

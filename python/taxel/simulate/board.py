@@ -14,11 +14,12 @@ from taxel._base.arguments import flag, instance, numbers, text, whole
 from taxel._core import DeviceError, ProblemError
 from taxel.array import Array
 from taxel.simulate.circuit import Circuit
-from taxel.wire import Registers, _bytes
+from taxel.wire import Registers
+from taxel.wire.given import given_bytes
 
 __all__ = ["NOT_RETURNED", "Board", "Version2", "fitting", "reading"]
 
-#: A trip time that says: the comparator had not returned when the ramp began. A fault, not a value.
+#: The trip time of a comparator that had not returned when the ramp began: a fault, not a value.
 NOT_RETURNED = 65_535
 
 #: Lines that the thesis' presets are made for.
@@ -40,7 +41,7 @@ class Version2:
     heartbeat_us : int, us
         How often it promises that nothing has happened; each frame for 0.1 s after an event.
     states_us : int, us
-        How often each value is told again and the board's totals said; 0: never.
+        How often each value and the board's totals are sent again; 0: never.
 
     Raises
     ------
@@ -177,8 +178,8 @@ class Board:
         ------
         ProblemError : not one trip time a taxel
         """
-        taken = 2**32 if most is None else whole("most", most, 0, 2**32)
-        return self._core.frame(numbers("ticks", ticks, np.uint16).reshape(-1), taken)
+        at_most = 2**32 if most is None else whole("most", most, 0, 2**32)
+        return self._core.frame(numbers("ticks", ticks, np.uint16).reshape(-1), at_most)
 
     def reset(self) -> None:
         """Reset it: registers, values and time as at the start, in a new session; what waits is still sent."""
@@ -186,7 +187,7 @@ class Board:
 
     def command(self, data: Any) -> str:
         """Take command bytes as they come; return the status lines that answer them."""
-        return self._core.command(_bytes(data))
+        return self._core.command(given_bytes(data))
 
     def record(self, start: bool) -> None:
         """Start or stop a recording: a marker goes out where that changes anything."""
@@ -198,7 +199,7 @@ class Board:
 
     @property
     def greeting(self) -> str:
-        """What the board says at reset."""
+        """The line that the board sends at reset."""
         return self._core.greeting()
 
     @property

@@ -34,7 +34,7 @@ _ADAPTIVE = defaults("adaptive_ramp")
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class Fabric(Value):
-    """Say what a taxel of piezoresistive fabric conducts under a force: ``rest_us + touch_us (F / 0.02 N)^exponent``.
+    """Model a fabric taxel's conductance under a force: ``rest_us + touch_us (F / 0.02 N)^exponent``.
 
     Parameters
     ----------
@@ -142,8 +142,8 @@ class VirtualGround(_Lines):
     wire_ohm : float, ohm, from 0 to 1e9
         A line from one taxel to the next, and from its end to the first; 0, or 0.001 or more.
     rail_v : float, V, above 0
-        Where amplifiers saturate; also at 0 V. The line of one that does is no longer held: it hangs on the rail by the
-        feedback resistor.
+        Where amplifiers saturate; also at 0 V. The line of one that does is no longer held: the feedback
+        resistor ties it to the rail.
     seed : int, 0 or more
         Of the offsets.
 
@@ -224,7 +224,7 @@ class Divider(_Lines):
 
 
 class Trace(NamedTuple):
-    """Hold what an oscilloscope sees of one comparator: a point each, arrays of one length."""
+    """Hold the signals of one comparator, as an oscilloscope would show them: arrays of one length."""
 
     t_us: Values
     line_v: Values
@@ -234,7 +234,7 @@ class Trace(NamedTuple):
     ramp_v: Values
     """V."""
     high: NDArray[np.bool_]
-    """Whether the comparator says that the ramp has passed."""
+    """The comparator's output: whether the ramp has passed."""
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -253,7 +253,7 @@ class Converter(Value):
         Time constant of a comparator's input: the default settles to 2 % in 0.2 us (thesis 4.4.1).
     amplifier_us : float, us, from 0 to 1000000
         Time constant of the amplifiers, what a column leaves for the next; 0: none. 0.705 if the board's 15 pF lie
-        across its 47 kOhm, which no text says.
+        across its 47 kOhm, which no text states.
     discharge_us : float, us, from 0 to 1000000
         Time constant with which the ramp falls back (a guess).
     wait_us : float, us, from 0 to 1000000
@@ -297,7 +297,7 @@ class Converter(Value):
     _kind = "converter"
 
     def ticks(self, volts: ArrayLike) -> Values:
-        """Return when each comparator says that the ramp has passed, in ticks with their fraction.
+        """Return when each comparator trips, in ticks with their fraction.
 
         A counter shows the whole ticks below. The frames are scanned one after the other, columns from the first; the
         first frame finds everything settled.
@@ -320,7 +320,15 @@ class Converter(Value):
         return _core.converter_ticks(self._json(), shape, given.ravel()).reshape(given.shape)
 
     def ramp_volts(self, ticks: ArrayLike) -> Values:
-        """Return where the ramp stands after so many ticks, V, of the same shape.
+        """Return where the ramp stands after so many ticks.
+
+        Parameters
+        ----------
+        ticks : float64, ticks, any shape
+
+        Returns
+        -------
+        float64, V, of the same shape
 
         Raises
         ------
@@ -330,7 +338,16 @@ class Converter(Value):
         return _core.converter_ramp(self._json(), given.ravel(), False).reshape(given.shape)
 
     def ramp_ticks(self, volts: ArrayLike) -> Values:
-        """Return when the ramp passes a voltage, ticks, of the same shape: the inverse; `ramp` at 3 V and above.
+        """Return when the ramp passes a voltage: the inverse of `ramp_volts`.
+
+        Parameters
+        ----------
+        volts : float64, V, any shape
+
+        Returns
+        -------
+        float64, ticks, of the same shape
+            `ramp` at 3 V and above.
 
         Raises
         ------
@@ -340,19 +357,29 @@ class Converter(Value):
         return _core.converter_ramp(self._json(), given.ravel(), True).reshape(given.shape)
 
     def trace(self, line_v: Sequence[float], *, every_us: float = 0.01, stop_us: float = 3.0) -> Trace:
-        """Return what an oscilloscope sees of one comparator while its lines are read, again and again.
+        """Return the signals of one comparator while its lines are read, again and again.
 
         Parameters
         ----------
         line_v : sequence of float, V, one a step
             The sense lines, settled.
-        every_us : float, us, above 0
+        every_us : float, us, above 0 and finite
             Between two points.
-        stop_us : float, us
+        stop_us : float, us, 0 or more
+
+        Returns
+        -------
+        Trace
 
         Raises
         ------
-        ProblemError : not one voltage a step, or more than 1e7 points
+        ProblemError : not one voltage a step, or more than 1e7 points or steps
+
+        Examples
+        --------
+        >>> trace = Converter().trace([1.4, 1.5, 2.0, 2.5], every_us=0.01, stop_us=3.0)
+        >>> len(trace.t_us), round(float(trace.ramp_v.max()), 2)
+        (301, 3.0)
         """
         lines = floats("line_v", line_v, "V").tolist()
         every, stop = number("every_us", every_us, "us"), number("stop_us", stop_us, "us")
@@ -367,16 +394,16 @@ class Converted(NamedTuple):
     ramp: NDArray[np.uint32]
     """How long its ramp took, ticks, shape (frames,)."""
     ticks: Values
-    """When the comparators said that it had passed, shape (frames, rows, columns), as `Converter.ticks`."""
+    """When the comparators tripped, shape (frames, rows, columns), as `Converter.ticks`."""
     volts: Values
-    """What the whole ticks that a counter shows say of the voltage, V: halfway to the next tick, 3 V at the end."""
+    """The voltages of the whole ticks that a counter shows, V: halfway to the next tick, 3 V at the end."""
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class AdaptiveRamp(Value):
     """Convert by a ramp that is steep while the signal moves fast and gentle while it hardly does (thesis 4.3.2).
 
-    After a frame the taxel that moved farthest says how long the next ramp is: as long as lets it move by `moves_ticks`
+    After a frame the taxel that moved farthest sets the length of the next ramp, which lets it move by `moves_ticks`
     of that ramp within the frame, so that a reading is about as much too old as too coarse. Without any move the ramp
     takes twice its time, up to the gentlest. What a step and a column take beside their ramp stays.
 
@@ -437,8 +464,8 @@ class AdaptiveRamp(Value):
         shape: tuple[int, int] = frames.shape[1:]
         period = number("period_us", period_us, "us")
         t_us, ramp, *read = _core.adaptive_convert(self._json(), shape, frames.ravel(), period)
-        ticks, said = (one.reshape(-1, *shape) for one in read)
-        return Converted(t_us, ramp, ticks, said)
+        ticks, read_v = (one.reshape(-1, *shape) for one in read)
+        return Converted(t_us, ramp, ticks, read_v)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)

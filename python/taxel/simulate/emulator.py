@@ -1,4 +1,4 @@
-"""The emulated board at work: it feels acts as fast as it goes, or in real time and over UDP whatever it is given."""
+"""The emulated board: acts are played to it as fast as it goes, or any touch in real time and over UDP."""
 
 from __future__ import annotations
 
@@ -163,7 +163,7 @@ def play(
     asynchronous: bool = False,
     watch: Callable[[float], object] = lambda _: None,
 ) -> Played:
-    """Let an emulated board feel acts, as fast as it goes, and decode its datagrams.
+    """Play acts to an emulated board, as fast as it goes, and decode its datagrams.
 
     The board arms after its first frame, is tared with a noise floor of 0 for `tare_ms`, then takes the preset's floor
     and marks a start; before the last frame it marks a stop.
@@ -250,14 +250,14 @@ def emulate(
     watch: Callable[[EmulatorReport], None] = lambda _: None,
     touched: Callable[[list[Contact]], None] = lambda _: None,
 ) -> EmulatorReport:
-    """Let an emulated board feel something in real time, and send its datagrams by UDP.
+    """Play a touch to an emulated board in real time, and send its datagrams by UDP.
 
     Parameters
     ----------
     to : str
         Address and port, as "127.0.0.1:5208".
     touch : iterable of Scene, Silence, Pictures; Replay; or Pipe
-        What it feels. Acts may be without an end: each is made ready while those before it are played. Of acts the
+        The touch. Acts may be without an end: each is worked out while those before it are played. Of acts the
         board arms after the first frame, is tared with a noise floor of 0 for `tare_ms`, marks a start, and at the end
         a stop.
     seed, preset, tare_ms, array, sensor
@@ -300,7 +300,7 @@ def emulate(
     watch : function, optional
         Called with a report ten times a second.
     touched : function, optional
-        Called before `watch` with touches of acts that were made ready since; us of the board's clock.
+        Called before `watch` with touches of acts that were worked out since; us of the board's clock.
 
     Returns
     -------
@@ -359,9 +359,9 @@ def emulate(
 
 
 def _checked(acts: Iterable[Act], array: Array) -> Iterator[Any]:
-    """Return the parts of acts, one after the other; what is wrong with one is said when it is its turn.
+    """Return the parts of acts, one after the other; an act that makes no sense is refused when its turn comes.
 
-    Of a sequence that is said at once.
+    Of a sequence all are checked at once.
     """
     if isinstance(acts, Sequence):
         return iter(_parts(acts, array))

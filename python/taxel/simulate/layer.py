@@ -1,4 +1,4 @@
-"""Foam bonded to the board: what a wave of pressure does to it, and which pressures hold a body."""
+"""Foam bonded to the board: its response to waves of pressure, and the pressures that hold a body."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _KPA = 1000.0
 
 
 class Pressed(NamedTuple):
-    """What a layer answers to a body that has sunk into it."""
+    """The pressures of a layer on a body that has sunk into it."""
 
     pressure_kpa: NDArray[np.float64]
     """On the layer's face, by taxel, shape (rows, columns); nowhere negative."""
@@ -31,7 +31,7 @@ class Pressed(NamedTuple):
 
 
 class Layer:
-    """Reckon with foam that is bonded to the board: elastic, coupled, and pressed without shear.
+    """Solve contact with foam that is bonded to the board: elastic, coupled, and pressed without shear.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Layer:
     -----
     Carbone and Mangialardi 2008 for the face; the base's share of a wave solves the same four conditions. Contact is
     solved by projected Gauss-Seidel, of more than 600 cells (times `cells_per_pitch`) by conjugate gradients with FFT
-    (Polonsky and Keer 1999). A taxel feels the mean of its cells.
+    (Polonsky and Keer 1999). A taxel senses the mean stress of its cells.
     Collapse and densification replace how far a body has sunk by how far it would have in a linear column under the
     same pressure (ours): exact for a wide touch, for columns and for linear foam.
 
@@ -98,24 +98,77 @@ class Layer:
         return np.stack(np.meshgrid(y, x, indexing="ij"))
 
     def compliance(self, waves: ArrayLike) -> NDArray[np.float64]:
-        """Return how far a wave of pressure pushes the face in, mm/kPa, by wave number (1/mm)."""
-        return np.asarray(self._core.waves(_waves(waves))[0]) / _KPA
-
-    def base_share(self, waves: ArrayLike) -> NDArray[np.float64]:
-        """Return the share of a wave of pressure that arrives at the base, by wave number (1/mm)."""
-        return np.asarray(self._core.waves(_waves(waves))[1])
-
-    def press(self, sunk_mm: ArrayLike) -> Pressed:
-        """Return what holds a body that has sunk so far below the face at rest; begins where the last two led.
+        """Return how far a wave of pressure pushes the face in.
 
         Parameters
         ----------
-        sunk_mm : float64, shape (rows, columns), each times `cells_per_pitch`
-            At each cell; below 0 where the body is still above the face.
+        waves : float64, any shape, 1/mm, 0 or more
+            Wave numbers.
+
+        Returns
+        -------
+        float64, one a wave number, mm/kPa
 
         Raises
         ------
-        ProblemError : another shape, or what is not finite
+        ProblemError : a wave number that is none
+
+        Notes
+        -----
+        Carbone and Mangialardi (2008), J. Mech. Phys. Solids 56:684.
+
+        Examples
+        --------
+        >>> Layer({"modulus_kpa": 60.0, "thickness_mm": 10.0, "poisson": 0.0}).compliance([0.0]).round(4)
+        array([0.1667])
+        """
+        return np.asarray(self._core.waves(_waves(waves))[0]) / _KPA
+
+    def base_share(self, waves: ArrayLike) -> NDArray[np.float64]:
+        """Return the share of a wave of pressure that arrives at the base.
+
+        Parameters
+        ----------
+        waves : float64, any shape, 1/mm, 0 or more
+            Wave numbers.
+
+        Returns
+        -------
+        float64, one a wave number, 0 to 1
+
+        Raises
+        ------
+        ProblemError : a wave number that is none
+
+        Examples
+        --------
+        >>> Layer().base_share([0.0])
+        array([1.])
+        """
+        return np.asarray(self._core.waves(_waves(waves))[1])
+
+    def press(self, sunk_mm: ArrayLike) -> Pressed:
+        """Return the pressures that hold a body which has sunk so far below the face at rest.
+
+        The solution begins at the pressures to which the latest two calls lead.
+
+        Parameters
+        ----------
+        sunk_mm : float64, mm, shape (rows, columns), each times `cells_per_pitch`
+            At each cell; below 0 where the body is still above the face.
+
+        Returns
+        -------
+        Pressed
+
+        Raises
+        ------
+        ProblemError : another shape, or a depth that is not finite
+
+        Examples
+        --------
+        >>> Layer().press(np.zeros((64, 64))).force_n
+        0.0
         """
         sunk = numbers("sunk_mm", sunk_mm, np.float64)
         cells = (self.array.rows * self.cells_per_pitch, self.array.columns * self.cells_per_pitch)
@@ -130,7 +183,7 @@ class Layer:
         return Pressed(on, _KPA * base.reshape(self.array.shape).astype(np.float64), force)
 
     def forget(self) -> None:
-        """Begin the next touch from nothing."""
+        """Begin the next touch without the pressures of the last two."""
         self._core.forget()
 
     def __repr__(self) -> str:

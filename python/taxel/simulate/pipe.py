@@ -1,4 +1,4 @@
-"""What an emulated board may feel: frames of any other sensor, from a pipe."""
+"""Frames of any other sensor, from a pipe, as the touch of an emulated board."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LONGEST_LINE = 1 << 16
 
 
 class Pipe:
-    """Let the board feel frames of any other sensor as they come: from a pipe, after a line that says what they are.
+    """Play frames of any other sensor to the board as they come: from a pipe, after a line that describes them.
 
     The line is JSON: ``{"rows": 16, "columns": 8, "rate": 100, "bits": 12}``, and may name ``pitch_mm`` and ``name``.
     Behind it stand frames: uint16, little-endian, row by row. The board's clock is the pipe's: a frame is one over
@@ -30,7 +30,7 @@ class Pipe:
         As ``sys.stdin.buffer``; must have a descriptor.
     noise_floor : int, ticks
         A change above it makes an event; a tick is one unit of the values, or more where so many bits are too many for
-        so fast a scan (`shift` says how often a value is halved).
+        so fast a scan (`shift` is how often a value is halved).
 
     Raises
     ------
@@ -56,7 +56,7 @@ class Pipe:
             raise ProblemError(f"standard input, line 1: {rows} x {columns} taxels: {error}") from None
         self._registers = held.replace(noise_floor=floor)
 
-    def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames say how fast they are
+    def registers(self, preset: str | None) -> Registers:  # noqa: ARG002  the frames' line has their rate
         """Return what the board holds that scans such frames."""
         return self._registers
 

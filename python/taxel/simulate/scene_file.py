@@ -46,7 +46,7 @@ _LONGEST_MS = 60_000.0
 
 @dataclass(frozen=True)
 class SceneFile:
-    """Hold what a scene file says.
+    """Hold the contents of a scene file.
 
     Examples
     --------
@@ -128,7 +128,7 @@ class SceneFile:
         # Says what makes no sense before anything is played.
         _core.check_scene(array._parts(), scene._part(), json.dumps(sensor))
         if not np.isfinite(scene.motion(array=array).force_n).all():
-            raise SceneError("foam: the force on it is too large to be told; take a softer one")
+            raise SceneError("foam: the force on it is beyond what a float32 holds; must be softer")
         preset = text("preset", said["preset"]) if "preset" in said else cls.preset
         fitting(preset, array)
         tare_ms = number("tare_ms", said.get("tare_ms", cls.tare_ms))

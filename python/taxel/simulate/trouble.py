@@ -1,12 +1,13 @@
-"""What can be wrong on the way from touch to host: taxels with flaws, a network with faults."""
+"""Flaws of taxels and faults of a network, for an emulated board."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
-from taxel._base.arguments import mapping, number, shown, whole
+from taxel._base.arguments import finite, mapping, shown, whole
 from taxel._core import ProblemError
 
 __all__ = ["Faults", "Flaws"]
@@ -14,30 +15,30 @@ __all__ = ["Faults", "Flaws"]
 
 @dataclass(frozen=True)
 class Flaws:
-    """Say what is wrong with taxels; each flaw is 0 at first, and is drawn from a seed of its own.
+    """Set the flaws of taxels; each is 0 where it is left out, and is drawn from a seed of its own.
 
     Parameters
     ----------
-    gain : float
-        How far gains differ: standard deviation of their logarithm.
-    threshold : float, ticks
-        How far thresholds differ: a taxel reads so many ticks too few (standard deviation, without sign).
-    hysteresis : float, ticks
+    gain : float, 0 or more
+        Standard deviation of the logarithm of the taxels' gains.
+    threshold : float, ticks, 0 or more
+        Standard deviation of the taxels' thresholds: a taxel reads so many ticks too few.
+    hysteresis : float, ticks, 0 or more
         How far a reading stays behind its way up and down; of each taxel half to three halves of it.
-    drift : float, ticks a minute
-        How fast readings wander: standard deviation over taxels of a steady drift.
-    dead, stuck : float, share of taxels
-        That read 0, or one value drawn for each, for ever.
-    loose : int, lines
-        With a loose contact: all of a line reads 0 now and then, for 50 ms on average, once a second.
-    noise : float, ticks
+    drift : float, ticks a minute, 0 or more
+        Standard deviation over taxels of a steady drift of their readings.
+    dead, stuck : float, share of taxels, from 0 to 1
+        Taxels that always read 0, or one value that is drawn for each.
+    loose : int, lines, 0 or more
+        Lines with a loose contact: all of a line reads 0 now and then, for 50 ms on average, once a second.
+    noise : float, ticks, 0 or more
         Standard deviation of one reading.
-    seeds : mapping of names to int, optional
+    seeds : mapping of names to int, 0 or more, optional
         The seed of a flaw; each of the others has 0.
 
     Raises
     ------
-    ProblemError : a seed for no flaw, or no number
+    ProblemError : a size outside its range, a seed for no flaw, or a seed that is no whole number
 
     Examples
     --------
@@ -57,7 +58,10 @@ class Flaws:
 
     def __post_init__(self) -> None:
         for name in self._names():
-            number(name, getattr(self, name))
+            if name == "loose":
+                whole(name, self.loose, 0)
+            else:
+                finite(name, getattr(self, name), least=0.0, most=1.0 if name in ("dead", "stuck") else math.inf)
         for name, seed in mapping("seeds", {} if self.seeds is None else self.seeds).items():
             if name not in self._names():
                 raise ProblemError(f"seeds: {shown(name)} is no flaw: there are {', '.join(self._names())}")
@@ -72,24 +76,29 @@ class Flaws:
         return {name: {"size": float(getattr(self, name)), "seed": seeds.get(name, 0)} for name in self._names()}
 
     def __repr__(self) -> str:
-        said = [f"{name}={getattr(self, name)}" for name in self._names() if getattr(self, name)]
-        said += [f"seeds={dict(self.seeds)}"] if self.seeds else []
-        return f"Flaws({', '.join(said)})"
+        given = [f"{name}={getattr(self, name)}" for name in self._names() if getattr(self, name)]
+        given += [f"seeds={dict(self.seeds)}"] if self.seeds else []
+        return f"Flaws({', '.join(given)})"
 
 
 @dataclass(frozen=True)
 class Faults:
-    """Say what a network does to datagrams: which share each fault befalls; one datagram suffers one at most.
+    """Set the share of datagrams to which each fault of a network happens; one datagram has one fault at most.
 
     Parameters
     ----------
-    lost, repeated, reordered, cut, corrupted : float, 0 to 1
+    lost, repeated, reordered, cut, corrupted : float, share of datagrams, from 0 to 1, together at most 1
         Never arrive; arrive twice; are overtaken by 1 to 8 others; arrive without their end; with 1 to 8 flipped bits.
-    seed : int
+    seed : int, 0 or more
 
     Raises
     ------
-    ProblemError : shares that are none (when they are used)
+    ProblemError : a share that is none, shares that are more than 1 together, or a seed that is no whole number
+
+    Examples
+    --------
+    >>> Faults(lost=0.1, seed=1).lost
+    0.1
     """
 
     lost: float = 0.0
@@ -100,8 +109,9 @@ class Faults:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in self._names():
-            number(name, getattr(self, name))
+        shares = [finite(name, getattr(self, name), least=0.0, most=1.0) for name in self._names()]
+        if sum(shares) > 1:
+            raise ProblemError(f"{', '.join(self._names())} are {sum(shares):g} together: must be at most 1")
         whole("seed", self.seed, 0, 2**63 - 1)
 
     @classmethod

@@ -7,15 +7,16 @@ from collections.abc import Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import bare, column, floats, nth, number, shown, window
+from taxel._base.archive import read_arrays
+from taxel._base.arguments import bare, column, floats, nth, number, several, shown, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept
+from taxel._base.drawing import draw
 from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
 from taxel.spikes.exchange import read_nwb, write_nwb
@@ -69,6 +70,7 @@ class SpikeTrains(Columns):
         self.times: NDArray[np.float64] = kept("times", times, np.float64, "ms")
         self.offsets: NDArray[np.int64] = kept("offsets", offsets, np.int64)
         self.values: NDArray[np.float32] | None = None if values is None else kept("values", values, np.float32)
+        _finite_values(self.values)
         self.start, self.stop = number("start", start, "ms"), number("stop", stop, "ms")
         _core.check_spikes(self._parts())
 
@@ -106,6 +108,7 @@ class SpikeTrains(Columns):
             signed, valued = _by_train("values", bare("values", values), np.float32)
             if valued != counts:
                 raise ProblemError("values: must have the lengths of the trains, one value a spike")
+            _finite_values(signed)
         offsets = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         if stop is None:
             # What is not finite is refused below, by its place.
@@ -181,7 +184,7 @@ class SpikeTrains(Columns):
         ProblemError : a number outside the trains
         """
         try:
-            chosen = np.atleast_1d(np.asarray(trains))
+            chosen = np.atleast_1d(np.asarray(bare("trains", trains)))
         except ValueError as error:
             raise ProblemError(f"trains: {error}") from None
         if chosen.dtype == bool:
@@ -380,22 +383,17 @@ class SpikeTrains(Columns):
         """
         place = checked_path("path", path)
         try:
-            with open(place, "rb") as file, np.load(file) as columns:
-                held = {name: columns[name] for name in columns.files}
+            held = read_arrays(place, ("times", "offsets", "start", "stop", "values"))
             return cls(held["times"], held["offsets"], held["start"].item(), held["stop"].item(), held.get("values"))
-        except (ValueError, KeyError, AttributeError, EOFError, BadZipFile, ProblemError) as error:
+        except (ValueError, KeyError, ProblemError, FormatError) as error:
             raise FormatError(f"{place}: holds no spike trains: {shown(str(error))}") from None
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes in another colour."""
-        from taxel.plot import raster  # noqa: PLC0415  matplotlib loads slowly
-
-        return raster(self, ax)
+        return draw("raster", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
-
-        return html(self)
+        return draw("html", self)  # type: ignore[no-any-return]
 
     def _values(self) -> list[NDArray[np.float32]] | None:
         """Return the values train by train."""
@@ -443,10 +441,7 @@ class SpikeTrains(Columns):
 
 def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[NDArray[Any], list[int]]:
     """Return all entries, train after train, and how many each train has."""
-    try:
-        entries = list(lists)
-    except TypeError:
-        raise ProblemError(f"{name} is {shown(lists)}: must be one list a train") from None
+    entries = several(name, lists)
     if not entries:
         return np.empty(0, dtype), []
     try:
@@ -458,3 +453,10 @@ def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[
         each = [np.atleast_1d(np.asarray(entry, object)) for entry in entries]
         columns = [column(f"{name}[{n}]", array, dtype) for n, array in enumerate(each)]
         return np.concatenate(columns), [len(values) for values in columns]
+
+
+def _finite_values(values: NDArray[np.float32] | None) -> None:
+    """Refuse a value of a spike that is not finite, by its place."""
+    if values is not None and not np.isfinite(values).all():
+        k = int(np.flatnonzero(~np.isfinite(values))[0])
+        raise ProblemError(f"values[{k}] is {values[k]}: must be finite")

@@ -4,7 +4,7 @@ use crate::wire::Registers;
 use crate::wire::registers::{POWER_LAW, POWER_LAW_FRACTION};
 
 /// Bits behind the point of `threshold_rest` and of the intensity word.
-const TOLD_FRACTION: u32 = 10;
+const WORD_FRACTION: u32 = 10;
 
 /// Integrals and thresholds of all taxels.
 #[derive(Debug, Clone, Default)]
@@ -13,46 +13,60 @@ pub(super) struct Afferents {
     base: Vec<u32>,
     /// By taxel: the threshold (5.5).
     threshold: Vec<u32>,
+    /// By taxel: the integral with which it last fired.
+    fired: Vec<i64>,
 }
 
 impl Afferents {
-    /// Forgets everything: the next frame counts as what had always been.
+    /// Returns to the state before the first frame, whose pressures become the reference.
     pub(super) fn forget(&mut self) {
         self.base.clear();
     }
 
-    /// Takes the trip time of a taxel (already held within the ramp), frame by frame; the integral where it fires.
-    pub(super) fn sample(&mut self, taxel: usize, ticks: u16, registers: &Registers) -> Option<i64> {
-        let rest = u32::from(registers.threshold_rest) << (POWER_LAW_FRACTION - TOLD_FRACTION);
+    /// Samples the trip time of a taxel (already held within the ramp), frame by frame; returns whether it fires.
+    pub(super) fn sample(&mut self, taxel: usize, ticks: u16, registers: &Registers) -> bool {
+        let rest = rest(registers);
         let share = |part: u16, whole: u32| (u64::from(part) * u64::from(rest) / u64::from(whole)) as u32;
-        let pressure = POWER_LAW[usize::from(ticks).min(POWER_LAW.len() - 1)];
+        let pressure = pressure(ticks);
         let (base, threshold) = (&mut self.base[taxel], &mut self.threshold[taxel]);
         let integral = i64::from(pressure) - i64::from(*base);
         if integral.unsigned_abs() > u64::from(*threshold) {
             *base = pressure;
             *threshold = threshold.saturating_add(share(registers.threshold_jump, 256));
-            return Some(integral);
+            self.fired[taxel] = integral;
+            return true;
         }
         *threshold = if *threshold > rest {
             threshold.saturating_sub(share(registers.threshold_decay.into(), 1024))
         } else {
             rest
         };
-        None
+        false
     }
 
     /// Begins with the pressures of a frame, where this is the first.
     pub(super) fn begin(&mut self, ticks: &[u16], registers: &Registers) {
         if self.base.is_empty() {
-            let table = |&t: &u16| POWER_LAW[usize::from(t.min(registers.ramp)).min(POWER_LAW.len() - 1)];
-            self.base = ticks.iter().map(table).collect();
-            let rest = u32::from(registers.threshold_rest) << (POWER_LAW_FRACTION - TOLD_FRACTION);
-            self.threshold = vec![rest; ticks.len()];
+            self.base = ticks.iter().map(|&t| pressure(t.min(registers.ramp))).collect();
+            self.threshold = vec![rest(registers); ticks.len()];
+            self.fired = vec![0; ticks.len()];
         }
+    }
+
+    /// The spike of a taxel that fired: its polarity, and its intensity word, which is how large the integral was.
+    pub(super) fn spike(&self, taxel: usize) -> (bool, u16) {
+        let integral = self.fired[taxel];
+        let size = integral.unsigned_abs() >> (POWER_LAW_FRACTION - WORD_FRACTION);
+        (integral > 0, size.min(u16::MAX.into()) as u16)
     }
 }
 
-/// The intensity word of a spike: how large the integral was.
-pub(super) fn told(integral: i64) -> u16 {
-    (integral.unsigned_abs() >> (POWER_LAW_FRACTION - TOLD_FRACTION)).min(u16::MAX.into()) as u16
+/// The threshold at rest.
+fn rest(registers: &Registers) -> u32 {
+    u32::from(registers.threshold_rest) << (POWER_LAW_FRACTION - WORD_FRACTION)
+}
+
+/// Compressed pressure (5.1) of a trip time.
+fn pressure(ticks: u16) -> u32 {
+    POWER_LAW[usize::from(ticks).min(POWER_LAW.len() - 1)]
 }

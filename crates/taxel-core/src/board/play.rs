@@ -61,11 +61,11 @@ impl Play {
     /// # Errors
     ///
     /// `Device` where registers break a rule, `Scene` where an act cannot be played.
-    pub fn stage(&self) -> Result<Stage> {
+    pub fn stage(&self, stop: Stop<'_>) -> Result<Stage> {
         let Self { array, registers, .. } = self;
         registers.check(array)?;
         let taxels = Taxels::new(&self.sensor, array.len(), registers.ramp, self.seed)?;
-        Stage::new(array, taxels, registers.frame_us(), &self.acts)
+        Stage::new(array, taxels, registers.frame_us(), &self.acts, stop)
     }
 
     /// Arms a board with the first frame.
@@ -74,8 +74,8 @@ impl Play {
     ///
     /// As [`Play::stage`], [`Board::new`], [`Board::asynchronous`], [`Crossed::new`] and [`Crossed::fits`]; `Problem` where
     /// the tare leaves no frame for the acts.
-    pub fn arm(&self) -> Result<Armed> {
-        let mut stage = self.stage()?;
+    pub fn arm(&self, stop: Stop<'_>) -> Result<Armed> {
+        let mut stage = self.stage(stop)?;
         let commands = session(&self.registers, self.tare_ms, stage.frames() as u64)?;
         let mut board = Board::new(self.registers, &self.array)?;
         if self.asynchronous {
@@ -87,9 +87,9 @@ impl Play {
             crossed = Some(Crossed::new(chain.clone(), &self.registers, &self.array)?);
         }
         let mut first = vec![0; self.array.len()];
-        stage.frame(&mut first)?;
+        stage.frame(&mut first, stop)?;
         if let Some(crossed) = &mut crossed {
-            crossed.read(&self.registers, &mut first, Stop::never())?;
+            crossed.read(&self.registers, &mut first, stop)?;
         }
         board.arm(&first)?;
         Ok(Armed { board, crossed, stage, commands })
@@ -102,7 +102,7 @@ impl Play {
     ///
     /// As [`Play::arm`]; `Interrupted` where asked to stop.
     pub fn hear(&self, mut watch: impl FnMut(f64), stop: Stop<'_>) -> Result<Played> {
-        let Armed { mut board, mut crossed, mut stage, commands } = self.arm()?;
+        let Armed { mut board, mut crossed, mut stage, commands } = self.arm(stop)?;
         let version = self.registers.wire_version;
         let mut receiver = Receiver::new(Decoder::new(self.array.clone()), version);
         let mut events = Events::empty(self.array.clone());
@@ -122,7 +122,7 @@ impl Play {
             if done.is_multiple_of(second) {
                 watch(done as f64 / frames as f64);
             }
-            let more = stage.frame(ticks)?;
+            let more = stage.frame(ticks, stop)?;
             if let Some(crossed) = &mut crossed
                 && more
             {

@@ -1,31 +1,54 @@
-//! In which order the board looks at its taxels.
+//! In which order the board reads its taxels.
 
 use crate::Array;
 use crate::wire::Registers;
 
-/// The sense lines that convert together, step after step, each in the order of the channels.
-///
-/// Step s puts sense line (steps x c + s) on channel c; of these only the array's rows are there.
-#[must_use]
-pub(crate) fn sense_lines(registers: &Registers, array: &Array) -> Vec<Vec<u16>> {
-    let steps = registers.steps(array) as u16;
-    let channels = u16::from(registers.channels);
-    let line =
-        |step: u16| (0..channels).map(move |channel| steps * channel + step).filter(|&y| y < array.rows).collect();
-    (0..steps).map(line).collect()
+/// The driven lines of a frame and the sense lines of each, in their order.
+#[derive(Debug, Clone)]
+pub(super) struct Scan {
+    /// The sense lines of a driven line in the order of steps, within a step of channels; each with its step.
+    sense_lines: Vec<(u64, u16)>,
+    lfsr: Lfsr,
+}
+
+impl Scan {
+    /// The scan at reset.
+    ///
+    /// Step s puts sense line (steps x c + s) on channel c; of these only the array's rows are there.
+    pub(super) fn new(registers: &Registers, array: &Array) -> Self {
+        let (steps, channels) = (registers.steps(array) as u16, u16::from(registers.channels));
+        let of_step = |step: u16| (0..channels).map(move |channel| (step.into(), steps * channel + step));
+        let sense_lines = (0..steps).flat_map(of_step).filter(|&(_, y)| y < array.rows).collect();
+        Self { sense_lines, lfsr: Lfsr(Lfsr::SEED) }
+    }
+
+    /// Begins the random order of lines anew.
+    pub(super) fn reset(&mut self) {
+        self.lfsr = Lfsr(Lfsr::SEED);
+    }
+
+    /// The driven lines of the next frame, in order.
+    pub(super) fn lines(&mut self, registers: &Registers) -> Vec<u16> {
+        let mut lines: Vec<u16> = (0..registers.lines).collect();
+        if registers.random_lines {
+            self.lfsr.shuffle(&mut lines);
+        }
+        lines
+    }
+
+    /// The sense lines of a driven line, in order, each with its step.
+    pub(super) fn sense_lines(&self) -> &[(u64, u16)] {
+        &self.sense_lines
+    }
 }
 
 /// The 16-bit shift register that shuffles the driven lines (Fibonacci; taps 16, 14, 13, 11: all 65 535 states).
 #[derive(Debug, Clone)]
-pub(crate) struct Lfsr(u16);
+struct Lfsr(u16);
 
 impl Lfsr {
     /// What it holds at reset (read).
-    pub(crate) const SEED: u16 = 0xace1;
-
-    pub(crate) fn new() -> Self {
-        Self(Self::SEED)
-    }
+    const SEED: u16 = 0xace1;
 
     /// Sixteen shifts on: each draw is a fresh word.
     fn draw(&mut self) -> u16 {
@@ -37,7 +60,7 @@ impl Lfsr {
     }
 
     /// Shuffles lines (Fisher and Yates, from the last place down; place = word x (k + 1) >> 16).
-    pub(crate) fn shuffle(&mut self, lines: &mut [u16]) {
+    fn shuffle(&mut self, lines: &mut [u16]) {
         for k in (1..lines.len()).rev() {
             let place = (usize::from(self.draw()) * (k + 1)) >> 16;
             lines.swap(k, place);

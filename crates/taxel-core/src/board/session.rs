@@ -1,4 +1,4 @@
-//! A board from reset to stop, as the demo and `taxel emulate` use it: it arms, is tared, starts, and stops.
+//! A board from reset to stop, as the demo and `taxel emulate` use it: arming, tare, start and stop.
 
 use super::{Board, BoardCounts};
 use crate::spikes::us;
@@ -7,7 +7,7 @@ use crate::{Result, Stop, problem};
 
 /// The commands of a session of `frames` frames, and before which frame each comes.
 ///
-/// The first frame arms the board ([`Board::arm`]). For the tare the noise floor is 0, so that every taxel tells its rest
+/// The first frame arms the board ([`Board::arm`]). For the tare the noise floor is 0, so that every taxel sends its rest
 /// again and again; `tare_ms` later come the floor of `registers` and the start marker, before the last frame the stop.
 ///
 /// # Errors
@@ -47,8 +47,8 @@ fn write(register: u8, registers: Registers) -> Command {
 }
 
 impl Board {
-    /// Scans the first frame for nobody: at reset all previous values are 0, and every taxel would be sent. It counts as
-    /// a frame, what nobody gets does not count.
+    /// Scans the first frame and discards its events: at reset all previous values are 0, and every taxel would be sent.
+    /// The frame and its faults are counted, the discarded events are not.
     ///
     /// # Errors
     ///
@@ -56,8 +56,8 @@ impl Board {
     pub fn arm(&mut self, ticks: &[u16]) -> Result<()> {
         let before = self.counts;
         self.frame(ticks, |_| true)?;
-        if let Some(alone) = &mut self.alone {
-            alone.hush();
+        if let Some(asynchronous) = &mut self.asynchronous {
+            asynchronous.clear();
         }
         let BoardCounts { frames, not_returned, .. } = self.counts;
         self.counts = BoardCounts { frames, not_returned, ..before };
@@ -78,7 +78,7 @@ impl Board {
         mut sink: impl FnMut(&[u8]) -> bool,
         stop: Stop<'_>,
     ) -> Result<()> {
-        let mut ticks = vec![0; self.values.len()];
+        let mut ticks = vec![0; self.array.len()];
         let mut commands = commands.iter().peekable();
         while touch(&mut ticks)? {
             stop.check()?;

@@ -10,7 +10,7 @@ use crate::{Result, Stop, problem};
 
 /// A converter whose ramp takes another time in each frame; what a step and a column take beside their ramp stays.
 ///
-/// After a frame the taxel that moved farthest says how long the next ramp is: as long as lets it move by `moves_ticks`
+/// After a frame the taxel that moved farthest sets the length of the next ramp: the length that lets it move by `moves_ticks`
 /// of that ramp within the frame, so that what a reading is too old by stays of the size of what it is too coarse by. A
 /// move of `noise_ticks` or less of the coarser of two ramps is none; without any, the ramp takes twice its time, up to
 /// the gentlest. The rule is ours: the thesis calls for one and states none.
@@ -44,7 +44,7 @@ pub struct Converted {
     pub ramp: Vec<u32>,
     /// What was read, as [`Scan::frame`] gives it, frame after frame.
     pub ticks: Vec<f64>,
-    /// What whole ticks say of the voltage, V: where the ramp stands halfway to the next, or at its end.
+    /// The voltage that whole ticks stand for, V: the ramp's halfway to the next tick, or at its end.
     pub volts: Vec<f64>,
 }
 
@@ -156,7 +156,7 @@ impl Adaptive {
             out.t_us.push(t_us);
             out.ramp.push(ramp);
             out.ticks.extend(&ticks);
-            // The counter shows whole ticks; what had not returned says nothing.
+            // The counter shows whole ticks; a comparator that had not returned gives no reading.
             let shape = scan.converter().ramp();
             out.volts.extend(ticks.iter().map(|tick| shape.volts(tick.floor() + 0.5)));
             let mut moved = 0.0;

@@ -2,7 +2,7 @@
 //!
 //! While a column is read its sense lines are put on the channels' comparators one after the other. A comparator's input
 //! settles towards its line's voltage as the multiplexer lets it, and that line, where the amplifiers are slow, from what
-//! the last column left there. Meanwhile the ramp rises; a reading is when the comparator first says that it has passed.
+//! the last column left there. Meanwhile the ramp rises; a reading is when the comparator first trips.
 
 use serde::{Deserialize, Serialize};
 
@@ -56,6 +56,9 @@ impl Default for Converter {
         }
     }
 }
+
+/// The most points of a trace, and the most steps of the multiplexer in one.
+const MOST_POINTS: f64 = 1e7;
 
 /// A time, us.
 const TIME: Range = Range::FROM_0.at_most(1e6);
@@ -160,12 +163,12 @@ impl Converter {
         most
     }
 
-    /// What an oscilloscope sees of one comparator while its lines, `line_v`, are read one after the other, again and
+    /// The signals of one comparator, as an oscilloscope would show them, while its lines, `line_v`, are read one after the other, again and
     /// again, with a point each `every_us`.
     ///
     /// # Errors
     ///
-    /// `Problem` where there is not one voltage a step, or points do not ascend.
+    /// `Problem` where there is not one voltage a step, or the points or the steps until `stop_us` are too many.
     pub fn trace(&self, line_v: &[f64], every_us: f64, stop_us: f64) -> Result<Vec<Moment>> {
         self.check()?;
         if line_v.len() != self.steps {
@@ -174,9 +177,15 @@ impl Converter {
         if let Some(k) = line_v.iter().position(|v| !v.is_finite()) {
             return Err(problem!("voltages[{k}] is {}: must be finite", line_v[k]));
         }
-        if !(every_us > 0.0 && stop_us / every_us <= 1e7) {
+        if !(every_us > 0.0 && every_us.is_finite() && stop_us / every_us <= MOST_POINTS) {
             return Err(problem!(
-                "every_us is {every_us} us: must be above 0, with at most 1e7 points in {stop_us} us"
+                "every_us is {every_us} us: must be above 0 and finite, with at most {MOST_POINTS:e} points in {stop_us} us"
+            ));
+        }
+        let most_us = MOST_POINTS * self.step_us;
+        if !(0.0..=most_us).contains(&stop_us) {
+            return Err(problem!(
+                "stop_us is {stop_us} us: must be from 0 to {most_us}, which are {MOST_POINTS:e} steps"
             ));
         }
         let (ramp_us, half) = (f64::from(self.ramp) / TICKS_A_US, 0.5 * self.hysteresis_v);
@@ -255,7 +264,7 @@ pub struct Moment {
     pub input_v: f64,
     /// The ramp, V.
     pub ramp_v: f64,
-    /// What the comparator says: the ramp has passed.
+    /// The comparator's output: whether the ramp has passed.
     pub high: bool,
 }
 

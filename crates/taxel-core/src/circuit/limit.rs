@@ -12,7 +12,7 @@ pub struct Limit {
     pub least_v: f64,
     /// The upper one, likewise.
     pub most_v: f64,
-    /// What lies between it and the line, ohm: more than the source's own resistance.
+    /// The resistance between it and the line, ohm: more than the source's own.
     pub ohm: f64,
 }
 
@@ -35,7 +35,7 @@ impl Limit {
     ///
     /// # Errors
     ///
-    /// `Problem` where it is not so in float64; what `response` says.
+    /// `Problem` where it is not so in float64; as `response` fails.
     pub(super) fn apply(
         &self,
         sense_ohm: f64,

@@ -39,7 +39,7 @@ impl Material {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
-    /// What it looks like from below.
+    /// Its shape from below.
     pub shape: Shape,
     /// Where its middle first touches, mm right of the first taxel.
     pub x_mm: f64,
@@ -177,6 +177,18 @@ impl Body {
     #[must_use]
     pub fn mass_g(&self) -> Option<f64> {
         self.mass_g.or_else(|| Some(self.material?.grams_per_mm3() * self.shape.volume_mm3()?))
+    }
+
+    /// How long it takes at least, ms: waits and holds, without what a hand's way or a bounce adds.
+    pub(super) fn least_ms(&self) -> f64 {
+        let held = |press: &Press| press.wait_ms + press.hold_ms;
+        let moving = match &self.motion {
+            Move::Dropped { ending: Ending::Caught { press, .. }, .. } => held(press),
+            Move::Dropped { ending: Ending::LeftToRest { rest_ms, .. }, .. } => *rest_ms,
+            Move::Pressed(press) => held(press),
+            Move::Rolled(along) | Move::Slid(along) => along.for_ms,
+        };
+        self.after_ms + moving
     }
 
     /// Checks that it makes sense; `place` names it.

@@ -124,7 +124,7 @@ mod tests {
     /// Base stress at distance `r` by waves in the plane, on a fine square grid: no Bessel function, no table.
     fn direct(foam: &Foam, radius: f64, depth: f64, distances: &[f64]) -> Vec<f64> {
         // A pressure that depends on the distance alone, seen along x: sum over y first (its Abel projection), then one
-        // Fourier sum. The projection of the base stress is taken back by summing over directions.
+        // Fourier sum. Summing over directions inverts the projection of the base stress.
         let (side, n) = (160.0, 640_usize);
         let step = side / n as f64;
         let pressure = |x: f64, y: f64| {

@@ -3,7 +3,7 @@
 use super::body::Body;
 use super::bonded::{Bonded, Cell, MOST_SWEPT};
 use super::{Foam, Shape};
-use crate::Result;
+use crate::{Result, Stop};
 
 /// Depths at which a table holds the force, evenly spaced in the square root of depth.
 const DEPTHS: usize = 160;
@@ -42,20 +42,20 @@ pub enum Push {
 }
 
 impl Push {
-    /// The law of a body on `foam`; `layer` is that foam, bonded, where it is not taken for columns.
+    /// The law of a body on `foam`; `layer` is that foam, bonded, where it is not modelled as columns.
     ///
     /// # Errors
     ///
-    /// `Scene` where foam and ball do not fit columns.
-    pub fn of(foam: &Foam, body: &Body, layer: Option<&mut Bonded>) -> Result<Self> {
+    /// `Scene` where foam and ball do not fit columns; `Interrupted`.
+    pub fn of(foam: &Foam, body: &Body, layer: Option<&mut Bonded>, stop: Stop<'_>) -> Result<Self> {
         let give = body.stiffness_n_mm.map_or(0.0, f64::recip);
-        let mut forces: Box<dyn FnMut(f64) -> f64> = match (layer, &body.shape) {
+        let mut forces: Box<dyn FnMut(f64) -> Result<f64>> = match (layer, &body.shape) {
             (None, Shape::Sphere { radius_mm }) => {
                 let (foam, radius_mm) = (foam.clone(), *radius_mm);
                 if give == 0.0 {
                     return Ok(Self::Columns { foam, radius_mm });
                 }
-                Box::new(move |depth| foam.force(radius_mm, depth).0)
+                Box::new(move |depth| Ok(foam.force(radius_mm, depth).0))
             }
             (None, _) => return Err(super::scene::columns_take_one_ball()),
             (Some(layer), shape) => {
@@ -76,14 +76,16 @@ impl Push {
                         if !many {
                             layer.forget();
                         }
-                        sum += layer.press(&sinking.cells).iter().sum::<f64>() * layer.area_mm2();
+                        let pressure: f64 = layer.press(&sinking.cells, stop)?.iter().sum();
+                        sum += pressure * layer.area_mm2();
                     }
-                    sum / places.len() as f64
+                    Ok(sum / places.len() as f64)
                 })
             }
         };
         let depth = |k: usize| foam.floor_mm() * (k as f64 / (DEPTHS - 1) as f64).powi(2);
-        let force: Vec<f64> = (0..DEPTHS).map(|k| if k == 0 { 0.0 } else { forces(depth(k)) }).collect();
+        let force =
+            (0..DEPTHS).map(|k| if k == 0 { Ok(0.0) } else { forces(depth(k)) }).collect::<Result<Vec<f64>>>()?;
         let mut entries = vec![[0.0; 3]];
         for k in 1..DEPTHS {
             // By power of the depth, which is nearly one and the same, so that a mean over neighbours bends nothing.
@@ -109,7 +111,7 @@ impl Push {
                 let ([from, _, low], [to, _, high]) = around(entries, 0, down_mm);
                 let share = ((down_mm - from) / (to - from)).min(1.0);
                 let after = entries.partition_point(|e| e[0] < down_mm).clamp(1, entries.len() - 1);
-                // A dashpot feels the slope, so that it does not jump from entry to entry.
+                // A dashpot's force depends on the slope, which therefore must not jump from entry to entry.
                 let (before, next) = (slope(entries, after - 1), slope(entries, after));
                 (low + (high - low) * share, before + (next - before) * share)
             }

@@ -1,4 +1,4 @@
-//! What happens on the array: as it is written, or drawn by a seed.
+//! A scene: bodies over the array and their motions, written by hand or drawn by a seed.
 
 use rand::Rng;
 use rand::SeedableRng;
@@ -14,7 +14,7 @@ use crate::{Array, Error, Result};
 /// How far from the array's edge drawn scenes stay, mm: within it the layer's influence would be cut off.
 const MARGIN_MM: f64 = 36.0;
 
-/// How what lies under bodies is reckoned.
+/// The model of the foam under bodies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Surface {
@@ -26,11 +26,11 @@ pub enum Surface {
     Columns,
 }
 
-/// Bodies over the array, the foam that they touch, and what becomes of them.
+/// Bodies over the array, the foam that they touch, and their motions.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
-    /// How what lies under them is reckoned.
+    /// The model of the foam under them.
     #[serde(default)]
     pub surface: Surface,
     /// How many cells of the layer lie along the pitch of taxels: more than one where a touch is narrower than some two
@@ -140,6 +140,12 @@ impl Scene {
         })
     }
 
+    /// How long the scene lasts at least, ms: what is known before any body moves.
+    pub(super) fn least_ms(&self) -> f64 {
+        let longest = self.bodies.iter().map(Body::least_ms).fold(0.0, f64::max);
+        self.lead_ms + longest + self.tail_ms
+    }
+
     /// Checks that the scene can be played on an array.
     ///
     /// # Errors
@@ -202,7 +208,7 @@ mod tests {
             for dashpot_ms in [0.0, 0.3, 1.0] {
                 let mut scene = Scene::draw(&array, 11, index, index % 4 == 0).unwrap();
                 scene.foam.dashpot_ms = dashpot_ms;
-                let motion = super::super::Motion::of(&scene, &array, 48.0).unwrap();
+                let motion = super::super::Motion::of(&scene, &array, 48.0, crate::Stop::never()).unwrap();
                 assert!(motion.contacts.iter().all(|c| c.stop_us.is_finite()));
             }
         }
@@ -216,7 +222,7 @@ mod tests {
             *height_mm = 200.0;
         }
         scene.foam = Foam { modulus_kpa: 50.0, damping_s_m: 0.1, dashpot_ms: 0.0, ..Foam::default() };
-        super::super::Motion::of(&scene, &Array::thesis(), 48.0).unwrap();
+        super::super::Motion::of(&scene, &Array::thesis(), 48.0, crate::Stop::never()).unwrap();
     }
 
     fn dropped(scene: &mut Scene) -> (&mut f64, &mut u32, &mut Press) {

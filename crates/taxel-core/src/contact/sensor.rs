@@ -17,7 +17,7 @@ const STATED_RAMP: f64 = 150.0;
 /// What the sensor does with force; the same law for each taxel, and how far taxels differ.
 ///
 /// A taxel conducts `G = G0 + k F^n`; the amplifier gives `V = V_trans (1 + R_f G)` (thesis 4.3.2). The ramp is an RC
-/// curve towards 5 V that ends at 3 V: 0.02 N, which the thesis could tell at 1.3 V (4.4.1), is then 0.1 V and 4.5
+/// curve towards 5 V that ends at 3 V: 0.02 N, which the thesis could detect at 1.3 V (4.4.1), is then 0.1 V and 4.5
 /// ticks of a ramp of 150. Above 3 V a taxel reads the ramp's whole time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]

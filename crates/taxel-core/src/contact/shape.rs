@@ -1,4 +1,4 @@
-//! What a body looks like from below.
+//! The shape of a body from below.
 
 use serde::{Deserialize, Serialize};
 

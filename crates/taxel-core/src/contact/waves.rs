@@ -8,6 +8,8 @@ use realfft::num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
 
+use crate::{Result, Stop};
+
 /// A real plane and its Fourier transform, with what it takes to go from one to the other.
 pub(super) struct Waves {
     rows: usize,
@@ -61,21 +63,30 @@ impl Waves {
     }
 
     /// A kernel that depends on the wave number alone (1/mm), as [`Waves::convolve`] takes it.
-    pub fn kernel(&self, of: impl Fn(f64) -> f64) -> Vec<f64> {
+    ///
+    /// # Errors
+    ///
+    /// `Interrupted`.
+    pub fn kernel(&self, of: impl Fn(f64) -> f64, stop: Stop<'_>) -> Result<Vec<f64>> {
         let step = |n: usize| 2.0 * PI / (n as f64 * self.pitch_mm);
         let (along, across) = (step(self.columns), step(self.rows));
         let mut kernel = Vec::with_capacity(self.spectrum.len());
         for x in 0..=self.columns / 2 {
+            stop.check()?;
             for y in 0..self.rows {
                 let y = y.min(self.rows - y);
                 kernel.push(of((x as f64 * along).hypot(y as f64 * across)));
             }
         }
-        kernel
+        Ok(kernel)
     }
 
     /// Convolves the plane with a kernel; the plane repeats beyond its edges.
-    pub fn convolve(&mut self, kernel: &[f64]) {
+    ///
+    /// # Errors
+    ///
+    /// `Interrupted`: the plane then holds nothing of use.
+    pub fn convolve(&mut self, kernel: &[f64], stop: Stop<'_>) -> Result<()> {
         let Self { rows, columns, .. } = *self;
         for (y, row) in self.plane.chunks_exact_mut(columns).enumerate() {
             self.to_waves
@@ -85,12 +96,15 @@ impl Waves {
                 self.spectrum[x * rows + y] = *value;
             }
         }
+        stop.check()?;
         self.down.process_with_scratch(&mut self.spectrum, &mut self.scratch);
         let scale = 1.0 / (rows * columns) as f64;
         for (value, factor) in self.spectrum.iter_mut().zip(kernel) {
             *value *= factor * scale;
         }
+        stop.check()?;
         self.up.process_with_scratch(&mut self.spectrum, &mut self.scratch);
+        stop.check()?;
         for (y, row) in self.plane.chunks_exact_mut(columns).enumerate() {
             for (x, value) in self.line.iter_mut().enumerate() {
                 *value = self.spectrum[x * rows + y];
@@ -104,6 +118,7 @@ impl Waves {
                 .process_with_scratch(&mut self.line, row, &mut self.scratch[..self.from_waves.get_scratch_len()])
                 .expect("lengths are the plan's");
         }
+        Ok(())
     }
 }
 
@@ -133,8 +148,8 @@ mod tests {
             let at = |x: usize, y: usize| (2.0 * (q(columns, kx) * x as f64 + q(rows, ky) * y as f64)).cos();
             let plane: Vec<f64> = (0..rows * columns).map(|k| at(k % columns, k / columns)).collect();
             waves.plane.clone_from(&plane);
-            let kernel = waves.kernel(|q| 1.0 / (1.0 + q * q));
-            waves.convolve(&kernel);
+            let kernel = waves.kernel(|q| 1.0 / (1.0 + q * q), Stop::never()).unwrap();
+            waves.convolve(&kernel, Stop::never()).unwrap();
             let expected = 1.0 / (1.0 + q(columns, kx).powi(2) + q(rows, ky).powi(2));
             for (got, was) in waves.plane.iter().zip(&plane) {
                 assert!((got - expected * was).abs() < 1e-12, "{rows} x {columns}");

@@ -12,14 +12,14 @@ use crate::{Result, Stop, problem};
 /// The widest window that a score takes, us: one hour.
 pub const WIDEST_WINDOW_US: i64 = 3_600_000_000;
 
-/// How the detections of one label met the reference events of that label.
+/// How the detections of one label match the reference events of that label.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tally {
     /// What happened.
     pub label: String,
     /// Detection and reference event that belong together, by their places in the input, ascending in time.
     pub pairs: Vec<(usize, usize)>,
-    /// Reference events that nothing was said of, by their places in the input, ascending in time.
+    /// Reference events without a detection, by their places in the input, ascending in time.
     pub missed: Vec<usize>,
     /// Detections of nothing, by their places in the input, ascending in time.
     pub false_: Vec<usize>,
@@ -75,13 +75,13 @@ impl Spread {
 
 /// Scores detections against reference events, label by label (6.5.2), in the order of their names.
 ///
-/// `windows` (us) says for each reference event how far a detection may lie from it, either way, and still belong to
+/// `windows` (us) holds for each reference event how far a detection may lie from it, either way, and still belong to
 /// it. Every detection that belongs to none is false, however near.
 ///
 /// # Errors
 ///
 /// `Problem` where there is not one window a reference event, a window is below 0 or above [`WIDEST_WINDOW_US`], or so
-/// many detections lie within the windows that matching them would not end; `Interrupted` where `stop` says so.
+/// many detections lie within the windows that matching them would not end; `Interrupted` where asked to stop.
 pub fn score(found: &[Detection], truth: &[Reference], windows: &[i64], stop: Stop<'_>) -> Result<Vec<Tally>> {
     if windows.len() != truth.len() {
         return Err(problem!("{} windows for {} reference events: must be one each", windows.len(), truth.len()));

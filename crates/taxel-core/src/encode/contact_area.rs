@@ -15,7 +15,7 @@ use crate::{Array, EventsView, Result, Spike, problem};
 /// Contact area: rises and falls of the number of loaded taxels through levels.
 ///
 /// A taxel is loaded while its held value stands above its tared rest by the board's noise floor and half a tick; it
-/// counts if one of its 8 neighbours is loaded too, so that noise does not. A taxel never heard of, in the tare or
+/// counts if one of its 8 neighbours is loaded too, so that noise does not. A taxel without any event, in the tare or
 /// since, is unloaded. Reckoned once a stamp, after its last event; spikes have the stamp's time. Trains, unsigned:
 /// rises through each level, then falls below each.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -107,7 +107,7 @@ struct Area {
 }
 
 impl Area {
-    /// The stamp at `t` us is over: says which levels the area passed since the last one.
+    /// Ends the stamp at `t` us: emits a spike of each level that the area passed since the last one.
     fn say(&mut self, t: i64, out: &mut Vec<Spike>) {
         let (before, now) = (self.said, self.loaded.area());
         if before == now {

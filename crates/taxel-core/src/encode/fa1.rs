@@ -25,7 +25,7 @@ use crate::parameters::Described;
 use crate::spikes::ms;
 use crate::{Array, Result, Spike, problem};
 
-/// The FA-1 afferent exactly as equations 5.1 to 5.5, polarity kept.
+/// The FA-1 afferent exactly as equations 5.1 to 5.5, with the polarity.
 ///
 /// Reckoned in f64; pressure below 0 counts as 0 before 5.1. A value that a state of version 2 repaired is no change of 5.3.
 /// It begins as if the first sample had always been. One signed train a taxel.
@@ -289,17 +289,17 @@ impl Afferents {
                 (values[k], base[k]) = (held[block][lane], self.blocks[block].base[lane]);
             }
             Self::compress(self.alpha, &mut self.table, &values, &mut rho);
-            // Who fires is known first, without a branch that nobody could foresee.
+            // Firing lanes are collected first, without a branch that the processor could not predict.
             let (mut firing, mut n) = ([0; BLOCK], 0);
             for (k, near) in some.iter().enumerate() {
                 let u = rho[k] - base[k];
                 firing[n] = k;
-                // Below 0, theta has both said of a small U, which is neither.
+                // With theta below 0 both comparisons hold for a small U, which fires neither way.
                 n += usize::from((u > near.theta) != (u < -near.theta));
             }
             for &k in &firing[..n] {
                 let (Near { channel, theta }, u) = (some[k], rho[k] - base[k]);
-                // A baseline of 0 makes every change as large as can be said.
+                // A baseline of 0 makes every change as large as a spike's value can be.
                 let size = if self.most > 1.0 { (u.abs() / self.theta_0).trunc().clamp(1.0, self.most) } else { 1.0 };
                 let said = if u > theta { size } else { -size };
                 out.push(Spike { t: ms(t), train: channel, value: said as f32 });

@@ -1,4 +1,4 @@
-//! FA-2: the fast adapting afferent of large fields, which tells vibration and the moment of contact.
+//! FA-2: the fast adapting afferent of large fields, which responds to vibration and to the moment of contact.
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! What every encoder of the registry says of itself.
+//! The interface of every encoder in the registry.
 
 use super::sampled::Channels;
 use super::stream::Stream;
@@ -6,7 +6,7 @@ use super::tare::Tare;
 use crate::parameters::Described;
 use crate::{Array, Result};
 
-/// What an encoder's file says of it.
+/// An encoder's parameters, checks, stream and trains.
 pub(super) trait Law {
     /// Its parameters, with their defaults and ranges.
     fn described() -> Described
@@ -16,10 +16,10 @@ pub(super) trait Law {
     /// Checks every parameter.
     fn check(&self) -> Result<()>;
 
-    /// Begins to encode what an array feels; the parameters are checked.
+    /// Begins a stream from an array; the parameters are checked.
     fn stream(&self, array: &Array) -> Result<Box<dyn Stream>>;
 
-    /// On how many trains it speaks for an array.
+    /// The number of spike trains that it makes of an array.
     fn trains(&self, array: &Array) -> usize {
         Channels::new(array).len()
     }

@@ -31,7 +31,7 @@ pub struct LevelCrossing {
     /// Release as a distance below each level, 0 or more; instead of the share.
     #[serde(default)]
     pub release_by: Option<f64>,
-    /// How long a crossing must last before it is said, ms; it is said then, so this is the latency. Default 0.
+    /// How long a crossing must last before it gives a spike, ms, which is also the encoder's latency. Default 0.
     #[serde(default)]
     pub hold_ms: f64,
     /// Tonic spikes, the slowly adapting part: one at the crossing and then every so many ms while above; none by
@@ -105,7 +105,7 @@ impl Law for LevelCrossing {
         }
         if let Some(level) = self.tonic_level {
             if self.tonic_ms.is_none() {
-                return Err(problem!("tonic_level without tonic_ms: say how often"));
+                return Err(problem!("tonic_level without tonic_ms: must come with the period tonic_ms"));
             }
             if !self.levels.contains(&level) {
                 return Err(problem!("tonic_level is {level}: must be one of the levels {:?}", self.levels));
@@ -135,9 +135,9 @@ struct ChannelLevel {
     on_at: f32,
     /// ... until it reads less than this.
     off_at: f32,
-    /// What the samples say.
+    /// Whether the latest sample is above.
     above: bool,
-    /// What was said: follows `above` once that has held.
+    /// The state of the latest spike: follows `above` once that has lasted.
     said: bool,
     /// When `above` last changed, us.
     since: i64,
@@ -162,9 +162,9 @@ struct Crossings {
 struct Tonic {
     every: i64,
     level: usize,
-    /// When each channel speaks next, with the crossing that this belongs to; all wait equally long.
+    /// The time of each channel's next tonic spike, with its crossing; all periods are equal, so in order.
     next: VecDeque<(i64, usize, i64)>,
-    /// When the crossing was said that a channel is above by; `None` while below.
+    /// When the spike came of the crossing by which a channel is above; `None` while below.
     above_since: Vec<Option<i64>>,
 }
 

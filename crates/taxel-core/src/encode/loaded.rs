@@ -67,7 +67,7 @@ impl Loaded {
         Ok(fresh)
     }
 
-    /// Gives a place another rest; its value is to be taken again.
+    /// Gives a place another rest; its value above rest must be computed again.
     pub(super) fn set_rest(&mut self, place: usize, rest: f64) {
         self.rest[place] = rest;
         self.from[place / BLOCK][place % BLOCK] = round_up(rest + self.noise_floor + 0.5);

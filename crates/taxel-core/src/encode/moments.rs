@@ -1,5 +1,5 @@
-//! How large a touch is, how hard, and where its centre has gone since it began: nothing in it says where it began, so
-//! what is learnt at one place holds at others.
+//! A touch's area, force, and the displacement of its centre since it began. None of them depends on where the touch began,
+//! so what is learnt at one place holds at others.
 
 use std::collections::VecDeque;
 
@@ -24,7 +24,7 @@ use crate::{Array, Result, Spike, problem};
 /// between touches all are 0. A level of the displacement stands on both sides of 0 and is passed outwards.
 ///
 /// Trains, unsigned, levels in the order area, total, peak, x right, x left, y down, y up, from the least on: where each
-/// is reached, then where each is left, then, with `tonic_ms`, one that speaks while beyond. Begins settled.
+/// is reached, then where each is left, then, with `tonic_ms`, one that spikes while the level is passed. Begins settled.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Moments {
@@ -224,7 +224,7 @@ struct Passing {
     since: Vec<Option<i64>>,
     /// How often tonic spikes come, us.
     every: Option<i64>,
-    /// When a level speaks next, which, and since when it was reached then; all wait equally long, so in order.
+    /// The time of a level's next tonic spike, the level, and since when it was reached; all periods are equal, so in order.
     due: VecDeque<(i64, usize, i64)>,
 }
 

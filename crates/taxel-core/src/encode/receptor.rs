@@ -49,7 +49,7 @@ pub(super) trait Filter: Send + Clone + 'static {
     /// where anything that it holds did.
     fn step<const SEE: bool>(&self, state: &mut Self::State, lane: usize, x: f64, u: f64, moved: &mut u64) -> f64;
 
-    /// Whether it tells what is, and not only changes: then a value that a state repaired counts as any other.
+    /// Whether its spikes depend on values, and not on changes alone: then a value that a state repaired counts as any other.
     const TELLS_VALUES: bool = false;
 
     /// Moves what it holds of one channel by a difference that was there before, so that it is no change.
@@ -127,8 +127,8 @@ impl<F: Filter> Afferents<F> {
         self.blocks.iter().all(|b| b.still)
     }
 
-    /// Takes a block's next sample, `x` of each lane; tells `fired` the lanes that fire. With `SEE`, sees whether it is
-    /// still from here on; else it counts as moved, which is safe.
+    /// Processes a block's next sample, `x` of each lane; calls `fired` with the lanes that fire. With `SEE`, determines whether
+    /// the block is still from here on; else the block counts as moved, which is safe.
     #[inline(always)]
     pub(super) fn sample<const SEE: bool>(
         &mut self,
@@ -276,7 +276,7 @@ mod tests {
         out
     }
 
-    /// Holds blocks, of which only those at work are looked at, against channels one by one; says how many spikes came, and
+    /// Compares blocks, of which only those that move are computed, with channels one by one; gives how many spikes came, and
     /// how often a block was left out.
     fn holds<F: Filter>(filter: &F, firing: Firing, rng: &mut StdRng) -> [usize; 2] {
         let (channels, range) = (rng.random_range(1..150), 150.0);

@@ -1,4 +1,4 @@
-//! SA-1: the slowly adapting afferent of small fields, which tells how hard is pressed as long as it is.
+//! SA-1: the slowly adapting afferent of small fields, whose rate follows the force as long as a taxel is pressed.
 
 use super::slow::slowly_adapting;
 

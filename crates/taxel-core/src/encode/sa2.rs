@@ -1,4 +1,4 @@
-//! SA-2: the slowly adapting afferent of large fields, which tells a held load steadily.
+//! SA-2: the slowly adapting afferent of large fields, which fires steadily under a held load.
 
 use super::slow::slowly_adapting;
 

@@ -28,34 +28,34 @@ pub(super) trait Rule: Send + Clone + 'static {
         true
     }
 
-    /// The first sample: the encoder begins as if it had always been so.
+    /// The first sample: the encoder begins as if the array had always read it.
     fn begin(&mut self, t: i64, held: &[Block], out: &mut Vec<Spike>);
 
     /// A later sample; only blocks that `changed` differ from the last one. Everything before `t` was passed.
     fn sample(&mut self, t: i64, held: &[Block], changed: &[bool], next: &mut Next, out: &mut Vec<Spike>);
 
-    /// Whether it takes its time over each block, and asks for some of what comes `next` by the way.
+    /// Whether a block takes so long to compute that the rule prefetches parts of the `next` picture between blocks.
     const ASKS: bool = false;
 
-    /// What falls due before `t` (exclusive) while the last sample holds.
+    /// Emits the spikes that fall due before `t` (exclusive) while the last sample holds.
     fn pass(&mut self, _t: i64, _out: &mut Vec<Spike>) {}
 
-    /// Whether it speaks of values that a state repaired. One that tells changes does not, as nobody knows when the value
-    /// changed: its reference moves with the value ([`Rule::repair`]).
+    /// Whether a value that a state repaired gives spikes. In a rule of changes it does not, as the time of the change is not
+    /// known: the rule's reference moves with the value ([`Rule::repair`]).
     const HEARS_REPAIRED: bool = true;
 
-    /// A state says that a channel which read `from` reads `to`, and did so before: no change is to be told.
+    /// A state reports that a channel which read `from` reads `to`, and did so before: that gives no spike.
     fn repair(&mut self, _channel: usize, _from: f32, _to: f32) {}
 
-    /// A channel, whose block the next sample says to have changed, rests at `rest` from there on.
+    /// A channel, whose block counts as changed in the next sample, rests at `rest` from there on.
     fn set_rest(&mut self, _channel: usize, _rest: f64) {}
 
-    /// What a channel rests at; `None` where that is not known, or the rule reads no tare.
+    /// The rest of a channel; `None` where that is not known, or the rule reads no tare.
     fn rest(&self, _channel: usize) -> Option<f64> {
         None
     }
 
-    /// Whether nothing would ever come while the last sample holds, so that samples without change may be left out.
+    /// Whether the last sample, if it holds, gives no spike any more, so that samples without change may be left out.
     fn idle(&self) -> bool;
 }
 
@@ -74,15 +74,15 @@ wide! {
     }
 }
 
-/// The next picture, where it follows in memory: asked for while this one is read or encoded, a block at a time, as
-/// memory takes only so many wishes at once.
+/// The next picture, where it follows in memory. It is prefetched a block at a time while this one is read or encoded, as the
+/// processor has few line fill buffers: more prefetches at once would be dropped.
 pub(super) struct Next {
     at: *const Block,
     left: usize,
 }
 
 impl Next {
-    /// Nobody knows what comes next.
+    /// The address of the next picture is not known.
     pub(super) fn unknown() -> Self {
         Self { at: std::ptr::null(), left: 0 }
     }
@@ -92,7 +92,7 @@ impl Next {
         Self { at: picture.as_ptr_range().end.cast(), left: blocks(picture.len()) }
     }
 
-    /// Asks for a block; says whether there was one.
+    /// Prefetches a block; gives whether there was one.
     #[inline(always)]
     pub(super) fn fetch(&mut self) -> bool {
         if self.left == 0 {
@@ -301,7 +301,7 @@ impl Source {
 /// A rule fed with samples: each frame is one; events are read as held intensities every `period`.
 ///
 /// The samples of events stand at the first stamp plus whole periods, and each holds what came up to and at its time.
-/// A taxel reads 0 until it is heard. An event behind the latest stamp (reordered datagrams) counts as of that stamp.
+/// A taxel reads 0 until its first event. An event behind the latest stamp (reordered datagrams) counts as of that stamp.
 #[derive(Clone)]
 pub(super) struct Sampled<R> {
     rule: R,
@@ -359,7 +359,7 @@ impl<R: Rule> Sampled<R> {
         })
     }
 
-    /// The rule is told what stands above rest, where there is a tare.
+    /// Gives the rule values above rest, where there is a tare.
     pub(super) fn above(mut self, tare: Option<&Tare>, array: &Array) -> Result<Self> {
         if let Some(tare) = tare {
             let blank = vec![0.0; array.len()];

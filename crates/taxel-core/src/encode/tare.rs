@@ -12,7 +12,7 @@ use crate::{Array, EventsView, FramesView, Result, problem, reading};
 pub struct Tare {
     /// The sensor.
     pub array: Array,
-    /// By place (`row * columns + column`), in the sensor's unit; `None` where a taxel was never heard of.
+    /// By place (`row * columns + column`), in the sensor's unit; `None` for a taxel without any event.
     pub rest: Vec<Option<f64>>,
     /// The stretch at rest begins, us.
     pub start_us: i64,
@@ -117,8 +117,8 @@ impl Tare {
     }
 }
 
-/// A taxel that a person zeroed: from then on it rests at what it held. Never done but when asked for, as standing contact
-/// would be taken for rest.
+/// A taxel that a person zeroed: from then on it rests at what it held. Only a person zeroes taxels: done automatically, it would take standing
+/// contact for rest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Zeroing {
     /// When, us: after all events up to then, before later ones.
@@ -161,7 +161,7 @@ pub struct TareBuilder {
 #[derive(Clone, Copy, Default)]
 struct Held {
     value: f64,
-    /// Since when it holds, us; `None` before it is heard.
+    /// Since when it holds, us; `None` before its first event.
     since: Option<i64>,
     /// value times us.
     area: f64,
@@ -252,9 +252,9 @@ impl TareBuilder {
     ///
     /// # Errors
     ///
-    /// `Problem` where nothing was heard, the stretch is empty, or something later came.
+    /// `Problem` where no event came, the stretch is empty, or a later event came.
     pub fn finish(mut self, stop: i64, note: &str) -> Result<Tare> {
-        let Some(start) = self.start else { return Err(problem!("tare: nothing was heard")) };
+        let Some(start) = self.start else { return Err(problem!("tare: no event came")) };
         if stop <= start {
             return Err(problem!("tare from {start} to {stop} us: start must lie before stop"));
         }
@@ -270,7 +270,7 @@ impl TareBuilder {
             .map(|(place, taxel)| (taxel.time > 0.0 && exists(place)).then(|| taxel.area / taxel.time))
             .collect();
         if rest.iter().all(Option::is_none) {
-            return Err(problem!("tare from {start} to {stop} us: nothing was heard"));
+            return Err(problem!("tare from {start} to {stop} us: no event came"));
         }
         Ok(Tare { rest, array: self.array, start_us: start, stop_us: stop, note: note.to_owned() })
     }

@@ -1,4 +1,4 @@
-//! A threshold and two phasic Izhikevich neurons: one hears the thresholded signal, one its inverse (thesis 3.4.3, 6.5.1).
+//! A threshold and two phasic Izhikevich neurons: one receives the thresholded signal, one its inverse (thesis 3.4.3, 6.5.1).
 
 use serde::{Deserialize, Serialize};
 
@@ -171,7 +171,7 @@ struct Neurons {
 }
 
 impl Neurons {
-    /// Takes `steps` steps; tells `fired` each spike's step and lane.
+    /// Computes `steps` steps; calls `fired` with each spike's step and lane.
     #[inline(always)]
     fn run(&mut self, model: Model, steps: i64, mut fired: impl FnMut(i64, usize)) {
         if self.still || steps <= 0 {
@@ -316,7 +316,7 @@ impl Rule for Pairs {
         for channel in 0..self.channels {
             self.hear(channel, held[channel / BLOCK][channel % BLOCK]);
         }
-        // Lanes beyond the last train hear nothing and stay at rest.
+        // Lanes beyond the last train receive no input and stay at rest.
         let used = self.trains() % LANES;
         if used > 0
             && let Some(last) = self.falls.last_mut()

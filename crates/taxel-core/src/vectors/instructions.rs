@@ -4,6 +4,9 @@ use std::sync::OnceLock;
 
 use crate::{Result, problem};
 
+/// The best set that may be used, once it is known.
+static BEST: OnceLock<Instructions> = OnceLock::new();
+
 /// Sets of vector instructions that code is written or compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Instructions {
@@ -21,15 +24,55 @@ impl Instructions {
     /// All, from the plainest; each machine that has one has those before it.
     pub const ALL: [Self; 4] = [Self::Plain, Self::Avx2, Self::Avx512, Self::Avx512Bytes];
 
-    /// The best that this machine has.
+    /// The best set that may be used: the widest of this machine, or a narrower one after [`cap`](Self::cap).
     #[must_use]
     #[inline]
     pub fn best() -> Self {
-        static BEST: OnceLock<Instructions> = OnceLock::new();
-        *BEST.get_or_init(|| Self::ALL.into_iter().take_while(|i| i.asked()).last().unwrap_or(Self::Plain))
+        *BEST.get_or_init(Self::widest)
     }
 
-    /// Whether this machine has them.
+    /// The widest set that this machine has.
+    fn widest() -> Self {
+        Self::ALL.into_iter().take_while(|set| set.detected()).last().unwrap_or(Self::Plain)
+    }
+
+    /// Allows no set wider than the named one in this process; asked once, before anything is computed.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where no set is called so, where this machine does not have it, or where another set is in use already.
+    pub fn cap(name: &str) -> Result<()> {
+        let set = Self::named(name).ok_or_else(|| {
+            problem!("TAXEL_INSTRUCTIONS is {name:?}: must be {}", Self::ALL.map(Self::name).join(", "))
+        })?;
+        let widest = Self::widest();
+        if set > widest {
+            return Err(problem!("TAXEL_INSTRUCTIONS is {name:?}: this machine has at most {}", widest.name()));
+        }
+        if *BEST.get_or_init(|| set) != set {
+            return Err(problem!("TAXEL_INSTRUCTIONS is {name:?}: {} is in use already", Self::best().name()));
+        }
+        Ok(())
+    }
+
+    /// The set of this name.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|set| set.name() == name)
+    }
+
+    /// What the set is called in TAXEL_INSTRUCTIONS.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Plain => "plain",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+            Self::Avx512Bytes => "avx512_bytes",
+        }
+    }
+
+    /// Whether this set may be used.
     #[must_use]
     #[inline]
     pub fn present(self) -> bool {
@@ -45,8 +88,8 @@ impl Instructions {
         if self.present() { Ok(self) } else { Err(problem!("instructions {self:?}: this machine does not have them")) }
     }
 
-    /// Asks the machine for what this set has beyond the one before.
-    fn asked(self) -> bool {
+    /// Whether the machine has what this set has beyond the one before.
+    fn detected(self) -> bool {
         match self {
             Self::Plain => true,
             #[cfg(target_arch = "x86_64")]
@@ -99,6 +142,9 @@ macro_rules! by_width {
                 return unsafe { avx2($($argument),*) };
             }
         }
+        // Other machines have one set, which needs no choice.
+        #[cfg(not(target_arch = "x86_64"))]
+        let _: $crate::vectors::Instructions = $set;
         $plain($($argument),*)
     }};
 }
@@ -173,3 +219,19 @@ macro_rules! kernel {
 }
 
 pub(crate) use {by_width, kernel, wide};
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_sets_are_refused_and_a_set_in_use_stays() {
+        assert!(Instructions::cap("avx3").unwrap_err().to_string().contains("plain, avx2, avx512, avx512_bytes"));
+        let used = Instructions::best();
+        assert!(Instructions::cap(used.name()).is_ok());
+        for other in Instructions::ALL.into_iter().filter(|&set| set != used) {
+            assert!(Instructions::cap(other.name()).is_err());
+        }
+        assert_eq!(Instructions::best(), used);
+    }
+}

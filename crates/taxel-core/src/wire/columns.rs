@@ -210,6 +210,17 @@ fn spare<T>(column: &mut Vec<T>, entries: usize) -> &mut [MaybeUninit<T>] {
     &mut column.spare_capacity_mut()[..entries]
 }
 
+/// What was written into columns that were laid out, and what stands beside them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Columns {
+    /// How far the columns were filled.
+    pub filled: Filled,
+    /// Which rows states gave; none where no row is of that kind.
+    pub repaired: Option<Vec<bool>>,
+    /// Starts and stops, as they came.
+    pub markers: Vec<Marker>,
+}
+
 /// Columns that were laid out, as they fill from their first row on.
 pub(in crate::wire) struct Laid<'a> {
     room: Room<'a>,
@@ -223,14 +234,14 @@ impl<'a> Laid<'a> {
         Self { room, filled: Filled { rows: 0, paired: false }, repaired: vec![], markers: vec![] }
     }
 
-    /// What was written, which rows states gave (none where no row is of that kind), and the markers.
-    pub(in crate::wire) fn end(self) -> (Filled, Option<Vec<bool>>, Vec<Marker>) {
-        let mask = (!self.repaired.is_empty()).then(|| {
+    /// What was written.
+    pub(in crate::wire) fn end(self) -> Columns {
+        let repaired = (!self.repaired.is_empty()).then(|| {
             let mut mask = vec![false; self.filled.rows];
             self.repaired.into_iter().for_each(|rows| mask[rows].fill(true));
             mask
         });
-        (self.filled, mask, self.markers)
+        Columns { filled: self.filled, repaired, markers: self.markers }
     }
 }
 

@@ -20,11 +20,13 @@
 mod checksum;
 mod counts;
 mod decoder;
+mod encode;
 mod packer;
 mod stream;
 
 pub use counts::{Counts, Status};
 pub use decoder::{Decoder, Heard, stream_rows};
+pub use encode::{Encoded, encode};
 pub use packer::{Packer, Settings};
 pub use stream::{Decoded, StreamReader, decode};
 
@@ -182,6 +184,9 @@ pub enum Refused {
     /// Too short for header and trailer.
     #[error("shorter than 24 bytes")]
     Short,
+    /// Longer than any that a board sends.
+    #[error("longer than 1400 bytes")]
+    Long,
     /// Another first byte, or another version.
     #[error("begins with another byte or version")]
     Foreign,
@@ -202,6 +207,9 @@ impl Header {
         }
         if datagram.len() < HEADER_BYTES + TRAILER_BYTES {
             return Err(Refused::Short);
+        }
+        if datagram.len() > DATAGRAM_BYTES {
+            return Err(Refused::Long);
         }
         let (rest, sum) = datagram.split_at(datagram.len() - 4);
         if checksum::crc32c(rest).to_le_bytes() != sum {

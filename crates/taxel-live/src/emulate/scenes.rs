@@ -37,13 +37,13 @@ impl Scenes {
         frame_us: f64,
         acts: impl Iterator<Item = Result<Act>> + Send + 'static,
     ) -> Result<Self> {
-        let stage = Stage::new(array, taxels, frame_us, &[])?;
+        let stage = Stage::new(array, taxels, frame_us, &[], Stop::never())?;
         let (ready, coming) = channel::bounded(AHEAD);
         let array = array.clone();
         let work = move || {
             for (n, act) in acts.enumerate() {
                 let prepared = act.and_then(|act| {
-                    Prepared::of(&array, frame_us, &act).map_err(|error| match error {
+                    Prepared::of(&array, frame_us, &act, Stop::never()).map_err(|error| match error {
                         taxel_core::Error::Scene(text) => taxel_core::Error::Scene(format!("act {n}: {text}")).into(),
                         other => other.into(),
                     })
@@ -82,7 +82,7 @@ impl Scenes {
 
 impl Touch for Scenes {
     fn frame(&mut self, ticks: &mut [u16], stop: Stop<'_>) -> Result<bool> {
-        Ok(self.is_ready(stop)? && self.stage.frame(ticks)?)
+        Ok(self.is_ready(stop)? && self.stage.frame(ticks, stop)?)
     }
 
     fn is_last(&mut self, stop: Stop<'_>) -> Result<bool> {

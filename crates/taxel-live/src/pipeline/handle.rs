@@ -1,22 +1,19 @@
-//! What others may do with a pipeline while it runs: look on, record, tell it of the board.
+//! What other parts may do with a pipeline while it runs: get its events, record, announce what was written to the board.
 
 use std::net::SocketAddr;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 
 use crossbeam_channel as channel;
 use taxel_core::encode::Zeroing;
 use taxel_core::wire::Registers;
 
 use super::copies::Copies;
-use super::counters::Counters;
+use super::counters::{Counters, Summary};
 use super::options::{LiveOptions, Record};
-use super::recorder::Recorder;
+use super::recordings::Recordings;
 use super::said::Said;
-use super::shared::{Ended, Shared, Wish};
-use super::source::Source;
+use super::shared::{Request, Shared};
 use super::tap::Outlet;
 use crate::Result;
 use crate::capture::Origin;
@@ -29,6 +26,7 @@ const COPIED_WAITING: usize = 1 << 12;
 #[derive(Clone)]
 pub struct Handle {
     pub(super) shared: Arc<Shared>,
+    pub(super) recordings: Arc<Recordings>,
 }
 
 impl Handle {
@@ -38,7 +36,7 @@ impl Handle {
         &self.shared.options
     }
 
-    /// The address that it listens on; unspecified, with port 0, where a bridge feeds it.
+    /// The address that it receives on; unspecified, with port 0, where a bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()
@@ -62,104 +60,79 @@ impl Handle {
         self.shared.ended.load(Ordering::Acquire)
     }
 
-    /// What the registers hold, as far as it was told.
+    /// The board's registers, as far as they are known.
     #[must_use]
     pub fn registers(&self) -> Registers {
         *lock(&self.shared.registers)
     }
 
-    /// Tells what was written to the board's registers: the recording keeps it, and the version of the wire is expected.
+    /// Announces what was written to the board's registers: it is recorded, and the version of the wire is expected.
     pub fn wrote(&self, registers: Registers) {
         *lock(&self.shared.registers) = registers;
-        self.shared.wish(Wish::Registers(registers));
+        self.shared.request(Request::Registers(registers));
     }
 
-    /// Lets somebody look on, from the next batch on.
+    /// Gives a viewer the events from the next batch on.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where all is over.
+    /// `Core(Problem)` where the pipeline has ended.
     pub fn look(&self) -> Result<Outlet> {
         let (give, outlet) = channel::bounded(1);
-        self.shared.wish(Wish::Look(give));
-        self.wait(&outlet)
+        self.shared.request(Request::Tap(give));
+        self.shared.wait(&outlet)
     }
 
     /// Copies what comes, for other computers, from the next batch on.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where all is over.
+    /// `Core(Problem)` where the pipeline has ended.
     pub fn copy(&self) -> Result<Copies> {
         let (give, parcels) = channel::bounded(1);
         let said = self.hear(COPIED_WAITING);
-        self.shared.wish(Wish::Copy(give));
-        Ok(Copies::new(Arc::clone(&self.shared), self.wait(&parcels)?, said))
+        self.shared.request(Request::Copy(give));
+        Ok(Copies::new(Arc::clone(&self.shared), self.shared.wait(&parcels)?, said))
     }
 
-    /// Hears detections as they are said; so many may wait, and who is too slow misses some.
+    /// Gives each detection from here on; so many may wait, and a slow receiver misses some.
     #[must_use]
     pub fn hear(&self, waiting: usize) -> channel::Receiver<Said> {
         let (say, said) = channel::bounded(waiting);
-        lock(&self.shared.listeners).push(say);
+        lock(&self.shared.subscribers).push(say);
         said
     }
 
-    /// Begins to record what comes from here on, beginning with the registers and what the taxels hold.
+    /// Records what arrives from now on, of all sources, beginning with the registers and the held values. A recording that
+    /// runs ends with what arrived before: each datagram, and each line, belongs to one of the two.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where something is recorded already, `File` where the file exists or cannot be created.
-    pub fn record(&self, record: &Record) -> Result<()> {
-        if lock(&self.shared.recorder).is_some() {
-            return Err(taxel_core::problem!("a recording runs already: stop it first").into());
-        }
-        // What else is heard belongs to the recording that it was begun with.
-        let recorder = self.reserve(record, vec![])?;
-        lock(&self.shared.broken).take();
-        self.next_recording(Some(recorder)).map(drop)
+    /// `File` where the file exists or cannot be created: then the one that runs goes on. What ended that one early, or `File`
+    /// where its end cannot be written. `Core(Problem)` where all is over.
+    pub fn record(&self, record: &Record) -> Result<Option<Summary>> {
+        self.recordings.record(record)
     }
 
-    /// A recording that is to begin, with the board's registers as they are now, and those other sources.
-    pub(super) fn reserve(&self, record: &Record, sources: Vec<Source>) -> Result<Recorder> {
-        let header = LiveOptions { registers: self.registers(), sources, ..self.shared.options.clone() };
-        Recorder::reserve(record, &header, self.place())
-    }
-
-    /// Has what comes from here on go to this recording, or to none; gives the one that ran.
-    pub(super) fn next_recording(&self, next: Option<Recorder>) -> Result<Ended> {
-        // Who looks whether it goes on finds that it does.
-        self.shared.records.fetch_or(next.is_some(), Ordering::AcqRel);
-        let (give, ended) = channel::bounded(1);
-        self.shared.wish(Wish::Record(next.map(Box::new), give));
-        let ended = self.wait(&ended).and_then(std::convert::identity);
-        if ended.is_err() {
-            self.shared.records.store(lock(&self.shared.recorder).is_some(), Ordering::Release);
-        }
-        ended
-    }
-
-    /// Ends the recording that [`Handle::record`] began. Gives the file, where anything came, and what was lost, in a line.
+    /// Ends the recording that [`Handle::record`] began: what it contains, and the file, where anything arrived.
     ///
     /// # Errors
     ///
     /// What ended it early, or `File` where its end cannot be written; `Core(Problem)` where there is none.
-    pub fn end_recording(&self) -> Result<(Option<PathBuf>, String)> {
-        let (recorder, counters) = self.next_recording(None)?;
-        if let Some(error) = lock(&self.shared.broken).take() {
-            return Err(error);
-        }
-        let Some(recorder) = recorder else {
-            return Err(taxel_core::problem!("nothing is recorded").into());
-        };
-        let verdict = recorder.verdict(&counters);
-        Ok((recorder.finish(&counters)?, verdict))
+    pub fn end_recording(&self) -> Result<Summary> {
+        self.recordings.end()
     }
 
-    /// Whether a recording runs, and has not been ended by an error.
+    /// Whether a recording that [`Handle::record`] began runs, and has not been ended by an error.
     #[must_use]
     pub fn records(&self) -> bool {
-        self.shared.records.load(Ordering::Acquire)
+        self.recordings.run()
+    }
+
+    /// Whether anything is recorded, also from the beginning on.
+    #[must_use]
+    pub fn is_recording(&self) -> bool {
+        lock(&self.shared.recorder).is_some()
     }
 
     /// As [`Live::note`](super::Live::note).
@@ -171,7 +144,7 @@ impl Handle {
         self.shared.note(text, true)
     }
 
-    /// Writes down what holds for the whole recording, such as the name of a trial: a note without a time, which is no event.
+    /// Writes a note that holds for the whole recording, such as the name of a trial: a note without a time, which is no event.
     ///
     /// # Errors
     ///
@@ -180,41 +153,29 @@ impl Handle {
         self.shared.note(text, false)
     }
 
-    /// Takes what these taxels (column, row) hold now for their rest from now on, in the readout and in the recording's
-    /// pictures; the recording keeps when it was done, and the rests before and after. Never done but when asked for.
+    /// Takes the values that these taxels (column, row) hold for their rest from now on, in the readout and in the recording's
+    /// pictures; the recording states when that was, and the rests before and after. Only done on request.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where a taxel does not exist or was not heard of yet, a tare is being taken, or a `.lsa` is recorded, which
-    /// could not keep it: then none is zeroed. `File` where the disk is full.
+    /// `Core(Problem)` where a taxel does not exist or has had no event so far, a tare is being taken, or a `.lsa` is recorded, which
+    /// cannot hold it: then none is zeroed. `File` where the disk is full.
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let (give, zeroed) = channel::bounded(1);
-        self.shared.wish(Wish::Zero(taxels.to_vec(), give));
-        self.wait(&zeroed).and_then(std::convert::identity)
+        self.shared.request(Request::Zero(taxels.to_vec(), give));
+        self.shared.wait(&zeroed).and_then(std::convert::identity)
     }
 
-    /// What was zeroed last at each taxel that was, by taxel index; and how often something was.
+    /// The latest zeroing of each taxel that was zeroed, by taxel index; and how often taxels were.
     #[must_use]
     pub fn zeroed(&self) -> (Vec<Zeroing>, u64) {
-        let shown = self.shared.shown();
-        (shown.zeroed.values().copied().collect(), shown.zeroings)
+        let published = self.shared.published();
+        (published.zeroed.values().copied().collect(), published.zeroings)
     }
 
-    /// How often something was zeroed.
+    /// How often taxels were zeroed.
     #[must_use]
     pub fn zeroings(&self) -> u64 {
-        self.shared.shown().zeroings
-    }
-
-    fn wait<T>(&self, from: &channel::Receiver<T>) -> Result<T> {
-        loop {
-            match from.recv_timeout(Duration::from_millis(50)) {
-                Ok(given) => return Ok(given),
-                Err(_) if self.is_over() => {
-                    return Err(taxel_core::problem!("live: has ended").into());
-                }
-                Err(_) => {}
-            }
-        }
+        self.shared.published().zeroings
     }
 }

@@ -1,6 +1,5 @@
-//! The two kinds of file that a [`Live`](super::Live) records to.
+//! One recording of a [`Live`](super::Live): to a `.mcap` of its own, to a part of another pipeline's, or to a raw `.lsa`.
 
-use std::fs::OpenOptions;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, OnceLock, PoisonError, Weak};
@@ -16,40 +15,39 @@ use super::said::Said;
 use super::source::Source;
 use crate::capture::{Batch, Origin};
 use crate::locked::lock;
-use crate::recording::{self, BoardChange, Header, LsaWriter, Track, Writer, now_ns};
+use crate::recording::{self, BoardChange, Header, LsaWriter, OutputFile, Track, Writer, now_ns};
 use crate::{Error, Result};
 
-/// A recording being written. Raw `.lsa` holds bytes and nothing else: what else there is to keep is left out of it.
+/// One recording, from its reservation to its end. Raw `.lsa` holds bytes and nothing else: notes, markers and the like are left
+/// out of it.
 ///
-/// A file that is to be replaced is touched when there is something to replace it with, and not before: where nothing
-/// comes, it stays.
+/// The file is locked from the reservation on. One that is to be replaced is changed when there is something to replace it with,
+/// and not before: where nothing comes, it stays.
 pub(super) struct Recorder {
     record: Record,
     header: Header,
-    /// Whether there was no such file.
-    new: bool,
     noted: AtomicBool,
-    /// Whether something came that the file cannot hold, and whether anything is in it.
+    /// Whether data came that the file cannot hold, and whether any data came.
     refused: AtomicBool,
     begun: AtomicBool,
     kind: OnceLock<Kind>,
-    /// Held by the one who opens the file.
-    opening: Mutex<()>,
-    /// What had been counted when it began, where that was while listening.
+    /// The reserved file until it is begun; locked by the caller who begins it.
+    reserved: Mutex<Option<OutputFile>>,
+    /// The counters at its beginning, where it began while the pipeline was running.
     since: Option<Box<Counters>>,
     clock: Mutex<Clock>,
-    /// Whose file it is, where it is another's.
+    /// The pipeline whose file it is, where it is another's.
     host: Option<Part>,
 }
 
-/// How a recording's clock goes against the pipeline's.
+/// How the recording's clock, which begins with its first stamp, relates to the pipeline's.
 #[derive(Clone, Copy)]
 enum Clock {
-    /// So far behind it, us.
+    /// It is behind by so many us.
     Behind(i64),
-    /// As the pipeline's: its file waits until that can be said in it.
+    /// The file is not begun before the offset is known, and then states it in its header: times are the pipeline's.
     Waits,
-    /// Begins with its first stamp, which has not come.
+    /// The first stamp has not come.
     Unknown,
 }
 
@@ -62,7 +60,7 @@ enum Kind {
 }
 
 impl Kind {
-    /// Where more than bytes is kept.
+    /// The messages' writer; a raw file has none.
     fn track(&self) -> Option<&Track> {
         match self {
             Self::Mcap(writer) => Some(writer),
@@ -72,12 +70,12 @@ impl Kind {
     }
 }
 
-/// The pipeline whose recording it is.
+/// The pipeline whose recording others are parts of.
 pub(super) trait Host: Send + Sync {
     /// Opens another source's part of it.
     fn part(&self, name: &str) -> Result<Track>;
 
-    /// Ends everything because of an error.
+    /// Ends the pipeline because of an error.
     fn fail(&self, error: Error);
 }
 
@@ -89,7 +87,7 @@ pub(super) struct Part {
 }
 
 impl Part {
-    /// Opens it: the file is there from then on.
+    /// Opens it: the file is begun from then on.
     pub(super) fn open(&self) -> Result<Track> {
         let host = self.host.upgrade().ok_or_else(|| problem!("source {}: the recording has ended", self.name))?;
         host.part(&self.name)
@@ -101,26 +99,25 @@ impl Recorder {
         Self {
             record: record.clone(),
             header,
-            new: false,
             noted: AtomicBool::new(false),
             refused: AtomicBool::new(false),
             begun: AtomicBool::new(false),
             kind: OnceLock::new(),
-            opening: Mutex::new(()),
+            reserved: Mutex::default(),
             since: None,
             clock: Mutex::new(Clock::Behind(0)),
             host: None,
         }
     }
 
-    /// A part of another's recording.
+    /// A part of another pipeline's recording.
     pub(super) fn join(host: Part, record: &Record, options: &LiveOptions, place: &Origin) -> Self {
         let name = host.name.clone();
-        let board = Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
+        let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
         Self { host: Some(host), ..Self::of(record, Header { name, ..board }) }
     }
 
-    /// A part of another's recording that begins while this one's board is listened to.
+    /// A part of another pipeline's recording that begins while this one's board is received.
     pub(super) fn part_of(&self, host: Part, options: &LiveOptions, place: &Origin) -> Result<Self> {
         let track = self.writer(&host.name)?;
         let part = Self::join(host, &self.record, options, place);
@@ -140,58 +137,50 @@ impl Recorder {
         }
     }
 
+    /// A recording from the pipeline's beginning: a new file is begun at once.
     pub(super) fn create(record: &Record, options: &LiveOptions, place: &Origin) -> Result<Self> {
-        let board = Header::of_board(options.array.clone(), Some(options.registers), said_of(place), now_ns());
-        let sources = options.sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
-        let header = Header { difference: options.differences, name: options.name.clone(), sources, ..board };
-        let path = &record.path;
-        let new = !(record.overwrite && path.exists());
-        let recorder = Self { new, ..Self::of(record, header) };
-        if !recorder.header.sources.is_empty() && named(path)? != "mcap" {
-            return Err(problem!("{}: only a .mcap holds several sources", path.display()).into());
-        }
+        let (recorder, file) = Self::reserved(record, options, place)?;
+        let new = file.is_new();
+        *lock(&recorder.reserved) = Some(file);
         if new {
             recorder.kind()?;
-        } else {
-            named(path)?;
-            recording::replaceable(path)?;
-            OpenOptions::new().write(true).open(path).map_err(Error::file(path))?;
         }
         Ok(recorder)
     }
 
-    /// A recording that begins while listening: takes the name, so that nobody else can; the file is written later.
+    /// A recording that begins while the pipeline runs: the file is reserved, and written later.
     pub(super) fn reserve(record: &Record, options: &LiveOptions, place: &Origin) -> Result<Self> {
-        let path = &record.path;
-        let kind = named(path)?;
-        let new = !(record.overwrite && path.exists());
-        if new {
-            let done = path.with_extension("lss");
-            if kind == "lsa" && done.exists() {
-                return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
-            }
-            OpenOptions::new().write(true).create_new(true).open(path).map_err(Error::file(path))?;
+        let (recorder, file) = Self::reserved(record, options, place)?;
+        let recorder = Self { since: Some(Box::default()), ..recorder };
+        if kind_of_name(&record.path)? == "lsa" {
+            *lock(&recorder.reserved) = Some(file);
+            return Ok(recorder);
         }
-        let whole = Self::create(&Record { overwrite: true, ..record.clone() }, options, place);
-        let whole = whole.and_then(|whole| {
-            if kind == "mcap" {
-                // Where nothing else is heard it waits for the board's first stamp, so that its times are ours.
-                let for_clock = whole.header.sources.is_empty();
-                let how = recording::WriterOptions { compression: record.compression, overwrite: true };
-                let writer = Writer::plan(path, &whole.header, how, for_clock)?;
-                let clock = Mutex::new(if for_clock { Clock::Waits } else { Clock::Unknown });
-                return Ok(Self { kind: OnceLock::from(Kind::Mcap(Box::new(writer))), clock, ..whole });
-            }
-            Ok(whole)
-        });
-        if new && whole.is_err() {
-            // It was empty, and ours.
-            let _ = std::fs::remove_file(path);
-        }
-        Ok(Self { new, since: Some(Box::default()), ..whole? })
+        // Without other sources it waits for the board's first stamp, so that its times are the pipeline's.
+        let for_clock = recorder.header.sources.is_empty();
+        let writer = Writer::plan(file, &recorder.header, record.compression, for_clock);
+        let clock = Mutex::new(if for_clock { Clock::Waits } else { Clock::Unknown });
+        Ok(Self { kind: OnceLock::from(Kind::Mcap(Box::new(writer))), clock, ..recorder })
     }
 
-    /// Begins with the registers and what the taxels hold, by the counters of now.
+    /// A recording whose file is opened and locked, and not changed.
+    fn reserved(record: &Record, options: &LiveOptions, place: &Origin) -> Result<(Self, OutputFile)> {
+        let board = Header::of_board(options.array.clone(), Some(options.registers), origin_text(place), now_ns());
+        let sources = options.sources.iter().map(Source::header).collect::<taxel_core::Result<_>>()?;
+        let header = Header { difference: options.differences, name: options.name.clone(), sources, ..board };
+        let (path, kind) = (&record.path, kind_of_name(&record.path)?);
+        if !header.sources.is_empty() && kind != "mcap" {
+            return Err(problem!("{}: only a .mcap holds several sources", path.display()).into());
+        }
+        header.check()?;
+        let file = match kind {
+            "mcap" => OutputFile::open(path, record.overwrite)?,
+            _ => LsaWriter::reserve(path, record.overwrite)?,
+        };
+        Ok((Self::of(record, header), file))
+    }
+
+    /// Begins with the registers and the values that the taxels hold, at these counters.
     pub(super) fn begin(&mut self, now: &Counters, held: &[u16]) -> Result<()> {
         self.since = Some(Box::new(now.clone()));
         if let Some(registers) = &self.header.registers {
@@ -201,14 +190,14 @@ impl Recorder {
         self.track(|track| track.held(now_ns(), t_us, held))
     }
 
-    /// Begins anew where nothing came into it yet; gives whether it does.
+    /// Begins anew where it holds nothing yet; returns whether it does.
     pub(super) fn again(&mut self, now: &Counters) -> bool {
         if self.holds_anything() {
             return false;
         }
         self.since = Some(Box::new(now.clone()));
         if let Some(Kind::Mcap(writer)) = self.kind.get() {
-            writer.started(now_ns());
+            writer.set_started(now_ns());
         }
         true
     }
@@ -219,23 +208,23 @@ impl Recorder {
         others || self.begun.load(Ordering::Relaxed) || self.noted.load(Ordering::Relaxed)
     }
 
-    /// What had been counted when it began, where that was while listening: then it ends alone.
+    /// The counters at its beginning, where it began while the pipeline was running: then an error ends it alone.
     pub(super) fn since(&self) -> Option<&Counters> {
         self.since.as_deref()
     }
 
-    /// Says by how much a clock that begins with the recording's first stamp is behind ours, us: a file that waits for that can be
-    /// written.
+    /// Sets by how much a clock that begins with the recording's first stamp is behind the pipeline's, us: a file that waits for
+    /// that can be written.
     pub(super) fn set_origin(&mut self, origin_us: i64) -> Result<()> {
-        let said = match self.kind.get() {
+        let in_header = match self.kind.get() {
             Some(Kind::Mcap(writer)) => writer.begin(origin_us)?,
             _ => false,
         };
-        *lock(&self.clock) = Clock::Behind(if said { 0 } else { origin_us });
+        *lock(&self.clock) = Clock::Behind(if in_header { 0 } else { origin_us });
         Ok(())
     }
 
-    /// A time of the pipeline's clock on the recording's; none where that is not known yet.
+    /// A time of the pipeline's clock on the recording's clock; none where that is not known yet.
     fn timed(&self, t: i64) -> Option<i64> {
         match *lock(&self.clock) {
             Clock::Behind(us) => Some(t - us),
@@ -244,22 +233,22 @@ impl Recorder {
         }
     }
 
-    /// Does something where more than bytes is kept.
+    /// Writes messages, which a raw file leaves out.
     fn track(&self, work: impl FnOnce(&Track) -> Result<()>) -> Result<()> {
-        if named(&self.record.path)? == "lsa" {
+        if kind_of_name(&self.record.path)? == "lsa" {
             return Ok(());
         }
         self.kind()?.track().map_or(Ok(()), work)
     }
 
-    /// Whether times of the pipeline's clock can be said in it.
+    /// Whether times of the pipeline's clock can be converted to the recording's.
     pub(super) fn is_timed(&self) -> bool {
         self.timed(0).is_some()
     }
 
-    /// The open file.
+    /// The file, which is begun where it was not.
     fn kind(&self) -> Result<&Kind> {
-        let _one = lock(&self.opening);
+        let mut reserved = lock(&self.reserved);
         if let Some(kind) = self.kind.get() {
             return Ok(kind);
         }
@@ -267,13 +256,15 @@ impl Recorder {
             let track = host.open()?;
             return Ok(self.kind.get_or_init(|| Kind::Track(track)));
         }
-        let Record { path, compression, overwrite } = &self.record;
-        let kind = match named(path)? {
+        let path = &self.record.path;
+        let file = reserved.take().ok_or_else(|| problem!("{}: could not be begun", path.display()))?;
+        let kind = match kind_of_name(path)? {
             "mcap" => {
-                let how = recording::WriterOptions { compression: *compression, overwrite: *overwrite };
-                Kind::Mcap(Box::new(Writer::create(path, &self.header, how)?))
+                let writer = Writer::plan(file, &self.header, self.record.compression, false);
+                writer.begin(self.header.origin_us)?;
+                Kind::Mcap(Box::new(writer))
             }
-            _ => Kind::Lsa(Mutex::new(LsaWriter::create(path, *overwrite)?)),
+            _ => Kind::Lsa(Mutex::new(LsaWriter::begin(file)?)),
         };
         Ok(self.kind.get_or_init(|| kind))
     }
@@ -296,9 +287,9 @@ impl Recorder {
         self.track(|track| track.registers(now_ns(), registers))
     }
 
-    /// Raw bytes are of version 1: those of version 2 do not say where a datagram ends.
+    /// Refuses version 2 in a raw file: its bytes alone do not show where a datagram ends.
     pub(super) fn takes(&self, version: u8) -> Result<()> {
-        if version == 1 || named(&self.record.path)? == "mcap" {
+        if version == 1 || kind_of_name(&self.record.path)? == "mcap" {
             return Ok(());
         }
         self.refused.store(true, Ordering::Relaxed);
@@ -323,7 +314,7 @@ impl Recorder {
         self.track(|track| track.detection(said.said_ns, &Detection { t, known, ..found.clone() }))
     }
 
-    /// What is taken off the pictures from here on.
+    /// The rest that is subtracted from the pictures from here on.
     pub(super) fn tare(&self, tare: &Tare) -> Result<()> {
         self.track(|track| {
             track.tare(tare);
@@ -332,19 +323,19 @@ impl Recorder {
     }
 
     pub(super) fn picture(&self, at_ns: i64, board_us: i64, columns: u16, held: &[u16]) -> Result<()> {
-        // Of a file that is not there yet nothing is to be seen.
+        // A file that is not begun has no pictures.
         let there = !matches!(self.kind()?, Kind::Mcap(writer) if !writer.has_begun());
         let Some(t_us) = self.timed(board_us).filter(|_| there) else { return Ok(()) };
         self.track(|track| track.picture(at_ns, t_us, columns, held))
     }
 
-    /// What an unfinished recording will know of its losses; a raw one knows nothing, but its bytes reach the system.
+    /// Writes the losses up to now, which an unfinished recording then states; a raw one cannot hold them.
     pub(super) fn so_far(&self, counters: &Counters) -> Result<()> {
         let track = self.kind.get().and_then(Kind::track);
         track.map_or(Ok(()), |track| track.counts(now_ns(), &self.losses(counters)))
     }
 
-    /// Bytes must not wait in memory for long: `.mcap` sees to that itself.
+    /// Hands waiting bytes to the system: they must not wait in memory for long. `.mcap` does so by itself.
     pub(super) fn flush(&self) -> Result<()> {
         match self.kind.get() {
             Some(Kind::Mcap(_) | Kind::Track(_)) | None => Ok(()),
@@ -353,33 +344,28 @@ impl Recorder {
     }
 
     pub(super) fn note(&self, board_us: Option<i64>, text: &str) -> Result<()> {
-        if named(&self.record.path)? == "lsa" {
+        if kind_of_name(&self.record.path)? == "lsa" {
             return Err(problem!("a .lsa holds raw bytes and no notes: record to a .mcap file").into());
         }
         self.noted.store(true, Ordering::Relaxed);
         self.track(|track| track.note(now_ns(), board_us.and_then(|t| self.timed(t)), text))
     }
 
-    /// A taxel that a person zeroed.
+    /// Writes that a person zeroed a taxel.
     pub(super) fn zeroing(&self, zeroing: &Zeroing) -> Result<()> {
-        if named(&self.record.path)? == "lsa" {
+        if kind_of_name(&self.record.path)? == "lsa" {
             return Err(problem!("a .lsa cannot keep that a taxel was zeroed: record to a .mcap file").into());
         }
         let Some(t) = self.timed(zeroing.t) else { return Ok(()) };
         self.track(|track| track.zeroing(now_ns(), &Zeroing { t, ..*zeroing }))
     }
 
-    /// What was lost, as the file keeps it.
+    /// What was lost, as the file states it.
     pub(super) fn losses(&self, counters: &Counters) -> recording::Counts {
         losses(counters, self.since())
     }
 
-    /// The same in a line.
-    pub(super) fn verdict(&self, counters: &Counters) -> String {
-        self.losses(counters).verdict()
-    }
-
-    /// Closes the file and says where it is; a file that would hold nothing is not kept.
+    /// Closes the file and returns its path; a file that would hold nothing is not kept.
     pub(super) fn finish(self, counters: &Counters) -> Result<Option<PathBuf>> {
         let lost = self.losses(counters);
         if let Some(host) = &self.host {
@@ -389,38 +375,41 @@ impl Recorder {
             return Ok(None);
         }
         let nothing = !self.holds_anything() && (self.since.is_some() || counters.nothing_came());
-        let path = self.record.path;
         let refused = self.refused.into_inner();
         if nothing || (refused && !self.begun.into_inner()) {
-            drop(self.kind);
-            if self.new {
-                std::fs::remove_file(&path).map_err(Error::file(&path))?;
+            match self.kind.into_inner() {
+                Some(Kind::Mcap(writer)) => writer.discard()?,
+                Some(Kind::Lsa(writer)) => unpoisoned(writer).discard()?,
+                Some(Kind::Track(_)) | None => {}
             }
-            return Ok(None);
+            let reserved = self.reserved.into_inner().unwrap_or_else(PoisonError::into_inner);
+            return reserved.map_or(Ok(()), OutputFile::discard).map(|()| None);
         }
         match self.kind.into_inner() {
             Some(Kind::Mcap(writer)) => drop(writer.finish(lost)?),
             // Without its .lss, as it is not whole.
-            Some(Kind::Lsa(writer)) if refused => {
-                writer.into_inner().unwrap_or_else(PoisonError::into_inner).flush()?
-            }
-            Some(Kind::Lsa(writer)) => writer.into_inner().unwrap_or_else(PoisonError::into_inner).finish()?,
+            Some(Kind::Lsa(writer)) if refused => unpoisoned(writer).end()?,
+            Some(Kind::Lsa(writer)) => unpoisoned(writer).finish()?,
             Some(Kind::Track(_)) | None => {}
         }
-        Ok(Some(path))
+        Ok(Some(self.record.path))
     }
 }
 
-/// Where datagrams come from, as files keep it.
-fn said_of(place: &Origin) -> String {
+fn unpoisoned(writer: Mutex<LsaWriter>) -> LsaWriter {
+    writer.into_inner().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Where datagrams come from, as it is written into files.
+fn origin_text(place: &Origin) -> String {
     match place {
         Origin::Udp(address) => format!("udp {address}"),
         Origin::Bridge(name) => name.clone(),
     }
 }
 
-/// What kind of file a name says.
-fn named(path: &Path) -> Result<&str> {
+/// The kind of file, by the ending of its name.
+fn kind_of_name(path: &Path) -> Result<&str> {
     match path.extension().and_then(|e| e.to_str()) {
         Some(kind @ ("mcap" | "lsa")) => Ok(kind),
         _ => {
@@ -430,9 +419,9 @@ fn named(path: &Path) -> Result<&str> {
     }
 }
 
-/// What was lost, as recordings keep it; of one that began later, since then.
+/// What was lost, as recordings state it; since `since` where a recording began then.
 pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording::Counts {
-    // What waits when it ends is none of its business.
+    // What waits at its end belongs to a later recording.
     let now = since.map_or_else(|| counters.clone(), |begun| counters.since(begun));
     let mut decoder = recording::damage(&now.wire);
     decoder.insert("bytes_of_version_1_refused".to_owned(), now.wire_refused);
@@ -440,7 +429,7 @@ pub(super) fn losses(counters: &Counters, since: Option<&Counters>) -> recording
         decoder.extend(causes);
         missing
     });
-    // Of version 1 nobody knows what was sent: a recording that holds any of it cannot say that nothing is missing.
+    // Version 1 numbers no datagrams: a recording that holds any of it cannot state that none is missing.
     let knows = now.wire_v2.intact > 0 && now.wire.bytes == 0;
     recording::Counts {
         received: now.capture.datagrams,

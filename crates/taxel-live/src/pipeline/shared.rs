@@ -1,9 +1,9 @@
-//! What the threads of a pipeline share, and what they show to those who look on.
+//! What the threads of a pipeline share, what they publish, and what is requested of them.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use crossbeam_channel as channel;
 use taxel_core::Marker;
@@ -23,20 +23,23 @@ use crate::locked::lock;
 use crate::recording::Track;
 use crate::{Error, Result};
 
-/// What the threads tell those who look on.
+/// How often a wait for an answer checks whether the decoding thread has ended.
+const ANSWER_EVERY: Duration = Duration::from_millis(50);
+
+/// What the threads publish: counts, the picture, the tare.
 #[derive(Debug, Default)]
-pub(super) struct Shown {
+pub(super) struct Published {
     pub(super) counters: Counters,
     pub(super) decode_latency: Latencies,
     pub(super) said_latency: Latencies,
     pub(super) markers: Vec<Marker>,
     pub(super) picture: Vec<u16>,
     pub(super) tare: Option<Tare>,
-    /// What the readout takes each taxel to read at rest, by taxel index; empty where it reads no tare, or has none yet.
+    /// The rest of each taxel that the readout reads with, by taxel index; empty where it needs none, or has none yet.
     pub(super) rest: Vec<Option<f64>>,
-    /// What was zeroed last at each taxel, by its index.
+    /// The latest zeroing of each taxel, by its index.
     pub(super) zeroed: BTreeMap<usize, Zeroing>,
-    /// How often something was.
+    /// How often taxels were zeroed.
     pub(super) zeroings: u64,
     pub(super) failed: Option<Error>,
 }
@@ -47,24 +50,24 @@ pub(super) struct Shared {
     pub(super) begun: Instant,
     pub(super) receiver: Receiver,
     pub(super) handover: Handover,
-    pub(super) shown: Mutex<Shown>,
+    pub(super) published: Mutex<Published>,
     pub(super) recorder: Mutex<Option<Recorder>>,
-    /// What ended a recording that was begun while listening, early.
+    /// The error that ended a recording early which was begun while the pipeline ran.
     pub(super) broken: Mutex<Option<Error>>,
-    /// What the decoding thread is asked for between two batches.
-    pub(super) wishes: Mutex<Vec<Wish>>,
-    pub(super) wished: AtomicBool,
-    /// Times of detections, markers and notes, us, since the recording's pictures were looked at last.
-    pub(super) happened: Mutex<Vec<i64>>,
-    /// Whether a recording was begun while listening, and has not ended.
+    /// Requests to the decoding thread, which it answers between two batches.
+    pub(super) requests: Mutex<Vec<Request>>,
+    pub(super) requested: AtomicBool,
+    /// Times of detections, markers and notes, us, around which the recording gets pictures, since it last did.
+    pub(super) picture_times: Mutex<Vec<i64>>,
+    /// Whether a recording runs that was begun while the pipeline ran.
     pub(super) records: AtomicBool,
-    /// Those who hear detections beside [`Live::next`](super::Live::next); who is too slow misses some.
-    pub(super) listeners: Mutex<Vec<channel::Sender<Said>>>,
+    /// Further queues that get each detection; a slow one misses some.
+    pub(super) subscribers: Mutex<Vec<channel::Sender<Said>>>,
     /// Where detections go.
     pub(super) sending: Vec<Arc<Line>>,
-    /// What the registers hold now, which may not be what they held at the beginning.
+    /// The registers as they are now.
     pub(super) registers: Mutex<Registers>,
-    /// The version of the wire that the board was told to speak, since this was looked at last; 0: nothing was said.
+    /// The version of the wire that the board was newly told to speak; 0 where it was not.
     pub(super) expected: AtomicU8,
     pub(super) ended: AtomicBool,
 }
@@ -73,38 +76,53 @@ pub(super) struct Shared {
 pub(super) type Ended = (Option<Recorder>, Counters);
 
 /// What the decoding thread does between two batches.
-pub(super) enum Wish {
+pub(super) enum Request {
     /// End the recording that runs, and record into this one, where there is one, from the next datagram on.
     Record(Option<Box<Recorder>>, channel::Sender<Result<Ended>>),
-    /// Let somebody look on.
-    Look(channel::Sender<Outlet>),
-    /// Give copies for other computers.
+    /// Give a viewer the events.
+    Tap(channel::Sender<Outlet>),
+    /// Give datagrams for another computer.
     Copy(channel::Sender<channel::Receiver<Vec<u8>>>),
     /// The registers were written.
     Registers(Registers),
-    /// Zero these taxels, and say what that was.
+    /// Zero these taxels, and return the zeroings.
     Zero(Vec<(u16, u16)>, channel::Sender<Result<Vec<Zeroing>>>),
 }
 
 impl Shared {
-    pub(super) fn shown(&self) -> MutexGuard<'_, Shown> {
-        lock(&self.shown)
+    pub(super) fn published(&self) -> MutexGuard<'_, Published> {
+        lock(&self.published)
     }
 
-    /// Asks the decoding thread for something; it hears it within 20 ms, and never where it has ended.
-    pub(super) fn wish(&self, wish: Wish) {
-        lock(&self.wishes).push(wish);
-        self.wished.store(true, Ordering::Release);
+    /// Requests something of the decoding thread, which answers within 20 ms, and never after its end.
+    pub(super) fn request(&self, request: Request) {
+        lock(&self.requests).push(request);
+        self.requested.store(true, Ordering::Release);
     }
 
-    /// Something is worth a picture: the recording gets those around these times, us.
-    pub(super) fn happened(&self, times: impl IntoIterator<Item = i64>) {
-        lock(&self.happened).extend(times);
+    /// The recording gets the pictures around these times, us.
+    pub(super) fn picture_around(&self, times: impl IntoIterator<Item = i64>) {
+        lock(&self.picture_times).extend(times);
     }
 
-    /// Everything was worked through.
+    /// Everything that came was processed.
     pub(super) fn end(&self) {
         self.ended.store(true, Ordering::Release);
+    }
+
+    /// Waits for the answer to a request.
+    ///
+    /// # Errors
+    ///
+    /// `Core(Problem)` where the decoding thread has ended.
+    pub(super) fn wait<T>(&self, answer: &channel::Receiver<T>) -> Result<T> {
+        loop {
+            match answer.recv_timeout(ANSWER_EVERY) {
+                Ok(answer) => return Ok(answer),
+                Err(_) if self.has_ended() => return Err(taxel_core::problem!("live: has ended").into()),
+                Err(_) => {}
+            }
+        }
     }
 
     pub(super) fn has_ended(&self) -> bool {
@@ -112,24 +130,24 @@ impl Shared {
     }
 
     pub(super) fn counters(&self) -> Counters {
-        let shown = self.shown();
+        let published = self.published();
         Counters {
             capture: self.receiver.counts(),
             bridged: self.receiver.bridged(),
-            decode_latency: shown.decode_latency.quantiles(),
-            said_latency: shown.said_latency.quantiles(),
+            decode_latency: published.decode_latency.quantiles(),
+            said_latency: published.said_latency.quantiles(),
             sent: self.sending.iter().map(|line| line.counts()).collect(),
             seconds: self.begun.elapsed().as_secs_f64(),
-            ..shown.counters.clone()
+            ..published.counters.clone()
         }
     }
 
-    /// Writes something down, with the time of now or without one.
+    /// Writes a note, with the time of now or without one.
     pub(super) fn note(&self, text: &str, timed: bool) -> Result<()> {
-        let board_us = self.shown().counters.board_us.filter(|_| timed);
+        let board_us = self.published().counters.board_us.filter(|_| timed);
         match &*lock(&self.recorder) {
             Some(recorder) => {
-                self.happened(board_us);
+                self.picture_around(board_us);
                 recorder.note(board_us, text)
             }
             None => Err(taxel_core::problem!("a note is kept in a recording: record to a .mcap file").into()),
@@ -138,7 +156,7 @@ impl Shared {
 
     /// Ends everything because of an error, which [`Live::next`](super::Live::next) and [`Live::stop`](super::Live::stop) then give.
     pub(super) fn fail(&self, error: Error) {
-        self.shown().failed.get_or_insert(error);
+        self.published().failed.get_or_insert(error);
         self.receiver.stop();
     }
 }

@@ -1,5 +1,5 @@
 //! The manual's raw recordings (Appendix 1, section 3): `NAME.lsa` holds all bytes as they came and nothing else, an empty
-//! `NAME.lss` says that it is complete. The manual's program overwrites without a warning; this one refuses.
+//! `NAME.lss` marks it as complete. The manual's program overwrites without a warning; this one refuses.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -8,15 +8,28 @@ use std::path::{Path, PathBuf};
 use taxel_core::wire::{self, Decoder, Pairing};
 use taxel_core::{Array, Events, Stop};
 
-use super::create;
+use super::OutputFile;
 use crate::{Error, Result};
 
 /// A `.lsa` being written. Its `.lss` appears with [`LsaWriter::finish`], and only then.
 #[derive(Debug)]
 pub struct LsaWriter {
-    path: PathBuf,
-    overwrite: bool,
-    out: BufWriter<File>,
+    out: BufWriter<RawFile>,
+    bytes: u64,
+}
+
+/// The file, to be written through a buffer.
+#[derive(Debug)]
+struct RawFile(OutputFile);
+
+impl Write for RawFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.file().write(bytes)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.0.file().flush()
+    }
 }
 
 impl LsaWriter {
@@ -24,29 +37,52 @@ impl LsaWriter {
     ///
     /// # Errors
     ///
-    /// `File` where the `.lsa` or its `.lss` exists (and `overwrite` is not set), or the file cannot be created.
+    /// As [`OutputFile::open`]; `File` where its `.lss` exists (and `overwrite` is not set).
     pub fn create(path: &Path, overwrite: bool) -> Result<Self> {
+        Self::begin(Self::reserve(path, overwrite)?)
+    }
+
+    /// Opens the file without changing it.
+    ///
+    /// # Errors
+    ///
+    /// As [`LsaWriter::create`].
+    pub(crate) fn reserve(path: &Path, overwrite: bool) -> Result<OutputFile> {
         let done = done(path);
         if !overwrite && done.exists() {
             return Err(Error::file(&done)(std::io::Error::from_raw_os_error(libc::EEXIST)));
         }
-        let out = BufWriter::new(create(path, overwrite)?);
-        if overwrite {
-            match std::fs::remove_file(&done) {
-                Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(&done)(error)),
-                _ => {}
-            }
-        }
-        Ok(Self { path: path.to_owned(), overwrite, out })
+        OutputFile::open(path, overwrite)
     }
 
-    /// Keeps the next bytes.
+    /// Begins a file that is reserved.
+    ///
+    /// # Errors
+    ///
+    /// `File` where it, or an earlier `.lss`, cannot be replaced.
+    pub(crate) fn begin(file: OutputFile) -> Result<Self> {
+        file.begin()?;
+        let done = done(file.path());
+        match std::fs::remove_file(&done) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(Error::file(&done)(error)),
+            _ => {}
+        }
+        Ok(Self { out: BufWriter::new(RawFile(file)), bytes: 0 })
+    }
+
+    fn path(&self) -> &Path {
+        self.out.get_ref().0.path()
+    }
+
+    /// Adds the next bytes.
     ///
     /// # Errors
     ///
     /// `File` where the disk is full or gone.
     pub fn bytes(&mut self, bytes: &[u8]) -> Result<()> {
-        self.out.write_all(bytes).map_err(Error::file(&self.path))
+        self.bytes += bytes.len() as u64;
+        let outcome = self.out.write_all(bytes);
+        outcome.map_err(|error| Error::file(self.path())(error))
     }
 
     /// Hands over to the operating system what still waits in memory; call it each 100 ms or so.
@@ -55,18 +91,41 @@ impl LsaWriter {
     ///
     /// `File` where the disk is full or gone.
     pub fn flush(&mut self) -> Result<()> {
-        self.out.flush().map_err(Error::file(&self.path))
+        let outcome = self.out.flush();
+        outcome.map_err(|error| Error::file(self.path())(error))
     }
 
-    /// Says that the recording is complete: all bytes are on the disk, then the empty `.lss` appears.
+    /// Ends a recording that is not complete: all bytes are on the disk, without an `.lss`.
     ///
     /// # Errors
     ///
-    /// `File` where the disk is full or gone; there is no `.lss` then.
-    pub fn finish(mut self) -> Result<()> {
+    /// `File` where the disk is full or gone, or the file was removed, renamed or replaced while it was written.
+    pub fn end(&mut self) -> Result<()> {
         self.flush()?;
-        self.out.get_ref().sync_all().map_err(Error::file(&self.path))?;
-        create(&done(&self.path), self.overwrite).map(drop)
+        let file = &self.out.get_ref().0;
+        file.file().sync_all().map_err(Error::file(file.path()))?;
+        file.check(|| format!("{} bytes", self.bytes))
+    }
+
+    /// Marks the recording as complete: all bytes are on the disk, then the empty `.lss` appears.
+    ///
+    /// # Errors
+    ///
+    /// As [`LsaWriter::end`]; there is no `.lss` then.
+    pub fn finish(mut self) -> Result<()> {
+        self.end()?;
+        let done = done(self.path());
+        File::create(&done).map(drop).map_err(Error::file(&done))
+    }
+
+    /// Ends a recording that holds nothing: a new file is removed.
+    ///
+    /// # Errors
+    ///
+    /// `File` where the file cannot be removed.
+    pub(crate) fn discard(self) -> Result<()> {
+        let (file, _) = self.out.into_parts();
+        file.0.discard()
     }
 }
 
@@ -79,7 +138,7 @@ pub struct DecodedLsa {
     pub events: Events,
     /// What the decoder saw and dropped.
     pub counts: wire::Counts,
-    /// Whether its `.lss` says that it is complete.
+    /// Whether its `.lss` marks it as complete.
     pub complete: bool,
 }
 

@@ -13,7 +13,7 @@ from taxel.simulate.fem.indentation import Course
 
 __all__ = ["SamplingGrid"]
 
-#: Samples that are reckoned at a time.
+#: Samples that are computed at a time.
 _AT_ONCE = 100
 #: How far beyond the grid's ends the base's nodes still matter to the spline, mm.
 _BEYOND_MM = 1.0

@@ -1,4 +1,4 @@
-"""A half disc pressed on a block of silicone along a straight path: what is asked, and what the base then feels."""
+"""A half disc pressed on a block of silicone along a straight path: its parameters, and the stress at the base."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from taxel._base.arguments import callback, instance, number
 from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
 from taxel.simulate.fem.contact import Contact
+from taxel.simulate.fem.interruptible import interruptible
 from taxel.simulate.fem.material import DRAGON_SKIN_10, Yeoh
 from taxel.simulate.fem.mesh import Mesh, block, half_disc
 from taxel.simulate.fem.solids import Solids
@@ -167,7 +168,7 @@ class Course:
     cuts: int = 0
 
     def sensed_kpa(self, quantity: str = "nominal") -> NDArray[np.float64]:
-        """Return what the base feels by step and node, by one of three readings of "pressure".
+        """Return the pressure at the base by step and node, by one of three readings of "pressure".
 
         Parameters
         ----------
@@ -268,7 +269,7 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
     Returns
     -------
     Course
-        Where no equilibrium was found from some path on it ends there, and `fault` says so: nothing is filled in.
+        Where no equilibrium was found from some path on it ends there, and `fault` is the reason: nothing is filled in.
 
     Raises
     ------
@@ -290,7 +291,7 @@ def press(indentation: Indentation, *, progress: Callable[[float, float], object
     if progress is not None:
         callback("progress", progress)
     ground, indenter = bodies(i)
-    solids = Solids([(ground, i.silicone), (indenter, Yeoh.of_modulus(i.modulus_kpa))])
+    solids = interruptible(lambda: Solids([(ground, i.silicone), (indenter, Yeoh.of_modulus(i.modulus_kpa))]))
     top, arc = indenter.held + solids.first[1], indenter.touching + solids.first[1]
     contact = Contact(solids.nodes, ground.touching, arc, i.penalty * i.silicone.modulus_kpa / i.mesh_mm, i.friction)
     held = np.concatenate([_both(ground.held), _both(top)])

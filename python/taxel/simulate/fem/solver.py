@@ -11,6 +11,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from taxel.simulate.fem.contact import Contact, Touch
+from taxel.simulate.fem.interruptible import interruptible
 from taxel.simulate.fem.solids import Solids
 
 __all__ = ["State", "Stopped", "march"]
@@ -18,15 +19,15 @@ __all__ = ["State", "Stopped", "march"]
 #: A residual below this, mN by mm of thickness, counts as none.
 _TOLERANCE = 1e-8
 _ITERATIONS = 15
-#: Newton's first steps are taken whole; then that part of a step that leaves least.
+#: Newton's first steps are whole; then the part of a step that leaves the least residual.
 _FULL_STEPS = 3
 _PARTS = (1.0, 0.5, 0.25, 0.1)
 #: How often a step may be halved.
 _HALVINGS, _FIRST_HALVINGS = 9, 3
 
 
-class Stopped(ArithmeticError):  # noqa: N818  says what happened
-    """Tell that no equilibrium was found further on, and how far it came."""
+class Stopped(ArithmeticError):  # noqa: N818  no error of the caller's
+    """Raised where no equilibrium was found further on; its text holds the path so far."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +137,7 @@ def _equilibrium(
         pushed, tangent, touch = contact.forces(solids.nodes + u.reshape(-1, 2), state.touch)
         return _Residual(u, inner + pushed, pushed, stiffness + tangent, touch)
 
-    here = at(u)
+    here = interruptible(lambda: at(u))
     for iteration in range(_ITERATIONS):
         if np.abs(here.total[free]).max() < _TOLERANCE:
             solids.check(here.u)
@@ -149,11 +150,14 @@ def _equilibrium(
 
 
 def _solved(matrix: sparse.csc_array, right: NDArray[np.float64]) -> NDArray[np.float64]:
-    try:
+    def solve() -> NDArray[np.float64]:
         factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.01, options={"SymmetricMode": True})
+        return np.asarray(factor.solve(right))
+
+    try:
+        return interruptible(solve)
     except RuntimeError:
         raise ArithmeticError("a singular matrix") from None
-    return np.asarray(factor.solve(right))
 
 
 def _along(
@@ -171,7 +175,7 @@ def _along(
         u = here.u.copy()
         u[free] -= part * step
         try:
-            there = at(u)
+            there = interruptible(lambda u=u: at(u))  # type: ignore[misc]
         except ArithmeticError as error:
             fault = error
             continue

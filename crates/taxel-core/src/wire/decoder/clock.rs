@@ -13,7 +13,7 @@ pub(super) const TURN: i64 = 65_536;
 
 /// Unwraps stamps into 64 bits.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Clock {
+pub(in crate::wire) struct Clock {
     /// The latest time, in stamps.
     pub(super) latest: Option<i64>,
     /// Where the last stamp was a step back: its time, in stamps.
@@ -24,7 +24,7 @@ pub(super) struct Clock {
 
 impl Clock {
     /// Gives the unwrapped time in stamps, and whether it is a step back.
-    pub(super) fn unwrap(&mut self, stamp: u16, arrived: Option<i64>) -> (i64, bool) {
+    pub(in crate::wire) fn unwrap(&mut self, stamp: u16, arrived: Option<i64>) -> (i64, bool) {
         let Some(latest) = self.latest else {
             (self.latest, self.heard) = (Some(i64::from(stamp)), arrived);
             return (i64::from(stamp), false);

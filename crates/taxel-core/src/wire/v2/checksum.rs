@@ -1,5 +1,8 @@
 //! CRC-32C (Castagnoli), which short datagrams want quickly too.
 
+#[cfg(target_arch = "x86_64")]
+use crate::vectors::Instructions;
+
 /// From so many bytes on the crate's way, several strands at once, is the faster one.
 #[cfg(target_arch = "x86_64")]
 const LONG: usize = 192;
@@ -12,7 +15,7 @@ pub(super) const EVEN: usize = 64;
 #[inline]
 pub(super) fn crc32c(bytes: &[u8]) -> u32 {
     #[cfg(target_arch = "x86_64")]
-    if (4..=EVEN).contains(&bytes.len()) && is_x86_feature_detected!("avx512bw") && is_x86_feature_detected!("sse4.2") {
+    if (4..=EVEN).contains(&bytes.len()) && Instructions::Avx512.present() && is_x86_feature_detected!("sse4.2") {
         // SAFETY: the machine has these (and so F, which BW needs), and there are 4 to 64 bytes.
         return unsafe { even(bytes) };
     }

@@ -19,7 +19,7 @@ pub struct Status {
 
 /// What a decoder heard, and all that it missed, by cause.
 ///
-/// `datagrams = intact + repeated + old + refused by cause`; of each session `missing` numbers lie between the first and the last
+/// `datagrams = intact + repeated + old + short + long + foreign + checksum`; of each session `missing` numbers lie between the first and the last
 /// intact one and never came.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Counts {
@@ -33,6 +33,8 @@ pub struct Counts {
     pub old: u64,
     /// Refused: too short.
     pub short: u64,
+    /// Refused: longer than 1400 bytes.
+    pub long: u64,
     /// Refused: not of version 2, or of another board.
     pub foreign: u64,
     /// Refused: the checksum disagrees.
@@ -43,7 +45,7 @@ pub struct Counts {
     pub unknown_kind: u64,
     /// With flags that are not known; decoded.
     pub unknown_flags: u64,
-    /// Bodies that end within a word; what was whole is decoded.
+    /// Bodies that end within a word or have an offset that is too late; what stands before is decoded.
     pub malformed: u64,
     /// Events on the array.
     pub events: u64,
@@ -51,10 +53,14 @@ pub struct Counts {
     pub repaired: u64,
     /// States on the array.
     pub states: u64,
+    /// Of these, those that came too late: the taxel's value is newer, or the board was reset since.
+    pub stale: u64,
     /// Events and states outside the array.
     pub outside: u64,
     /// Starts and stops.
     pub markers: u64,
+    /// Markers of a code that is not known; left out.
+    pub unknown_marker: u64,
     /// Times that the board said it had dropped events.
     pub dropped: u64,
     /// Resets that were noticed.
@@ -73,6 +79,7 @@ impl Counts {
             repeated: self.repeated - earlier.repeated,
             old: self.old - earlier.old,
             short: self.short - earlier.short,
+            long: self.long - earlier.long,
             foreign: self.foreign - earlier.foreign,
             checksum: self.checksum - earlier.checksum,
             missing: self.missing.saturating_sub(earlier.missing),
@@ -82,8 +89,10 @@ impl Counts {
             events: self.events - earlier.events,
             repaired: self.repaired - earlier.repaired,
             states: self.states - earlier.states,
+            stale: self.stale - earlier.stale,
             outside: self.outside - earlier.outside,
             markers: self.markers - earlier.markers,
+            unknown_marker: self.unknown_marker - earlier.unknown_marker,
             dropped: self.dropped - earlier.dropped,
             resets: self.resets - earlier.resets,
             unknown_value: self.unknown_value - earlier.unknown_value,

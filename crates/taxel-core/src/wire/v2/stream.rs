@@ -1,10 +1,10 @@
 //! Datagrams in files and on streams, each behind its length: cut anywhere, and found again after damage.
 
 use super::counts::Counts;
-use super::decoder::{Decoder, stream_rows};
+use super::decoder::{Decoder, check_room, stream_rows};
 use super::{DATAGRAM_BYTES, HEADER_BYTES, Header, LENGTH_BYTES, TRAILER_BYTES};
-use crate::wire::columns::{Filled, Laid, Room};
-use crate::{Array, Marker, Result, Stop, problem};
+use crate::wire::columns::{Columns, Laid, Room};
+use crate::{Array, Result, Stop};
 
 /// Cuts a stream into datagrams. What is none is skipped byte by byte and counted, to the next place where length, magic and
 /// checksum agree.
@@ -86,16 +86,12 @@ fn cut(bytes: &[u8], ends: bool, skipped: &mut u64, listener: &mut impl Listener
     at
 }
 
-/// What a whole stream told, but for what stands in the columns.
+/// What a whole stream held, but for the rows themselves.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Decoded {
-    /// How far the columns were filled.
-    pub filled: Filled,
-    /// Which rows states gave; none where no row is of that kind.
-    pub repaired: Option<Vec<bool>>,
-    /// Starts and stops, as they came.
-    pub markers: Vec<Marker>,
-    /// What was heard and missed.
+    /// What the columns hold.
+    pub columns: Columns,
+    /// What was received and missed.
     pub counts: Counts,
     /// Bytes that belonged to no datagram.
     pub skipped: u64,
@@ -134,11 +130,8 @@ impl Listener for Filling<'_> {
 pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Result<Decoded> {
     /// Bytes between two looks at `stop`: some milliseconds of work, and more than a datagram.
     const PIECE: usize = 1 << 20;
-    let most = stream_rows(bytes.len());
-    if room.len() < most {
-        return Err(problem!("columns have room for {} rows: {} bytes may need {most}", room.len(), bytes.len()));
-    }
-    let (mut filling, mut skipped, mut rest) = (Filling(Decoder::new(array), Laid::new(room)), 0, bytes);
+    let laid = Laid::new(check_room(room, bytes.len())?);
+    let (mut filling, mut skipped, mut rest) = (Filling(Decoder::new(array), laid), 0, bytes);
     while !rest.is_empty() {
         stop.check()?;
         let piece = &rest[..rest.len().min(PIECE)];
@@ -146,6 +139,5 @@ pub fn decode(bytes: &[u8], array: Array, room: Room<'_>, stop: Stop<'_>) -> Res
         rest = &rest[done..];
     }
     let Filling(decoder, laid) = filling;
-    let (filled, repaired, markers) = laid.end();
-    Ok(Decoded { filled, repaired, markers, counts: decoder.counts(), skipped })
+    Ok(Decoded { columns: laid.end(), counts: decoder.counts(), skipped })
 }

@@ -6,6 +6,7 @@
 
 use super::held::Held;
 use super::session::Session;
+use super::taken::Taken;
 use super::words::{EIGHT, Eight, FULL};
 use crate::wire::columns::Room;
 use crate::wire::v2::checksum::{EVEN, even};
@@ -17,18 +18,6 @@ const LONGEST: usize = EVEN + 4;
 
 /// Rows that a datagram's stores may touch: a whole eight for each that is begun.
 const ROWS: usize = ((LONGEST - HEADER_BYTES - TRAILER_BYTES) / 2).next_multiple_of(EIGHT);
-
-/// Plain datagrams that were taken.
-#[derive(Debug, Clone, Copy, Default)]
-pub(in crate::wire::v2) struct Taken {
-    pub(in crate::wire::v2) datagrams: usize,
-    /// Their own.
-    pub(in crate::wire::v2) bytes: usize,
-    /// When the last one began, us.
-    pub(super) base: i64,
-    /// What it promises, us.
-    pub(super) span: u16,
-}
 
 /// What the decoder knows, as a run goes on with it.
 pub(super) struct Run<'a> {

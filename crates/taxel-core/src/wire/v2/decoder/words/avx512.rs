@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::body::{Body, word};
+use super::body::Body;
 use super::eight::{EIGHT, hold_eight};
 use crate::wire::columns::Room;
 use crate::wire::v2::decoder::held::Held;
@@ -294,10 +294,8 @@ pub(super) unsafe fn blocks<const VALUE: u32>(body: &mut Body<'_>, held: &mut He
         let times = words.controls & words.polarity;
         if times & 1 != 0 {
             let after = body.at + bytes;
-            if body.bytes.len() - after < bytes {
-                return;
-            }
-            let offset = if VALUE == 16 { word::<4>(body.bytes, after) } else { word::<2>(body.bytes, after) };
+            let offset = if VALUE == 16 { body.offset::<4>(after) } else { body.offset::<2>(after) };
+            let Some(offset) = offset else { return };
             (body.t, body.position) = (body.base + i64::from(offset), -1);
             body.at = after + bytes;
             continue;

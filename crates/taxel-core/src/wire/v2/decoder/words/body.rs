@@ -1,6 +1,6 @@
 //! A datagram's body as it is read, which is what its loops carry.
 
-use crate::wire::v2::{Header, Layout, before};
+use crate::wire::v2::{Header, LATEST_OFFSET, Layout, before};
 
 /// What a body's words mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -9,8 +9,10 @@ pub(crate) enum Meaning {
     Changes,
     /// Changes by a value.
     Differences,
-    /// Values told again.
+    /// Values that the board repeats.
     States,
+    /// Those of a session before the latest: its reset is newer.
+    StaleStates,
 }
 
 /// A body and how far it was read.
@@ -29,7 +31,7 @@ pub(crate) struct Body<'a> {
     pub(super) t: i64,
     /// That of the last word.
     pub(super) position: i64,
-    /// Whether an offset was missing.
+    /// Whether an offset was missing, or later than any that a writer sends.
     pub(super) cut: bool,
     /// The latest time of a row, us; `i64::MIN` before the first.
     pub(crate) latest: i64,
@@ -49,6 +51,13 @@ impl<'a> Body<'a> {
     pub(crate) fn left(&self) -> usize {
         // Of 2 or 4 bytes each: no division.
         (self.bytes.len() - self.at) >> self.layout.bytes.trailing_zeros()
+    }
+
+    /// The offset that stands at a place, us; none where the body ends before it, or where it is later than a writer sends.
+    #[inline(always)]
+    pub(super) fn offset<const BYTES: usize>(&self, at: usize) -> Option<u32> {
+        let offset = (self.bytes.len() - at >= BYTES).then(|| word::<BYTES>(self.bytes, at))?;
+        (u64::from(offset) <= LATEST_OFFSET).then_some(offset)
     }
 }
 

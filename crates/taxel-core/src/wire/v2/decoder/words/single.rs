@@ -30,11 +30,11 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
         if skip == control {
             if !p {
                 position += (i64::from(value) + 1) << (SKIP - 1);
-            } else if body.bytes.len() - at >= BYTES {
-                (t, position) = (base + i64::from(word::<BYTES>(body.bytes, at)), -1);
-                at += BYTES;
-            } else {
-                body.cut = true;
+                continue;
+            }
+            match body.offset::<BYTES>(at) {
+                Some(offset) => (at, t, position) = (at + BYTES, base + i64::from(offset), -1),
+                None => (at, body.cut) = (body.bytes.len(), true),
             }
             continue;
         }
@@ -61,11 +61,20 @@ pub(super) fn words<const BYTES: usize, const SKIP: u32, const VALUE: u32>(
                 Meaning::States => {
                     counts.states += 1;
                     let before = held.get(place);
-                    if !newest || before == Some(value) {
+                    if !newest {
+                        counts.stale += 1;
+                        continue;
+                    }
+                    if before == Some(value) {
                         continue;
                     }
                     counts.repaired += 1;
                     p = value >= before.unwrap_or_default();
+                }
+                Meaning::StaleStates => {
+                    counts.states += 1;
+                    counts.stale += 1;
+                    continue;
                 }
             }
             if known && (newest || body.meaning == Meaning::Differences) {

@@ -1,0 +1,78 @@
+//! Commands of the host and the status lines that answer them.
+
+use super::Board;
+use crate::wire::{Command, Registers};
+
+impl Board {
+    /// The status line of a reset: version of the wire, size and channels.
+    #[must_use]
+    pub fn greeting(&self) -> String {
+        let Registers { wire_version, channels, .. } = self.written;
+        format!("taxel-board v{wire_version} {}x{} {channels}ch\n", self.array.rows, self.array.columns)
+    }
+
+    /// Executes command bytes as they come; returns the status lines that answer them, each with its line end.
+    pub fn command(&mut self, bytes: &[u8]) -> String {
+        let mut lines = String::new();
+        for &byte in bytes {
+            if let Some(command) = self.reader.push(byte) {
+                lines += &self.execute(command);
+                lines.push('\n');
+            }
+        }
+        lines
+    }
+
+    fn execute(&mut self, command: Command) -> String {
+        let Command { register, value } = command;
+        if register == 6 && value == 8 {
+            return self.greeting().trim_end().to_owned();
+        }
+        if register == 6 && value < 8 {
+            return format!("ok REG{value}=0x{:08X}", self.written.word(value as u8));
+        }
+        let recording = self.written.record;
+        match self.written.write(command, &self.array) {
+            Err(refusal) => format!("bad REG{register} rule {}", refusal.rule),
+            Ok(()) => {
+                if self.written.record != recording {
+                    self.mark(self.written.record);
+                }
+                format!("ok REG{register}=0x{value:08X}")
+            }
+        }
+    }
+
+    /// Starts or stops a recording, as a write of `record` does: a marker goes out where that changes anything.
+    pub fn record(&mut self, start: bool) {
+        if self.written.record != start {
+            self.written.record = start;
+            self.mark(start);
+        }
+    }
+
+    fn mark(&mut self, start: bool) {
+        if self.active.wire_version == 2 {
+            self.link.marker(self.now(), start, &mut self.counts);
+        } else {
+            self.link.marker_word(self.time, start, &mut self.counts);
+        }
+    }
+
+    /// The faults whose count has changed since the last call, one status line each.
+    pub fn faults(&mut self) -> String {
+        let now = [
+            ("queue", self.counts.dropped),
+            ("comparator", self.counts.not_returned),
+            ("command", self.reader.skipped()),
+        ];
+        let mut lines = String::new();
+        for ((name, count), reported) in now.into_iter().zip(&mut self.reported) {
+            if count != *reported {
+                lines += &format!("fault {name} {count}\n");
+                *reported = count;
+            }
+        }
+        lines
+    }
+}

@@ -1,0 +1,191 @@
+//! One frame of the board: the array is scanned, its changes are queued, time moves on.
+
+use super::Board;
+use super::asynchronous::{Asynchronous, Crossing, Sample};
+use super::comparator::NOT_RETURNED;
+use super::link::Found;
+use super::options::{IntensityWord, Previous};
+use super::refresh::totals;
+use crate::{Result, problem};
+
+impl Board {
+    /// Scans one frame and moves time on by it.
+    ///
+    /// `ticks` are the trip times of the comparators by taxel index, in 1/300 us from the ramp's start; one at or above
+    /// the ramp's length reads as that length, and [`NOT_RETURNED`] is a fault. `sink` gets each datagram's payload and
+    /// returns whether it accepted it; what it does not accept waits in the queue, and a full queue drops a taxel's words.
+    ///
+    /// # Errors
+    ///
+    /// `Problem` where there is not one trip time a taxel.
+    pub fn frame(&mut self, ticks: &[u16], mut sink: impl FnMut(&[u8]) -> bool) -> Result<()> {
+        if ticks.len() != self.array.len() {
+            return Err(problem!("frame of {} trip times: the array has {} taxels", ticks.len(), self.array.len()));
+        }
+        self.link.offer(&mut self.counts, &mut sink);
+        self.take_over(&mut sink);
+        let registers = self.active;
+        let lines = self.scan.lines(&registers);
+        let any = self.compare(ticks);
+        if self.is_asynchronous() {
+            self.queue_crossings(any, ticks, &mut sink);
+        } else if any {
+            for (place, &x) in (0_u64..).zip(&lines) {
+                if self.comparators.line_changed[usize::from(x)] {
+                    self.line(x, self.time + place * u64::from(registers.line_period), ticks, &mut sink);
+                }
+            }
+        }
+        if self.previous == Previous::LastSample && !registers.mechanoreceptor {
+            self.comparators.sample(ticks, &registers);
+        }
+        self.time += registers.frame_10ns();
+        self.counts.frames += 1;
+        self.end_frame(&mut sink);
+        Ok(())
+    }
+
+    /// Takes over the registers that were written, at a frame's edge.
+    fn take_over(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
+        if self.active == self.written {
+            return;
+        }
+        if self.active.wire_version != self.written.wire_version {
+            self.link.flush_words(&mut self.counts, sink);
+        }
+        if self.active.mechanoreceptor != self.written.mechanoreceptor {
+            self.afferents.forget();
+            self.asynchronous = self.asynchronous.take().map(|_| Asynchronous::default());
+        }
+        self.active = self.written;
+        self.link.flush(self.now(), &mut self.counts, sink);
+        self.link.follow(self.settings());
+    }
+
+    /// Finds the taxels that make an event in this frame; returns whether there is any.
+    fn compare(&mut self, ticks: &[u16]) -> bool {
+        let (registers, faults) = (self.active, &mut self.counts.not_returned);
+        if !registers.mechanoreceptor {
+            return self.comparators.compare(ticks, &registers, faults);
+        }
+        self.afferents.begin(ticks, &registers);
+        let afferents = &mut self.afferents;
+        self.comparators.fire(ticks, &registers, faults, |taxel, t| afferents.sample(taxel, t, &registers))
+    }
+
+    /// Queues the events of one driven line: step after step, channel after channel; of version 2 with all of a frame at one
+    /// time row after row, as its words ask for.
+    fn line(&mut self, x: u16, start: u64, ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
+        let registers = self.active;
+        if registers.wire_version == 2 && registers.frame_sync {
+            for y in 0..self.array.rows {
+                self.taxel(self.time, (x, y), ticks, sink);
+            }
+            return;
+        }
+        for k in 0..self.scan.sense_lines().len() {
+            let (step, y) = self.scan.sense_lines()[k];
+            let at = if registers.frame_sync { self.time } else { start + step * u64::from(registers.step_period) };
+            self.taxel(at, (x, y), ticks, sink);
+        }
+    }
+
+    /// Queues the event of a taxel, where it has one.
+    fn taxel(&mut self, at: u64, (x, y): (u16, u16), ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
+        let registers = self.active;
+        let taxel = self.array.index(x, y);
+        if !self.comparators.changed[taxel] || !self.exists(taxel) {
+            return;
+        }
+        let (value, before) = (ticks[taxel].min(registers.ramp), self.comparators.values[taxel]);
+        let (p, intensity) = if registers.mechanoreceptor {
+            self.afferents.spike(taxel)
+        } else {
+            match self.intensity {
+                IntensityWord::Value | IntensityWord::Nothing => (value >= before, value),
+                IntensityWord::Difference => (value >= before, value.abs_diff(before)),
+            }
+        };
+        if self.enqueue(Found { at, x, y, p, intensity }, sink) && !registers.mechanoreceptor {
+            self.comparators.values[taxel] = value;
+        }
+    }
+
+    /// Finds the crossings of taxels that compare by themselves, and queues those from before this frame.
+    fn queue_crossings(&mut self, any: bool, ticks: &[u16], sink: &mut impl FnMut(&[u8]) -> bool) {
+        let Some(mut asynchronous) = self.asynchronous.take() else { return };
+        let (registers, columns, new) = (self.active, usize::from(self.array.columns), asynchronous.is_new());
+        if any {
+            for taxel in (0..ticks.len()).filter(|&taxel| self.comparators.changed[taxel]) {
+                let (x, y) = ((taxel % columns) as u16, (taxel / columns) as u16);
+                if x >= registers.lines || !self.exists(taxel) {
+                    continue;
+                }
+                let after = u64::from(x) * u64::from(registers.line_period);
+                let sample = Sample { taxel, x, y, after, ticks: ticks[taxel].min(registers.ramp) };
+                let sent = &mut self.comparators.values[taxel];
+                asynchronous.cross(self.time, sample, registers.noise_floor.into(), sent);
+            }
+        }
+        // The reading of a taxel whose comparator has not returned is its last one.
+        let read =
+            ticks.iter().zip(&self.comparators.values).map(|(&t, &value)| if t == NOT_RETURNED { value } else { t });
+        let due = asynchronous.end_frame(self.time, read.map(|t| t.min(registers.ramp)));
+        self.asynchronous = Some(asynchronous);
+        // The events of all taxels at reset are of the first frame itself.
+        debug_assert!(!new || due.is_empty());
+        for Crossing { at, x, y, p, value, moved } in due {
+            let intensity = if self.intensity == IntensityWord::Difference { moved } else { value };
+            self.enqueue(Found { at, x, y, p, intensity }, sink);
+        }
+    }
+
+    /// Queues an event on the active version of the wire; false where the queue is full and it was dropped.
+    fn enqueue(&mut self, found: Found, sink: &mut impl FnMut(&[u8]) -> bool) -> bool {
+        self.counts.changes += 1;
+        if self.active.wire_version == 2 {
+            return self.link.pack(found, &mut self.counts, sink);
+        }
+        let valued = self.active.mechanoreceptor || self.intensity != IntensityWord::Nothing;
+        self.link.words(found, valued, &mut self.counts, sink)
+    }
+
+    /// Sends what is due at a frame's end: all of version 1; of version 2 events, promises, states and totals.
+    fn end_frame(&mut self, sink: &mut impl FnMut(&[u8]) -> bool) {
+        if self.active.wire_version == 1 {
+            self.link.flush_words(&mut self.counts, sink);
+            return;
+        }
+        let (now, next) = (self.now(), self.now() + self.active.frame_10ns() / 100);
+        self.link.end_frame((now, next), &mut self.counts, sink);
+        let every = self.version_2.states_us * 100;
+        if every == 0 {
+            return;
+        }
+        for x in self.refresh.lines(self.time, every, &self.active) {
+            self.repeat(x, now, sink);
+        }
+        if self.refresh.totals(self.time, every) {
+            let status = totals(&self.counts, &self.at_reset);
+            self.link.status(now, &status, &mut self.counts, sink);
+        }
+    }
+
+    /// Repeats the values of a driven line as states: what the board compares with.
+    fn repeat(&mut self, x: u16, now: u64, sink: &mut impl FnMut(&[u8]) -> bool) {
+        if self.active.mechanoreceptor || self.intensity == IntensityWord::Nothing {
+            return;
+        }
+        let Self { link, counts, array, comparators, .. } = self;
+        let exists = |taxel: usize| array.exists.as_ref().is_none_or(|exists| exists[taxel]);
+        let taxels = (0..array.rows)
+            .map(|y| ((x, y), array.index(x, y)))
+            .filter(|&(_, taxel)| exists(taxel))
+            .map(|(place, taxel)| (place, comparators.values[taxel]));
+        link.states(now, taxels, counts, sink);
+    }
+
+    fn exists(&self, taxel: usize) -> bool {
+        self.array.exists.as_ref().is_none_or(|exists| exists[taxel])
+    }
+}

@@ -1,0 +1,202 @@
+//! The emulated board as a whole: trip times and commands in, datagrams and status lines out.
+
+use super::*;
+use crate::Array;
+use crate::wire::registers::PRESETS;
+use crate::wire::{Command, Pairing, Registers, WORD_BYTES, Word, decode};
+
+fn board() -> Board {
+    Board::new(Registers::default(), &Array::thesis()).unwrap()
+}
+
+fn play(board: &mut Board, ticks: &[u16]) -> Vec<Vec<u8>> {
+    let mut datagrams = vec![];
+    board
+        .frame(ticks, |datagram| {
+            datagrams.push(datagram.to_vec());
+            true
+        })
+        .unwrap();
+    datagrams
+}
+
+fn words(datagrams: &[Vec<u8>]) -> Vec<Word> {
+    let word = |w: &[u8]| Word::from_bytes(w.try_into().unwrap());
+    datagrams.iter().flat_map(|d| d.chunks(WORD_BYTES)).map(word).collect()
+}
+
+#[test]
+fn a_full_frame_goes_line_by_line_step_by_step_channel_by_channel() {
+    let datagrams = play(&mut board(), &[100; 4096]);
+    assert!(datagrams.iter().all(|d| d.len() <= 1400 && d.len() % 10 == 0));
+    assert_eq!(datagrams.len(), (8192_usize).div_ceil(280));
+    let (events, _) = decode(&datagrams.concat(), Array::thesis(), Pairing::Direct);
+    let order: Vec<(u16, u16)> = events.x.iter().copied().zip(events.y.iter().copied()).collect();
+    let mut expected = vec![];
+    for line in 0..64 {
+        for step in 0..4 {
+            expected.extend((0..16).map(|channel| (line, 4 * channel + step)));
+        }
+    }
+    assert_eq!(order, expected);
+}
+
+#[test]
+fn a_change_must_exceed_the_floor_and_a_ramp_is_never_exceeded() {
+    let mut board = board();
+    let mut ticks = vec![0; 4096];
+    ticks[7] = 3;
+    assert!(play(&mut board, &ticks).is_empty());
+    ticks[7] = 4;
+    let change = Word::Change { stamp: 1, x: 7, y: 0, p: true };
+    assert_eq!(words(&play(&mut board, &ticks)), [change, Word::Intensity { ticks: 4, x: 7, y: 0, p: true }]);
+    ticks[7] = 9000;
+    assert_eq!(words(&play(&mut board, &ticks))[1], Word::Intensity { ticks: 150, x: 7, y: 0, p: true });
+    ticks[7] = NOT_RETURNED;
+    assert!(play(&mut board, &ticks).is_empty());
+    assert_eq!((board.faults(), board.faults()), ("fault comparator 1\n".to_owned(), String::new()));
+}
+
+#[test]
+fn a_slow_rise_is_sent_with_the_last_value_sent_and_never_with_the_last_sample() {
+    let sent = |mut board: Board| -> usize {
+        (0..20_u16).map(|frame| play(&mut board, &[frame; 4096]).concat().len() / 10).sum()
+    };
+    assert_eq!(sent(board()), 4 * 4096);
+    assert_eq!(sent(board().previous(Previous::LastSample)), 0);
+}
+
+#[test]
+fn differences_carry_their_sign_in_the_polarity() {
+    let mut board = board().intensity(IntensityWord::Difference);
+    let mut ticks = vec![0; 4096];
+    for (value, difference, p) in [(50, 50, true), (20, 30, false)] {
+        ticks[0] = value;
+        assert_eq!(words(&play(&mut board, &ticks))[1], Word::Intensity { ticks: difference, x: 0, y: 0, p });
+    }
+}
+
+#[test]
+fn stamps_are_the_frames_with_sync_and_the_steps_without() {
+    let slow = Registers { line_period: 10_000, ..Registers::default() };
+    for (frame_sync, expected) in [(true, 0), (false, 63)] {
+        let mut board = Board::new(Registers { frame_sync, ..slow }, &Array::thesis()).unwrap();
+        let all = words(&play(&mut board, &[100; 4096]));
+        let Some(Word::Change { stamp, .. }) = all.iter().rev().nth(1) else { panic!("a change") };
+        assert_eq!(*stamp, expected);
+    }
+}
+
+#[test]
+fn random_lines_visit_each_line_once_a_frame_in_an_order_of_its_own() {
+    let registers = Registers { random_lines: true, noise_floor: 0, ..Registers::default() };
+    let mut board = Board::new(registers, &Array::thesis()).unwrap();
+    let mut orders = std::collections::HashSet::new();
+    for frame in 0..50_u16 {
+        let (events, _) = decode(&play(&mut board, &[frame + 1; 4096]).concat(), Array::thesis(), Pairing::Direct);
+        let order: Vec<u16> = events.x.chunks(64).map(|line| line[0]).collect();
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
+        assert_eq!(sorted, (0..64).collect::<Vec<u16>>());
+        assert!(orders.insert(order), "frame {frame} repeats an order");
+    }
+}
+
+#[test]
+fn a_full_queue_drops_both_words_of_a_taxel_and_counts_them() {
+    let mut board = board().queue(1000);
+    board.frame(&[100; 4096], |_| false).unwrap();
+    assert_eq!((board.counts().words, board.counts().dropped), (1000, 4096 - 500));
+    let later = play(&mut board, &[100; 4096]);
+    // What was never sent still differs, so it comes with the next frame.
+    assert_eq!(words(&later).len(), 2 * 4096);
+    assert_eq!(board.counts().sent, board.counts().words);
+    assert_eq!(board.faults(), "fault queue 3596\n");
+}
+
+#[test]
+fn commands_are_answered_and_taken_over_at_a_frames_edge() {
+    let mut board = board();
+    assert_eq!(board.greeting(), "taxel-board v1 64x64 16ch\n");
+    let write = |register, value| Command { register, value }.to_bytes();
+    assert_eq!(board.command(&write(4, 160)), "ok REG4=0x000000A0\n");
+    assert_eq!(board.command(&write(4, 165)), "bad REG4 rule 3\n");
+    assert_eq!(board.command(&write(6, 4)), "ok REG4=0x000000A0\n");
+    assert_eq!(board.command(&write(6, 8)), board.greeting());
+    assert_eq!(board.command(&write(6, 9)), "bad REG6 rule 4\n");
+    assert_eq!(
+        board.command(&[write(5, 0x003f_0a00), write(6, 5)].concat()),
+        "ok REG5=0x003F0A00\nok REG5=0x003F0A00\n"
+    );
+    let bytes = write(1, 400);
+    let answers: Vec<String> = bytes.iter().map(|&byte| board.command(&[byte])).collect();
+    assert_eq!(answers.concat(), "ok REG1=0x00000190\n");
+    play(&mut board, &[0; 4096]);
+    assert_eq!(board.time_us(), 256.0);
+}
+
+#[test]
+fn record_marks_the_stream_once_each_way() {
+    let mut board = board();
+    play(&mut board, &[0; 4096]);
+    board.command(&Command { register: 7, value: 1 << 16 }.to_bytes());
+    board.record(true);
+    assert_eq!(words(&play(&mut board, &[0; 4096])), [Word::Marker { stamp: 1, start: true }]);
+    board.record(false);
+    assert_eq!(words(&play(&mut board, &[0; 4096])), [Word::Marker { stamp: 3, start: false }]);
+}
+
+#[test]
+fn a_board_of_afferents_fires_as_equations_5_1_to_5_5_say() {
+    use rand::{Rng, SeedableRng, rngs::StdRng};
+    let mut random = StdRng::seed_from_u64(9);
+    let registers = Registers::preset("5.2 kHz, FA-1").unwrap();
+    let mut board = Board::new(registers, &Array::thesis()).unwrap();
+    // In whole numbers of 2^-16, as the page of the registers says.
+    let rest = i64::from(registers.threshold_rest) * 64;
+    let jump = i64::from(registers.threshold_jump) * rest / 256;
+    let decay = i64::from(registers.threshold_decay) * rest / 1024;
+    let (mut base, mut theta, mut spikes) = (None, rest, 0);
+    let mut ticks = vec![40_u16; 4096];
+    for frame in 0..5000 {
+        let step: u16 = [0, 0, 0, 1, 2, 40][random.random_range(0..6)];
+        ticks[70] = if random.random() { ticks[70] + step } else { ticks[70].saturating_sub(step) }.min(150);
+        let said = words(&play(&mut board, &ticks));
+        let pressure = (f64::from(ticks[70]).powf(0.7) * 65_536.0).round() as i64;
+        let integral = pressure - *base.get_or_insert(pressure);
+        if integral.abs() > theta {
+            spikes += 1;
+            let [Word::Change { x, y, p, .. }, Word::Intensity { ticks: told, .. }] = said[..] else {
+                panic!("frame {frame}: {said:?}, {integral} against {theta}")
+            };
+            assert_eq!((x, y, p), (6, 1, integral > 0), "frame {frame}");
+            assert_eq!(i64::from(told), integral.abs() / 64, "frame {frame}");
+            (base, theta) = (Some(pressure), theta + jump);
+        } else {
+            assert!(said.is_empty(), "frame {frame}: {said:?}, {integral} against {theta}");
+            theta = if theta > rest { theta - decay } else { rest };
+        }
+    }
+    assert!(spikes > 50, "{spikes}");
+}
+
+#[test]
+fn presets_play_on_boards_that_fit_them() {
+    for preset in PRESETS.iter().filter(|p| p.sense_lines == 64 && !p.registers.mechanoreceptor) {
+        let mut board = Board::new(preset.registers, &Array::thesis()).unwrap();
+        assert_eq!(words(&play(&mut board, &[50; 4096])).len(), 8192, "{}", preset.name);
+    }
+}
+
+#[test]
+fn nonsense_is_refused() {
+    let mut board = board();
+    assert!(board.frame(&[0; 4095], |_| true).unwrap_err().to_string().contains("4095 trip times"));
+    let wide = Array::new(2, 65, 1.0, "wide").unwrap();
+    assert!(Board::new(Registers::default(), &wide).unwrap_err().to_string().contains("choose version 2 (rule 8)"));
+    let huge = Array::new(257, 256, 1.0, "huge").unwrap();
+    let refused = Board::new(Registers::at_reset(&huge, 64), &huge).unwrap_err().to_string();
+    assert!(refused.contains("more than 65536 positions"), "{refused}");
+    let small = Array::new(8, 8, 1.0, "small").unwrap();
+    assert!(Board::new(Registers::default(), &small).unwrap_err().to_string().contains("8 columns to drive"));
+}

@@ -1,0 +1,151 @@
+//! Bodies on the bonded layer, as the taxels sense them.
+
+use super::super::bonded::MOST_SWEPT;
+use super::super::push::Sinking;
+use super::super::{Bonded, Motion, Scene, Shape, Taxels};
+use super::{GROUPS, place};
+use crate::{Array, Result, Stop};
+
+/// Stress that no taxel senses, MPa: a millionth of a newton on it, a hundred-thousandth of what the thesis could detect.
+const FAINT_MPA: f32 = 2e-7;
+
+/// The layer, the bodies' motion, and the latest solutions.
+///
+/// The layer is solved at even steps, one a frame for a ball or two, fewer where more taxels are touched than sweeps
+/// solve in time; between them stress follows straight lines.
+#[derive(Debug)]
+pub(super) struct Layer {
+    layer: Bonded,
+    shapes: Vec<Shape>,
+    pub motion: Motion,
+    sinking: Sinking,
+    /// From one solution to the next, in steps of the motion.
+    every: usize,
+    /// The latest solutions, by their number; the newest last.
+    solved: Vec<Solved>,
+    pressure: Vec<f64>,
+    pressed: [bool; GROUPS],
+    columns: usize,
+}
+
+#[derive(Debug, Default)]
+struct Solved {
+    number: usize,
+    touches: bool,
+    /// Stress at the base by taxel, MPa.
+    base: Vec<f32>,
+}
+
+/// So many frames lie between two solutions where a whole array is touched.
+const SELDOM: usize = 4;
+
+impl Layer {
+    /// Finds how many cells the bodies touch at most, and so how often the layer is solved.
+    pub fn new(scene: &Scene, layer: Bonded, motion: Motion, array: &Array) -> Self {
+        let shapes: Vec<Shape> = scene.bodies.iter().map(|body| body.shape.clone()).collect();
+        let mut stress = Self {
+            layer,
+            shapes,
+            motion,
+            sinking: Sinking::default(),
+            every: GROUPS,
+            solved: vec![],
+            pressure: vec![],
+            pressed: [false; GROUPS],
+            columns: usize::from(array.columns),
+        };
+        let most = (0..stress.motion.len()).step_by(50 * GROUPS).map(|k| stress.sink(k)).max().unwrap_or(0);
+        if most > MOST_SWEPT {
+            stress.every = SELDOM * GROUPS;
+        }
+        stress.layer.forget();
+        stress
+    }
+
+    /// Finds the cells that are touched after `k` steps; how many there are.
+    fn sink(&mut self, k: usize) -> usize {
+        let bodies: Vec<(&Shape, (f64, f64), f64)> = self
+            .shapes
+            .iter()
+            .zip(&self.motion.tracks)
+            .map(|(shape, track)| {
+                let depth = if track.force_n[k] > 0.0 { f64::from(track.depth_mm[k]) } else { 0.0 };
+                (shape, (f64::from(track.x_mm[k]), f64::from(track.y_mm[k])), depth)
+            })
+            .collect();
+        self.sinking.find(&self.layer, &bodies);
+        self.sinking.cells.len()
+    }
+
+    /// Solves the layer at one of the even steps, where that is not known yet.
+    fn solve(&mut self, number: usize, stop: Stop<'_>) -> Result<()> {
+        if self.solved.iter().any(|solved| solved.number == number) {
+            return Ok(());
+        }
+        let mut solved = if self.solved.len() < 3 { Solved::default() } else { self.solved.remove(0) };
+        let k = (number * self.every).min(self.motion.len() - 1);
+        solved.number = number;
+        solved.touches = self.sink(k) > 0;
+        if solved.touches {
+            // What is lost on the way raises the force above that of a body at rest.
+            let gain: Vec<f64> = (0..self.shapes.len())
+                .map(|n| {
+                    let track = &self.motion.tracks[n];
+                    let rest = self.motion.pushes[n].force_at_depth(f64::from(track.depth_mm[k]));
+                    if rest > 0.0 { f64::from(track.force_n[k]) / rest } else { 0.0 }
+                })
+                .collect();
+            self.pressure.clear();
+            let pressed = self.layer.press(&self.sinking.cells, stop)?;
+            self.pressure.extend(pressed.iter().zip(&self.sinking.whose).map(|(p, n)| p * gain[*n as usize]));
+            self.layer.arrive(&self.sinking.cells, &self.pressure, &mut solved.base, stop)?;
+        } else {
+            self.layer.forget();
+            solved.base.clear();
+            solved.base.resize(self.layer.taxels(), 0.0);
+        }
+        self.solved.push(solved);
+        Ok(())
+    }
+
+    /// Writes what the board reads in a frame into `clean`.
+    ///
+    /// # Errors
+    ///
+    /// `Interrupted`.
+    pub fn show(
+        &mut self,
+        frame: usize,
+        frame_us: f64,
+        taxels: &Taxels,
+        clean: &mut [f32],
+        stop: Stop<'_>,
+    ) -> Result<()> {
+        (0..GROUPS).try_for_each(|group| self.group(group, place(frame, group, frame_us), taxels, clean, stop))
+    }
+
+    /// Writes what a group of lines reads, `place` steps after the start, into `clean`.
+    fn group(&mut self, group: usize, place: f64, taxels: &Taxels, clean: &mut [f32], stop: Stop<'_>) -> Result<()> {
+        let number = place as usize / self.every;
+        let share = (place / self.every as f64 - number as f64) as f32;
+        self.solve(number, stop)?;
+        self.solve(number + 1, stop)?;
+        let of = |number: usize| self.solved.iter().find(|solved| solved.number == number).expect("solved above");
+        let (now, next) = (of(number), of(number + 1));
+        if !now.touches && !next.touches && !self.pressed[group] {
+            return Ok(());
+        }
+        self.pressed[group] = now.touches || next.touches;
+        let edge = |group: usize| (group * self.columns).div_ceil(GROUPS);
+        let lines = edge(group)..edge(group + 1);
+        let by_row = now.base.chunks_exact(self.columns).zip(next.base.chunks_exact(self.columns));
+        for (row, ((now, next), clean)) in by_row.zip(clean.chunks_exact_mut(self.columns)).enumerate() {
+            for column in lines.clone() {
+                let stress = now[column] + share * (next[column] - now[column]);
+                let drive = if stress > FAINT_MPA { taxels.drive(stress) } else { 0.0 };
+                clean[column] = taxels.ticks(row * self.columns + column, drive);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,63 @@
+//! One neuron of a readout: its label, its state, and its crossings so far.
+
+use crate::Result;
+use crate::detect::TrainedNeuron;
+use crate::neuron::{Neuron, NeuronStream, OutputSpike, Time};
+
+/// One neuron with its name.
+#[derive(Clone)]
+pub(super) struct NamedNeuron {
+    pub label: String,
+    neuron: Neuron,
+    weights: Vec<f64>,
+    threshold: f64,
+    /// By how much its crossings come later than the event: the encoder's latency and the trained delay, ms.
+    pub offset_ms: f64,
+    /// Begun with the first spike, so that a grid lies alike wherever the input starts.
+    pub stream: Option<NeuronStream>,
+    pub crossings: Vec<OutputSpike>,
+    /// When the latest input came that may rest on a repaired taxel, ms.
+    pub repaired: Option<f64>,
+}
+
+impl NamedNeuron {
+    /// A trained neuron before its first spike.
+    pub fn new(label: String, one: TrainedNeuron, threshold: f64, latency_ms: f64) -> Self {
+        Self {
+            label,
+            offset_ms: latency_ms + one.delay_ms,
+            neuron: one.neuron,
+            weights: one.weights,
+            threshold,
+            stream: None,
+            crossings: vec![],
+            repaired: None,
+        }
+    }
+
+    /// Passes a spike on an input to the neuron.
+    ///
+    /// # Errors
+    ///
+    /// As [`NeuronStream::push`].
+    pub fn push(&mut self, t: f64, input: u32) -> Result<()> {
+        let stream = match &mut self.stream {
+            Some(stream) => stream,
+            None => {
+                let start = match self.neuron.time {
+                    Time::Continuous => t,
+                    Time::Grid => (t / self.neuron.step_ms).floor() * self.neuron.step_ms,
+                };
+                self.stream.insert(self.neuron.stream(&self.weights, self.threshold, start.min(t))?)
+            }
+        };
+        stream.push(t, input, &mut self.crossings)
+    }
+
+    /// Moves the crossings so far to `out`, each with the neuron's number and whether it may rest on repaired taxels.
+    pub fn drain_crossings(&mut self, k: usize, out: &mut Vec<(OutputSpike, usize, bool)>) {
+        let repaired = self.repaired;
+        let rests = |t: f64| repaired.is_some_and(|at| at <= t && t - at <= self.neuron.memory_ms());
+        out.extend(self.crossings.drain(..).map(|crossing| (crossing, k, rests(crossing.t))));
+    }
+}

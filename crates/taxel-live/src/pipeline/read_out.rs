@@ -1,0 +1,106 @@
+//! The fourth stage: events to the readout, in this thread or, through a queue, to one behind it.
+
+use taxel_core::Events;
+use taxel_core::detect::Detection;
+use taxel_core::encode::Zeroing;
+
+use super::handover::{Quiet, Taken};
+use super::reader::Reader;
+use super::shared::Shared;
+
+pub(super) struct ReadOutStage {
+    /// Whether there is a readout at all.
+    is_on: bool,
+    /// The readout, as long as it works in this thread.
+    reader: Option<Reader>,
+    /// One that is to continue in a thread of its own.
+    separated: Option<Box<Reader>>,
+    /// Without a reader nothing is found.
+    nothing: Vec<Detection>,
+    /// The time up to which the readout was told by promises of version 2 that no more events come, us.
+    announced: Option<i64>,
+}
+
+impl ReadOutStage {
+    pub(super) fn new(reader: Option<Reader>) -> Self {
+        Self { is_on: reader.is_some(), reader, separated: None, nothing: vec![], announced: None }
+    }
+
+    pub(super) fn is_on(&self) -> bool {
+        self.is_on
+    }
+
+    /// Publishes its state before the first events.
+    pub(super) fn begin(&self, shared: &Shared) {
+        if let Some(reader) = &self.reader {
+            reader.begin(shared);
+        }
+    }
+
+    /// From now on another thread reads out.
+    pub(super) fn separate(&mut self) {
+        if let Some(reader) = self.reader.take() {
+            self.separated = Some(Box::new(reader));
+        }
+    }
+
+    /// The reader for that thread, once.
+    pub(super) fn take_separated(&mut self) -> Option<Box<Reader>> {
+        self.separated.take()
+    }
+
+    /// Detections that no thread has taken for output yet.
+    pub(super) fn found(&mut self) -> &mut Vec<Detection> {
+        self.reader.as_mut().map_or(&mut self.nothing, |reader| &mut reader.found)
+    }
+
+    pub(super) fn announced(&self) -> Option<i64> {
+        self.announced
+    }
+
+    /// The board was reset: its earlier promises hold no more.
+    pub(super) fn reset(&mut self) {
+        self.announced = None;
+    }
+
+    /// Reads events out, with the time before which the board has promised to send no more; a queue may leave them empty.
+    pub(super) fn push(&mut self, shared: &Shared, events: &mut Events, promised: Option<i64>) {
+        if !self.is_on || (promised.is_none() && events.is_empty() && events.markers.is_empty()) {
+            return;
+        }
+        match &mut self.reader {
+            Some(reader) => {
+                reader.take(shared, events, Taken { quiet: promised.map(Quiet::Promised), last: false });
+            }
+            None => {
+                let dropped = shared.handover.put(events, promised);
+                shared.published().counters.events_dropped = dropped;
+            }
+        }
+        self.announced = self.announced.max(promised);
+    }
+
+    /// Nothing comes before a time.
+    pub(super) fn quiet(&mut self, shared: &Shared, quiet: Quiet) {
+        match &mut self.reader {
+            Some(reader) => reader.wait(shared, Taken { quiet: Some(quiet), last: false }),
+            None => shared.handover.quiet(quiet),
+        }
+    }
+
+    pub(super) fn zero(&mut self, shared: &Shared, zeroings: &[Zeroing]) {
+        match &mut self.reader {
+            Some(reader) => reader.zero(zeroings),
+            None if self.is_on => shared.handover.zero(zeroings),
+            None => {}
+        }
+    }
+
+    /// Nothing will come any more.
+    pub(super) fn close(&mut self, shared: &Shared, quiet: Option<Quiet>) {
+        match &mut self.reader {
+            Some(reader) => reader.wait(shared, Taken { quiet, last: true }),
+            None => shared.handover.close(quiet),
+        }
+    }
+}

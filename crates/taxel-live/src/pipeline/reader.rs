@@ -1,0 +1,173 @@
+//! Encodes events and reads them out: in the thread that decodes, or in one behind it.
+
+use taxel_core::Events;
+use taxel_core::detect::{Detection, FrameTime, Readout, ReadoutStream};
+use taxel_core::encode::{Tare, Zeroing};
+
+use super::ahead::Ahead;
+use super::handover::{Quiet, Taken};
+use super::options::LiveOptions;
+use super::output::DetectionOutput;
+use super::rest::Rest;
+use super::shared::Shared;
+
+/// What reads the events out.
+pub enum Listener {
+    /// Nothing: datagrams are received and recorded only.
+    None,
+    /// A readout.
+    Reading(Box<ReadoutStream>),
+    /// A readout that first takes a tare: from the first event on for so long (us of the board's clock), or until the
+    /// board marks a start.
+    Taring(i64, Box<Readout>),
+}
+
+impl Listener {
+    /// The listener of a readout, where there is one: it takes a fresh tare of `tare_us` where that is given, else it reads at
+    /// once, with `tare` where its encoder needs one.
+    ///
+    /// # Errors
+    ///
+    /// As [`Readout::stream`].
+    pub fn of(
+        readout: Option<Readout>,
+        tare: Option<&Tare>,
+        tare_us: Option<i64>,
+        options: &LiveOptions,
+    ) -> taxel_core::Result<Self> {
+        Ok(match (readout, tare_us) {
+            (None, _) => Self::None,
+            (Some(readout), Some(us)) => Self::Taring(us, Box::new(readout)),
+            (Some(readout), None) => Self::Reading(Box::new(readout.stream(&options.array, options.frames(), tare)?)),
+        })
+    }
+}
+
+pub(super) struct Reader {
+    mode: Mode,
+    /// Detections that no thread has taken for output yet.
+    pub(super) found: Vec<Detection>,
+    events: Events,
+    zeroings: Vec<Zeroing>,
+    frames: FrameTime,
+}
+
+enum Mode {
+    Reading(Ahead),
+    Taring(Box<Rest>),
+    /// Between the two, and after an error.
+    Idle,
+}
+
+impl Reader {
+    pub(super) fn new(listener: Listener, options: &LiveOptions) -> Self {
+        let events = Events::empty(options.array.clone());
+        let mode = match listener {
+            Listener::None => Mode::Idle,
+            Listener::Reading(stream) => Mode::Reading(Ahead::new(stream)),
+            Listener::Taring(stretch_us, readout) => {
+                Mode::Taring(Box::new(Rest::new(stretch_us, readout, &options.array)))
+            }
+        };
+        Self { mode, found: vec![], events, zeroings: vec![], frames: options.frames() }
+    }
+
+    /// Publishes whether it takes a tare, and the rest that it reads with, before the first events.
+    pub(super) fn begin(&self, shared: &Shared) {
+        shared.published().counters.taring = matches!(self.mode, Mode::Taring(_));
+        self.publish_rest(shared);
+    }
+
+    /// In a thread of its own: reads out what is handed over until the last of it, and hands its detections to the output.
+    pub(super) fn run(mut self, shared: &Shared, output: &DetectionOutput) {
+        let mut last = false;
+        loop {
+            if !self.found.is_empty() {
+                output.add(shared, &mut self.found);
+                output.run(shared);
+            }
+            if last {
+                break;
+            }
+            let taken = shared.handover.take(&mut self.events, &mut self.zeroings);
+            self.process(shared, taken);
+            last = taken.last;
+        }
+    }
+
+    /// In the thread that decodes: reads its events out, and leaves it the memory of the last ones.
+    pub(super) fn take(&mut self, shared: &Shared, events: &mut Events, taken: Taken) {
+        std::mem::swap(&mut self.events, events);
+        self.process(shared, taken);
+        self.events.clear();
+    }
+
+    /// Nothing came, but time has.
+    pub(super) fn wait(&mut self, shared: &Shared, taken: Taken) {
+        self.events.clear();
+        self.process(shared, taken);
+    }
+
+    /// Takes zeroings, each of which has its own time.
+    pub(super) fn zero(&mut self, zeroings: &[Zeroing]) {
+        self.zeroings.extend_from_slice(zeroings);
+    }
+
+    fn process(&mut self, shared: &Shared, taken: Taken) {
+        if let Err(error) = self.try_process(shared, taken) {
+            shared.fail(error);
+            self.mode = Mode::Idle;
+        }
+    }
+
+    fn try_process(&mut self, shared: &Shared, taken: Taken) -> crate::Result<()> {
+        match &mut self.mode {
+            Mode::Reading(readout) => {
+                self.zeroings.drain(..).try_for_each(|zeroing| readout.zero(&zeroing))?;
+                readout.push(self.events.view(), &mut self.found)?;
+                match taken.quiet {
+                    Some(Quiet::Promised(t)) => readout.advance(t, &mut self.found)?,
+                    Some(Quiet::Believed(t)) if taken.last => readout.advance(t, &mut self.found)?,
+                    Some(Quiet::Believed(t)) => readout.quiet(t, &mut self.found)?,
+                    None => {}
+                }
+            }
+            Mode::Taring(rest) => {
+                if let Some((stop, inside)) = rest.push(&self.events, taken.quiet.map(Quiet::until))? {
+                    self.begin_reading(shared, stop, inside)?;
+                }
+            }
+            Mode::Idle => self.zeroings.clear(),
+        }
+        if !self.events.is_empty() || taken.last {
+            let counters = &mut shared.published().counters;
+            counters.read_out += self.events.len() as u64;
+            if let Mode::Reading(readout) = &self.mode {
+                (counters.late, counters.wrong) = (readout.late(), readout.wrong());
+            }
+        }
+        Ok(())
+    }
+
+    /// The rest is over: reads from the first event after it on.
+    fn begin_reading(&mut self, shared: &Shared, stop: i64, inside: usize) -> crate::Result<()> {
+        let Mode::Taring(rest) = std::mem::replace(&mut self.mode, Mode::Idle) else { return Ok(()) };
+        let (tare, stream) = rest.finish(stop, self.frames)?;
+        let mut readout = Ahead::new(Box::new(stream));
+        readout.push(self.events.view().piece(inside..self.events.len()), &mut self.found)?;
+        self.mode = Mode::Reading(readout);
+        self.publish_rest(shared);
+        let mut published = shared.published();
+        published.counters.taring = false;
+        published.tare = Some(tare);
+        Ok(())
+    }
+
+    /// Publishes the rest that the readout reads with, where it needs any.
+    fn publish_rest(&self, shared: &Shared) {
+        if let Mode::Reading(readout) = &self.mode {
+            let rest = readout.rest();
+            shared.published().rest = if rest.iter().all(Option::is_none) { vec![] } else { rest };
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! The third stage: into the recording that runs, where one does, go datagrams as they came, what became of the board, markers,
+//! pictures and counts.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use taxel_core::encode::Zeroing;
+use taxel_core::wire::{Receiver, Registers, Took};
+use taxel_core::{Events, Marker};
+
+use super::counters::Counters;
+use super::decode::fresh_decoder;
+use super::recorder::Recorder;
+use super::shared::{Ended, Shared};
+use super::stills::Stills;
+use super::tap::UNKNOWN;
+use crate::Result;
+use crate::capture::Batch;
+use crate::locked::lock;
+use crate::recording::{BoardChange, Change, now_ns};
+
+/// How often an unfinished recording learns what was lost.
+const COUNTS_EVERY: Duration = Duration::from_secs(1);
+
+pub(super) struct RecordStage {
+    shared: Arc<Shared>,
+    /// Decodes from a recording's first datagram on, as a reader will, until the offset between its clock and the pipeline's is
+    /// known.
+    origin: Option<Box<Receiver>>,
+    stills: Stills,
+    /// Datagrams that had been decoded when the last still was considered.
+    considered: u64,
+    /// Whether the recording has the fresh tare.
+    tared: bool,
+    /// When the recording got its counts last.
+    counted: Instant,
+}
+
+impl RecordStage {
+    pub(super) fn new(shared: Arc<Shared>) -> Self {
+        Self { shared, origin: None, stills: Stills::new(), considered: 0, tared: false, counted: Instant::now() }
+    }
+
+    pub(super) fn runs(&self) -> bool {
+        lock(&self.shared.recorder).is_some()
+    }
+
+    /// Works with the recording that runs. An error ends the pipeline where the recording was asked for from its beginning, and the
+    /// recording alone where it began later.
+    fn with(&self, work: impl FnOnce(&mut Recorder) -> Result<()>) -> Result<()> {
+        let mut slot = lock(&self.shared.recorder);
+        let Some(recorder) = &mut *slot else { return Ok(()) };
+        match work(recorder) {
+            Err(error) if recorder.since().is_some() => {
+                *slot = None;
+                lock(&self.shared.broken).get_or_insert(error);
+                self.shared.records.store(false, Ordering::Release);
+                Ok(())
+            }
+            outcome => outcome,
+        }
+    }
+
+    pub(super) fn datagrams(&self, batch: &Batch) -> Result<()> {
+        self.with(|recorder| recorder.datagrams(batch))
+    }
+
+    /// What a datagram showed of the board: a reset, or another version of the wire.
+    pub(super) fn board(&self, took: &Took, at_ns: i64) -> Result<()> {
+        if took.version == 1 && !took.changed {
+            return Ok(());
+        }
+        let wire = took.changed.then_some(Change::Wire { version: took.version, asked: false });
+        self.with(|recorder| {
+            recorder.takes(took.version)?;
+            for change in wire.into_iter().chain(took.reset.then_some(Change::Reset)) {
+                recorder.board_change(&BoardChange { at_ns, t_us: took.now, change })?;
+            }
+            Ok(())
+        })
+    }
+
+    /// The board was told to speak another version of the wire; `t_us` is its latest time.
+    pub(super) fn asked_for_version(&self, version: u8, t_us: Option<i64>) -> Result<()> {
+        let change = Change::Wire { version, asked: true };
+        self.with(|recorder| recorder.board_change(&BoardChange { at_ns: now_ns(), t_us, change }))
+    }
+
+    pub(super) fn registers(&self, registers: &Registers) -> Result<()> {
+        self.with(|recorder| recorder.registers(registers))
+    }
+
+    pub(super) fn markers(&self, markers: &[Marker]) -> Result<()> {
+        if markers.is_empty() {
+            return Ok(());
+        }
+        self.with(|recorder| markers.iter().try_for_each(|marker| recorder.marker(*marker)))?;
+        self.shared.picture_around(markers.iter().map(|marker| marker.t));
+        Ok(())
+    }
+
+    /// Decodes a datagram by the recording's own clock, which begins with its first stamp: once that has come, of an event or a
+    /// marker, the offset to the pipeline's clock is known. `stamps` are the first of each as the pipeline decoded them.
+    pub(super) fn find_origin(&mut self, bytes: &[u8], at_ns: i64, stamps: (Option<i64>, Option<i64>)) -> Result<()> {
+        let Some(origin) = &mut self.origin else { return Ok(()) };
+        let mut events = Events::empty(self.shared.options.array.clone());
+        origin.push(bytes, Some(at_ns / 1000), &mut events);
+        let by_event = stamps.0.zip(events.t.first()).map(|(ours, theirs)| ours - theirs);
+        let by_marker = stamps.1.zip(events.markers.first()).map(|(ours, theirs)| ours - theirs.t);
+        let Some(origin_us) = by_event.or(by_marker) else { return Ok(()) };
+        self.origin = None;
+        let mut timed = true;
+        self.with(|recorder| {
+            timed = recorder.is_timed();
+            recorder.set_origin(origin_us)
+        })?;
+        if timed { Ok(()) } else { self.earlier_zeroings() }
+    }
+
+    /// Ends the recording that runs, and begins the next one, where there is one, with the values that the taxels hold. What has
+    /// come so far belongs to the former, what comes from here on to the latter.
+    pub(super) fn switch(&mut self, next: Option<Box<Recorder>>, held: &[u16]) -> Result<Ended> {
+        let now = self.shared.counters();
+        let ended = lock(&self.shared.recorder).take();
+        self.origin = None;
+        if let Some(mut next) = next {
+            if let Err(error) = next.begin(&now, held) {
+                *lock(&self.shared.recorder) = ended;
+                return Err(error);
+            }
+            self.origin = Some(Box::new(fresh_decoder(&self.shared.options)));
+            self.tared = false;
+            let timed = next.is_timed();
+            *lock(&self.shared.recorder) = Some(*next);
+            if timed {
+                self.earlier_zeroings()?;
+            }
+        }
+        self.shared.records.store(self.origin.is_some(), Ordering::Release);
+        Ok((ended, now))
+    }
+
+    /// Taxels that were zeroed before the recording began stay zeroed in it.
+    fn earlier_zeroings(&self) -> Result<()> {
+        let zeroed: Vec<Zeroing> = self.shared.published().zeroed.values().copied().collect();
+        self.with(|recorder| zeroed.iter().try_for_each(|one| recorder.zeroing(one)))
+    }
+
+    /// Records zeroings; on an error the caller zeroes nothing.
+    pub(super) fn zeroings(&self, zeroings: &[Zeroing]) -> Result<()> {
+        match &*lock(&self.shared.recorder) {
+            Some(recorder) => zeroings.iter().try_for_each(|zeroing| recorder.zeroing(zeroing)),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes a still where it is time for one, and records those that the recording gets; at its end the last one.
+    pub(super) fn pictures(&mut self, decoded: u64, held: &[u16], last: bool) -> Result<()> {
+        let now = Instant::now();
+        if !(last || self.stills.is_due(now)) {
+            return Ok(());
+        }
+        let times = std::mem::take(&mut *lock(&self.shared.picture_times));
+        if !self.runs() {
+            self.stills.clear();
+            return Ok(());
+        }
+        let new = decoded != self.considered;
+        self.considered = decoded;
+        if let (true, Some(t_us)) = (new, self.shared.published().counters.board_us) {
+            // In a picture 0 is also a taxel without any event so far.
+            let held = held.iter().map(|&held| if held == UNKNOWN { 0 } else { held });
+            self.stills.take(now, now_ns(), t_us, held);
+        }
+        times.into_iter().for_each(|t| self.stills.around(t));
+        let columns = self.shared.options.array.columns;
+        let mut stills = std::mem::replace(&mut self.stills, Stills::new());
+        let outcome = self.with(|recorder| {
+            stills.give().try_for_each(|still| recorder.picture(still.at_ns, still.t_us, columns, &still.held))
+        });
+        self.stills = stills;
+        outcome
+    }
+
+    /// Ten times a second: the tare once it is complete, and, once a second, the counts.
+    pub(super) fn progress(&mut self) -> Result<()> {
+        if !self.runs() {
+            return Ok(());
+        }
+        let (counters, tare) = {
+            let published = self.shared.published();
+            let tare = if self.tared { None } else { published.tare.clone() };
+            (published.counters.clone(), tare)
+        };
+        self.tared |= tare.is_some();
+        let due = self.counted.elapsed() >= COUNTS_EVERY;
+        if due {
+            self.counted = Instant::now();
+        }
+        let (capture, bridged) = (self.shared.receiver.counts(), self.shared.receiver.bridged());
+        self.with(|recorder| {
+            if let Some(tare) = tare {
+                recorder.tare(&tare)?;
+            }
+            recorder.flush()?;
+            if due { recorder.so_far(&Counters { capture, bridged, ..counters }) } else { Ok(()) }
+        })
+    }
+}

@@ -1,0 +1,262 @@
+//! The stages one after the other, in the thread that has them: receive, decode, record, read out.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use taxel_core::detect::Detection;
+use taxel_core::encode::Zeroing;
+use taxel_core::problem;
+
+use super::decode::DecodeStage;
+use super::observers::Observers;
+use super::read_out::ReadOutStage;
+use super::reader::Reader;
+use super::receive::ReceiveStage;
+use super::record::RecordStage;
+use super::recorder::Recorder;
+use super::shared::{Ended, Request, Shared};
+use super::tap::UNKNOWN;
+use crate::Result;
+use crate::capture::Batch;
+use crate::locked::lock;
+use crate::recording::now_ns;
+
+/// How long to wait for datagrams where silence means nothing.
+const IDLE: Duration = Duration::from_millis(20);
+
+/// Events are handed on when so many are there, also in the middle of a large batch.
+const HAND_ON: usize = 1 << 14;
+
+/// Why [`Stages::run`] returned.
+pub(super) enum Next {
+    /// Detections wait for output ([`Stages::found`]).
+    Output,
+    /// The readout is to continue in a thread of its own.
+    Separate(Box<Reader>),
+    /// Nothing will come any more.
+    Over,
+}
+
+pub(super) struct Stages {
+    shared: Arc<Shared>,
+    receive: ReceiveStage,
+    decode: DecodeStage,
+    record: RecordStage,
+    read_out: ReadOutStage,
+    observers: Observers,
+    begun: bool,
+}
+
+impl Stages {
+    pub(super) fn new(shared: &Arc<Shared>, reader: Option<Reader>) -> Self {
+        Self {
+            shared: Arc::clone(shared),
+            receive: ReceiveStage::new(Arc::clone(shared)),
+            decode: DecodeStage::new(&shared.options),
+            record: RecordStage::new(Arc::clone(shared)),
+            read_out: ReadOutStage::new(reader),
+            observers: Observers::new(Arc::clone(shared)),
+            begun: false,
+        }
+    }
+
+    /// Detections that no thread has taken for output yet.
+    pub(super) fn found(&mut self) -> &mut Vec<Detection> {
+        self.read_out.found()
+    }
+
+    /// Runs until the caller has something to do; an error ends the pipeline.
+    pub(super) fn run(&mut self) -> Next {
+        self.rounds().unwrap_or_else(|error| {
+            self.shared.fail(error);
+            self.read_out.close(&self.shared, None);
+            Next::Over
+        })
+    }
+
+    fn rounds(&mut self) -> Result<Next> {
+        if !self.begun {
+            self.begun = true;
+            self.read_out.begin(&self.shared);
+            if self.record.runs() {
+                self.separate()?;
+            }
+        }
+        loop {
+            if let Some(reader) = self.read_out.take_separated() {
+                return Ok(Next::Separate(reader));
+            }
+            if !self.found().is_empty() {
+                return Ok(Next::Output);
+            }
+            if self.receive.is_done() {
+                self.finish()?;
+                return Ok(Next::Over);
+            }
+            self.round()?;
+        }
+    }
+
+    /// From now on a thread of its own receives, and another one reads out: a disk may hold this one up.
+    fn separate(&mut self) -> Result<()> {
+        self.receive.separate(self.read_out.is_on())?;
+        self.read_out.separate();
+        Ok(())
+    }
+
+    fn round(&mut self) -> Result<()> {
+        let version = self.shared.expected.swap(0, Ordering::AcqRel);
+        if version != 0 {
+            self.expect_version(version)?;
+        }
+        let tick = if self.read_out.is_on() { self.decode.tick() } else { None };
+        let (batch, came) = self.receive.next(self.observers.longest_wait(tick.unwrap_or(IDLE)))?;
+        let silent_until = if came {
+            self.process(&batch)?;
+            self.record.datagrams(&batch)?;
+            None
+        } else {
+            let until = self.receive.silent_until();
+            if let (true, Some(quiet)) = (self.read_out.is_on(), self.decode.quiet(until)) {
+                self.read_out.quiet(&self.shared, quiet);
+            }
+            until
+        };
+        self.observers.datagrams(&batch, silent_until);
+        self.receive.reuse(batch);
+        self.observers.tick();
+        self.record.pictures(self.decode.decoded(), self.decode.held(), false)?;
+        if self.observers.picture(self.decode.held()) {
+            self.record.progress()?;
+        }
+        if self.shared.requested.swap(false, Ordering::Acquire) {
+            self.answer()?;
+        }
+        Ok(())
+    }
+
+    fn process(&mut self, batch: &Batch) -> Result<()> {
+        for (datagram, bytes) in batch.iter() {
+            let mut decoded = self.decode.push(datagram, bytes);
+            if decoded.took.reset {
+                let later = self.decode.split_at_reset(&mut decoded);
+                self.hand_on()?;
+                self.observers.reset();
+                self.decode.reset(&later);
+                if decoded.took.version == 2 {
+                    self.read_out.reset();
+                }
+            }
+            let now = now_ns();
+            self.decode.note(&decoded, self.read_out.announced());
+            self.record.board(&decoded.took, decoded.arrived_ns)?;
+            self.record.find_origin(bytes, decoded.arrived_ns, self.decode.first_stamps(&decoded))?;
+            self.shared.published().decode_latency.note(now - decoded.arrived_ns);
+            if self.decode.events().len() >= HAND_ON {
+                // So much waits only where reading out takes longer than what comes leaves it.
+                self.read_out.separate();
+                self.hand_on()?;
+            }
+        }
+        self.hand_on()
+    }
+
+    /// Hands the decoded events on to the other stages.
+    fn hand_on(&mut self) -> Result<()> {
+        self.decode.hold();
+        self.observers.events(self.decode.events());
+        self.record.markers(&self.decode.events().markers)?;
+        {
+            let mut published = self.shared.published();
+            published.markers.extend_from_slice(&self.decode.events().markers);
+            self.decode.publish(&mut published.counters);
+        }
+        let promised = self.decode.take_promise();
+        self.read_out.push(&self.shared, self.decode.events(), promised);
+        self.decode.clear();
+        Ok(())
+    }
+
+    /// Nothing will come any more: hands on what waits in each stage.
+    fn finish(&mut self) -> Result<()> {
+        self.decode.finish();
+        self.hand_on()?;
+        self.record.pictures(self.decode.decoded(), self.decode.held(), true)?;
+        let quiet = self.decode.quiet(self.receive.silent_until()).filter(|_| self.read_out.is_on());
+        self.observers.finish();
+        self.read_out.close(&self.shared, quiet);
+        self.answer()
+    }
+
+    /// Does what was requested since the last batch. A caller may have gone before its answer.
+    fn answer(&mut self) -> Result<()> {
+        let requests = std::mem::take(&mut *lock(&self.shared.requests));
+        for request in requests {
+            match request {
+                Request::Record(next, give) => drop(give.send(self.switch_recording(next))),
+                Request::Tap(give) => self.observers.add_tap(&give, self.decode.held()),
+                Request::Copy(give) => self.observers.add_copier(&give),
+                Request::Zero(taxels, give) => drop(give.send(self.zero(&taxels))),
+                Request::Registers(registers) => {
+                    self.decode.set_frame_us(registers.frame_us());
+                    self.expect_version(registers.wire_version)?;
+                    self.record.registers(&registers)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn switch_recording(&mut self, next: Option<Box<Recorder>>) -> Result<Ended> {
+        self.record.pictures(self.decode.decoded(), self.decode.held(), true)?;
+        if next.is_some() {
+            self.separate()?;
+        }
+        self.record.switch(next, self.decode.held())
+    }
+
+    /// The board was told to speak this version of the wire.
+    fn expect_version(&mut self, version: u8) -> Result<()> {
+        if self.decode.expect(version) {
+            self.record.asked_for_version(version, self.decode.latest())?;
+        }
+        Ok(())
+    }
+
+    /// Takes the values that these taxels hold for their rest from now on: where one cannot be zeroed none is.
+    fn zero(&mut self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
+        let array = &self.shared.options.array;
+        let published = self.shared.published();
+        if published.counters.taring {
+            return Err(problem!("a tare is being taken: zero taxels when that is done").into());
+        }
+        let now = published.counters.offset.map(|offset| offset.board_us(now_ns()));
+        let Some(t) = published.counters.board_us.max(self.read_out.announced()).max(now) else {
+            return Err(problem!("nothing came yet: no taxel can be zeroed").into());
+        };
+        let mut zeroings = vec![];
+        for &(x, y) in taxels {
+            let mut zeroing = Zeroing { t, x, y, rest: 0.0, before: None };
+            zeroing.check(array)?;
+            let place = array.index(x, y);
+            if self.decode.held()[place] == UNKNOWN {
+                return Err(problem!("taxel at row {y}, column {x}: no event so far, so its value is unknown").into());
+            }
+            zeroing.rest = self.decode.held()[place].into();
+            let tared = published.rest.get(place).copied().flatten();
+            zeroing.before = published.zeroed.get(&place).map(|earlier| earlier.rest).or(tared);
+            zeroings.push(zeroing);
+        }
+        drop(published);
+        // Recorded first: no taxel is zeroed of which the recording does not know.
+        self.record.zeroings(&zeroings)?;
+        let mut published = self.shared.published();
+        published.zeroed.extend(zeroings.iter().map(|one| (array.index(one.x, one.y), *one)));
+        published.zeroings += 1;
+        drop(published);
+        self.shared.picture_around([t]);
+        self.read_out.zero(&self.shared, &zeroings);
+        Ok(zeroings)
+    }
+}

@@ -1,0 +1,112 @@
+//! The pipeline's threads, as leader and followers (Schmidt et al., Pattern-Oriented Software Architecture 2, 2000): one thread at
+//! a time has the stages. As long as nothing is recorded it receives, decodes, reads out and hands detections on, so that one
+//! wake-up lies between a datagram and a callback. It puts the stages down before it calls a callback and takes them up again after;
+//! where a callback takes longer than [`TAKE_OVER`], the other thread takes them, and goes on receiving: what comes meanwhile
+//! waits in the kernel's buffer.
+//!
+//! A disk may hold up a recording, and a readout may be slower than what comes: then one thread receives (or takes what a third
+//! one received), decodes and records, and the other reads out, from there on.
+
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
+
+use super::output::DetectionOutput;
+use super::reader::Reader;
+use super::shared::Shared;
+use super::stages::{Next, Stages};
+use crate::locked::lock;
+
+/// How often the follower looks whether the stages were put down: so long a callback may hold up what comes.
+const TAKE_OVER: Duration = Duration::from_millis(2);
+
+/// The stages and the output, which the threads take turns at.
+pub(super) struct Threads {
+    turn: Mutex<Turn>,
+    changed: Condvar,
+    output: DetectionOutput,
+}
+
+struct Turn {
+    /// `None` while a thread, the leader, has them.
+    stages: Option<Box<Stages>>,
+    /// A readout that is to continue in a thread of its own.
+    reader: Option<Reader>,
+    over: bool,
+    /// Threads that have not ended.
+    left: usize,
+}
+
+impl Threads {
+    pub(super) fn new(stages: Stages, output: DetectionOutput, threads: usize) -> Self {
+        let turn = Turn { stages: Some(Box::new(stages)), reader: None, over: false, left: threads };
+        Self { turn: Mutex::new(turn), changed: Condvar::new(), output }
+    }
+
+    /// What each thread does, until the end.
+    pub(super) fn run(&self, shared: &Arc<Shared>) {
+        let _leaving = Leaving { threads: self, shared };
+        loop {
+            let nothing = |turn: &mut Turn| turn.stages.is_none() && turn.reader.is_none() && !turn.over;
+            let waited = self.changed.wait_timeout_while(lock(&self.turn), TAKE_OVER, nothing);
+            let (mut turn, waited) = waited.unwrap_or_else(PoisonError::into_inner);
+            if waited.timed_out() {
+                continue;
+            }
+            if let Some(reader) = turn.reader.take() {
+                drop(turn);
+                reader.run(shared, &self.output);
+                return;
+            }
+            let Some(stages) = turn.stages.take() else { return };
+            drop(turn);
+            self.lead(stages, shared);
+        }
+    }
+
+    /// Leads until there are detections to hand on, or all is over.
+    fn lead(&self, mut stages: Box<Stages>, shared: &Shared) {
+        loop {
+            let next = stages.run();
+            let alone = self.output.add(shared, stages.found());
+            match next {
+                Next::Output if !alone => continue,
+                // The follower is not woken for it: the callback would wait for that.
+                Next::Output => lock(&self.turn).stages = Some(stages),
+                Next::Separate(reader) => {
+                    lock(&self.turn).reader = Some(*reader);
+                    self.changed.notify_one();
+                    continue;
+                }
+                Next::Over => {
+                    lock(&self.turn).over = true;
+                    self.changed.notify_all();
+                }
+            }
+            self.output.run(shared);
+            return;
+        }
+    }
+}
+
+/// However a thread ends, the other one does not wait for it.
+struct Leaving<'a> {
+    threads: &'a Threads,
+    shared: &'a Shared,
+}
+
+impl Drop for Leaving<'_> {
+    fn drop(&mut self) {
+        let mut turn = lock(&self.threads.turn);
+        turn.left -= 1;
+        if std::thread::panicking() {
+            turn.over = true;
+            self.shared.receiver.stop();
+            self.shared.handover.close(None);
+        }
+        if turn.left == 0 {
+            self.shared.end();
+        }
+        drop(turn);
+        self.threads.changed.notify_all();
+    }
+}

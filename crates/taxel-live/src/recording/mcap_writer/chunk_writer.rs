@@ -1,0 +1,118 @@
+//! Packs queued messages into chunks of the format, and hands each to the operating system as whole records.
+//!
+//! Chunks are built in memory (the crate's buffered mode) because its direct mode goes back to fill in lengths: a kill in
+//! between would leave a length of 2e16.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{McapError, WriteOptions};
+use serde_json::json;
+
+use super::record_file::RecordFile;
+use super::write_queue::Queue;
+use super::{BEGIN, CHUNK_BYTES, END};
+use crate::recording::{Compression, Counts, Header, OutputFile, Topic, now_ns};
+
+/// Bytes of a message record besides its content.
+const MESSAGE_BYTES: usize = 31;
+
+/// The crate's writer, with the recording's header.
+pub(super) struct ChunkWriter {
+    mcap: mcap::Writer<NoSeek<RecordFile>>,
+    header: Header,
+    /// What is being written; its memory becomes the queue's of the next time.
+    pub(super) taken: Queue,
+}
+
+impl ChunkWriter {
+    pub(super) fn begin(
+        file: OutputFile,
+        header: &Header,
+        compression: Compression,
+        at_disk: &Arc<AtomicBool>,
+    ) -> std::result::Result<Self, McapError> {
+        let options = WriteOptions::new()
+            .profile("taxel")
+            .library(concat!("taxel ", env!("CARGO_PKG_VERSION")))
+            .compression(match compression {
+                Compression::None => None,
+                Compression::Lz4 => Some(mcap::Compression::Lz4),
+                Compression::Zstd => Some(mcap::Compression::Zstd),
+            })
+            .compression_level(u32::from(compression == Compression::Zstd))
+            .compression_threads(0)
+            // Each chunk has its own checksum.
+            .calculate_data_section_crc(false)
+            .disable_seeking(true)
+            .chunk_size(Some(2 * CHUNK_BYTES as u64));
+        let mcap = options.create(NoSeek::new(RecordFile::new(file, at_disk)))?;
+        let mut writer = Self { mcap, header: header.clone(), taken: Queue::default() };
+        let opening = BTreeMap::from([("header".to_owned(), json!(header).to_string())]);
+        writer.mcap.write_metadata(&Metadata { name: BEGIN.to_owned(), metadata: opening.clone() })?;
+        for (k, source) in std::iter::once(header).chain(&header.sources).enumerate() {
+            for topic in Topic::of_source(source.stream.is_some()) {
+                let schema = match topic.schema() {
+                    None => 0,
+                    Some((name, text)) => writer.mcap.add_schema(name, "jsonschema", text.as_bytes())?,
+                };
+                // Once more where a checksum guards it.
+                let more = if k == 0 && topic == Topic::Datagrams { opening.clone() } else { BTreeMap::new() };
+                let (number, name) = (topic.channel(k), topic.channel_name(k, &source.name));
+                writer.mcap.add_channel_with_id(number, schema, &name, topic.encoding(), &more)?;
+            }
+        }
+        writer.mcap.flush()?;
+        Ok(writer)
+    }
+
+    /// Packs messages into chunks and hands each to the operating system: from then on a kill cannot take it.
+    pub(super) fn write(&mut self) -> std::result::Result<(), McapError> {
+        let (mut at, mut chunk) = (0, 0);
+        for message in &self.taken.messages {
+            let header = MessageHeader {
+                channel_id: message.channel,
+                sequence: message.number,
+                log_time: message.at_ns,
+                publish_time: message.at_ns,
+            };
+            self.mcap.write_to_known_channel(&header, &self.taken.bytes[at..at + message.bytes])?;
+            at += message.bytes;
+            chunk += MESSAGE_BYTES + message.bytes;
+            if chunk >= CHUNK_BYTES {
+                self.mcap.flush()?;
+                chunk = 0;
+            }
+        }
+        self.taken.clear();
+        if chunk > 0 { self.mcap.flush() } else { Ok(()) }
+    }
+
+    /// Writes what was lost and the summary, and waits until the disk has all.
+    pub(super) fn end(
+        &mut self,
+        counts: Option<&Counts>,
+        others: &BTreeMap<String, Counts>,
+    ) -> std::result::Result<(), McapError> {
+        if let Some(counts) = counts {
+            let mut end = BTreeMap::from([
+                ("verdict".to_owned(), counts.verdict()),
+                ("counts".to_owned(), json!(counts).to_string()),
+                ("header".to_owned(), json!(self.header).to_string()),
+                ("stopped_ns".to_owned(), now_ns().to_string()),
+            ]);
+            end.extend(others.iter().map(|(name, counts)| (format!("counts.{name}"), json!(counts).to_string())));
+            self.mcap.write_metadata(&Metadata { name: END.to_owned(), metadata: end })?;
+        }
+        self.mcap.flush()?;
+        self.mcap.finish()?;
+        Ok(())
+    }
+
+    pub(super) fn into_file(self) -> RecordFile {
+        self.mcap.into_inner().into_inner()
+    }
+}

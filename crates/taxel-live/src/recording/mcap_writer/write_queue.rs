@@ -1,0 +1,336 @@
+//! Messages that wait in memory, and the thread that writes them, so that no recording thread waits for the disk.
+//!
+//! The thread empties the queue when it fills a chunk, at the latest every [`FLUSH_EVERY`]. On a busy machine it may get no
+//! processor for seconds, and a kill would lose all that waits for it. So a caller who finds the queue [`LATE`] writes it itself:
+//! a thread that has something to record has a processor to write it with. Only while the writing thread waits for the disk do
+//! callers go on without it, as long as there is room.
+
+use std::collections::BTreeMap;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use mcap::McapError;
+use taxel_core::problem;
+
+use super::CHUNK_BYTES;
+use super::chunk_writer::ChunkWriter;
+use super::record_file::RecordFile;
+use crate::locked::lock;
+use crate::recording::{Compression, Counts, FLUSH_EVERY, Header, LATE, OutputFile, Topic};
+use crate::{Error, Result};
+
+/// How much may wait in memory for the clock of a recording whose file is not begun yet, bytes: heartbeats of a board of version 2
+/// at rest for hours.
+const WAITING_BYTES: usize = 1 << 22;
+
+/// The queue of a recording, and the state of its file: planned, being written, or closed.
+pub(super) struct WriteQueue {
+    path: PathBuf,
+    /// How the file is begun, as long as it is not.
+    pub(super) plan: Mutex<Option<Plan>>,
+    /// Locked by the thread that writes, before `state` where it needs both. `None` before the file is begun and after its end.
+    pub(super) writer: Mutex<Option<ChunkWriter>>,
+    pub(super) thread: Mutex<Option<JoinHandle<Result<()>>>>,
+    /// Whether the thread that writes waits for the operating system.
+    pub(super) at_disk: Arc<AtomicBool>,
+    state: Mutex<Pending>,
+    /// Wakes the thread: the end has come, or the queue fills a chunk.
+    work: Condvar,
+    /// Wakes callers: there is room in the queue again, or writing has failed.
+    room: Condvar,
+}
+
+/// A file that is reserved and not begun yet.
+pub(super) struct Plan {
+    pub(super) file: OutputFile,
+    pub(super) header: Header,
+    pub(super) compression: Compression,
+}
+
+#[derive(Default)]
+pub(super) struct Pending {
+    pub(super) queue: Queue,
+    /// Whether the file is begun; until then everything waits.
+    pub(super) begun: bool,
+    /// Whether the file waits for the board's clock ([`Writer::begin`](super::Writer::begin)), not only for the first data.
+    for_clock: bool,
+    /// Datagrams and samples of each source.
+    pub(super) recorded: Vec<u64>,
+    /// What each source but the first counted at its end.
+    pub(super) ends: BTreeMap<String, Counts>,
+    /// How the recording ends: set once.
+    end: Option<Option<Counts>>,
+    /// Why writing failed; nothing is taken after it.
+    failure: Option<WriteFailure>,
+}
+
+/// The operating system's error of a failed write, which every later call returns; `io::Error` itself cannot be copied.
+#[derive(Clone)]
+struct WriteFailure {
+    code: Option<i32>,
+    text: String,
+}
+
+/// Messages in the order in which they came.
+#[derive(Default)]
+pub(super) struct Queue {
+    pub(super) messages: Vec<Queued>,
+    pub(super) bytes: Vec<u8>,
+    /// When the first of them came.
+    since: Option<Instant>,
+}
+
+/// A message whose content is the next `bytes` bytes of the queue.
+pub(super) struct Queued {
+    pub(super) channel: u16,
+    pub(super) number: u32,
+    pub(super) at_ns: u64,
+    pub(super) bytes: usize,
+}
+
+impl Queue {
+    fn is_empty(&self) -> bool {
+        self.messages.is_empty()
+    }
+
+    fn is_late(&self) -> bool {
+        self.since.is_some_and(|since| since.elapsed() >= LATE)
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.messages.clear();
+        self.bytes.clear();
+        self.since = None;
+    }
+}
+
+impl WriteQueue {
+    pub(super) fn new(plan: Plan, for_clock: bool) -> Self {
+        let recorded = vec![0; plan.header.sources.len() + 1];
+        Self {
+            path: plan.file.path().to_owned(),
+            plan: Mutex::new(Some(plan)),
+            writer: Mutex::default(),
+            thread: Mutex::default(),
+            at_disk: Arc::new(AtomicBool::new(false)),
+            state: Mutex::new(Pending { recorded, for_clock, ..Pending::default() }),
+            work: Condvar::new(),
+            room: Condvar::new(),
+        }
+    }
+
+    pub(super) fn lock(&self) -> MutexGuard<'_, Pending> {
+        lock(&self.state)
+    }
+
+    /// Adds a message of a source; waits while `most` bytes or more are in the queue.
+    pub(super) fn push(
+        self: &Arc<Self>,
+        source: usize,
+        topic: Topic,
+        (at_ns, number): (i64, u64),
+        bytes: &[u8],
+        most: usize,
+    ) -> Result<()> {
+        let mut state = self.lock();
+        while state.begun && state.queue.bytes.len() >= most && state.failure.is_none() {
+            self.work.notify_all();
+            state = self.room.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        if let Some(failure) = &state.failure {
+            return Err(failure.clone().of_file(&self.path));
+        }
+        if state.end.is_some() {
+            return Err(problem!("{}: the recording has ended", self.path.display()).into());
+        }
+        let before = state.queue.bytes.len();
+        state.queue.bytes.extend_from_slice(bytes);
+        if state.begun && before < CHUNK_BYTES && state.queue.bytes.len() >= CHUNK_BYTES {
+            self.work.notify_all();
+        }
+        // The format's number has 32 bits; the reader unwraps it.
+        #[allow(clippy::cast_possible_truncation)]
+        let number = number as u32;
+        let at_ns = u64::try_from(at_ns).unwrap_or(0);
+        state.queue.messages.push(Queued { channel: topic.channel(source), number, at_ns, bytes: bytes.len() });
+        state.queue.since.get_or_insert_with(Instant::now);
+        let data = matches!(topic, Topic::Datagrams | Topic::Samples);
+        state.recorded[source] += u64::from(data);
+        if !state.begun {
+            if data && (!state.for_clock || state.queue.bytes.len() > WAITING_BYTES) {
+                drop(state);
+                self.begin(None)?;
+            }
+            return Ok(());
+        }
+        if !state.queue.is_late() || self.at_disk.load(Ordering::Relaxed) {
+            return Ok(());
+        }
+        drop(state);
+        self.drain()
+    }
+
+    /// Begins the file, once; returns whether it was this call that did.
+    pub(super) fn begin(self: &Arc<Self>, origin_us: Option<i64>) -> Result<bool> {
+        // Held until the file is begun: a second caller finds it begun.
+        let mut planned = lock(&self.plan);
+        let Some(plan) = planned.take() else {
+            return self.lock().failure.clone().map_or(Ok(false), |failure| Err(failure.of_file(&self.path)));
+        };
+        let header = Header { origin_us: origin_us.unwrap_or(plan.header.origin_us), ..plan.header };
+        let begun = self.start(Plan { header, ..plan });
+        if let Err(error) = &begun {
+            self.lock().failure = Some(WriteFailure::copy(error));
+            self.room.notify_all();
+        }
+        begun.map(|()| true)
+    }
+
+    fn start(self: &Arc<Self>, plan: Plan) -> Result<()> {
+        self.open(plan)?;
+        let queue = Arc::clone(self);
+        let thread = std::thread::Builder::new().name("taxel-record".to_owned()).spawn(move || queue.run());
+        *lock(&self.thread) = Some(thread.map_err(Error::file(&self.path))?);
+        Ok(())
+    }
+
+    /// Begins the file without the thread that writes it.
+    pub(super) fn open(&self, Plan { file, header, compression }: Plan) -> Result<()> {
+        file.begin()?;
+        let writer = ChunkWriter::begin(file, &header, compression, &self.at_disk);
+        *lock(&self.writer) = Some(writer.map_err(|error| WriteFailure::of(error).of_file(&self.path))?);
+        let mut state = self.lock();
+        state.begun = true;
+        // What waited for the file is as new as the file.
+        if state.queue.since.is_some() {
+            state.queue.since = Some(Instant::now());
+        }
+        Ok(())
+    }
+
+    /// Ends the recording, with the counts of its first source where it is finished, and waits for the thread: then the file is on
+    /// the disk.
+    pub(super) fn finish(&self, counts: Option<Counts>) -> Result<()> {
+        {
+            let mut state = self.lock();
+            let recorded = state.recorded[0];
+            state.end.get_or_insert(counts.map(|counts| Counts { recorded, ..counts }));
+        }
+        self.work.notify_all();
+        let thread = lock(&self.thread).take();
+        match thread.map(JoinHandle::join) {
+            None => Ok(()),
+            Some(Ok(outcome)) => outcome,
+            Some(Err(panic)) => std::panic::resume_unwind(panic),
+        }
+    }
+
+    /// Ends without an end record, and gives the file up.
+    pub(super) fn abandon(&self) -> Option<OutputFile> {
+        let planned = lock(&self.plan).take().map(|plan| plan.file);
+        let file = planned.or_else(|| lock(&self.writer).take().map(|writer| writer.into_file().file));
+        // Without its writer the thread ends at once.
+        let _ = self.finish(None);
+        file
+    }
+
+    /// The thread: writes the queue, and waits.
+    fn run(&self) -> Result<()> {
+        raise_priority();
+        loop {
+            let began = Instant::now();
+            self.drain()?;
+            let state = self.lock();
+            if let (true, Some(end)) = (state.queue.is_empty(), state.end.clone()) {
+                drop(state);
+                return self.close(end.as_ref());
+            }
+            if state.end.is_none() && state.queue.bytes.len() < CHUNK_BYTES {
+                let rest = FLUSH_EVERY.saturating_sub(began.elapsed());
+                drop(self.work.wait_timeout(state, rest).unwrap_or_else(PoisonError::into_inner));
+            }
+        }
+    }
+
+    /// Takes all that waits and writes it. Order is kept: the writer is locked from before the one to after the other.
+    fn drain(&self) -> Result<()> {
+        let mut slot = lock(&self.writer);
+        let Some(writer) = slot.as_mut() else {
+            // Writing failed meanwhile, which the queue keeps; or it is at its end, and nothing is added any more.
+            return self.lock().failure.clone().map_or(Ok(()), |failure| Err(failure.of_file(&self.path)));
+        };
+        std::mem::swap(&mut self.lock().queue, &mut writer.taken);
+        self.room.notify_all();
+        match writer.write() {
+            Ok(()) => Ok(()),
+            Err(error) => Err(self.fail(error, slot.take().map(ChunkWriter::into_file))),
+        }
+    }
+
+    /// Writes the end, waits for the disk, and checks that the file is where it was.
+    fn close(&self, counts: Option<&Counts>) -> Result<()> {
+        let Some(mut writer) = lock(&self.writer).take() else { return Ok(()) };
+        let ends = std::mem::take(&mut self.lock().ends);
+        if let Err(error) = writer.end(counts, &ends) {
+            return Err(self.fail(error, Some(writer.into_file())));
+        }
+        let mut file = writer.into_file();
+        if let Err(error) = file.sync() {
+            return Err(self.fail(error.into(), Some(file)));
+        }
+        file.file.check(|| {
+            let recorded: u64 = self.lock().recorded.iter().sum();
+            format!("{recorded} datagrams and lines")
+        })
+    }
+
+    /// Keeps an error for later callers, and leaves a file that can be read.
+    fn fail(&self, error: McapError, file: Option<RecordFile>) -> Error {
+        let failure = WriteFailure::of(error);
+        if let Some(file) = file {
+            file.salvage(&failure.text);
+        }
+        self.lock().failure = Some(failure.clone());
+        self.room.notify_all();
+        failure.of_file(&self.path)
+    }
+}
+
+impl WriteFailure {
+    /// A copy of an error that was returned.
+    fn copy(error: &Error) -> Self {
+        match error {
+            Error::File { source, .. } => Self { code: source.raw_os_error(), text: source.to_string() },
+            other => Self { code: None, text: other.to_string() },
+        }
+    }
+
+    fn of(error: McapError) -> Self {
+        match error {
+            McapError::Io(error) => {
+                let whole = error.to_string();
+                let text = whole.split(" (os error").next().unwrap_or(&whole).to_owned();
+                Self { code: error.raw_os_error(), text }
+            }
+            other => Self { code: None, text: other.to_string() },
+        }
+    }
+
+    fn of_file(self, path: &Path) -> Error {
+        let source = match self.code {
+            Some(code) => io::Error::from_raw_os_error(code),
+            None => io::Error::other(self.text),
+        };
+        Error::File { path: path.to_owned(), source }
+    }
+}
+
+/// Raises the calling thread's priority on a busy machine, where the system allows it (the superuser, or `LimitNICE`).
+fn raise_priority() {
+    // SAFETY: a system call on numbers; on Linux 0 means the calling thread alone. Where it is refused nothing changes.
+    unsafe { libc::setpriority(libc::PRIO_PROCESS, 0, -10) };
+}

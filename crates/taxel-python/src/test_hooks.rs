@@ -1,0 +1,39 @@
+//! What only tests call: work that panics, waits for Ctrl-C or returns an error of each kind, to see what [`enter`] makes of it.
+//! Built with the feature `test-hooks` alone.
+
+use std::time::Duration;
+
+use pyo3::prelude::*;
+use taxel_core::Error;
+
+use crate::enter::enter;
+use crate::errors::ProblemError;
+
+/// Does what `what` names without the GIL: returns an error of a kind, panics, or waits a minute for Ctrl-C.
+#[pyfunction]
+fn test_hook(py: Python<'_>, what: &str) -> PyResult<()> {
+    let error = match what {
+        "format" => Error::Format("file, byte 0: raised by a test hook".to_owned()),
+        "problem" => Error::Problem("argument: raised by a test hook".to_owned()),
+        "device" => Error::Device("register: raised by a test hook".to_owned()),
+        "scene" => Error::Scene("ball: raised by a test hook".to_owned()),
+        "interrupted" => Error::Interrupted,
+        #[allow(clippy::panic)]
+        "panic" => return enter(py, |_| -> Result<(), Error> { panic!("raised by a test hook") }),
+        "wait" => {
+            return enter(py, |stop| {
+                for _ in 0..60_000 {
+                    std::thread::sleep(Duration::from_millis(1));
+                    stop.check()?;
+                }
+                Ok::<(), Error>(())
+            });
+        }
+        other => return Err(ProblemError::new_err(format!("what is {other:?}: there is no such test hook"))),
+    };
+    enter(py, |_| Err::<(), _>(error))
+}
+
+pub(crate) fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(test_hook, module)?)
+}

@@ -1,0 +1,428 @@
+"""From a board's datagrams to detections, while they come."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import fields, replace
+from functools import partial
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._base.arguments import flag, number, numbers, parameters, text, whole
+from taxel._base.arguments import path as checked_path
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.live.lsl import LslInlet, LslOutlet
+from taxel.live.options import LiveOptions, takes
+from taxel.live.said import Said
+from taxel.live.summary import Summary, summary_of
+from taxel.recording.notes import Zeroing
+from taxel.tare import Tare
+
+__all__ = ["Live"]
+
+#: How what goes to, or comes from, the lab streaming layer begins.
+_LSL = "lsl:"
+
+#: The largest column or row of any taxel.
+_MOST_PLACE = 2**16 - 1
+
+#: How long an iteration waits at a time.
+_WAIT_S = 0.5
+
+
+class Live:
+    """Receive a board's datagrams, record them, read them out, while they come.
+
+    A context manager, and an iterator of detections that ends when `stop` was called. The work is done in threads of
+    its own: receive, decode and record; encode and read out; while it records, a third receives. What is too slow loses
+    data where it is counted.
+
+    Parameters
+    ----------
+    port : int
+        UDP; 0 finds a free one, see `address`.
+    host : str
+        The address of this machine on which to listen: every one of its addresses by default.
+    remote : Remote, optional
+        A board of another computer, in place of `port` and `host`. End this before that.
+    array : Array
+        The sensor; by default the remote board's or the readout's own, or the thesis' 64 x 64.
+    registers : str or taxel.wire.Registers
+        What the board's registers hold: themselves, or a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz", of
+        which a smaller array drives fewer lines. Left out: those of a board of this array at reset, up to 64 x 64 at
+        5.2 kHz; a remote board reports its own.
+    differences : bool
+        Whether the board sends differences for intensities (the panel's "delta intensity").
+    readout : Readout, optional
+        Reads the events out. Left out, nothing is detected.
+    tare : Tare or float (s), optional
+        For a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event on, which
+        ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
+    record : path, optional
+        A new file: `.mcap` keeps all that is known, `.lsa` the manual's raw bytes.
+    record_later : bool
+        Whether recordings begin and end while it runs (`record`, `end_recording`); then none begins here, and `sources`
+        are recorded while one runs.
+    name : str
+        The board's name in the recording.
+    sources : mapping of str to str, optional
+        The other sources of the recording (`.mcap`), by name, each with its own clock:
+        "udp:HOST:PORT,array=16x16,preset=2 kHz" another board, which sends to that address of this machine;
+        "serial:PATH@BAUD" or "pipe:PATH" lines of numbers, as an IMU's ("-" is the standard input); "given" numbers
+        that a program gives (`sample`). Of numbers ``columns=t_us:ax:ay`` names the columns of a line (else the first
+        line is waited for), and ``time=NAME:UNIT`` the column that is its clock, where that is not one called `t_us`,
+        `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, a line's time is when it
+        came.
+    compression : {"none", "lz4", "zstd"}
+        Of `.mcap`.
+    overwrite : bool
+        Whether an existing file may be replaced.
+    guard_frames : float, 0 or more
+        In silence the readout's time moves on by the host's clock, this many frames behind it.
+    gap_frames : float, 0 or more
+        At a gap in the sequence of wire version 2 time waits so many frames for what may only be late.
+    say : callable, optional
+        Called with each `Said` in the thread that made it, one at a time; what it raises ends everything and is
+        raised by `next`. It must not call `stop`. Where it takes longer than 2 ms another thread goes on receiving; up
+        to 16 384 detections wait for it.
+    lines : bool
+        Write each detection to the standard output as one line of JSON, from the thread that made it.
+    send : str or sequence of str
+        Send each detection as such a line to "udp:HOST:PORT" (a datagram a line), "pipe:PATH" (a named pipe that
+        exists) or "serial:PATH@BAUD", from the thread that made it; "lsl:NAME" sends its label in a stream of markers
+        of the lab streaming layer. Up to 1024 lines wait for a slow reader; lines that find no room, or no reader, are
+        lost and counted, and nothing waits for them.
+    kernel_buffer_bytes, queue_bytes, readout_events : int, optional
+        How much may wait in the kernel, before the decoder and before the readout.
+    gro : bool, optional
+        Let the kernel hand over trains of datagrams in one piece (`UDP_GRO`). It then counts its drops in trains.
+
+    Raises
+    ------
+    OSError : the port is taken; the file cannot be created, or is being recorded by another program
+    FileExistsError : the file is there already and `overwrite` is false
+    ProblemError : arguments that make no sense; a readout that needs a tare and has none
+    DeviceError : registers that break a rule
+
+    Notes
+    -----
+    `t` and `known` of a detection are the same here and from the recording; `said` is when it was output in fact. The
+    clocks' offset and drift are estimated from arrivals: nothing comes early, so the lower envelope of arrival less
+    board time is the offset.
+
+    Examples
+    --------
+    >>> from taxel.live import send
+    >>> with Live(0, host="127.0.0.1") as live:
+    ...     sent = send([bytes.fromhex("c000050304")], *live.address, seconds=0.01)
+    >>> live.stop().counters["wire"]["changes"] == sent["datagrams"]
+    True
+    >>> live
+    Live(ended; nothing lost after arrival (version 1 of the wire cannot show what was lost before it))
+    """
+
+    @takes(LiveOptions)
+    def __init__(self, options: LiveOptions) -> None:
+        options = options.completed()
+        remote, readout, tare, say = options.remote, options.readout, options.tare, options.say
+        self.array = Array._of(options.array)
+        #: To begin another one on another address.
+        self._options = replace(options, array=self.array)
+        destinations, sources = options.destinations(), options.named_sources()
+        outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
+        inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in sources if how.startswith(_LSL)}
+        self._inlets = list(inlets.values())
+        self._labels = None if readout is None else list(json.loads(readout.to_json())["neurons"])
+        receivers: list[Callable[[Said], object]] = [*outlets, *([] if say is None else [say])]
+        self._summary: Summary | None = None
+        feed = None if remote is None else remote._fed(options.queue_bytes)
+        self._core = _core.Live(
+            text("host", options.host),
+            whole("port", options.port, 0, 65_535),
+            self.array._parts(),
+            parameters(
+                options.for_rust(
+                    send=[to for to in destinations if not to.startswith(_LSL)],
+                    sources=[(what, _given(inlets[what]) if what in inlets else how) for what, how in sources],
+                )
+            ),
+            options.recording(),
+            None if readout is None else readout.to_json(),
+            tare.to_json() if isinstance(tare, Tare) else None,
+            None if tare is None or isinstance(tare, Tare) else _stretch_us(tare),
+            None if not receivers else lambda *said: [receive(Said(*said)) for receive in receivers],
+            flag("lines", options.lines),
+            feed,
+        )
+        self._remote, self._place = remote, self._core.place()
+        if remote is not None and feed is not None:
+            remote._begin(feed)
+        for what, inlet in inlets.items():
+            inlet.begin(partial(self._core.sample, what))
+
+    def _again(self, port: int, host: str, **changed: Any) -> Live:
+        """Return another one that works alike, of a board that sends to this address."""
+        options = replace(self._options, port=port, host=host, remote=None, **changed)
+        return Live(**{field.name: getattr(options, field.name) for field in fields(options)})
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Host and port that it receives on.
+
+        Raises
+        ------
+        ProblemError : the board is another computer's
+        """
+        if self._remote is not None:
+            raise ProblemError(f"live: receives from {self.place}, and on no address of this computer")
+        return self._core.address()
+
+    @property
+    def place(self) -> str:
+        """Where datagrams come from, in words: "UDP 127.0.0.1:5208", or a remote board's address."""
+        return self._place
+
+    def next(self, timeout: float = 1.0) -> Said | None:
+        """Return the next detection, or None after `timeout` s without one, or at once after the end.
+
+        Raises
+        ------
+        OSError : the disk is full, the socket failed
+        ProblemError : the encoder cannot use what comes
+        """
+        said = self._core.next(number("timeout", timeout))
+        return None if said is None else Said(*said)
+
+    def __iter__(self) -> Iterator[Said]:
+        """Yield detections as they come, until `stop` is called."""
+        while True:
+            over = self._core.is_over()
+            said = self.next(0.0 if over else _WAIT_S)
+            if said is not None:
+                yield said
+            elif over:
+                return
+
+    @property
+    def counters(self) -> dict[str, Any]:
+        """Counts of what came, what became of it and what was lost where, up to now.
+
+        Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
+        (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
+        `taxel.wire_v2.Counts`), `wire_refused` (bytes of version 1 while the board speaks version 2), `wire_changes`,
+        `wire_late` (events of version 2 that came when time had gone on without them), `bridged` (None, or of a board
+        of another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
+        ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
+        `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those output in a
+        silence that an event then interrupted, later than the guard), `detections_dropped`, `sources` (the counts of
+        each other source), `sent` (of each destination: to,
+        sent, lost, waiting, trouble), `decode_latency` and
+        `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
+        drift_ppm, or None), `board_us`, `markers`, `marked_start`, `seconds`, `taring`.
+
+        Sums: messages at the socket = messages + dropped_by_kernel (a message is a datagram, or a train of them with
+        `gro`); datagrams = decoded + dropped_by_queue + waiting; bytes = 5 words + skipped; events = read_out +
+        events_dropped; detections = sent + lost + waiting of each destination.
+        """
+        if self._summary is not None:
+            return self._summary.counters
+        counters: dict[str, Any] = json.loads(self._core.counters())
+        return counters
+
+    @property
+    def picture(self) -> NDArray[np.uint16]:
+        """Values that the taxels hold, ticks, shape (rows, columns), ten times a second; 0 without any event so far."""
+        return self._core.picture().reshape(self.array.shape)
+
+    @property
+    def tare(self) -> Tare | None:
+        """The fresh tare, once it is complete."""
+        if self._summary is not None:
+            return self._summary.tare
+        taken = self._core.tare()
+        return None if taken is None else Tare.from_json(taken)
+
+    def take_markers(self) -> list[tuple[int, bool]]:
+        """Return the markers that came since the last call: (t us, start)."""
+        return self._core.take_markers()
+
+    def expect_version(self, version: int) -> None:
+        """Announce that the board was told to speak this version of the wire: decoded at once, not after a second.
+
+        Raises
+        ------
+        ProblemError : no such version
+        """
+        self._core.expect_version(whole("version", version, 1, 2))
+
+    def source_address(self, name: str) -> tuple[str, int]:
+        """Return host and port that another board of the recording sends to.
+
+        Raises
+        ------
+        ProblemError : no other board of that name
+        """
+        address = self._core.source_address(text("name", name))
+        if address is None:
+            raise ProblemError(f"source {name!r}: no other board has that name")
+        return address
+
+    def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
+        """Record numbers of a source whose values a program gives.
+
+        Parameters
+        ----------
+        name : str
+        values : float, one for each column of the source, its own stamp among them
+        arrived_ns : int, ns since 1970, optional
+            When they came; now, where it is left out.
+
+        Raises
+        ------
+        ProblemError : no such source, or other columns
+        OSError : the disk is full
+        """
+        came = None if arrived_ns is None else whole("arrived_ns", arrived_ns, 0)
+        self._core.sample(text("name", name), numbers("values", values, np.float64).reshape(-1).tolist(), came)
+
+    def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
+        """Take the values that taxels hold for their rest from now on: for taxels that drift.
+
+        The readout's encoder reads them above that rest, where it uses a tare; the recording states the zeroing, with
+        the rests before and after, and `taxel.detect.run` applies it. Only done on request: a load that stands on a
+        taxel then would be taken for its rest.
+
+        Parameters
+        ----------
+        x, y : int, or shape (n,)
+            Columns and rows.
+
+        Raises
+        ------
+        ProblemError : a taxel that does not exist or has had no event so far (names it; then none is zeroed), a tare
+            that is being taken, or a `.lsa` that is recorded, which cannot hold it
+        OSError : the disk is full
+        """
+        columns, rows = (numbers(name, given, np.int64).reshape(-1) for name, given in (("x", x), ("y", y)))
+        if len(columns) != len(rows):
+            raise ProblemError(f"x has {len(columns)} columns, y {len(rows)} rows: must be as many")
+        for name, given in (("x", columns), ("y", rows)):
+            if len(given) and (given.min() < 0 or given.max() > _MOST_PLACE):
+                raise ProblemError(
+                    f"{name}: holds {given.min() if given.min() < 0 else given.max()}, must be a taxel's"
+                )
+        return tuple(Zeroing(*one) for one in self._core.zero(list(zip(columns.tolist(), rows.tolist(), strict=True))))
+
+    @property
+    def zeroed(self) -> tuple[Zeroing, ...]:
+        """The latest zeroing of each taxel that was zeroed, by `zero` or a panel."""
+        return tuple(Zeroing(*one) for one in self._core.zeroed())
+
+    def note(self, said: str) -> None:
+        """Write a note into the recording, with the time of now.
+
+        Raises
+        ------
+        ProblemError : nothing is recorded, or to a `.lsa`, which holds bytes only
+        """
+        self._core.note(text("note", said))
+
+    def record(
+        self, path: str | os.PathLike[str], *, compression: str = "none", overwrite: bool = False
+    ) -> Summary | None:
+        """Record what comes from here on, of all sources, beginning with the registers and the taxels' values.
+
+        A recording that runs ends with what came before: each datagram, and each line, belongs to one of the two.
+
+        Parameters
+        ----------
+        path : path
+            As `record` of the constructor; so are the others.
+        compression : {"none", "lz4", "zstd"}
+        overwrite : bool
+
+        Returns
+        -------
+        Summary or None : how the recording that ran ended, with what came while it ran (latencies are of all)
+
+        Raises
+        ------
+        FileExistsError : the file is there already and `overwrite` is false; the recording that runs goes on
+        OSError : the file cannot be created; the disk was full before the end of the one that ran
+        ProblemError : `record_later` was not given
+        """
+        place = checked_path("path", path)
+        ended = self._core.record(place, text("compression", compression), flag("overwrite", overwrite))
+        return None if ended is None else summary_of(ended)
+
+    def record_again(self) -> bool:
+        """Let the recording that runs begin anew, where no source has given anything; return whether it does."""
+        return self._core.record_again()
+
+    def end_recording(self) -> Summary:
+        """End the recording that `record` began; a file to which nothing came is not kept.
+
+        Raises
+        ------
+        OSError : the disk was full before its end; what was written before stays readable
+        ProblemError : nothing is recorded
+        """
+        return summary_of(self._core.end_recording())
+
+    @property
+    def records(self) -> bool:
+        """Whether a recording that `record` began runs; false where an error ended it, which `end_recording` raises."""
+        return self._core.records()
+
+    def stop(self) -> Summary:
+        """Process what has arrived, close the file, and return what was lost; every call returns the same summary.
+
+        Raises
+        ------
+        OSError : the disk is full, and what was written before stays readable; or the file was removed, renamed or
+            replaced while it was recorded, which names what is lost
+        ProblemError : called by `say`, in a forked child, or after an end by an error
+        """
+        inlets, self._inlets = self._inlets, []
+        for inlet in inlets:
+            inlet.close()
+        if self._summary is None:
+            self._summary = summary_of(self._core.stop())
+        return self._summary
+
+    def __enter__(self) -> Live:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if error is None:
+            self.stop()
+        elif self._summary is None:
+            # The first error is the one to report.
+            with contextlib.suppress(OSError, _core.Error):
+                self.stop()
+
+    def __repr__(self) -> str:
+        if self._summary is not None:
+            return f"Live(ended; {self._summary.verdict})"
+        return f"Live({self.place}, {self.array.rows} x {self.array.columns} taxels)"
+
+
+def _given(inlet: LslInlet) -> str:
+    return f"given,columns={':'.join(inlet.columns)}"
+
+
+def _stretch_us(seconds: float) -> int:
+    stretch = number("tare", seconds)
+    if not 1e-6 <= stretch <= 3600:
+        raise ProblemError(f"tare is {stretch} s: must lie between 1 us and an hour, or be a taxel.Tare")
+    return round(stretch * 1e6)

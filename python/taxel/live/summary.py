@@ -1,0 +1,74 @@
+"""How a `Live`, or one of its recordings, ended."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from taxel.tare import Tare
+
+__all__ = ["Summary", "delays"]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Report how a `Live`, or a recording of one, ended.
+
+    Attributes
+    ----------
+    counters : dict
+        As `Live.counters`; its sums are closed.
+    verdict : str
+        One line: nothing lost after arrival, what was lost where, or that nothing came.
+    path : Path or None
+        The recording; none where nothing came: then a new file is removed, and an earlier one stays.
+    tare : Tare or None
+        The fresh tare, where one was completed.
+    """
+
+    counters: dict[str, Any]
+    verdict: str
+    path: Path | None
+    tare: Tare | None
+
+    @property
+    def lost(self) -> int:
+        """How much was lost after it had arrived: messages in the kernel, datagrams in our queue; 0 is nothing.
+
+        Of a board of another computer also what was lost there and between the two.
+        """
+        boards = [self.counters, *(one for one in self.counters["sources"].values() if "capture" in one)]
+        lost = sum(int(one["capture"]["dropped_by_kernel"] + one["capture"]["dropped_by_queue"]) for one in boards)
+        bridged = self.counters["bridged"] or {}
+        return lost + sum(int(bridged.get(cause, 0)) for cause in ("missing", "dropped", "dropped_by_kernel"))
+
+    @property
+    def nothing_came(self) -> bool:
+        """Whether no datagram has come, lost ones included."""
+        capture = self.counters["capture"]
+        return not capture["messages"] + capture["dropped_by_kernel"]
+
+
+def summary_of(text: str) -> Summary:
+    """Return the summary that Rust gives as JSON."""
+    values = json.loads(text)
+    path = None if values["path"] is None else Path(values["path"])
+    taken = None if values["tare"] is None else Tare.from_json(json.dumps(values["tare"]))
+    return Summary(values["counters"], values["verdict"], path, taken)
+
+
+def delays(measured: dict[str, Any]) -> str:
+    """Return median and 99 % of a latency of `Live.counters` in words, or that nothing was measured.
+
+    Examples
+    --------
+    >>> delays({"count": 5, "p50_us": 41.2, "p99_us": 1300.0, "max_us": 1300.0})
+    'p50 41 us, p99 1,300 us'
+    >>> delays({"count": 0, "p50_us": None, "p99_us": None, "max_us": None})
+    'nothing measured'
+    """
+    if not measured["count"]:
+        return "nothing measured"
+    return f"p50 {measured['p50_us']:,.0f} us, p99 {measured['p99_us']:,.0f} us"

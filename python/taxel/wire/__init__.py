@@ -1,0 +1,29 @@
+"""Bytes to events and back: the board's wire in both versions, its commands and its registers.
+
+Version 1 is the thesis' (Appendix 1, sections 3 to 5); version 2 is ours, in which every loss shows (docs: *Wire
+version 2*).
+"""
+
+from taxel.wire.columns import Columns
+from taxel.wire.command import Command
+from taxel.wire.counts import Counts, Received, Status
+from taxel.wire.decoder import Decoder, decode
+from taxel.wire.encode import encode
+from taxel.wire.registers import FRAME_US, PRESETS, Registers, described
+from taxel.wire.stream import StreamReader
+
+__all__ = [
+    "FRAME_US",
+    "PRESETS",
+    "Columns",
+    "Command",
+    "Counts",
+    "Decoder",
+    "Received",
+    "Registers",
+    "Status",
+    "StreamReader",
+    "decode",
+    "described",
+    "encode",
+]

@@ -1,0 +1,123 @@
+"""Memory that a decoder fills."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel._base.arguments import instance, whole
+from taxel._base.columns import frozen
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.events import Events
+
+__all__ = ["Columns"]
+
+#: Rows from which on NumPy asks for large pages for the narrowest column too (from 4 MB on): the first write to each
+#: small page costs more than what is written there.
+_LARGE = 1 << 22
+
+
+def _on_a_line(n: int, dtype: Any) -> NDArray[Any]:
+    """Return memory for n values that begins on a cache line, as the decoder writes whole lines fastest."""
+    size = np.dtype(dtype).itemsize
+    memory = np.empty(n + 64 // size, dtype)
+    first = -memory.__array_interface__["data"][0] % 64 // size
+    return memory[first : first + n]
+
+
+class Columns:
+    """Keep memory for decoded events, to be filled again and again (`Decoder.push_into`, `decode`).
+
+    Fresh memory costs more than decoding: the first write to each page is a call of the kernel.
+
+    Parameters
+    ----------
+    rows : int, 1 or more
+        How many events there is room for; ``len(data) // 5 + 2`` is enough for `data`.
+
+    Raises
+    ------
+    ProblemError : no whole number, or below 1
+
+    Examples
+    --------
+    >>> columns, decoder = Columns(1000), Decoder()
+    >>> decoder.push_into(columns, bytes.fromhex("c000050304 c000060304"))
+    Events(1 events, 500 to 500 us, 64 x 64 taxels, no intensities)
+    """
+
+    def __init__(self, rows: int) -> None:
+        self._lay_out(whole("rows", rows, 1, 2**48), _on_a_line)
+
+    def _lay_out(self, n: int, memory: Callable[[int, Any], NDArray[Any]]) -> None:
+        try:
+            self.t: NDArray[np.int64] = memory(n, np.int64)
+            self.x: NDArray[np.uint16] = memory(n, np.uint16)
+            self.y: NDArray[np.uint16] = memory(n, np.uint16)
+            self.intensity: NDArray[np.uint16] = memory(n, np.uint16)
+            self.p: NDArray[np.bool_] = memory(n, np.bool_)
+            self.present: NDArray[np.bool_] = memory(n, np.bool_)
+        except MemoryError:
+            raise ProblemError(f"rows is {n}: there is no memory for so many") from None
+
+    def __len__(self) -> int:
+        return len(self.t)
+
+    def __repr__(self) -> str:
+        return f"Columns(room for {len(self)} events)"
+
+    def _parts(
+        self,
+    ) -> tuple[
+        NDArray[np.int64],
+        NDArray[np.uint16],
+        NDArray[np.uint16],
+        NDArray[np.uint16],
+        NDArray[np.uint8],
+        NDArray[np.uint8],
+    ]:
+        p, present = self.p.view(np.uint8), self.present.view(np.uint8)
+        return self.t, self.x, self.y, self.intensity, p, present
+
+    @classmethod
+    def _fresh(cls, rows: int) -> Columns:
+        """Return columns with room for `rows` events, to be filled once (`_given`), which own their memory whole."""
+        columns = cls.__new__(cls)
+        columns._lay_out(max(rows, _LARGE) if rows >= _LARGE // 4 else rows, np.empty)
+        return columns
+
+    @classmethod
+    def _asked_for(cls, columns: Columns | None, rows: int) -> tuple[Columns, bool]:
+        """Return the caller's columns, or fresh ones for so many rows; and whether they are fresh."""
+        return (cls._fresh(rows), True) if columns is None else (instance("columns", columns, cls), False)
+
+    def _first(
+        self,
+        array: Array,
+        rows: int,
+        paired: bool,
+        repaired: NDArray[np.bool_] | None,
+        markers: Sequence[tuple[int, bool]],
+    ) -> Events:
+        """Return the first rows as events that are views of the columns."""
+        ticks, present = (self.intensity[:rows], self.present[:rows]) if paired else (None, None)
+        t, x, y, p = self.t[:rows], self.x[:rows], self.y[:rows], self.p[:rows]
+        return Events._unchecked(t, x, y, p, array, ticks, present, repaired, tuple(markers))
+
+    def _given(
+        self,
+        array: Array,
+        rows: int,
+        paired: bool,
+        repaired: NDArray[np.bool_] | None,
+        markers: Sequence[tuple[int, bool]],
+    ) -> Events:
+        """Return the first rows as events that own the columns; memory that no event needs is given back."""
+        for filled in vars(self).values():
+            filled.resize(rows, refcheck=False)
+            frozen(filled)
+        return self._first(array, rows, paired, repaired, markers)

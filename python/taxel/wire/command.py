@@ -1,0 +1,56 @@
+"""Commands, host to board: five bytes that set a register (thesis, Appendix 1, Table 5.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from taxel import _core
+from taxel._base.arguments import whole
+from taxel.wire.given import given_bytes
+
+__all__ = ["Command"]
+
+
+@dataclass(frozen=True)
+class Command:
+    """Set one of the board's 32-bit registers: five bytes on the serial line (Table 5.1).
+
+    Parameters
+    ----------
+    register : int, 0 to 7
+    value : int, 0 to 2**32 - 1
+        The whole register.
+
+    Raises
+    ------
+    ProblemError : out of these ranges
+
+    Examples
+    --------
+    >>> Command(1, 300).to_bytes().hex()
+    '900000012c'
+    >>> Command.from_bytes(bytes.fromhex("900000012c"))
+    Command(register=1, value=300)
+    """
+
+    register: int
+    value: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "register", whole("register", self.register, 0, 7))
+        object.__setattr__(self, "value", whole("value", self.value, 0, 2**32 - 1))
+
+    def to_bytes(self) -> bytes:
+        """Return the five bytes."""
+        return _core.command_bytes(self.register, self.value)
+
+    @classmethod
+    def from_bytes(cls, data: Any) -> Command:
+        """Read five bytes.
+
+        Raises
+        ------
+        FormatError : not five bytes, or a top bit out of place (names the byte)
+        """
+        return cls(*_core.command_read(given_bytes(data)))

@@ -1,0 +1,264 @@
+"""Bytes of version 1, or datagrams of version 2, to events."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from taxel import _core
+from taxel._base.arguments import column, flag, instance, text, whole
+from taxel._core import ProblemError
+from taxel.array import Array
+from taxel.events import Events
+from taxel.wire.columns import Columns
+from taxel.wire.counts import Counts, Received, Status
+from taxel.wire.given import given_bytes
+
+__all__ = ["Decoder", "decode"]
+
+_PAIRINGS = ("direct", "taxel")
+
+
+def decode(
+    data: Any,
+    version: Literal[1, 2] = 1,
+    *,
+    array: Array | None = None,
+    pairing: Literal["direct", "taxel"] = "direct",
+    differences: bool = False,
+    lengths: ArrayLike | None = None,
+    columns: Columns | None = None,
+) -> Events:
+    """Read a whole stream; see `Decoder`, which also counts what is dropped.
+
+    Parameters
+    ----------
+    data : bytes, or anything with a contiguous buffer
+        Version 1: words, one behind the other. Version 2: datagrams of one board, each with its length before it (16
+        bits, little-endian).
+    version : {1, 2}
+    array : Array, optional
+        The sensor; the thesis' 64 x 64 where it is left out.
+    pairing : {"direct", "taxel"}
+        Version 1, as in `Decoder`.
+    differences : bool
+        Version 1, as in `Decoder`.
+    lengths : array of int, shape (datagrams,), optional
+        Version 1: bytes of each datagram, where `data` is datagrams one behind the other. Each is then decoded by
+        itself, so that no intensity belongs to a change of the datagram before.
+    columns : Columns, optional
+        Memory that is used again, with room for ``len(data) // 5 + 2`` events, of version 2 for ``len(data) // 2 +
+        32``: the events are views of it, good until it is filled again. With pairing "taxel", and where it is left out,
+        they have memory of their own.
+
+    Returns
+    -------
+    Events
+
+    Raises
+    ------
+    ProblemError : an argument that makes no sense; damage in the bytes is no error
+
+    Examples
+    --------
+    >>> decode(bytes.fromhex("c000050304 e000280304"))
+    Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+    >>> from taxel.simulate import Board
+    >>> from taxel.wire import Registers
+    >>> sent = Board(Registers(wire_version=2)).frame(np.full(4096, 40, np.uint16))
+    >>> decode(b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent), version=2)
+    Events(4096 events, 0 to 0 us, 64 x 64 taxels, 4096 intensities)
+    """
+    decoder = Decoder(version, array=array, pairing=pairing, differences=differences)
+    stream = given_bytes(data)
+    room, own = Columns._asked_for(columns, _core.wire_rows(decoder.version, len(stream)))
+    if decoder.version == 2:
+        if lengths is not None:
+            raise ProblemError("lengths: each datagram of version 2 has its own before it; leave them out")
+        filled = _core.decode_datagrams(stream, decoder.array._parts(), room._parts())[0]
+    elif lengths is not None:
+        filled = decoder._core.fill_datagrams(stream, column("lengths", lengths, np.int64), room._parts())
+    else:
+        filled = decoder._core.fill(stream, None, room._parts(), pairing == "direct")
+    events = (room._given if own else room._first)(decoder.array, *filled)
+    if pairing == "taxel":
+        markers, events = events.markers, decoder.finish()
+        events.markers = markers
+    return events
+
+
+class Decoder:
+    """Turn what a board sends into events as it comes.
+
+    Damage is never an error: `counts` has all that was dropped, by cause. Of version 1 the events are the same wherever
+    the bytes are cut: the decoder finds its place again at the next first byte, and a change waits for the next word,
+    which may be its intensity, for the end of its datagram (`end_of_datagram`) or of the stream (`finish`), and no
+    longer. Of version 2 each intact datagram is decoded once, whatever was lost, repeated, reordered or damaged; the
+    decoder belongs to the first board of which it receives one.
+
+    Parameters
+    ----------
+    version : {1, 2}
+    array : Array, optional
+        The sensor; the thesis' 64 x 64 where it is left out. Events outside it are counted and dropped.
+    pairing : {"direct", "taxel"}
+        Version 1: which change an intensity belongs to. "direct": the word before it, if that is a change of the same
+        taxel. "taxel": the latest change of that taxel that has none yet, for boards that order otherwise; all events
+        then wait for `finish`, so it is for whole recordings.
+    differences : bool
+        Version 1: whether intensities are differences from the last value sent (the panel's "delta intensity"), which
+        bytes do not show. They are then added up from 0, so that `Events` hold values; right from the board's reset on
+        and until an intensity is lost. A datagram of version 2 has a flag for it.
+
+    Raises
+    ------
+    ProblemError : an argument that makes no sense
+
+    Notes
+    -----
+    Table 5.4, and the page *Wire version 2*. Time of version 1 is unwrapped into 64 bits: a stamp up to 0.1 s behind
+    the latest time is a step back (counted, kept), any other lies ahead, so silences of up to 6.45 s are right. Arrival
+    times tell how long a longer one was.
+
+    Examples
+    --------
+    >>> decoder = Decoder()
+    >>> decoder.push(bytes.fromhex("c000050304 e00028"))
+    Events(0 events, no time, 64 x 64 taxels, no intensities)
+    >>> decoder.push(bytes.fromhex("0304"))
+    Events(1 events, 500 to 500 us, 64 x 64 taxels, 1 intensities)
+    >>> decoder.counts.words, decoder.counts.skipped
+    (2, 0)
+
+    >>> from taxel.simulate import Board
+    >>> from taxel.wire import Registers
+    >>> board, decoder = Board(Registers(wire_version=2)), Decoder(version=2)
+    >>> ticks = np.zeros(4096, np.uint16)
+    >>> ticks[board.array.index(3, 4)] = 40
+    >>> [decoder.push(datagram) for datagram in board.frame(ticks)]
+    [Events(1 events, 0 to 0 us, 64 x 64 taxels, 1 intensities)]
+    >>> decoder.last, decoder.counts.intact, decoder.counts.missing
+    (Received(until=192, intact=True), 1, 0)
+    """
+
+    def __init__(
+        self,
+        version: Literal[1, 2] = 1,
+        *,
+        array: Array | None = None,
+        pairing: Literal["direct", "taxel"] = "direct",
+        differences: bool = False,
+    ) -> None:
+        self.version = whole("version", version, 1, 2)
+        self.array = Array._of(array)
+        text("pairing", pairing, _PAIRINGS)
+        if self.version == 2 and (pairing != "direct" or flag("differences", differences)):
+            raise ProblemError("pairing and differences are of version 1: datagrams of version 2 say both themselves")
+        parts = self.array._parts()
+        self._core = _core.WireDecoder(self.version, parts, pairing, flag("differences", differences))
+
+    def push(self, data: Any, arrived: int | None = None) -> Events:
+        """Decode the next bytes of version 1, or a datagram of version 2; return the events that they complete.
+
+        Parameters
+        ----------
+        data : bytes, or anything with a contiguous buffer
+        arrived : int, us, optional
+            The host's clock when they came. Of version 1 it chooses the wrap of the 16-bit time after a silence of more
+            than 6.45 s; of version 2 it says how much time has passed at a reset of the board.
+
+        Returns
+        -------
+        Events
+
+        Raises
+        ------
+        ProblemError : `data` is not bytes, or `arrived` not a whole number
+        """
+        stream = given_bytes(data)
+        columns = Columns._fresh(_core.wire_rows(self.version, len(stream)))
+        return columns._given(self.array, *self._fill(columns, stream, arrived))
+
+    def push_into(self, columns: Columns, data: Any, arrived: int | None = None) -> Events:
+        """Decode into memory that is used again; return the events as views of it.
+
+        The events are good until the columns are filled again: copy what is to be kept.
+
+        Parameters
+        ----------
+        columns : Columns
+            With room for ``len(data) // 5 + 2`` events, of version 2 for ``len(data) // 2 + 32``.
+        data : bytes, or anything with a contiguous buffer
+        arrived : int, us, optional
+            As in `push`.
+
+        Returns
+        -------
+        Events
+
+        Raises
+        ------
+        ProblemError : too little room, or as `push`
+        """
+        room = instance("columns", columns, Columns)
+        return room._first(self.array, *self._fill(room, given_bytes(data), arrived))
+
+    def _fill(
+        self, columns: Columns, data: NDArray[np.uint8], arrived: int | None
+    ) -> tuple[int, bool, NDArray[np.bool_] | None, list[tuple[int, bool]]]:
+        """Fill columns; return rows, whether with intensities, which of them states gave, markers."""
+        when = None if arrived is None else whole("arrived", arrived)
+        return self._core.fill(data, when, columns._parts(), False)
+
+    def end_of_datagram(self) -> Events:
+        """End a datagram of version 1; return the change that waited for its intensity, if there is one.
+
+        Returns
+        -------
+        Events, at most one; none of version 2, in which no event waits
+        """
+        return Events._from_parts(self._core.end_of_datagram(), self.array)
+
+    def finish(self) -> Events:
+        """End a stream of version 1; return the rest. The decoder is then as new, but for its counts.
+
+        Returns
+        -------
+        Events, none of version 2, in which no event waits
+        """
+        return Events._from_parts(self._core.finish(), self.array)
+
+    @property
+    def counts(self) -> Counts:
+        """What was read, dropped and missed so far."""
+        return Counts(**json.loads(self._core.counts()))
+
+    @property
+    def last(self) -> Received | None:
+        """What the last datagram of version 2 was; None before the first, and of version 1."""
+        last = self._core.last()
+        return None if last is None else Received(*last)
+
+    @property
+    def status(self) -> Status | None:
+        """The totals that a board of version 2 last sent; None before, and of version 1."""
+        status = self._core.status()
+        return None if status is None else Status(**json.loads(status))
+
+    @property
+    def held(self) -> NDArray[np.int32]:
+        """What each taxel holds, shape (rows, columns), ticks; -1 where that is not known.
+
+        Of version 1 it is known with `differences` alone: without them the latest intensity of a taxel is in the
+        events.
+        """
+        return self._core.held().reshape(self.array.rows, self.array.columns)
+
+    def __repr__(self) -> str:
+        c, size = self.counts, f"{self.array.rows} x {self.array.columns} taxels"
+        if self.version == 2:
+            return f"Decoder(version 2, {size}, {c.intact} datagrams, {c.missing} missing)"
+        return f"Decoder({size}, {c.changes} events, {c.skipped} bytes skipped)"

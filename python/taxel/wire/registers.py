@@ -1,0 +1,264 @@
+"""The board's registers: sets, presets and rules (thesis, Appendix 1, Table 5.5)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from taxel import _core
+from taxel._base.arguments import flag, instance, number, several, shown, text, whole
+from taxel._core import DeviceError, ProblemError
+from taxel.array import Array
+from taxel.wire.command import Command
+
+__all__ = ["FRAME_US", "PRESETS", "Registers", "described"]
+
+#: The names that `Registers.preset` knows.
+PRESETS: tuple[str, ...] = tuple(_core.registers_presets())
+
+#: The fields as registers.toml has them, by name.
+_FIELDS: dict[str, Any] = {field["name"]: field for field in json.loads(_core.registers_fields())}
+#: Fields in units of 10 ns in the registers, in us here.
+_TIMES = tuple(name for name, field in _FIELDS.items() if field["unit"] == "10 ns")
+_FLAGS = tuple(name for name, field in _FIELDS.items() if field["unit"] == "flag")
+_MANUAL = {field["manual"]: name for name, field in _FIELDS.items() if field["manual"] != name}
+
+
+class Registers:
+    """Hold what the board's registers say; a set that breaks a rule cannot be made.
+
+    "Line" is the driven line, the outer step of the scan; "step" the inner one, the multiplexer's. The manual's names
+    (`row_change_period`, `ramp_time`, `nrows` ...) are aliases, in the manual's units (10 ns, ticks, lines less one).
+
+    Parameters
+    ----------
+    line_period, line_read : float, us
+        Time from one driven line to the next, and the part of it in which the line is read.
+    step_period, step_read : float, us
+        Time from one multiplexer step to the next, and the part of it in which the channels are read.
+    ramp : int, ticks of 1/300 us
+        How long the ramp rises.
+    noise_floor : int, ticks
+        A difference above it makes an event.
+    lines : int, 1 to 256
+        Driven lines.
+    random_lines, mechanoreceptor, invert_comparator, frame_sync, record : bool
+    wire_version : {1, 2}
+        Version 1 names 64 x 64 taxels at most.
+    threshold_rest, threshold_jump, threshold_decay : int, in 1/1024, 1/256 theta_0, 1/1024 theta_0
+        FA-1 on the board, where `mechanoreceptor` is set.
+    channels : {16, 64}
+        Of the converter: the board's build, not a register. A line of 64 taxels has 4 steps with 16, one with 64.
+    array : Array, optional
+        The sensor; the thesis' 64 x 64 where it is left out.
+
+    Raises
+    ------
+    DeviceError : a rule is broken (says which, with the numbers)
+    ProblemError : no such field, a value that is no number, a time that is no multiple of 0.01 us
+
+    Notes
+    -----
+    Table 5.5 and the page *Registers*; what is left out is as a board of this array holds it at reset: up to 64 x 64
+    taxels the preset "5.2 kHz".
+
+    Examples
+    --------
+    >>> fast = Registers.preset("5.2 kHz")
+    >>> fast.frame_us, fast.line_period, fast.row_change_period
+    (192.0, 3.0, 300)
+    >>> [command.register for command in fast.commands_to(Registers.preset("2 kHz"))]
+    [1, 2, 3, 4, 5]
+    >>> fast.replace(line_read=3.2)
+    Traceback (most recent call last):
+    taxel.DeviceError: line_read 3.20 us is longer than line_period 3.00 us (rule 1)
+    """
+
+    _held: dict[str, Any]
+
+    def __init__(self, *, array: Array | None = None, **fields: float) -> None:
+        sensor = Array._of(array)
+        channels = whole("channels", fields.get("channels", 16), 0, 255)
+        self._set(json.loads(_core.registers_at_reset(sensor._parts(), channels)), fields, sensor)
+
+    def _set(self, held: dict[str, Any], fields: dict[str, float], array: Array | None) -> None:
+        self.array = Array._of(array)
+        raw = [(name, _raw(name, value)) for name, value in fields.items()]
+        self._held = json.loads(_core.registers_with(json.dumps(held), raw, self.array._parts()))
+
+    @classmethod
+    def preset(cls, name: str, *, array: Array | None = None) -> Registers:
+        """Return one of `PRESETS`.
+
+        Raises
+        ------
+        ProblemError : no such preset (names those that there are)
+        DeviceError : the array has fewer lines than the preset drives
+        """
+        registers = cls.__new__(cls)
+        registers._set(json.loads(_core.registers_preset(text("preset", name))), {}, array)
+        return registers
+
+    @classmethod
+    def _of(cls, held: dict[str, Any], array: Array) -> Registers:
+        """Return the set that a file or a board holds, in the registers' own units."""
+        registers = cls.__new__(cls)
+        registers._set(held, {}, array)
+        return registers
+
+    @classmethod
+    def _of_source(cls, array: Array, rate_hz: float, bits: int) -> tuple[Registers, int]:
+        """Return what a board holds that scans another sensor's frames, and how often it halves their values."""
+        held, halved = _core.registers_of_source(array._parts(), rate_hz, bits)
+        return cls._of(json.loads(held), array), halved
+
+    @classmethod
+    def from_words(cls, words: Sequence[int], *, array: Array | None = None, channels: int = 16) -> Registers:
+        """Return the set that eight 32-bit registers hold, REG0 first; of REG6 nothing is looked at.
+
+        Raises
+        ------
+        DeviceError : they break a rule
+        ProblemError : not eight numbers of 32 bits
+
+        Examples
+        --------
+        >>> fast = Registers.preset("5.2 kHz")
+        >>> Registers.from_words(fast.words) == fast
+        True
+        """
+        eight = [whole(f"words[{n}]", word, 0, 2**32 - 1) for n, word in enumerate(several("words", words))]
+        if len(eight) != 8:
+            raise ProblemError(f"words: {len(eight)}, must be 8")
+        held = _core.registers_of_words(eight, whole("channels", channels, 0, 255))
+        return cls._of(json.loads(held), Array._of(array))
+
+    def replace(self, **fields: float) -> Registers:
+        """Return a set with some fields changed, by taxel's names or the manual's.
+
+        Raises
+        ------
+        DeviceError, ProblemError : as for a new set
+        """
+        registers = Registers.__new__(Registers)
+        registers._set(self._held, fields, self.array)
+        return registers
+
+    def with_preset(self, name: str) -> Registers:
+        """Return a set that took over one of `PRESETS`, with as many lines as the array has.
+
+        A preset says neither which version of the wire the board speaks nor whether a recording runs: these stay, as
+        do the channels, which are the board's build.
+
+        Raises
+        ------
+        ProblemError : no such preset for boards of that size (names those that there are)
+        DeviceError : the board could not hold it (names the rule)
+
+        Examples
+        --------
+        >>> slow = Registers(wire_version=2).with_preset("2 kHz")
+        >>> slow.line_period, slow.noise_floor, slow.wire_version
+        (7.81, 10, 2)
+        """
+        named = text("preset", name)
+        held = json.loads(_core.registers_with_preset(self._json(), named, self.array._parts()))
+        return self._of(held, self.array)
+
+    @property
+    def frame_us(self) -> float:
+        """A frame's length, us: lines times line period."""
+        return _core.registers_words(self._json())[1]
+
+    @property
+    def words(self) -> tuple[int, ...]:
+        """The eight 32-bit registers, REG0 first."""
+        return tuple(_core.registers_words(self._json())[0])
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is allowed but hardly meant (rules 5 and 6), a line each."""
+        return tuple(_core.registers_check(self._json(), self.array._parts()))
+
+    def commands_to(self, target: Registers) -> list[Command]:
+        """Return the writes that lead from this set to another, in an order in which none is refused on the way.
+
+        `record` stays as it is: starting a recording is a command of its own.
+
+        Raises
+        ------
+        DeviceError : the sets are for boards with different channels
+        """
+        other = instance("target", target, Registers)
+        commands = _core.registers_commands(self._json(), other._json(), self.array._parts())
+        return [Command(register, value) for register, value in commands]
+
+    def _json(self) -> str:
+        return json.dumps(self._held)
+
+    def __getattr__(self, name: str) -> Any:
+        held = self.__dict__.get("_held", {})
+        if name in held:
+            return held[name] / 100 if name in _TIMES else held[name]
+        if name in _MANUAL and held:
+            value = held[_MANUAL[name]]
+            return int(value) - _FIELDS[_MANUAL[name]]["offset"]
+        raise AttributeError(f"Registers have no {name!r}")
+
+    def __dir__(self) -> Sequence[str]:
+        return [*super().__dir__(), *self._held, *_MANUAL]
+
+    def __eq__(self, other: object) -> bool:
+        return self._held == other._held if isinstance(other, Registers) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        fields = (f"{name}={getattr(self, name)}" for name in self._held)
+        return f"Registers({', '.join(fields)})"
+
+
+def described(registers: Registers) -> list[tuple[str, float, str, str, str]]:
+    """Return each field of a set: its name, value, unit, place in the registers, and what it is for.
+
+    Examples
+    --------
+    >>> described(Registers())[9][:4]
+    ('step_read', 0.55, 'us', 'REG3[31:16]')
+    """
+    held, rows = instance("registers", registers, Registers), []
+    for name, field in _FIELDS.items():
+        low, high = field["shift"], field["shift"] + int(field["mask"]).bit_length() - 1
+        bits = f"{high}:{low}" if high > low else f"{low}"
+        unit = {"10 ns": "us", "flag": ""}.get(field["unit"], field["unit"])
+        rows.append((name, float(getattr(held, name)), unit, f"REG{field['register']}[{bits}]", field["text"]))
+    return rows
+
+
+def _raw(name: str, value: object) -> int:
+    """Return a field's value in the register's own unit."""
+    if name in _TIMES:
+        units = number(name, value) * 100
+        if not abs(units - np.rint(units)) < 1e-6:
+            raise ProblemError(f"{name} is {shown(value)} us: must be a whole multiple of 0.01 us")
+        if not 0 <= units < 2**32:
+            raise DeviceError(f"{name} {shown(value)} us does not fit its bits (rule 4)")
+        return int(np.rint(units))
+    if _MANUAL.get(name, name) in _FLAGS:
+        return int(flag(name, bool(value) if isinstance(value, int) and value in (0, 1) else value))
+    try:
+        return whole(name, value, 0, 2**32 - 1)
+    except ProblemError:
+        # A number that a register's word could hold is judged by the rules, others here.
+        field = _FIELDS.get(_MANUAL.get(name, name))
+        if field is None:
+            raise
+        least, most = (field[end] - (field["offset"] if name in _MANUAL else 0) for end in ("least", "greatest"))
+        raise ProblemError(f"{name} is {shown(value)}: must be a whole number from {least} to {most}") from None
+
+
+#: The length of the board's frames at reset, us.
+FRAME_US: float = Registers().frame_us

@@ -1,0 +1,62 @@
+"""Streams of version 2: datagrams, each with its length before it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from taxel import _core
+from taxel.wire.given import given_bytes
+
+__all__ = ["StreamReader"]
+
+
+class StreamReader:
+    """Cut a file or stream into datagrams, each of which has its length before it (16 bits, little-endian).
+
+    What is no datagram is skipped byte by byte, to the next place where length, magic and checksum agree.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from taxel.simulate import Board
+    >>> from taxel.wire import Registers
+    >>> sent = Board(Registers(wire_version=2)).frame(np.full(4096, 40, np.uint16))
+    >>> data = b"".join(len(datagram).to_bytes(2, "little") + datagram for datagram in sent)
+    >>> reader = StreamReader()
+    >>> reader.push(b"noise" + data) == sent, reader.skipped
+    (True, 5)
+    """
+
+    def __init__(self) -> None:
+        self._core = _core.DatagramStream()
+
+    def push(self, data: Any) -> list[bytes]:
+        """Read the next bytes; return the datagrams that they complete.
+
+        Parameters
+        ----------
+        data : bytes, or anything with a contiguous buffer
+
+        Returns
+        -------
+        list of bytes, one a datagram, without its length
+
+        Raises
+        ------
+        ProblemError : `data` is not bytes
+        """
+        return self._core.push(given_bytes(data))
+
+    def finish(self) -> list[bytes]:
+        """End the stream; return the datagrams within bytes that seemed to begin a longer one.
+
+        Returns
+        -------
+        list of bytes, one a datagram, without its length
+        """
+        return self._core.finish()
+
+    @property
+    def skipped(self) -> int:
+        """Bytes that belonged to no datagram; those that may still become one count once the stream has ended."""
+        return self._core.skipped()

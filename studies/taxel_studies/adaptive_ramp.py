@@ -1,0 +1,267 @@
+"""A ramp that adapts to the signal, beside fixed ones: responsive in gross movement, fine in fine control (4.3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.simulate.circuit import AdaptiveRamp, Converter, Fabric, VirtualGround
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "ramps": [38, 75, 150, 300, 510],
+    "rows": 4,
+    "columns": 64,
+    "period_us": 20.0,
+    "press_n": 0.12,
+    "tremor": 0.05,
+    "tremor_hz": 8.0,
+    "tap_n": 0.5,
+    "tap_ms": 6.0,
+    "taps": 3,
+    "fine_ms": 500.0,
+    "realisations": 10,
+}
+#: What is called seen: so much more than before a tap, V (the least load that the thesis tells, 4.4.1).
+SEEN_V = 0.1
+#: Silence before the first tap and between two, ms.
+APART_MS = 40.0
+PHASES = ("fine", "gross")
+
+
+def force(p: Parameters, rng: np.random.Generator) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the load on the middle taxel at even times, N, and when taps begin, us.
+
+    Fine control: a slow press that is held, with a tremor. Gross movement: taps, half a sine each.
+    """
+    every = p["period_us"]
+    t = np.arange(int(1e3 * p["fine_ms"] / every)) * every * 1e-6
+    rise = np.clip(t / (0.6e-3 * p["fine_ms"]), 0.0, 1.0)
+    swing = 1.0 + p["tremor"] * np.sin(2 * np.pi * (p["tremor_hz"] * t + rng.random()))
+    fine = p["press_n"] * rise * swing
+    parts, begins = [fine], []
+    for _ in range(p["taps"]):
+        apart = 1e3 * (APART_MS + 5.0 * rng.random())
+        parts.append(np.zeros(int(apart / every)))
+        begins.append(every * sum(len(part) for part in parts))
+        parts.append(p["tap_n"] * np.sin(np.linspace(0.0, np.pi, int(1e3 * p["tap_ms"] / every))))
+    parts.append(np.zeros(int(5e3 / every)))
+    return np.concatenate(parts), np.array(begins)
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List one task a converter and a drawn touch."""
+    shared = {k: v for k, v in p.items() if k not in ("ramps", "realisations")}
+    return [Task({**shared, "ramp": ramp}, seed) for ramp in [None, *p["ramps"]] for seed in range(p["realisations"])]
+
+
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Convert a touch; tell what a host that holds the last reading is wrong by, by phase, and when it sees taps."""
+    rng = np.random.default_rng([seed, 432])
+    loads, taps = force(params, rng)
+    rows, columns, every = params["rows"], params["columns"], params["period_us"]
+    away = np.hypot(*np.meshgrid(np.arange(columns) - columns / 2, np.arange(rows) - rows / 2))
+    share = np.exp(-((away / 3.0) ** 2)) * np.exp(0.2 * rng.standard_normal(away.shape))
+    volts = VirtualGround().volts_alone(Fabric().conductance(loads[:, None, None] * share))
+    # Each taxel's rest is its own, so that no two quantise alike.
+    volts += 0.02 * rng.standard_normal(share.shape)
+    converter = Converter(hysteresis_v=0.0)
+    fixed = params["ramp"]
+    ramp = AdaptiveRamp(converter=converter)
+    if fixed is not None:
+        ramp = AdaptiveRamp(converter=converter, steepest=fixed, gentlest=fixed)
+    seen = ramp.convert(volts, period_us=every)
+    line_us = converter.line_us + converter.steps * (seen.ramp.astype(float) - converter.ramp) / 300.0
+    felt = np.argwhere(share > 0.2)
+    ends = every * int(1e3 * params["fine_ms"] / every)
+    # What the host holds at each time: the last reading that was taken before.
+    t = every * np.arange(len(loads))
+    squares = {phase: [0.0, 0] for phase in PHASES}
+    late: list[float] = []
+    tapped = np.zeros(len(t), bool)
+    for tap in taps:
+        tapped |= (t >= tap) & (t < tap + 1e3 * params["tap_ms"])
+    for y, x in felt.tolist():
+        taken = seen.t_us + x * line_us
+        last = np.searchsorted(taken, t, side="right") - 1
+        known = last >= 0
+        wrong = seen.volts[last[known], y, x] - volts[known, y, x]
+        for phase, when in (("fine", t[known] < ends), ("gross", tapped[known])):
+            squares[phase][0] += float((wrong[when] ** 2).sum())
+            squares[phase][1] += int(when.sum())
+    y, x = felt[np.argmax(share[felt[:, 0], felt[:, 1]])].tolist()
+    taken = seen.t_us + x * line_us
+    for tap in taps:
+        before = seen.volts[max(0, int(np.searchsorted(taken, tap)) - 1), y, x]
+        after = np.flatnonzero((taken >= tap) & (seen.volts[:, y, x] > before + SEEN_V))
+        late.append(float(taken[after[0]] - tap) if len(after) else float("nan"))
+    said: dict[str, Any] = {
+        "rms_mv": {phase: 1e3 * float(np.sqrt(s / max(1, n))) for phase, (s, n) in squares.items()},
+        "late_us": late,
+        "frames_a_s": {
+            "fine": float((seen.t_us < ends).sum() / (1e-6 * ends)),
+            "gross": float(np.median(1e6 / (columns * line_us[np.searchsorted(seen.t_us, taps + 2e3)]))),
+        },
+    }
+    if seed == 0:
+        near = (seen.t_us > taps[0] - 2e3) & (seen.t_us < taps[0] + 1e3 * params["tap_ms"] + 6e3)
+        said["course"] = {
+            "t_ms": (1e-3 * (taken[near] - taps[0])).round(4).tolist(),
+            "volts": seen.volts[near, y, x].round(5).tolist(),
+            "ramp": seen.ramp[near].tolist(),
+        }
+    return said
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Tell of each converter how wrong it is in each phase, how late it sees a tap, and how often it scans."""
+    del p
+    said: Said = {"ramps": {}}
+    for name in dict.fromkeys(row.params["ramp"] for row in rows):
+        here = [row.result for row in rows if row.params["ramp"] == name]
+        late = np.concatenate([one["late_us"] for one in here])
+        said["ramps"]["adaptive" if name is None else str(name)] = {
+            "rms_mv": {phase: float(np.median([one["rms_mv"][phase] for one in here])) for phase in PHASES},
+            "late_us": float(np.nanmedian(late)),
+            "unseen": int(np.isnan(late).sum()),
+            "frames_a_s": {phase: float(np.median([one["frames_a_s"][phase] for one in here])) for phase in PHASES},
+            "course": next((one["course"] for one in here if "course" in one), None),
+        }
+    return said
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 4.3.2 says."""
+    ramps = dict(said["ramps"])
+    own = ramps.pop("adaptive")
+    gentle, steep = ramps[str(max(p["ramps"]))], ramps[str(min(p["ramps"]))]
+
+    def wrong(one: dict[str, Any], phase: str) -> float:
+        return float(one["rms_mv"][phase])
+
+    def whole(one: dict[str, Any]) -> float:
+        """How much worse it is than the best fixed ramp of each phase, at its worst."""
+        return max(wrong(one, phase) / min(wrong(other, phase) for other in ramps.values()) for phase in PHASES)
+
+    best = min(ramps, key=lambda name: whole(ramps[name]))
+    return [
+        Statement(
+            "A gentle ramp gives high intensity resolution during fine control.",
+            "high resolution",
+            f"wrong by {wrong(own, 'fine'):.1f} mV with the adaptive ramp, {wrong(gentle, 'fine'):.1f} with the "
+            f"gentlest, {wrong(steep, 'fine'):.1f} with the steepest",
+            wrong(own, "fine") <= 1.1 * wrong(gentle, "fine"),
+        ),
+        Statement(
+            "A steep ramp gives responsive feedback during gross movements.",
+            "responsive",
+            f"during taps wrong by {wrong(own, 'gross'):.0f} mV with the adaptive ramp, {wrong(gentle, 'gross'):.0f} "
+            f"with the gentlest, {wrong(steep, 'gross'):.0f} with the steepest",
+            wrong(own, "gross") <= 0.7 * wrong(gentle, "gross"),
+            "the host holds the last reading: what moved since is its error",
+        ),
+        Statement(
+            "One ramp that adapts does both.",
+            "held to be possible, not tried",
+            f"at most {whole(own):.2f} times as wrong as the best fixed ramp of each phase; the best single fixed one, "
+            f"{best} ticks, {whole(ramps[best]):.2f} times",
+            whole(own) < whole(ramps[best]),
+        ),
+        Statement(
+            "The first tap after rest is seen as late as a gentle ramp sees it.",
+            "not stated",
+            f"{own['late_us']:.0f} us after it begins (median), {gentle['late_us']:.0f} with the gentlest, "
+            f"{steep['late_us']:.0f} with the steepest ramp",
+            None,
+            "it turns steep by what a gentle frame has shown",
+        ),
+    ]
+
+
+def tables(p: Parameters, said: Said) -> list[Table]:
+    """List all converters."""
+    del p
+    return [
+        Table(
+            "By ramp",
+            [
+                "ramp, ticks",
+                "fine control, mV rms",
+                "taps, mV rms",
+                "a tap is seen after, us",
+                "frames/s, fine and tap",
+            ],
+            [
+                [
+                    name,
+                    f"{one['rms_mv']['fine']:.2f}",
+                    f"{one['rms_mv']['gross']:.1f}",
+                    f"{one['late_us']:.0f}",
+                    f"{one['frames_a_s']['fine']:.0f}, {one['frames_a_s']['gross']:.0f}",
+                ]
+                for name, one in said["ramps"].items()
+            ],
+            "What a host that holds the last reading of each taxel is wrong by, while pressed and while tapped.",
+        )
+    ]
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw the two errors against each other, and a tap as the adaptive ramp and the gentlest read it."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(11, 3.8), layout="constrained")
+    left, middle, right = figure.subplots(1, 3)
+    for name, one in said["ramps"].items():
+        own = name == "adaptive"
+        at = (one["rms_mv"]["fine"], one["rms_mv"]["gross"])
+        left.plot(*at, "o" if own else "s", color="C3" if own else "C0")
+        left.annotate(name if own else f"{name} ticks", at, (0, 6), textcoords="offset points", ha="center")
+    left.set(xlabel="fine control, mV rms", ylabel="taps, mV rms")
+    logarithmic(left, x=[1, 2, 5, 10, 20, 50], y=[20, 30, 50, 70, 100])
+    left.margins(0.25, 0.2)
+    for name, colour in (("adaptive", "C3"), (str(max(p["ramps"])), "C0")):
+        course = said["ramps"][name]["course"]
+        middle.step(
+            course["t_ms"],
+            course["volts"],
+            where="post",
+            color=colour,
+            label=name if name == "adaptive" else f"{name} ticks",
+        )
+    middle.set(xlabel="time since a tap, ms", ylabel="what the host holds, V")
+    middle.legend(fontsize="small")
+    course = said["ramps"]["adaptive"]["course"]
+    right.step(course["t_ms"], course["ramp"], where="post", color="C3")
+    right.set(xlabel="time since a tap, ms", ylabel="ramp, ticks")
+    return figure
+
+
+STUDY = Study(
+    name="adaptive_ramp",
+    title="a ramp that adapts to the signal: steep in gross movement, gentle in fine control",
+    where="thesis 4.3.2",
+    protocol=(
+        "64 columns and four rows of one channel, read by ramps of five lengths, or by one that adapts between 38 and "
+        "510 ticks: so long that the fastest taxel moves by four of its ticks in a frame. A taxel and its neighbours "
+        "are pressed slowly and held (fine control), then tapped for 6 ms (gross movement); lines are ideal, "
+        "comparators without hysteresis, no noise but that of whole ticks. The thesis states neither a rule nor a gain."
+    ),
+    parameters=PARAMETERS,
+    sizes={"toy": {"realisations": 2, "ramps": [38, 150, 510], "period_us": 40.0, "fine_ms": 200.0}},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+    tables=tables,
+)

@@ -1,0 +1,253 @@
+"""The scanned array beside one whose taxels compare by themselves: bits of a touch, and what they cost (Table 7.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel import information
+from taxel.events import Events
+from taxel.simulate import Act, Scene, Silence, play, truth
+from taxel.spikes import SpikeTrains, to_ms
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table, logarithmic
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "radii_mm": [25.0, 30.0, 35.0],
+    "drops_mm": [100.0, 150.0, 200.0],
+    "trials": 30,
+    "windows_ms": [0.4, 0.7, 1.0, 2.0, 5.0],
+    "preset": "5.2 kHz",
+    "place_mm": 2.67,
+    "seed": 1,
+}
+#: Taxels of a side under the impact; address and sign of an event among 64 x 64, in bits.
+SIDE, EVENT_BITS = 20, 13
+#: Before a scene, ms: nothing is tared, since only changes are looked at.
+BEFORE_MS = 5.0
+ARRAYS = ("scanned", "asynchronous")
+#: What an array costs, in the words of its table.
+COSTS = {
+    "events": "events a touch",
+    "events_a_s": "events/s",
+    "address_kbit_s": "address and sign, kbit/s",
+    "touched_kbit_s": "wire version 2, kbit/s",
+    "rest_kbit_s": "the same at rest",
+}
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List one drop a task."""
+    shared = {"listen_ms": max(p["windows_ms"]), "preset": p["preset"], "place_mm": p["place_mm"]}
+    return [
+        Task({**shared, "radius_mm": r, "drop_mm": d}, 10_000 * p["seed"] + 1000 * (3 * i + j) + k)
+        for i, r in enumerate(p["radii_mm"])
+        for j, d in enumerate(p["drops_mm"])
+        for k in range(p["trials"])
+    ]
+
+
+def firsts(events: Events, contact_us: float, listen_ms: float) -> list[list[float]]:
+    """Return when each taxel under the impact first told a rise after contact, ms; taxels by their index there."""
+    low = events.array.columns // 2 - SIDE // 2
+    x, y = events.x.astype(int) - low, events.y.astype(int) - low
+    since = to_ms(events.t - contact_us)
+    # A frame's stamp is its beginning: it may lie before what it shows.
+    inside = events.p & (x >= 0) & (x < SIDE) & (y >= 0) & (y < SIDE) & (since > -0.5) & (since < listen_ms)
+    first = np.full(SIDE * SIDE, np.inf)
+    np.minimum.at(first, SIDE * y[inside] + x[inside], np.maximum(since[inside], 0.0))
+    return [[round(float(t), 6)] if np.isfinite(t) else [] for t in first]
+
+
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Drop a ball on one board that scans and on one that does not; tell first rises, events and bytes."""
+    random = np.random.default_rng([seed, 71])
+    x, y = (32 * 2.67 + random.uniform(-params["place_mm"], params["place_mm"], 2)).tolist()
+    ball: dict[str, Any] = {"shape": {"sphere": {"radius_mm": params["radius_mm"]}}, "x_mm": x, "y_mm": y}
+    scene = Scene.draw(seed).body(**ball, motion={"dropped": {"height_mm": params["drop_mm"]}})
+    acts: list[Act] = [Silence(BEFORE_MS), scene]
+    contacts = truth(acts, preset=params["preset"])[0]
+    contact, lasted = contacts[0].start_us, sum(c.stop_us - c.start_us for c in contacts)
+    said: dict[str, Any] = {"touched_ms": to_ms(lasted)}
+    for array in ARRAYS:
+        board: dict[str, Any] = {
+            "seed": seed,
+            "preset": params["preset"],
+            "tare_ms": 0.0,
+            "wire": 2,
+            "asynchronous": array == "asynchronous",
+        }
+        played = play(acts, **board)
+        length_us = played.events.markers[-1][0]
+        # The same board untouched for as long: noise, headers, promises.
+        rest = play([Silence(to_ms(length_us))], **board).bytes
+        touched = np.zeros(len(played.events), bool)
+        for c in contacts:
+            touched |= (played.events.t >= c.start_us - 200) & (played.events.t < c.stop_us + 1000)
+        said[array] = {
+            "first_ms": firsts(played.events, contact, params["listen_ms"]),
+            "events": int(touched.sum()),
+            "rest_kbit_s": 8e3 * rest / length_us,
+            "touched_kbit_s": 8e3 * (rest / length_us + (played.bytes - rest) / lasted),
+        }
+    return said
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Estimate the bits of first-spike and relative latencies by window, and tell what the arrays cost."""
+    labels = [f"{r.params['radius_mm']:g} mm from {r.params['drop_mm']:g} mm" for r in rows]
+    said: Said = {"most": float(np.log2(len(set(labels)))), "bits": {}, "costs": {}}
+    longest = max(p["windows_ms"])
+    for array in ARRAYS:
+        trials = [SpikeTrains.from_lists(r.result[array]["first_ms"], start=0.0, stop=longest + 1.0) for r in rows]
+        said["bits"][array] = {}
+        for window in p["windows_ms"]:
+            codes: dict[str, information.Code] = {
+                "first": information.FirstSpikeLatency(window_ms=window),
+                "relative": information.RelativeLatency(window_ms=window),
+            }
+            found = information.compare_codes(trials, labels, codes, folds=min(10, p["trials"]), seed=p["seed"])
+            said["bits"][array][f"{window:g}"] = {code: [one.bits, *one.interval] for code, one in found.items()}
+        told = [r.result[array] for r in rows]
+        touched_s = np.array([1e-3 * r.result["touched_ms"] for r in rows])
+        events = np.array([one["events"] for one in told])
+        moments = [len({t for train in one["first_ms"] for t in train}) for one in told]
+        said["costs"][array] = {
+            "events": float(np.median(events)),
+            "events_a_s": float(np.median(events / touched_s)),
+            "address_kbit_s": float(np.median(1e-3 * EVENT_BITS * events / touched_s)),
+            **{name: float(np.median([one[name] for one in told])) for name in ("rest_kbit_s", "touched_kbit_s")},
+            "moments": float(np.median(moments)),
+        }
+    return said
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 4.5 and Table 7.1 hope of an asynchronous array."""
+    bits, costs = said["bits"], said["costs"]
+    scanned, alone = (costs[array] for array in ARRAYS)
+    soon, late = (f"{w:g}" for w in (min(p["windows_ms"]), max(p["windows_ms"])))
+
+    def told(window: str, code: str) -> str:
+        return ", ".join(
+            f"{bits[array][window][code][0]:.2f} ({bits[array][window][code][1]:.2f} to "
+            f"{bits[array][window][code][2]:.2f}) {array}"
+            for array in ARRAYS
+        )
+
+    gains = {
+        window: bits["asynchronous"][window]["relative"][0] - bits["scanned"][window]["relative"][0]
+        for window in bits["scanned"]
+    }
+    most = max(gains, key=gains.__getitem__)
+    apart = all(bits["asynchronous"][soon][code][1] > bits["scanned"][soon][code][2] for code in ("first", "relative"))
+    return [
+        Statement(
+            "Asynchronous logic at the transducers gives even higher temporal precision.",
+            "higher precision",
+            f"first rises of a touch fall on {alone['moments']:.0f} different times of 1 us instead of "
+            f"{scanned['moments']:.0f} frames (median)",
+            alone["moments"] > 2 * scanned["moments"],
+            "what the foam, the fabric and the taxels' spread let through; taxels of one frame in between lie on "
+            "straight lines",
+        ),
+        Statement(
+            "Finer times tell more of ball and height.",
+            "not stated",
+            f"first-spike latency in {soon} ms: {told(soon, 'first')} bits of {said['most']:.2f}; relative latency: "
+            f"{told(soon, 'relative')}; in {late} ms: {told(late, 'relative')}; the largest gain is "
+            f"{gains[most]:+.2f} in {most} ms (relative)",
+            apart if p["trials"] >= PARAMETERS["trials"] else None,
+            "" if apart else "the intervals overlap in the shortest window, in one code or both",
+        ),
+        Statement(
+            "A fully asynchronous architecture is more efficient.",
+            "even better power and computational efficiencies",
+            f"while touched {alone['events_a_s']:.0f} events/s instead of {scanned['events_a_s']:.0f}; with address "
+            f"and sign alone {alone['address_kbit_s']:.0f} instead of {scanned['address_kbit_s']:.0f} kbit/s; on "
+            f"version 2 of the wire {alone['touched_kbit_s']:.0f} instead of {scanned['touched_kbit_s']:.0f}, of which "
+            f"{alone['rest_kbit_s']:.0f} and {scanned['rest_kbit_s']:.0f} are sent at rest too",
+            None,
+            "power is not simulated; a taxel by itself tells each step on the way, a scanned one only where a frame "
+            "finds it",
+        ),
+    ]
+
+
+def tables(p: Parameters, said: Said) -> list[Table]:
+    """List bits by window, and costs."""
+    del p
+    shown = {"first": "first-spike latency", "relative": "relative latency"}
+    rows = [
+        [
+            f"{name}, {array}",
+            *(f"{one[code][0]:.2f} ({one[code][1]:.2f} to {one[code][2]:.2f})" for one in said["bits"][array].values()),
+        ]
+        for code, name in shown.items()
+        for array in ARRAYS
+    ]
+    head = ["bits", *(f"{window} ms" for window in said["bits"]["scanned"])]
+    costs = [[array, *(f"{one[name]:.0f}" for name in COSTS)] for array, one in said["costs"].items()]
+    return [
+        Table("Bits by time since contact", head, rows, f"Of {said['most']:.2f}; intervals from trials redrawn."),
+        Table(
+            "While touched",
+            ["array", *COSTS.values()],
+            costs,
+            "Medians over trials. At rest: the same board untouched for as long (noise, headers, promises). While "
+            "touched: that, and what a scene's bytes have above it, over the time that the ball touches.",
+        ),
+    ]
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw the bits over time since contact, of both arrays."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    del p
+    figure = Figure(figsize=(9, 3.8), layout="constrained")
+    axes = figure.subplots(1, 2, sharey=True)
+    for ax, (code, title) in zip(
+        axes, (("first", "first-spike latency"), ("relative", "relative latency")), strict=True
+    ):
+        for array, colour, beside in zip(ARRAYS, ("C0", "C3"), (0.98, 1.02), strict=True):
+            windows = [float(w) for w in said["bits"][array]]
+            found = np.array([one[code] for one in said["bits"][array].values()])
+            off = np.abs(found[:, 1:] - found[:, :1]).T
+            # A little apart, so that neither interval hides the other.
+            ax.errorbar(np.multiply(windows, beside), found[:, 0], off, color=colour, label=array, fmt="o-", capsize=3)
+        ax.axhline(said["most"], color="0.6", ls=":", label="ceiling")
+        ax.set(xlabel="time since contact, ms", title=title)
+        logarithmic(ax, x=windows)
+    axes[0].set_ylabel("bits")
+    axes[0].legend(fontsize="small")
+    return figure
+
+
+STUDY = Study(
+    name="asynchronous",
+    title="an array whose taxels compare by themselves: bits of a touch, and what they cost",
+    where="thesis 4.5, 7.2 and Table 7.1",
+    protocol=(
+        "Balls of three radii fall from three heights, 30 times each, on the emulated board, its taxels and the ball's "
+        "place drawn anew each time; once its lines are scanned at 5208 frames/s, once each taxel compares by itself "
+        "with what it sent last and stamps are of 1 us. Who listens takes each taxel's first rise after contact; linear"
+        " discriminants name ball and height from these latencies. Between two frames of the simulation a taxel's "
+        "reading lies on a straight line, noise and all: a comparator's own faster noise is not simulated."
+    ),
+    parameters=PARAMETERS,
+    sizes={"toy": {"radii_mm": [25.0, 35.0], "drops_mm": [200.0], "trials": 6, "windows_ms": [0.7, 2.0]}},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+    tables=tables,
+)

@@ -1,0 +1,308 @@
+"""``taxel study``: run a study and leave its report."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from taxel import ProblemError
+from taxel.cli import SET_HELP, App, assignments
+from taxel_studies import DRAWN, FIGURES, STUDIES, load
+
+if TYPE_CHECKING:
+    from taxel_studies.runner import Workers
+
+__all__ = ["app"]
+
+app = App(no_args_is_help=True)
+
+Jobs = Annotated[int, typer.Option(help="Processes.")]
+Backend = Annotated[str, typer.Option(help="Who runs them: loky (processes here), dask or ray (a cluster).")]
+Scheduler = Annotated[
+    str | None, typer.Option(help="Address of a Dask or Ray cluster that runs already; else one starts here.")
+]
+Report = Annotated[Path, typer.Option(help="Folder for the page, pictures and all results; resumes what is in it.")]
+Size = Annotated[str, typer.Option(help="full, or toy (shows that it runs); some studies have more.")]
+Realisations = Annotated[int | None, typer.Option(help="How many, instead of the size's.")]
+Changes = Annotated[list[str] | None, typer.Option("--set", help=SET_HELP)]
+Data = Annotated[
+    Path | None, typer.Option(help="Folder of recordings, for the studies that need some (or TAXEL_DATA names it).")
+]
+Strict = Annotated[bool, typer.Option("--strict", help="A recording that cannot be read ends it; else it is left out.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the summary as JSON, and no progress.")]
+
+Figures = Annotated[Path, typer.Option("--figures", help="Folder of the kept figures: of a checkout.")]
+Confirm = Annotated[
+    bool,
+    typer.Option(
+        "--confirm",
+        help="Run it at size toy, hold it against the result kept beside its figure; where it is the same, the figure "
+        "counts as one of this code.",
+    ),
+]
+
+REPORT = Path("taxel-studies")
+KEPT = Path("benchmarks/results/figures")
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    stale: Annotated[
+        bool, typer.Option("--stale", help="List the kept figures whose code has changed since, and what changed.")
+    ] = False,
+    figures: Figures = KEPT,
+) -> None:
+    """Run a study: a protocol, its parameters, a report. Stops on Ctrl-C, resumes where it was.
+
+    Figures and tables of the thesis are names too: fig5.6 runs the study that holds it.
+
+    Example: taxel study fig6.9 --size toy
+    """
+    if stale:
+        from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
+
+        found = stale_figures(figures)
+        for name, parts in found.items():
+            typer.echo(f"{name}: {', '.join(parts)}")
+        typer.echo(
+            f"{len(found)} kept figures are stale; taxel study NAME --confirm, or run them again"
+            if found
+            else "no kept figure is stale"
+        )
+    elif context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command(name="all")
+def every(
+    size: Size = "full",
+    realisations: Realisations = None,
+    data: Data = None,
+    jobs: Jobs = 1,
+    backend: Backend = "loky",
+    scheduler: Scheduler = None,
+    report: Report = REPORT,
+    strict: Strict = False,
+    confirm: Confirm = False,
+    figures: Figures = KEPT,
+    as_json: AsJson = False,
+) -> None:
+    """Run every study and make one page of them; with --confirm, confirm those whose kept figures are stale.
+
+    Studies on recordings are left out, and said to be, where no recordings are; so are those whose packages are not
+    installed.
+
+    Example: taxel study all --report figures --jobs 2
+    """
+    if confirm:
+        from taxel_studies.kept import stale_figures  # noqa: PLC0415  the command line starts quickly
+
+        for name in stale_figures(figures):
+            if _left_out(name, _data(data)) is None:
+                _confirm(name, figures, data, strict)
+        return
+    changes = {} if realisations is None else {"realisations": realisations}
+    said = {}
+    try:
+        for name in STUDIES:
+            study = load(name)
+            own = {k: v for k, v in changes.items() if k in study.parameters}
+            where = _data(data)
+            if _left_out(name, where) is not None:
+                continue
+            said[name] = study.run(
+                report,
+                size=size if size in study.sizes else "full",
+                changes=own,
+                data=where,
+                workers=_workers(jobs, backend, scheduler),
+                strict=strict,
+                quiet=as_json,
+            )
+    finally:
+        # Whatever stopped it: the page shows what was run, and names the rest.
+        page = _page(report)
+    if as_json:
+        typer.echo(json.dumps(said))
+        return
+    for section in said.values():
+        _tell(section)
+    typer.echo(f"page: {page}")
+
+
+def _left_out(name: str, data: Path | None) -> str | None:
+    """Say why a study cannot be run here; None where it can."""
+    study = load(name)
+    why = study.lacks
+    if study.data and (data is None or not any((data / folder).is_dir() for folder in study.data)):
+        why = f"it needs any of {', '.join(study.data)} (--data)"
+    if why is not None:
+        typer.echo(f"{name}: left out, {why}", err=True)
+    return why
+
+
+def _confirm(name: str, figures: Path, data: Path | None, strict: bool) -> None:
+    from taxel_studies.kept import confirm  # noqa: PLC0415  the command line starts quickly
+
+    typer.echo(f"{name}: {confirm(name, figures, data=_data(data), strict=strict)}")
+
+
+def _add(name: str, title: str) -> Callable[..., None]:
+    def one(
+        size: Size = "full",
+        realisations: Realisations = None,
+        changes: Changes = None,
+        data: Data = None,
+        jobs: Jobs = 1,
+        backend: Backend = "loky",
+        scheduler: Scheduler = None,
+        report: Report = REPORT,
+        strict: Strict = False,
+        confirm: Confirm = False,
+        figures: Figures = KEPT,
+        as_json: AsJson = False,
+    ) -> None:
+        if confirm:
+            _confirm(name, figures, data, strict)
+            return
+        workers = _workers(jobs, backend, scheduler)
+        _run(name, size, _changes(changes or [], realisations), data, workers, report, strict, as_json)
+
+    text = f"{title[0].upper()}{title[1:]}.\n\nExample: taxel study {name} --report figures --jobs 2"
+    app.command(name=name, help=text, short_help=title)(one)
+    return one
+
+
+def _run(
+    name: str,
+    size: str,
+    changes: dict[str, Any],
+    data: Path | None,
+    workers: Workers,
+    report: Path,
+    strict: bool,
+    as_json: bool,
+) -> None:
+    section = load(name).run(
+        report, size=size, changes=changes, data=_data(data), workers=workers, strict=strict, quiet=as_json
+    )
+    page = _page(report)
+    if as_json:
+        typer.echo(json.dumps(section))
+        return
+    _tell(section)
+    typer.echo(f"page: {page}  picture: {report / name}  numbers: {report / name / 'summary.json'}")
+
+
+def _workers(jobs: int, backend: str, scheduler: str | None) -> Workers:
+    from taxel_studies.runner import Workers  # noqa: PLC0415  joblib loads slowly
+
+    return Workers(jobs, backend, scheduler)
+
+
+def _page(report: Path) -> Path | None:
+    from taxel_studies.page import write_page  # noqa: PLC0415  jinja2 loads slowly
+
+    return write_page(report) if report.is_dir() else None
+
+
+def _data(data: Path | None) -> Path | None:
+    named = os.environ.get("TAXEL_DATA")
+    return data or (Path(named) if named else None)
+
+
+def _changes(said: list[str], realisations: int | None) -> dict[str, Any]:
+    return ({} if realisations is None else {"realisations": realisations}) | assignments(said)
+
+
+def _tell(section: dict[str, Any]) -> None:
+    from rich.console import Console  # noqa: PLC0415  the command line starts quickly
+    from rich.table import Table  # noqa: PLC0415
+
+    typer.echo(f"\n{section['name']}, size {section['size']}: {section['title']}")
+    for s in section["statements"]:
+        holds = {True: "holds", False: "does not hold", None: "not judged"}[s["holds"]]
+        typer.echo(f"- {s['says']} {holds.upper()}" + (f" ({s['why']})" if s["why"] else ""))
+        typer.echo(f"    published: {s['published']}\n    ours: {s['ours']}")
+    for said in section["tables"]:
+        if not said["folded"]:
+            table = Table(title=said["title"], title_justify="left")
+            for k, name in enumerate(said["head"]):
+                table.add_column(name, justify="right" if k else "left", no_wrap=not k)
+            for row in said["rows"]:
+                table.add_row(*row)
+            Console().print(table)
+    for file, why in section["unread"].items():
+        typer.echo(f"could not be read, so left out: {file}: {why}")
+
+
+@app.command(short_help=STUDIES["gait"])
+def gait(
+    size: Size = "full",
+    test: Annotated[
+        str | None,
+        typer.Option(help="Such a folder of other people: train on DATA, judge on TEST, instead of by folds."),
+    ] = None,
+    search: Annotated[
+        str | None, typer.Option(help="listed points, or full: on plate also the 528 settings of 6.5.2 (hours).")
+    ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(help="One source (plate, gaitpdb, gaitndd, moticon, pedar); may be repeated.")
+    ] = None,
+    changes: Changes = None,
+    data: Data = None,
+    jobs: Jobs = 1,
+    backend: Backend = "loky",
+    scheduler: Scheduler = None,
+    report: Report = REPORT,
+    strict: Strict = False,
+    confirm: Confirm = False,
+    figures: Figures = KEPT,
+    as_json: AsJson = False,
+) -> None:
+    """Find gait events in walking recordings with one neuron an event (thesis 6.5, figures 6.12 to 6.14).
+
+    Recordings are not part of taxel. They can be had, each for its folder of DATA, from: github.com/jiku-pro/jiku-data,
+    SpeedPP2DS (plate; GPL-3.0); physionet.org/content/gaitpdb/1.0.0 (insole_gaitpdb; ODC-By 1.0);
+    physionet.org/content/gaitndd/1.0.0 (insole_gaitndd; ODC-By 1.0); github.com/moticon-rego/moticon-opengo,
+    tests/testdata (insole_moticon; Apache-2.0); github.com/Telfer/pressuRe, inst/extdata (pressure_formats; MIT). By
+    whom, and what their truth is: docs/recordings.md.
+
+    Example: taxel study gait --data recordings --jobs 2 --report figures
+    """
+    if confirm:
+        _confirm("gait", figures, data, strict)
+        return
+    named = {name: value for name, value in (("test", test), ("search", search), ("sources", only)) if value}
+    workers = _workers(jobs, backend, scheduler)
+    _run("gait", size, named | _changes(changes or [], None), data, workers, report, strict, as_json)
+
+
+def _add_figure(figure: str, study: str, run: Callable[..., None]) -> None:
+    @wraps(run)
+    def one(**given: Any) -> None:
+        typer.echo(f"{figure} is held by the study {study}", err=True)
+        run(**given)
+
+    app.command(name=figure, help=f"The study {study}, which holds {figure}.", hidden=True)(one)
+
+
+def _add_drawing(figure: str, where: str) -> None:
+    def one() -> None:
+        raise ProblemError(f"{figure} is no result but a drawing or a table of words: {where}")
+
+    app.command(name=figure, help=f"No study: {where}.", hidden=True)(one)
+
+
+_RUN = {"gait": gait} | {name: _add(name, title) for name, title in STUDIES.items() if name != "gait"}
+for _figure, _study in FIGURES.items():
+    _add_figure(_figure, _study, _RUN[_study])
+for _figure, _where in DRAWN.items():
+    _add_drawing(_figure, _where)

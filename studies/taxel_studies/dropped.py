@@ -1,0 +1,407 @@
+"""Balls dropped on the emulated array, sampled, coded and compared: what figures 4.8 to 4.10 and 5.10 to 5.14 share."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.distance import cdist
+
+from taxel import SceneError
+from taxel.array import Array
+from taxel.encode import ChangeEvents
+from taxel.events import Events
+from taxel.frames import Frames
+from taxel.information import NearestNeighbours
+from taxel.report import write_whole
+from taxel.report.provenance import installed
+from taxel.simulate import Scene, Silence, play, truth
+from taxel.spikes import to_ms
+from taxel.wire import FRAME_US, Registers
+from taxel_studies.runner import Task
+
+__all__ = [
+    "ANSWERED",
+    "FRAMES",
+    "IMPACTS",
+    "REGION",
+    "TABLE",
+    "TENNIS",
+    "TENNIS_TABLE",
+    "TENNIS_TOY",
+    "TOY",
+    "Condition",
+    "Drops",
+    "Rig",
+    "absolute_distances",
+    "conditions",
+    "named",
+    "named_by_neighbours",
+    "pictures",
+    "play_tasks",
+    "played",
+    "sampled",
+    "smoothed",
+    "spatial_grams",
+    "told",
+]
+
+#: 5.6.2's experiment: two spheres, three heights, three slants, 100 trials each; how trials differ is a guess.
+TABLE: dict[str, Any] = {
+    "balls_mm": [50.0, 70.0],
+    "heights_mm": [100.0, 150.0, 200.0],
+    "slants_deg": [0.0, 15.0, 30.0],
+    "drops": 100,
+    "mass_g": 36.0,
+    "mass_by_g": 1.0,
+    "height_sd_mm": 2.0,
+    "place_sd_mm": 5.0,
+    "board": 56,
+}
+#: Seconds.
+TOY: dict[str, Any] = {"heights_mm": [100.0, 200.0], "slants_deg": [0.0], "drops": 8}
+#: 4.4.2's: a tennis ball from two heights at two slants, 100 trials each; again it is a guess how trials differ.
+TENNIS_TABLE: dict[str, Any] = {
+    "balls_mm": [65.0],
+    "heights_mm": [400.0, 800.0],
+    "slants_deg": [0.0, 30.0],
+    "drops": 100,
+    "mass_g": 56.0,
+    "mass_by_g": 0.0,
+    "height_sd_mm": 5.0,
+    "place_sd_mm": 5.0,
+    "board": 44,
+}
+#: Seconds.
+TENNIS_TOY: dict[str, Any] = {"drops": 8}
+#: Taxels along a side of the region around the impact, and how long it is looked at, ms.
+REGION, LENGTH_MS = 16, 50.0
+#: Frames in that time.
+FRAMES = int(LENGTH_MS / to_ms(FRAME_US))
+#: So many taxels that rise in one frame are an impact; one alone may be noise.
+ANSWERED = 3
+#: Ticks: a change above it is an event, as in the board's fast presets.
+NOISE_FLOOR = 3.0
+#: Silence before the first drop: the tare, and some.
+_BEFORE_MS = 60.0
+#: How long the ball is in the air again before a hand takes it, ms after the impact, and how fast the hand goes, mm/s.
+_AFTER_MS, _HAND_MM_S = 15.0, 500.0
+#: Whoever lets go does so at no moment of the board's: within so many ms.
+_LEAD_MS = 20.0
+
+
+class Rig(NamedTuple):
+    """What an experiment is done with, and what is kept of it."""
+
+    preset: str
+    """Of the board."""
+    region: int
+    """Taxels along a side of what is kept."""
+    length_ms: float
+    """How long a drop is looked at."""
+    around: str
+    """The region's middle: of the taxels that answer in the impact's first frame the "mean", or the "first"."""
+    stiffness_n_mm: float | None = None
+    """Of a ball that gives."""
+
+    @property
+    def frame_us(self) -> float:
+        """From one frame to the next."""
+        return Registers.preset(self.preset).frame_us
+
+    @property
+    def frames(self) -> int:
+        """How many are looked at."""
+        return int(self.length_ms / to_ms(self.frame_us))
+
+
+#: 5.6.2's.
+IMPACTS = Rig("5.2 kHz", REGION, LENGTH_MS, "mean")
+#: 4.4.2's: 4.10 looks at 40 ms. A tennis ball gives by some 25 N/mm.
+TENNIS = Rig("2 kHz", 17, 40.0, "first", stiffness_n_mm=25.0)
+
+
+class Condition(NamedTuple):
+    """One of the combinations of contact parameters."""
+
+    ball_mm: float
+    """Diameter."""
+    height_mm: float
+    slant_deg: float
+
+
+class Drops(NamedTuple):
+    """All drops of a condition, as the host holds them."""
+
+    ticks: NDArray[np.uint16]
+    """Held readings, shape (drops, 1 + the rig's frames, taxels of the region); the first is that before the impact."""
+    events: NDArray[np.int64]
+    """How many change events the region gave in that time, by drop."""
+    lasted_us: NDArray[np.float64]
+    """From the first of these to the last."""
+
+
+def named(p: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of a study's parameters that the drops hang on."""
+    return {name: p[name] for name in TABLE}
+
+
+def conditions(p: Mapping[str, Any]) -> list[Condition]:
+    """Return all combinations."""
+    return [Condition(*one) for one in product(p["balls_mm"], p["heights_mm"], p["slants_deg"])]
+
+
+def play_tasks(p: Mapping[str, Any]) -> list[Task]:
+    """List one realisation a condition: all its drops."""
+    return [Task({**named(p), "condition": list(one)}, p["seed"]) for one in conditions(p)]
+
+
+def told(params: Mapping[str, Any], seed: int, folder: Path, rig: Rig = IMPACTS) -> dict[str, Any] | None:
+    """Return what a realisation of `play_tasks` tells of its drops; None where it is another's."""
+    if "condition" not in params:
+        return None
+    drops = played(params, Condition(*params["condition"]), seed, folder, rig)
+    return {"events": drops.events.tolist(), "lasted_ms": to_ms(drops.lasted_us).round(3).tolist()}
+
+
+def played(p: Mapping[str, Any], condition: Condition, seed: int, folder: Path, rig: Rig = IMPACTS) -> Drops:
+    """Return a condition's drops from the folder, or drop the ball and keep them there."""
+    code = installed("taxel_studies").digest(__name__)
+    made_by = json.dumps([named(p), condition, rig, seed, code], sort_keys=True)
+    digest = hashlib.sha256(made_by.encode()).hexdigest()[:16]
+    b, h, s = condition
+    path = folder / f"drops-{b:g}mm-{h:g}mm-{s:g}deg-{digest}.npz"
+    if not path.exists():
+        drops = _drop(p, condition, seed, rig)
+        write_whole(path, lambda file: np.savez_compressed(file, **drops._asdict()), overwrite=True)
+    with np.load(path) as kept:
+        return Drops(**{name: kept[name] for name in Drops._fields})
+
+
+def _drop(p: Mapping[str, Any], condition: Condition, seed: int, rig: Rig) -> Drops:
+    """Drop a ball so many times on one board that does not rest between drops."""
+    rng = np.random.default_rng([seed, *(round(1000 * part) for part in condition)])
+    acts: list[Silence | Scene] = [Silence(_BEFORE_MS)]
+    acts += [_scene(p, condition, rng, rig) for _ in range(p["drops"])]
+    impacts = [contact.start_us for contact in truth(acts, preset=rig.preset)[0] if contact.kind == "first"]
+    return _around(play(acts, seed=p["board"], preset=rig.preset).events, impacts, rig)
+
+
+def _scene(p: Mapping[str, Any], condition: Condition, rng: np.random.Generator, rig: Rig) -> Scene:
+    height = condition.height_mm + rng.normal(0, p["height_sd_mm"])
+    fall_ms = float(np.sqrt(2 * height / 9.81e-3))
+    array = Array.thesis()
+    x, y = ((n - 1) * array.pitch_mm / 2 + rng.normal(0, p["place_sd_mm"]) for n in (array.columns, array.rows))
+    gives = {} if rig.stiffness_n_mm is None else {"stiffness_n_mm": rig.stiffness_n_mm}
+    return Scene(
+        {
+            # One surface for all: else how it is reckoned would tell a slant.
+            "surface": "layer",
+            "foam": {},
+            "bodies": [
+                {
+                    "shape": {"sphere": {"radius_mm": condition.ball_mm / 2}},
+                    "mass_g": float(p["mass_g"] + rng.uniform(-1, 1) * p["mass_by_g"]),
+                    "x_mm": float(x),
+                    "y_mm": float(y),
+                    "motion": {
+                        "dropped": {
+                            "height_mm": float(height),
+                            "ending": {
+                                "left_to_rest": {
+                                    "rest_ms": fall_ms + rig.length_ms + _AFTER_MS,
+                                    "lift_mm_s": _HAND_MM_S,
+                                }
+                            },
+                        }
+                    },
+                    **gives,
+                }
+            ],
+            "slant_deg": condition.slant_deg,
+            "lead_ms": float(rng.uniform(0, _LEAD_MS)),
+        }
+    )
+
+
+def _around(events: Events, impacts: Sequence[float], rig: Rig) -> Drops:
+    """Cut out what the host holds of the region around each impact (4.4.2, 5.6.2).
+
+    Raises
+    ------
+    SceneError : an impact that hardly any taxel answered
+    """
+    events = events.sorted()
+    assert events.intensity is not None  # the board sends them
+    columns, rows = events.array.columns, events.array.rows
+    # A stamp is its frame's start, cut down to whole 100 us.
+    frame = np.ceil(events.t / rig.frame_us).astype(np.int64)
+    index = events.array.index(events.x, events.y)
+    held = np.zeros(rows * columns, np.uint16)
+    ticks = np.zeros((len(impacts), 1 + rig.frames, rig.region**2), np.uint16)
+    counts, lasted = np.zeros(len(impacts), np.int64), np.zeros(len(impacts))
+    done = 0
+    for k, impact in enumerate(impacts):
+        at = int(impact / rig.frame_us)
+        soon = slice(*np.searchsorted(frame, [at, at + rig.frames]))
+        rises = np.bincount(frame[soon][events.p[soon]] - at, minlength=rig.frames)
+        if rises.max() < ANSWERED:
+            raise SceneError(f"drop {k}: no {ANSWERED} taxels answered it in one frame; drop it from higher")
+        begin = at + int(np.argmax(rises >= ANSWERED))
+        first, end = np.searchsorted(frame, [begin, begin + 1])
+        held[index[done:first]] = events.intensity[done:first]
+        answered = slice(first, end if rig.around == "mean" else first + 1)
+        x0 = _corner(events.x[answered], columns, rig.region)
+        y0 = _corner(events.y[answered], rows, rig.region)
+        region = (np.arange(y0, y0 + rig.region)[:, None] * columns + np.arange(x0, x0 + rig.region)).ravel()
+        ticks[k, 0] = held[region]
+        edges = np.searchsorted(frame, np.arange(begin, begin + rig.frames + 1))
+        for n in range(rig.frames):
+            new = slice(edges[n], edges[n + 1])
+            held[index[new]] = events.intensity[new]
+            ticks[k, n + 1] = held[region]
+        done = int(edges[-1])
+        mine = frame[first:done][np.isin(index[first:done], region)]
+        counts[k], lasted[k] = len(mine), (mine[-1] - mine[0]) * rig.frame_us
+    return Drops(ticks, counts, lasted)
+
+
+def _corner(places: NDArray[Any], size: int, region: int) -> int:
+    """Return where a region begins whose middle is that of some places, within the array."""
+    return int(np.clip(round(float(places.mean()) - (region - 1) / 2), 0, size - region))
+
+
+def sampled(drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.float64]) -> NDArray[np.uint8]:
+    """Return the change events of drops that are looked at every so often, (drops, samples, ON and OFF, taxels).
+
+    Parameters
+    ----------
+    drops : uint16, shape (drops, 1 + frames, taxels)
+        As of `Drops`.
+    period_ms : float
+        A frame or more.
+    late_ms : float64, shape (drops,)
+        When the first sample comes after the impact's first frame. Sample 0 is the first at which anything fires.
+    """
+    values = _looked_at(drops, period_ms, late_ms, IMPACTS, LENGTH_MS)
+    count = values.shape[1] - 1
+    t = np.arange(count + 1, dtype=np.int64) * 1000
+    frames = Frames(values.transpose(1, 0, 2).astype(np.float32), t, unit="ticks")
+    spikes = ChangeEvents(noise_floor=NOISE_FLOOR).encode(frames)
+    assert spikes.values is not None  # change events have signs
+    train = np.repeat(np.arange(len(spikes)), np.diff(spikes.offsets))
+    taxels = drops.shape[2]
+    drop, sample = train // taxels, np.round(spikes.times).astype(np.int64) - 1
+    first = np.full(len(drops), count)
+    np.minimum.at(first, drop, sample)
+    found = np.zeros((len(drops), count, 2, taxels), np.uint8)
+    found[drop, sample - first[drop], (spikes.values < 0).astype(int), train % taxels] = 1
+    return found
+
+
+def pictures(
+    drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.float64], rig: Rig, length_ms: float
+) -> NDArray[np.float64]:
+    """Return how far taxels are from where they were before the impact, every so often, (drops, samples, taxels).
+
+    Parameters are those of `sampled`, the drops' rig, and how long they are looked at, ms.
+    """
+    values = _looked_at(drops, period_ms, late_ms, rig, length_ms).astype(np.float64)
+    return values[:, 1:] - values[:, :1]
+
+
+def _looked_at(
+    drops: NDArray[np.uint16], period_ms: float, late_ms: NDArray[np.float64], rig: Rig, length_ms: float
+) -> NDArray[np.uint16]:
+    """Return what the host holds before the impact, and then every so often, (drops, 1 + samples, taxels)."""
+    step = late_ms[:, None] + period_ms * np.arange(int(length_ms / period_ms + 1e-9))
+    frame = np.minimum((step / to_ms(rig.frame_us) + 1e-9).astype(np.int64), rig.frames - 1) + 1
+    frame = np.concatenate([np.zeros((len(drops), 1), np.int64), frame], axis=1)
+    return np.take_along_axis(drops, frame[:, :, None], axis=1)
+
+
+def smoothed(region: int, pitch_mm: float, sigma: float) -> NDArray[np.float32]:
+    """Return what each taxel of a square region adds to each (5.11), its own train counted twice as printed."""
+    x, y = np.meshgrid(np.arange(region), np.arange(region))
+    places = np.stack([x.ravel(), y.ravel()], -1) * pitch_mm
+    apart = np.sqrt(((places[:, None] - places) ** 2).sum(-1))
+    return np.asarray(np.eye(region * region) + np.exp(-apart / sigma), np.float32)
+
+
+def spatial_grams(
+    spikes: NDArray[np.uint8], period_ms: float, tau: float, kernels: Sequence[NDArray[np.float32]], ends: Sequence[int]
+) -> list[list[NDArray[np.float64]]]:
+    """Return the inner products of all patterns smoothed in time and over taxels (5.8 and 5.11, Euclidean).
+
+    Parameters
+    ----------
+    spikes : uint8, shape (patterns, samples, layers, taxels)
+        Spikes in each sample.
+    period_ms : float
+    tau : float, ms
+    kernels : sequence of float32, shape (taxels, taxels)
+        As of `smoothed`: one a sigma.
+    ends : sequence of int, ascending
+        After so many samples.
+
+    Returns
+    -------
+    list of list of float64, shape (patterns, patterns)
+        By kernel, then by end. The distances of these are `taxel.metrics.van_rossum_spatial` without normalisation of
+        the spikes before each end.
+
+    Notes
+    -----
+    Between samples every smoothed train is one exponential, so the integral is a running sum of the products at the
+    samples: (1 - q) of each but the last, q = exp(-2 T / tau), in units of tau / 2. One table of states serves every
+    sigma and every end.
+    """
+    count, _, layers, taxels = spikes.shape
+    state = np.zeros((count, layers, taxels), np.float32)
+    decay = np.float32(np.exp(-period_ms / tau))
+    passed = -np.expm1(-2 * period_ms / tau)
+    totals = [np.zeros((count, count)) for _ in kernels]
+    found: list[list[NDArray[np.float64]]] = [[] for _ in kernels]
+    for k in range(ends[-1]):
+        state *= decay
+        state += spikes[:, k]
+        for n, kernel in enumerate(kernels):
+            seen = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
+            here = seen @ seen.T
+            if k + 1 in ends:
+                found[n].append((totals[n] + here) * (tau / 2))
+            totals[n] += passed * here
+    return found
+
+
+def absolute_distances(
+    spikes: NDArray[np.uint8], period_ms: float, tau: float, kernel: NDArray[np.float32]
+) -> NDArray[np.float64]:
+    """Return the distances of all patterns as 5.10 and 5.12 are printed: absolute differences, summed over samples.
+
+    Parameters are those of `spatial_grams`; the distances `taxel.metrics.van_rossum_spatial_absolute` with the period
+    as its step.
+    """
+    count, samples, layers, taxels = spikes.shape
+    state = np.zeros((count, layers, taxels), np.float32)
+    decay = np.float32(np.exp(-period_ms / tau))
+    total = np.zeros((count, count))
+    for k in range(samples):
+        state *= decay
+        state += spikes[:, k]
+        seen = (state.reshape(-1, taxels) @ kernel).reshape(count, -1)
+        total += cdist(seen, seen, "cityblock")
+    return total
+
+
+def named_by_neighbours(distances: NDArray[np.float64], y: NDArray[np.int64], neighbours: int) -> NDArray[np.int64]:
+    """Return what each pattern's nearest others say that it is: none is its own neighbour."""
+    apart = distances.copy()
+    np.fill_diagonal(apart, np.inf)
+    return np.asarray(NearestNeighbours(neighbours=neighbours).fit(distances, y).predict(apart))

@@ -1,0 +1,154 @@
+"""Figure 3.3: from the analog readout of the fabric array to digital signals to spikes (thesis 3.4.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel.encode import ThresholdIzhikevich
+from taxel_studies.fabric_array import ARRAY, PERIOD_US, SENSOR, depth_of, pressed, read
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    **SENSOR,
+    "diameter_mm": 65.0,
+    "force_n": 4.0,
+    "speed_mm_s": 10.0,
+    "hold_ms": 150.0,
+    "presses": 3,
+    "realisations": 10,
+}
+#: What the neurons need to hear of one state before the next, ms (a step is told after some 20 ms).
+STEADY_MS = 60.0
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List one task a place of the sphere."""
+    return [Task({k: v for k, v in p.items() if k != "realisations"}, seed) for seed in range(p["realisations"])]
+
+
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Press a sphere several times and let go; count digital steps that last, and spikes."""
+    p, random = params, np.random.default_rng(seed)
+    x, y = random.uniform(-10, 10, 2)
+    depth = depth_of(p["diameter_mm"], p["force_n"], p["foam_kpa"], p["foam_mm"])
+    way = np.arange(0.0, depth, p["speed_mm_s"] * PERIOD_US * 1e-6)
+    hold = round(p["hold_ms"] * 1000 / PERIOD_US)
+    once = np.concatenate([np.zeros(hold), way, np.full(hold, depth), way[::-1]])
+    course = np.concatenate([*[once] * p["presses"], np.zeros(hold)])
+    frames = read(p, *pressed(p, p["diameter_mm"], depth, x, y), course, seed)
+    digital = frames.values.reshape(len(frames), -1) > p["threshold_v"]
+    spikes = ThresholdIzhikevich([p["threshold_v"]], published="3.4.3").encode(frames)
+    told, steps = np.zeros(2, int), np.zeros(2, int)
+    wrong = 0
+    for taxel in range(ARRAY.rows * ARRAY.columns):
+        lasting = _lasting(digital[:, taxel])
+        assert spikes.values is not None
+        values = spikes.values[spikes.offsets[taxel] : spikes.offsets[taxel + 1]]
+        rises, falls = int((np.diff(lasting.astype(int)) > 0).sum()), int((np.diff(lasting.astype(int)) < 0).sum())
+        ups, downs = int((values > 0).sum()), int((values < 0).sum())
+        steps += (rises, falls)
+        told += (ups, downs)
+        wrong += int((rises, falls) != (ups, downs))
+    busy = np.argsort(digital.sum(axis=0), kind="stable")[::-1][:12]
+    every = 20
+    return {
+        "steps": steps.tolist(),
+        "spikes": told.tolist(),
+        "wrong": wrong,
+        "active": int(digital.any(axis=0).sum()),
+        "drawn": {
+            "t_ms": (frames.t[::every] / 1000).tolist(),
+            "volts": frames.values.reshape(len(frames), -1)[::every][:, busy].T.round(4).tolist(),
+            "digital": digital[::every][:, busy].T.astype(int).tolist(),
+            "spikes": [spikes[int(k)].round(3).tolist() for k in busy],
+        }
+        if seed == 0
+        else None,
+    }
+
+
+def _lasting(digital: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    """Return a signal without its shorter states: chatter across the threshold counts as one step."""
+    edges = np.flatnonzero(np.diff(digital)) + 1
+    out, state = np.empty_like(digital), digital[0]
+    stops = [*edges[1:], len(digital)]
+    out[: edges[0] if len(edges) else len(digital)] = state
+    for start, stop in zip(edges, stops, strict=False):
+        if stop - start >= STEADY_MS * 1000 / PERIOD_US:
+            state = digital[start]
+        out[start:stop] = state
+    return out
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Sum up over places."""
+    del p
+    results = [r.result for r in rows]
+    return {
+        "steps": np.sum([r["steps"] for r in results], axis=0).tolist(),
+        "spikes": np.sum([r["spikes"] for r in results], axis=0).tolist(),
+        "wrong": sum(r["wrong"] for r in results),
+        "active": sum(r["active"] for r in results),
+        "drawn": next(r["drawn"] for r in results if r["drawn"]),
+    }
+
+
+def statements(_p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 3.4.3 says."""
+    (rises, falls), (ups, downs) = said["steps"], said["spikes"]
+    return [
+        Statement(
+            "A single spike is fired for each change from low to high, and by the other neuron from high to low.",
+            "one spike a rise, one a fall",
+            f"{rises} rises and {falls} falls that last {STEADY_MS:g} ms; {ups} and {downs} spikes; "
+            f"{said['wrong']} of {said['active']} taxels differ",
+            said["wrong"] == 0,
+            "a state shorter than some 20 ms may be lost, and behind a short gap a spike comes late",
+        )
+    ]
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw 3.3: analog, digital, spikes, of the twelve taxels that are on for longest."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(11, 3.6), layout="constrained")
+    left, middle, right = figure.subplots(1, 3, sharey=True)
+    seen = said["drawn"]
+    t = np.array(seen["t_ms"])
+    for row, (volts, digital, spikes) in enumerate(zip(seen["volts"], seen["digital"], seen["spikes"], strict=True)):
+        left.plot(t, row + 0.8 * np.array(volts) / max(map(max, seen["volts"])), color="C0", lw=0.8)
+        middle.step(t, row + 0.8 * np.array(digital), color="C2", lw=0.8, where="post")
+        right.vlines(spikes, row, row + 0.8, color="k", lw=0.9)
+    for ax, title in ((left, "analog readout"), (middle, f"above {p['threshold_v']:g} V"), (right, "spikes")):
+        ax.set(xlabel="time, ms", title=title, xlim=(0, t[-1]))
+    left.set_ylabel("taxel")
+    return figure
+
+
+STUDY = Study(
+    name="fig3.3",
+    title="the fabric array's readout, thresholded, as spikes of Izhikevich pairs: one a rise, one a fall",
+    where="thesis 3.4.3, figure 3.3",
+    protocol=(
+        "A sphere of 65 mm pressed three times to 4 N into 10 mm of foam under the 8 x 8 array, at ten places; "
+        "dividers of 10 kOhm at 5 V sampled at 10 kHz, a threshold of 0.25 V (foam, resistor, threshold, speed: ours); "
+        "a .02, b .25, c -65, d 6, gain .5, Euler steps of 0.1 ms, neurons settled at the start."
+    ),
+    parameters=PARAMETERS,
+    sizes={"toy": {"realisations": 2, "presses": 2}},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+)

@@ -1,0 +1,133 @@
+"""Figure 4.3: single-slope conversion, from the input to the time until the ramp passes it (thesis 4.3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel.simulate.circuit import Converter
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "shapes": ["rc", "linear"],
+    "ramp": 150,
+    "least_v": 0.5,
+    "most_v": 3.4,
+    "points": 291,
+    "drawn_v": 2.0,
+}
+#: Ticks of the counter in 1 us.
+TICKS_A_US = 300.0
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List one task a shape of the ramp."""
+    return [Task({**{k: v for k, v in p.items() if k != "shapes"}, "shape": shape}, 0) for shape in p["shapes"]]
+
+
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Convert a row of inputs, each settled; and watch one conversion."""
+    del seed
+    converter = Converter(shape=params["shape"], ramp=params["ramp"], steps=1)
+    volts = np.linspace(params["least_v"], params["most_v"], params["points"])
+    ticks = np.array([converter.ticks([[v]]) for v in volts]).ravel()
+    seen = converter.trace([params["drawn_v"]], every_us=0.005, stop_us=0.75)
+    return {
+        "volts": volts.round(6).tolist(),
+        "elapsed_us": (ticks / TICKS_A_US).round(9).tolist(),
+        "trace": {
+            "t_us": seen.t_us.round(6).tolist(),
+            "input_v": seen.input_v.round(6).tolist(),
+            "ramp_v": seen.ramp_v.round(6).tolist(),
+            "high": seen.high.astype(int).tolist(),
+        },
+    }
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Tell of each shape whether the time grows, up to which input, and how far it is from straight."""
+    said: Said = {"shapes": {}}
+    for row in rows:
+        volts, elapsed = np.array(row.result["volts"]), np.array(row.result["elapsed_us"])
+        whole = p["ramp"] / TICKS_A_US
+        within = elapsed < whole - 1e-9
+        line = np.polyfit(volts[within], elapsed[within], 1)
+        said["shapes"][row.params["shape"]] = {
+            **row.result,
+            "grows": bool((np.diff(elapsed[within]) > 0).all() and (np.diff(elapsed) >= -1e-9).all()),
+            "ends_v": round(float(volts[within].max()), 3),
+            "bent_us": round(float(np.abs(np.polyval(line, volts[within]) - elapsed[within]).max()), 5),
+        }
+    return said
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 4.3.2 says."""
+    found = []
+    for shape, one in said["shapes"].items():
+        name = "the board's RC ramp" if shape == "rc" else "a linear ramp"
+        found.append(
+            Statement(
+                f"t_elapsed grows with V_in ({name}).",
+                "grows",
+                f"grows up to {one['ends_v']:g} V; above that it is the ramp's {p['ramp'] / TICKS_A_US:g} us",
+                one["grows"],
+            )
+        )
+    for shape, one in said["shapes"].items():
+        straight = one["bent_us"] < 1e-3
+        found.append(
+            Statement(
+                f"The duration of t_elapsed is proportional to the magnitude of V_in ({shape} ramp).",
+                "proportional",
+                f"within {1e3 * one['bent_us']:.1f} ns of a straight line",
+                straight,
+                "" if straight else "an RC ramp flattens: later voltages are finer told (Appendix 1, 2.2.3 has the RC)",
+            )
+        )
+    return found
+
+
+def draw(_p: Parameters, said: Said) -> Figure:
+    """Draw one conversion as 4.3 does, and the time against the input for both ramps."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(9, 3.8), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    seen = next(iter(said["shapes"].values()))["trace"]
+    left.plot(seen["t_us"], seen["ramp_v"], color="C3", label="V_ramp")
+    left.plot(seen["t_us"], seen["input_v"], color="C2", label="V_in")
+    left.step(seen["t_us"], seen["high"], color="C0", where="post", label="V_comp (high: 1)")
+    left.set(xlabel="time, us", ylabel="V")
+    left.legend(fontsize="small", loc="upper right")
+    for number, (shape, one) in enumerate(said["shapes"].items()):
+        right.plot(one["volts"], one["elapsed_us"], color=f"C{number}", label=f"{shape} ramp")
+    right.set(xlabel="V_in, V", ylabel="t_elapsed, us")
+    right.legend(fontsize="small")
+    return figure
+
+
+STUDY = Study(
+    name="fig4.3",
+    title="single-slope conversion: the time until the ramp passes grows with the input",
+    where="thesis 4.3.2, figure 4.3",
+    protocol=(
+        "One comparator with 0.1 V of hysteresis, a ramp of 150 ticks of 1/300 us that ends at 3 V: the board's RC "
+        "curve towards 5 V, and a straight one. Inputs from 0.5 to 3.4 V, each settled."
+    ),
+    parameters=PARAMETERS,
+    sizes={"toy": {"points": 59}},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+)

@@ -1,0 +1,162 @@
+"""Figure 4.7: how soon the transducer answers, and how soon the input settles while four channels are multiplexed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel.simulate.circuit import Converter, Fabric, VirtualGround
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "delay_us": 50.0,
+    "rise_us": 5.0,
+    "impact_n": 0.5,
+    "forces_n": [0.02, 0.6, 0.1, 0.3],
+    "amplifiers_us": [0.0, 0.705],
+    "every_us": 0.002,
+    "settled": 0.02,
+}
+#: When the thesis' input has settled, us.
+SETTLED_US = 0.2
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List the impact, and one task a time constant of the amplifiers."""
+    impact = {name: p[name] for name in ("delay_us", "rise_us", "impact_n")}
+    scan = {name: p[name] for name in ("forces_n", "every_us", "settled")}
+    return [Task(impact, 0), *(Task({**scan, "amplifier_us": tau}, 0) for tau in p["amplifiers_us"])]
+
+
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Play the impact, or watch a comparator for a column."""
+    del seed
+    return _impact(params) if "impact_n" in params else _scan(params)
+
+
+def _impact(params: dict[str, Any]) -> dict[str, Any]:
+    """Strike one taxel at time 0: the fabric conducts by the force of `delay_us` before."""
+    t = np.arange(-20.0, 120.0, 0.5)
+    force = params["impact_n"] * np.clip((t - params["delay_us"]) / params["rise_us"], 0.0, 1.0)
+    volts = VirtualGround().volts(Fabric().conductance(force).reshape(-1, 1, 1)).ravel()
+    moved = t[np.argmax(volts > volts[0] + 1e-6)]
+    return {"t_us": t.tolist(), "volts": volts.round(6).tolist(), "moved_us": round(float(moved), 3)}
+
+
+def _scan(params: dict[str, Any]) -> dict[str, Any]:
+    """Read four lines of one channel; then two columns of which the first was pressed and the second was not."""
+    converter = Converter(amplifier_us=params["amplifier_us"])
+    lines = VirtualGround().volts(Fabric().conductance(np.array(params["forces_n"]))[:, None]).ravel()
+    seen = converter.trace(lines.tolist(), every_us=params["every_us"], stop_us=2 * converter.line_us)
+    second = seen.t_us >= converter.line_us
+    took = []
+    for step in range(converter.steps):
+        begins = converter.line_us + step * converter.step_us
+        here = second & (seen.t_us >= begins) & (seen.t_us < begins + converter.step_us)
+        off = np.abs(seen.input_v - seen.line_v)[here]
+        last = np.flatnonzero(off > params["settled"] * off[0])
+        took.append(float(seen.t_us[here][last[-1]] - begins) if len(last) else 0.0)
+    pressed = np.stack([lines, np.full(len(lines), VirtualGround().v_trans)], axis=1)
+    plain = Converter().ticks(np.stack([pressed[:, 1:]] * 2))[1].ravel()
+    left = converter.ticks(np.stack([pressed] * 2))[1][:, 1]
+    return {
+        "trace": {name: getattr(seen, name)[second].round(6).tolist() for name in ("t_us", "input_v", "ramp_v")}
+        | {"high": seen.high[second].astype(int).tolist()},
+        "settles_us": np.round(took, 4).tolist(),
+        "left_ticks": np.round(left - plain, 3).tolist(),
+    }
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Keep the impact and the scans by time constant."""
+    (impact,) = [r.result for r in rows if "impact_n" in r.params]
+    scans = [{"amplifier_us": tau, **r.result} for tau in p["amplifiers_us"] for r in _of(rows, tau)]
+    return {"impact": impact, "scans": scans}
+
+
+def _of(rows: Sequence[Row], tau: float) -> list[Row]:
+    return [r for r in rows if r.params.get("amplifier_us") == tau]
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 4.4.1 says."""
+    found = [
+        Statement(
+            "The sensor responds at approximately 50 us.",
+            "50 us",
+            f"V_in begins to move {said['impact']['moved_us']:g} us after the impact",
+            None,
+            "the fabric's delay is taken over from here, so it is no test; on the board the scan adds 0 to 192 us",
+        )
+    ]
+    for scan in said["scans"]:
+        worst = max(scan["settles_us"])
+        if scan["amplifier_us"] == 0:
+            found.append(
+                Statement(
+                    "V_in settles within 0.2 us while 4 channels are multiplexed at 3 us a column.",
+                    f"{SETTLED_US:g} us",
+                    f"to {100 * p['settled']:g} % of the step within {worst:.3f} us, in each of the four steps",
+                    None if worst <= SETTLED_US + p["every_us"] else False,
+                    "the multiplexer's time constant, 0.05 us, is chosen for it, so it is no test; no part states one",
+                )
+            )
+        else:
+            found.append(
+                Statement(
+                    f"The same, were the board's 15 pF to lie across R_f ({scan['amplifier_us']:g} us).",
+                    "no word of a column's traces in the next",
+                    "an unpressed column behind a pressed one reads "
+                    + ", ".join(f"{t:.1f}" for t in scan["left_ticks"])
+                    + " ticks too many in its four steps",
+                    None,
+                    "what a lab can measure: none if the capacitors lie elsewhere",
+                )
+            )
+    return found
+
+
+def draw(_p: Parameters, said: Said) -> Figure:
+    """Draw 4.7: the impact, and one comparator's input, ramp and output over a column."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(10, 3.8), layout="constrained")
+    left, right = figure.subplots(1, 2, width_ratios=[1, 1.6])
+    left.plot(said["impact"]["t_us"], said["impact"]["volts"], color="C2")
+    left.axvline(0.0, color="k", ls=":", lw=0.9)
+    left.set(xlabel="time since the impact, us", ylabel="V_in, V", title="(a)")
+    seen = said["scans"][0]["trace"]
+    t = np.array(seen["t_us"]) - seen["t_us"][0]
+    right.plot(t, seen["ramp_v"], color="C3", label="V_ramp")
+    right.plot(t, seen["input_v"], color="C2", label="V_in")
+    right.step(t, seen["high"], color="C0", where="post", label="V_comp (high: 1)")
+    right.set(xlabel="time since the column's change, us", ylabel="V", title="(b)")
+    right.legend(fontsize="small", loc="upper right")
+    return figure
+
+
+STUDY = Study(
+    name="fig4.7",
+    title="the transducer's answer to an impact, and settling while four channels are multiplexed",
+    where="thesis 4.4.1, figure 4.7",
+    protocol=(
+        "(a) 0.5 N within 5 us on one taxel whose fabric answers 50 us late. (b) One comparator reads four lines, "
+        "loaded by 0.02, 0.6, 0.1 and 0.3 N, 0.75 us each, at 3 us a column; settled is within 2 % of the step. Then "
+        "the same with amplifiers of 47 kOhm x 15 pF, and a column at rest behind the loaded one."
+    ),
+    parameters=PARAMETERS,
+    sizes={"toy": {"every_us": 0.01}},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+)

@@ -1,0 +1,151 @@
+"""Figure 4.9: drops of a tennis ball laid out by t-SNE, by sampling rate (thesis 4.4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel_studies import dropped, fig4_8
+from taxel_studies.dropped import TENNIS
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    **dropped.TENNIS_TABLE,
+    "rates_hz": [50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0],
+    "perplexity": 30.0,
+    "seed": 1,
+}
+TOY: dict[str, Any] = {**dropped.TENNIS_TOY, "rates_hz": [100.0, 1000.0], "perplexity": 5.0}
+#: How long a film is, ms.
+LENGTH_MS = 20.0
+#: From here on the classes lie clearly apart, Hz.
+CLEAR_HZ = 500.0
+#: How many nearest neighbours in the map are asked, and what share of one's own class counts as clearly apart.
+NEIGHBOURS, CLEAR = 10, 0.95
+
+
+def tasks(p: Parameters, courses: Path) -> list[Task]:
+    """List one realisation a condition."""
+    del courses
+    return dropped.play_tasks(p)
+
+
+def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+    """List one map a rate."""
+    del rows, courses
+    return [
+        Task({**dropped.named(p), "rate_hz": rate, "perplexity": p["perplexity"]}, p["seed"])
+        for rate in sorted(p["rates_hz"])
+    ]
+
+
+def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
+    """Drop the ball so many times; or lay all films at a rate out on a plane, and look at each one's neighbours."""
+    told = dropped.told(params, seed, courses, TENNIS)
+    if told is not None:
+        return told
+    from sklearn.manifold import TSNE  # noqa: PLC0415  an extra
+
+    found: dict[str, Any] = {}
+    for how, aligned in (("", True), ("any_phase_", False)):
+        x, y = fig4_8.films(params, seed, courses, 1000 / params["rate_hz"], LENGTH_MS, aligned=aligned)
+        laid = TSNE(perplexity=params["perplexity"], init="pca", random_state=seed).fit_transform(x)
+        found[f"{how}own"] = round(own_neighbours(np.asarray(laid, np.float64), y), 4)
+        if aligned:
+            found["map"] = [[round(float(a), 1), round(float(b), 1)] for a, b in laid]
+    return found
+
+
+def own_neighbours(places: NDArray[np.float64], y: NDArray[np.int64]) -> float:
+    """Return which share of the nearest neighbours is of one's own class."""
+    squares = (places**2).sum(1)
+    apart = squares[:, None] + squares - 2 * places @ places.T
+    np.fill_diagonal(apart, np.inf)
+    near = np.argsort(apart, axis=1)[:, : min(NEIGHBOURS, int(np.bincount(y).min()) - 1)]
+    return float(np.mean(y[near] == y[:, None]))
+
+
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
+    """List the maps by rate."""
+    del courses
+    maps = {row.params["rate_hz"]: row.result for row in rows if "rate_hz" in row.params}
+    names = [f"{c.height_mm / 10:g} cm, {c.slant_deg:g} degrees" for c in dropped.conditions(p)]
+    return {"lines": [{"rate_hz": rate, **maps[rate]} for rate in sorted(maps)], "classes": names}
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 4.4.2 says of the maps."""
+    lines = said["lines"]
+    fast = [line["own"] for line in lines if line["rate_hz"] >= CLEAR_HZ]
+    slow = [line["own"] for line in lines if line["rate_hz"] < CLEAR_HZ]
+    if not (fast and slow):
+        return []
+    listed = ", ".join(f"{line['own']:.2f} at {line['rate_hz']:g} Hz" for line in lines)
+    any_phase = ", ".join(f"{line['any_phase_own']:.2f}" for line in lines)
+    return [
+        Statement(
+            "Figure 4.9: classes lie clearly apart at 500 Hz and above, less so below.",
+            "the picture",
+            f"of the {NEIGHBOURS} nearest in the map are of one's own class: {listed}",
+            bool(min(fast) >= CLEAR and max(slow) < min(fast)),
+            f"clearly: {CLEAR:.0%} or more; by chance {1 / len(said['classes']):.2f}; sampling begun at any "
+            f"phase instead of at the impact: {any_phase}; {p['drops']} drops a class, perplexity {p['perplexity']:g}",
+        )
+    ]
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw a map a rate."""
+    del p
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    lines = said["lines"]
+    columns = min(3, len(lines))
+    figure = Figure(figsize=(3 * columns, 3 * -(-len(lines) // columns) + 0.5), layout="constrained")
+    axes = np.ravel(figure.subplots(-(-len(lines) // columns), columns, squeeze=False))
+    size = len(lines[0]["map"]) // len(said["classes"])
+    for ax, line in zip(axes, lines, strict=False):
+        places = np.array(line["map"])
+        for k, name in enumerate(said["classes"]):
+            ax.plot(*places[k * size : (k + 1) * size].T, ".", ms=4, color=f"C{k}", label=name)
+        ax.set_title(f"{line['rate_hz']:g} Hz", fontsize="medium")
+    for ax in axes:
+        ax.set_xticks([])
+        ax.set_yticks([])
+    for ax in axes[len(lines) :]:
+        ax.set_axis_off()
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize="small")
+    figure.suptitle("figure 4.9: t-SNE of the first 20 ms")
+    return figure
+
+
+STUDY = Study(
+    name="fig4.9",
+    title="drops of a tennis ball laid out by t-SNE, by sampling rate",
+    where="thesis 4.4.2, figure 4.9",
+    protocol=(
+        "The drops of the study fig4.8, the first 20 ms of each film, at the rates of the picture's panels by guess. "
+        "t-SNE of scikit-learn on all pictures of a film, begun at its principal components; beside each map, how many "
+        "of a film's 10 nearest neighbours in it are of its own class; and the same of films begun at any phase."
+    ),
+    parameters=PARAMETERS,
+    sizes={"toy": TOY},
+    tasks=tasks,
+    then=then,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+    needs=("sklearn",),
+    courses=True,
+)

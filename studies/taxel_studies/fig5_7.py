@@ -1,0 +1,162 @@
+"""Figure 5.7: bits of an indentation by sampling period and by bits an event (thesis 5.5.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel.encode import FA1
+from taxel.simulate.fem import SamplingGrid
+from taxel_studies import indented
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study, logarithmic
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    **indented.TABLE,
+    "samples": 500,
+    "periods_ms": [0.5, 1.0, 2.0, 5.0, 10.0, 20.0],
+    "event_bits": [1, 2, 4, 6, 8, 10],
+    "alpha": 0.7,
+    "seed": 1,
+}
+TOY: dict[str, Any] = {**indented.TOY, "samples": 12, "periods_ms": [10.0, 20.0], "event_bits": [1, 4]}
+
+
+def tasks(p: Parameters, courses: Path) -> list[Task]:
+    """List one course a path."""
+    del courses
+    return indented.course_tasks(list(indented.courses_of(p).values()))
+
+
+def then(p: Parameters, rows: Sequence[Row], courses: Path) -> list[Task]:
+    """List one realisation a period and number of bits; the shortest period first."""
+    del courses
+    shared = indented.shared(p, rows)
+    return [
+        Task(
+            {**shared, "period_ms": period, "event_bits": bits, "alpha": p["alpha"], "samples": p["samples"]},
+            p["seed"],
+        )
+        for period in sorted(p["periods_ms"])
+        for bits in p["event_bits"]
+    ]
+
+
+def realise(params: dict[str, Any], seed: int, courses: Path) -> dict[str, Any]:
+    """Press once; or sample all contacts, and see what discriminants make of spikes with so many bits."""
+    course = indented.make(params, courses)
+    if course is not None:
+        return indented.told(course)
+    conditions, samples = indented.reached(params), params["samples"]
+    encoder = FA1(
+        alpha=params["alpha"],
+        range=params["range_kpa"],
+        period_ms=params["period_ms"],
+        bits=params["event_bits"],
+    )
+    x = indented.rasters(
+        conditions,
+        indented.courses_of(params),
+        courses,
+        grid=SamplingGrid(),
+        encoder=encoder,
+        samples=samples,
+        seed=seed,
+    )
+    return indented.bits_of(indented.summed(x, len(conditions), samples, seed), samples)
+
+
+def summarise(p: Parameters, rows: Sequence[Row], courses: Path) -> Said:
+    """List the bits by period and bits an event."""
+    del courses
+    found = {
+        (row.params["period_ms"], row.params["event_bits"]): row.result["bits"]
+        for row in rows
+        if "event_bits" in row.params
+    }
+    periods = sorted(p["periods_ms"])
+    return {
+        "periods_ms": periods,
+        "lines": [{"event_bits": b, "bits": [found[period, b] for period in periods]} for b in p["event_bits"]],
+        "conditions": len(indented.reached(rows[-1].params)),
+    }
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 5.5.2 says."""
+    by = {line["event_bits"]: dict(zip(said["periods_ms"], line["bits"], strict=True)) for line in said["lines"]}
+    few, many = min(by), max(by)
+    short, long = said["periods_ms"][0], said["periods_ms"][-1]
+    size = (
+        f"{said['conditions']} conditions, {p['samples']} samples each, alpha {p['alpha']:g}, mesh {p['mesh_mm']:g} mm"
+    )
+    gain = {period: by[many][period] - by[few][period] for period in (short, long)}
+    found = [
+        Statement(
+            "Figure 5.7: more bits an event raise the information, and only at long periods by much.",
+            "the picture",
+            "; ".join(f"{period:g} ms: {bits:+.2f} bits" for period, bits in gain.items())
+            + f" from {few} to {many} bits an event",
+            bool(gain[long] > 0 and gain[long] > gain[short]),
+            size,
+        )
+    ]
+    if {1, 10} <= set(by) and {2.0, 20.0} <= set(said["periods_ms"]):
+        slow, quick = by[10][20.0], by[1][2.0]
+        found.append(
+            Statement(
+                "20 ms with 10 bits does much worse than 2 ms with 1 bit, at the same data rate.",
+                "much lower",
+                f"{slow:.2f} against {quick:.2f} bits",
+                bool(slow < quick - 0.5),
+                f"much: by half a bit or more; {size}",
+            )
+        )
+    return found
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw 5.7: a line a number of bits."""
+    del p
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(6, 4), layout="constrained")
+    ax = figure.subplots()
+    for line in said["lines"]:
+        ax.plot(
+            said["periods_ms"], line["bits"], ".-", label=f"{line['event_bits']} bit{'s' * (line['event_bits'] > 1)}"
+        )
+    ax.axhline(np.log2(said["conditions"]), color="0.6", ls=":")
+    logarithmic(ax, x=said["periods_ms"])
+    ax.set_xlabel("sampling period, ms")
+    ax.set_ylabel("bits")
+    ax.legend(title="an event", fontsize="small")
+    return figure
+
+
+STUDY = Study(
+    name="fig5.7",
+    title="bits of an indentation by sampling period and by bits an event",
+    where="thesis 5.5.2, figure 5.7",
+    protocol=(
+        "As fig5.5, with Table 5.3's alpha; a spike's value is the change since the last one in units of theta_0 "
+        "(5.7), towards zero, saturating at 2^bits - 1. When a spike is fired stays that of 5.4."
+    ),
+    parameters=PARAMETERS,
+    sizes={"coarse": {**indented.COARSE, "samples": 100}, "toy": TOY},
+    tasks=tasks,
+    then=then,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+    courses=True,
+)

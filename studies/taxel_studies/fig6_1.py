@@ -1,0 +1,178 @@
+"""Figure 6.1: input spikes, potential, threshold, refractory time, output spikes (thesis 6.3.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.learn import ConeX
+from taxel.neuron import Neuron
+from taxel.spikes import SpikeTrains
+from taxel_studies import mapping
+from taxel_studies.mapping import LEARN, TABLE, thresholds
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "inputs": 60,
+    "rates_hz": [5.0, 25.0],
+    "stop": 140.0,
+    "targets": [50.0, 100.0],
+    "after_spike": "keep",
+    "step_ms": 0.1,
+    "seed": 3,
+}
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List the one neuron."""
+    return [Task({k: v for k, v in p.items() if k != "seed"}, p["seed"])]
+
+
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Train one neuron and follow it."""
+    trains = mapping.poisson(seed, params["inputs"], params["stop"], *params["rates_hz"])
+    neuron = Neuron(**TABLE, after_spike=params["after_spike"])
+    cone = ConeX(neuron=neuron, **LEARN, lambdas=(1.0, 0.0, 0.0), kappa=1.0)
+    cone.fit([trains], [params["targets"]])
+    times = np.arange(round(params["stop"] / params["step_ms"]) + 1) * params["step_ms"]
+    potential = cone.neuron_.potential(cone.weights_, trains, times, spikes=params["targets"])
+    plain = cone.neuron_.potential(cone.weights_, trains, times)
+    return {
+        "status": cone.status_,
+        "spikes": [float(t) for t in cone.neuron_.run(cone.weights_, trains)],
+        "trains": [t.tolist() for t in trains],
+        "weights": cone.weights_.tolist(),
+        "times": times.round(6).tolist(),
+        "potential": potential.round(6).tolist(),
+        "worst_of_sum": float(np.max(np.abs(plain - _sum_of_kernels(cone.weights_, trains, times)))),
+        "at_targets": [
+            float(u) for u in cone.neuron_.potential(cone.weights_, trains, params["targets"], spikes=params["targets"])
+        ],
+    }
+
+
+def _sum_of_kernels(
+    weights: NDArray[np.float64], trains: SpikeTrains, times: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Return 6.4 with 6.5, as printed, without taxel's neuron."""
+    total = np.zeros(len(times))
+    for weight, spikes in zip(weights, trains, strict=True):
+        for spike in spikes:
+            x = np.maximum(times - spike, 0.0) / TABLE["tau"]
+            total += weight * x * np.exp(-x)
+    return total
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Keep the one neuron's story."""
+    del p
+    said: Said = rows[0].result
+    return said
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 6.3.1 and the caption say."""
+    times, potential = np.array(said["times"]), np.array(said["potential"])
+    theta = thresholds(np.array(p["targets"]), p["targets"])
+    off = np.max(np.abs(np.array(said["at_targets"]) - theta))
+    quiet = np.any([(times > t) & (times <= t + TABLE["refractory"]) for t in p["targets"]], axis=0)
+    raised = thresholds(np.array([t + TABLE["refractory"] for t in p["targets"]]), p["targets"])
+    exact = len(said["spikes"]) == len(p["targets"])
+    return [
+        Statement(
+            "The membrane potential is the sum of all postsynaptic potentials (6.4, 6.5).",
+            "the printed sum",
+            f"neuron against the printed sum: {said['worst_of_sum']:.0e} mV at most",
+            said["worst_of_sum"] < 1e-12,
+        ),
+        Statement(
+            "A spike is discharged where the potential meets the threshold: U is at it at each target.",
+            "U = theta",
+            f"|U - theta| at the targets: {off:.0e} mV; fires at {', '.join(f'{t:.6f}' for t in said['spikes'])} ms",
+            bool(off < 1e-12) and exact and bool(np.max(np.abs(np.subtract(said["spikes"], p["targets"]))) < 1e-6),
+        ),
+        Statement(
+            "The neuron then holds its resting potential for the absolute refractory period.",
+            f"0 mV for {TABLE['refractory']:g} ms",
+            f"{np.max(np.abs(potential[quiet])):g} mV at most",
+            bool(np.all(potential[quiet] == 0)),
+        ),
+        Statement(
+            "The threshold rises from theta_0 to theta_0 + theta+ and recovers.",
+            f"{TABLE['theta_0']:g} to {TABLE['theta_0'] + TABLE['theta_plus']:g} mV",
+            f"{raised[0]:g} mV at the end of the first refractory period; the neuron fires at the second target, where "
+            f"it has come down to {theta[-1]:.4f} mV",
+            exact and bool(np.isclose(raised[0], TABLE["theta_0"] + TABLE["theta_plus"])),
+        ),
+    ]
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw 6.1: input trains, output train, and the dynamics in the lower right panel."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(12, 6), layout="constrained")
+    axes = figure.subplot_mosaic(
+        [["inputs", "output"], ["inputs", "dynamics"]], height_ratios=[1, 5], width_ratios=[2, 3]
+    )
+    inputs, output, dynamics = axes["inputs"], axes["output"], axes["dynamics"]
+    weights = np.array(said["weights"])
+    inputs.eventplot(said["trains"], colors=_by_sign(weights), linewidths=1.0, linelengths=0.8)
+    inputs.set(
+        xlabel="time, ms",
+        ylabel="input",
+        title="input spike trains\n(red: excitatory, blue: inhibitory, grey: weight 0)",
+    )
+    inputs.set_xlim(0, p["stop"])
+    output.eventplot(
+        [p["targets"], said["spikes"]], colors=["0.6", "k"], linewidths=2.0, lineoffsets=[1, 0], linelengths=0.8
+    )
+    output.set(yticks=[0, 1], yticklabels=["neuron", "target"], title="output spike train")
+    output.set_xlim(0, p["stop"])
+    times = np.array(said["times"])
+    largest = np.argsort(-np.abs(weights))[:12]
+    for n in largest:
+        for spike in said["trains"][n]:
+            x = np.maximum(times - spike, 0.0) / TABLE["tau"]
+            dynamics.plot(times, weights[n] * x * np.exp(-x), color="C1", lw=0.8, alpha=0.8)
+    dynamics.plot([], [], color="C1", lw=0.8, label="postsynaptic potentials")
+    dynamics.plot(times, said["potential"], "k", lw=1.4, label="membrane potential U")
+    dynamics.plot(times, thresholds(times, p["targets"]), "C2--", lw=1.2, label="threshold")
+    for k, target in enumerate(p["targets"]):
+        spike, quiet = ("output spike", "absolute refractory period") if k == 0 else ("", "")
+        dynamics.vlines(target, 0, 0.62, "C3", lw=1.6, label=spike)
+        dynamics.axvspan(target, target + TABLE["refractory"], color="0.85", zorder=0, label=quiet)
+    dynamics.set(xlabel="time, ms", ylabel="mV", ylim=(None, 0.65), xlim=(0, p["stop"]))
+    figure.legend(*dynamics.get_legend_handles_labels(), fontsize="small", loc="outside lower right", ncols=5)
+    return figure
+
+
+def _by_sign(weights: NDArray[np.float64]) -> list[str]:
+    return ["0.7" if abs(w) < 1e-6 else "C3" if w > 0 else "C0" for w in weights]
+
+
+STUDY = Study(
+    name="fig6.1",
+    title="input spikes, potential, threshold and refractory time, and the output spikes they make",
+    where="thesis 6.3.1, figure 6.1",
+    protocol=(
+        "60 Poisson inputs of 5 to 25 Hz, two targets; Table 6.1, weights by CONE-X (l1, continuous time). Drawn are "
+        "the exact neuron and the postsynaptic potentials of its twelve largest weights."
+    ),
+    parameters=PARAMETERS,
+    sizes={"toy": {"step_ms": 0.5}},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+)

@@ -1,0 +1,158 @@
+"""Figure 6.10: dense against sparse weights under three noises (thesis 6.4.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel_studies import waves
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.waves import NOISES, READINGS, TRAINED_AT, realise
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "realisations": 100,
+    "ratios": [[0.0, 4.0], [1.0, 3.0], [2.0, 2.0], [3.0, 1.0], [4.0, 0.0]],
+    "kappa": 1.08,
+    "rest": [100.0, 100.0, 100.0],
+    "readings": ["targets", "B_max"],
+    "levels": {noise: list(levels) for noise, levels in waves.LEVELS.items()},
+    "repetitions": waves.REPETITIONS,
+}
+TOY: dict[str, Any] = {
+    "realisations": 2,
+    "ratios": [[0.0, 4.0], [4.0, 0.0]],
+    "levels": {"jitter": [0, 3, 6], "background": [0, 3, 30], "shunting": [0, 3, 30]},
+    "repetitions": 5,
+}
+
+#: Units of the levels.
+UNITS = {"jitter": "ms", "background": "Hz", "shunting": "%"}
+#: Levels of noise over which a statement is judged: above the first, up to the second.
+ANY, WEAK, STRONG = (0.0, 100.0), (0.0, 5.0), (15.0, 100.0)
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List the realisations: CONE-R in both trainings."""
+    settings = [{"kappa": p["kappa"], "lambdas": [*ratio, *p["rest"]]} for ratio in p["ratios"]]
+    return waves.tasks(p, settings, settings, "cone_r")
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Average the distances."""
+    return {"curves": waves.curves(p, rows)}
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 6.4.7 says, in each reading of B."""
+    found = []
+    for reading in p["readings"]:
+        curves = said["curves"][reading]
+        why = READINGS[reading] + (", which leaves kappa nearly powerless" if reading == "B_max" else "")
+        clean = curves["clean"]
+        claims = (
+            ("jitter", "dense is better against jitter", True, ANY),
+            ("background", "sparse is better against background", False, ANY),
+            ("shunting", "against weak shunting sparse is worse", True, WEAK),
+            ("shunting", "against strong shunting sparse is better", False, STRONG),
+        )
+        found += [
+            _compared(f"Noise-free training: {says}.", clean[noise], UNITS[noise], dense_is_better, levels, why)
+            for noise, says, dense_is_better, levels in claims
+            if noise in clean
+        ]
+        spread = {t: _spread(c) for t, c in (("clean", clean), ("noisy", curves["noisy"]))}
+        found.append(
+            Statement(
+                "Trained with noise, sparsity matters less.",
+                "results of sparsity were less evident",
+                "largest less smallest distance between ratios, mean over levels and noises: "
+                f"{spread['clean']:.2f} noise-free, {spread['noisy']:.2f} noisy",
+                spread["noisy"] < spread["clean"],
+                why,
+            )
+        )
+    return found
+
+
+def _compared(
+    says: str, curve: dict[str, Any], unit: str, dense_is_better: bool, among: tuple[float, float], why: str
+) -> Statement:
+    levels, mean = np.array(curve["levels"], float), np.array(curve["mean"])
+    dense, sparse = mean[0], mean[-1]
+    here = (levels > among[0]) & (levels <= among[1])
+    means = dense[here].mean(), sparse[here].mean()
+    gain = sparse - dense
+    turns = [
+        levels[k] + (levels[k + 1] - levels[k]) * gain[k] / (gain[k] - gain[k + 1])
+        for k in range(len(levels) - 1)
+        if levels[k] > 0 and gain[k] * gain[k + 1] < 0
+    ]
+    crossing = f"; they cross at {', '.join(f'{t:.1f}' for t in turns)} {unit}" if turns else "; they do not cross"
+    over = " to ".join(f"{level:g}" for level in sorted({levels[here].min(), levels[here].max()}))
+    holds = bool(means[0] < means[1] if dense_is_better else means[1] < means[0])
+    if not holds and len(turns) == 1 and (gain[here][0] > 0) == dense_is_better:
+        why += f": it does below {turns[0]:.1f} {unit}, and above it the other way round"
+    return Statement(
+        says,
+        "dense below sparse" if dense_is_better else "sparse below dense",
+        f"mean distance at {over} {unit}: {means[0]:.2f} dense (0 : 4), {means[1]:.2f} sparse (4 : 0){crossing}",
+        holds,
+        why,
+    )
+
+
+def _spread(curves: dict[str, Any]) -> float:
+    spreads = []
+    for curve in curves.values():
+        columns = [k for k, level in enumerate(curve["levels"]) if level >= TRAINED_AT]
+        mean = np.array(curve["mean"])[:, columns]
+        spreads.append(float((mean.max(axis=0) - mean.min(axis=0)).mean()))
+    return float(np.mean(spreads))
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw 6.10 once a reading: left noise-free, right noisy training; rows jitter, background, shunting."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(7.5 * len(p["readings"]), 8.5), layout="constrained")
+    parts = figure.subfigures(1, len(p["readings"]), squeeze=False)[0]
+    for part, reading in zip(parts, p["readings"], strict=True):
+        part.suptitle(READINGS[reading])
+        axes = part.subplots(len(p["levels"]), 2, squeeze=False)
+        for row, noise in enumerate(p["levels"]):
+            for column, training in enumerate(("clean", "noisy")):
+                curve = said["curves"][reading][training][noise]
+                for k, ratio in enumerate(p["ratios"]):
+                    label = f"{ratio[0]:g} : {ratio[1]:g}"
+                    axes[row, column].errorbar(curve["levels"], curve["mean"][k], curve["sem"][k], label=label, lw=1.2)
+                axes[row, column].set_xlabel(f"{noise}, {NOISES[noise]}")
+                axes[row, column].set_ylabel("VP distance")
+                axes[row, column].set_ylim(bottom=0)
+        axes[0, 0].set_title("trained without noise")
+        axes[0, 1].set_title("trained with noise")
+        axes[min(1, len(axes) - 1), 0].legend(title="lambda 1 : lambda 2", fontsize="small", loc="upper left")
+    return figure
+
+
+STUDY = Study(
+    name="fig6.10",
+    title="dense against sparse weights under jitter, background and shunting",
+    where="thesis 6.4.7, figure 6.10",
+    protocol=waves.PROTOCOL
+    + " CONE-R in both trainings, kappa 1.08, lambda 3 to 5 at 100, lambda 1 : lambda 2 varied.",
+    parameters=PARAMETERS,
+    sizes={"toy": TOY},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+)

@@ -1,0 +1,155 @@
+"""Figure 6.11: how weights are distributed, trained without noise and with it (thesis 6.4.7)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel_studies import waves
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.waves import READINGS, realise
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "realisations": 100,
+    "kappa": 1.04,
+    "lambdas": [2.0, 2.0, 100.0, 100.0, 100.0],
+    "readings": ["targets", "B_max"],
+    "trainings": ["clean", "jitter", "background", "shunting"],
+    "bin_mv": 0.001,
+    "repetitions": waves.REPETITIONS,
+}
+TOY: dict[str, Any] = {"realisations": 3, "repetitions": 5}
+#: A mode stands out from its valley by this share of the tallest mode.
+STANDS_OUT = 0.05
+#: Bins with a smaller share are not drawn.
+DRAWN_FROM = 2e-4
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List one task a seed, a training and a reading."""
+    return [
+        Task(
+            {
+                "training": training,
+                "learner": "cone_r",
+                "settings": [{"kappa": p["kappa"], "lambdas": p["lambdas"]}],
+                "divide_b_by": reading,
+                "levels": {training: []} if training != "clean" else {},
+                "repetitions": p["repetitions"],
+            },
+            seed,
+        )
+        for reading in p["readings"]
+        for training in p["trainings"]
+        for seed in range(p["realisations"])
+    ]
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Average the histograms over trials, as shares of the weights."""
+    bound = waves.LEARN["ub"]
+    half = round(bound / p["bin_mv"])
+    # A bin is centred at 0, where l1 leaves many weights.
+    edges = (np.arange(-half, half + 2) - 0.5) * p["bin_mv"]
+    said: Said = {"centres": ((edges[:-1] + edges[1:]) / 2).round(6).tolist(), "shares": {}}
+    for reading in p["readings"]:
+        said["shares"][reading] = {}
+        for training in p["trainings"]:
+            weights = [
+                r.result["found"][0]["weights"]
+                for r in rows
+                if r.params["divide_b_by"] == reading and r.params["training"] == training
+            ]
+            counts = np.histogram(np.clip(weights, edges[0], edges[-1]), edges)[0]
+            said["shares"][reading][training] = (counts / counts.sum()).round(6).tolist()
+    return said
+
+
+def modes(shares: NDArray[np.float64]) -> list[int]:
+    """Return the bins of the modes that stand out, in a histogram smoothed over three bins."""
+    smooth = np.convolve(np.pad(shares, 1, mode="edge"), [0.25, 0.5, 0.25], mode="valid")
+    least = STANDS_OUT * smooth.max()
+    found: list[int] = []
+    best, rising, valley = 0, True, smooth[0]
+    for k, value in enumerate(smooth):
+        if rising:
+            if value > smooth[best]:
+                best = k
+            elif value < smooth[best] - least:
+                found.append(best)
+                rising, valley = False, value
+        elif value < valley:
+            valley = value
+        elif value > valley + least:
+            rising, best = True, k
+    if rising:
+        found.append(best)
+    return found
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 6.4.7 says, in each reading of B."""
+    found = []
+    centres = np.array(said["centres"])
+    for reading in p["readings"]:
+        why = READINGS[reading]
+        for training in p["trainings"]:
+            shares = np.array(said["shares"][reading][training])
+            where = [float(centres[k]) for k in modes(shares)]
+            ours = "modes at " + ", ".join(f"{w:.3f}" for w in where) + " mV"
+            if training == "clean":
+                says, published = "Trained without noise, the weights have several modes.", "multi-modal"
+                holds = len(where) > 1
+            else:
+                says = f"Trained with {training}, they have one mode, at zero, and fall off from it."
+                published, holds = "unimodal, maximum centred at zero", len(where) == 1 and abs(where[0]) <= p["bin_mv"]
+                behind = shares[centres > 0.5 * p["bin_mv"]]
+                back = 100 * float(np.max(behind - np.minimum.accumulate(behind)))
+                ours += f"; above zero the histogram rises again by {back:.1f} % of the weights at most"
+            found.append(Statement(says, published, ours, holds, why))
+    return found
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw 6.11: a row a training, a column a reading."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(5 * len(p["readings"]), 8), layout="constrained")
+    axes = figure.subplots(len(p["trainings"]), len(p["readings"]), sharex=True, squeeze=False)
+    for column, reading in enumerate(p["readings"]):
+        axes[0, column].set_title(READINGS[reading])
+        for row, training in enumerate(p["trainings"]):
+            shares = 100 * np.array(said["shares"][reading][training])
+            edges = np.append(np.array(said["centres"]) - 0.5 * p["bin_mv"], said["centres"][-1] + 0.5 * p["bin_mv"])
+            axes[row, column].stairs(shares, edges, fill=True, color="C0" if row else "0.4")
+            axes[row, column].set_ylabel(f"{'no noise' if training == 'clean' else training}\n% of weights")
+        axes[-1, column].set_xlabel("weight, mV")
+    held = np.array([shares for trainings in said["shares"].values() for shares in trainings.values()]).max(axis=0)
+    drawn = np.array(said["centres"])[held > DRAWN_FROM]
+    axes[0, 0].set_xlim(drawn[0] - 2 * p["bin_mv"], drawn[-1] + 2 * p["bin_mv"])
+    return figure
+
+
+STUDY = Study(
+    name="fig6.11",
+    title="how the weights are distributed, trained without noise and with it",
+    where="thesis 6.4.7, figure 6.11",
+    protocol=waves.PROTOCOL
+    + " Here only the weights: CONE-R, kappa 1.04, lambda (2, 2, 100, 100, 100), mean of the trials.",
+    parameters=PARAMETERS,
+    sizes={"toy": TOY},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+)

@@ -1,0 +1,149 @@
+"""Figure 6.2: kappa lifts the potential behind the target and steepens the crossing (thesis 6.3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel_studies import mapping
+from taxel_studies.mapping import LEARN, TABLE
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "realisations": 20,
+    "inputs": 100,
+    "stop": 100.0,
+    "target": 100.0,
+    "kappas": [1.0, 1.2],
+    "lambdas": [0.0, 2.0, 100.0],
+    "divide_b_by": "targets",
+    "after_spike": "keep",
+    "drawn": [85.0, 112.0],
+    "step_ms": 0.05,
+}
+#: Delta t of Table 6.1, ms.
+DELTA_T: float = LEARN["delta_t_ms"]
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List one fit a kappa and a seed."""
+    first, last = p["drawn"]
+    times = (first + p["step_ms"] * np.arange(round((last - first) / p["step_ms"]) + 1)).round(6).tolist()
+    learnt = {"lambdas": p["lambdas"], "divide_b_by": p["divide_b_by"], "neuron__after_spike": p["after_spike"]}
+    return [
+        Task(
+            {
+                "pattern": "single",
+                "inputs": p["inputs"],
+                "stop": p["stop"],
+                "targets": [p["target"]],
+                "learn": {"kappa": kappa, **learnt},
+                "times": times,
+            },
+            seed,
+        )
+        for kappa in p["kappas"]
+        for seed in range(p["realisations"])
+    ]
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Sum up a kappa: the slope at the target, and how far the potential stays above threshold within delta t."""
+    times = np.array(rows[0].params["times"])
+    at = int(np.searchsorted(times, p["target"]))
+    behind = int(np.searchsorted(times, p["target"] + DELTA_T))
+    said: Said = {"times": times.tolist(), "kappas": []}
+    for kappa in p["kappas"]:
+        here = [r.result for r in rows if r.params["learn"]["kappa"] == kappa]
+        potential = np.array([r["potential"] for r in here])
+        said["kappas"].append(
+            {
+                "kappa": kappa,
+                **mapping.timing(here, [p["target"]]),
+                "slope": round(
+                    float(np.mean((potential[:, at + 1] - potential[:, at]) / (times[at + 1] - times[at]))), 5
+                ),
+                "rise": round(float(np.mean(potential[:, at : behind + 1].max(axis=1))) / TABLE["theta_0"] - 1, 5),
+                "potential": here[0]["potential"],
+            }
+        )
+    return said
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 6.3.2 says."""
+    all_ = said["kappas"]
+    slopes, rises = [c["slope"] for c in all_], [c["rise"] for c in all_]
+    return [
+        Statement(
+            "The same output spike time is maintained.",
+            "the target",
+            *mapping.told(all_),
+        ),
+        Statement(
+            "The potential crosses the threshold more steeply for kappa > 1.",
+            "steeper",
+            "mean slope behind the target, mV/ms: " + _by_kappa(p, slopes, ".4f"),
+            bool(np.all(np.diff(slopes) > 0)),
+        ),
+        Statement(
+            "A larger negative change is required to prevent the neuron from spiking.",
+            "robustness to false negatives",
+            f"within {DELTA_T:g} ms the potential would come above the threshold by, %: "
+            + _by_kappa(p, [100 * r for r in rises], ".1f"),
+            bool(np.all(np.diff(rises) > 0)),
+        ),
+    ]
+
+
+def _by_kappa(p: Parameters, values: Sequence[float], form: str) -> str:
+    return ", ".join(f"{format(v, form)} at kappa {k:g}" for k, v in zip(p["kappas"], values, strict=True))
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw 6.2: the potential around the target, without and with kappa."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(7.5, 4.2), layout="constrained")
+    ax = figure.subplots()
+    theta, target = TABLE["theta_0"], p["target"]
+    for number, c in enumerate(said["kappas"]):
+        ax.plot(said["times"], c["potential"], color=f"C{number}", lw=1.6, label=f"kappa = {c['kappa']:g}")
+        if c["kappa"] > 1:
+            ax.axhline(c["kappa"] * theta, color=f"C{number}", ls=":", lw=1.0)
+            ax.annotate("kappa theta", (p["drawn"][0], c["kappa"] * theta), va="bottom", fontsize="small")
+    ax.axhline(theta, color="k", ls="--", lw=0.9)
+    ax.annotate("theta", (p["drawn"][0], theta), va="bottom", fontsize="small")
+    for x, text in ((target, "target"), (target + DELTA_T, "target + delta t")):
+        ax.axvline(x, color="0.7", lw=0.8)
+        ax.annotate(text, (x, 0.02), xycoords=("data", "axes fraction"), rotation=90, fontsize="small", ha="right")
+    ax.set(xlabel="time, ms", ylabel="potential without spiking, mV", xlim=p["drawn"])
+    ax.legend(loc="lower right", fontsize="small")
+    return figure
+
+
+STUDY = Study(
+    name="fig6.2",
+    title="kappa lifts the potential behind the target, steepens the crossing and keeps the spike's time",
+    where="thesis 6.3.2, figure 6.2",
+    protocol=(
+        "100 inputs with one spike each, uniform on 0 to 100 ms, target at 100 ms; Table 6.1, CONE-X in continuous "
+        "time, lambda (0, 2, 100), B over the number of targets. The first pattern is drawn; slopes and rises are "
+        "means."
+    ),
+    parameters=PARAMETERS,
+    sizes={"toy": {"realisations": 2}},
+    tasks=tasks,
+    realise=mapping.realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+)

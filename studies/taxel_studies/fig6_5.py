@@ -1,0 +1,157 @@
+"""Figure 6.5: l1 uses few synapses, l2 all of them; the spike stays where it is (thesis 6.4.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel_studies import mapping
+from taxel_studies.mapping import TABLE, realise
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "realisations": 20,
+    "inputs": 100,
+    "stop": 100.0,
+    "target": 100.0,
+    "ratios": [[0.0, 1.0], [1.0, 4.0], [1.0, 1.0], [4.0, 1.0], [1.0, 0.0]],
+    "kappa": 1.0,
+    "after_spike": "keep",
+    "time": "continuous",
+    "drawn_to": 130.0,
+}
+TOY: dict[str, Any] = {"realisations": 2, "ratios": [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0]]}
+#: A weight below this counts as zero, mV.
+ZERO = 1e-6
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List one fit a ratio and a seed."""
+    return [
+        Task(
+            {
+                "pattern": "single",
+                "inputs": p["inputs"],
+                "stop": p["stop"],
+                "targets": [p["target"]],
+                "learn": {
+                    "kappa": p["kappa"],
+                    "lambdas": [*ratio, 0.0],
+                    "neuron__after_spike": p["after_spike"],
+                    "neuron__time": p["time"],
+                },
+                "times": np.arange(0.0, p["drawn_to"] + 0.5).tolist(),
+            },
+            seed,
+        )
+        for ratio in p["ratios"]
+        for seed in range(p["realisations"])
+    ]
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """Sum up a ratio: spikes, zero weights, where the largest weight sits."""
+    said: Said = {"times": rows[0].params["times"], "ratios": []}
+    for ratio in p["ratios"]:
+        here = [r.result for r in rows if r.params["learn"]["lambdas"][:2] == ratio]
+        weights = np.array([r["weights"] for r in here])
+        at = np.array([r["at"] for r in here])
+        largest = p["target"] - at[np.arange(len(here)), np.argmax(weights, axis=1)]
+        size = np.abs(weights)
+        said["ratios"].append(
+            {
+                "ratio": ratio,
+                **mapping.timing(here, [p["target"]]),
+                "zeros": round(float((size < ZERO).sum(axis=1).mean()), 1),
+                "largest_before_ms": round(float(largest.mean()), 2),
+                "l1": round(float(size.sum(axis=1).mean()), 4),
+                "potential": here[0]["potential"],
+                "weights": here[0]["weights"],
+                "at": here[0]["at"],
+            }
+        )
+    return said
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Judge what 6.4.2 and the caption say."""
+    all_ = said["ratios"]
+    zeros = [c["zeros"] for c in all_]
+    listed = ", ".join(f"{z:g} at {c['ratio'][0]:g} : {c['ratio'][1]:g}" for z, c in zip(zeros, all_, strict=True))
+    dense = next(c for c in all_ if c["ratio"][0] == 0)
+    rising = bool(np.all(np.diff(zeros) > 0))
+    return [
+        Statement(
+            "The output spike time remains unchanged.",
+            "100 ms",
+            *mapping.told(all_),
+        ),
+        Statement(
+            "With l2 all synapses contribute; with l1 only the most significant ones.",
+            "sparse for l1, dense for l2",
+            f"zero weights of {p['inputs']}: {listed}",
+            rising and zeros[0] < 1 and zeros[-1] > 0.9 * p["inputs"],
+        ),
+        Statement("The ratio tunes sparsity.", "sparsity of the solution can be tuned", f"zeros: {listed}", rising),
+        Statement(
+            "Caption: sparse solutions are obtained for lambda 2 > lambda 1.",
+            "sparse where l2 weighs more",
+            f"zeros: {listed}",
+            bool(zeros[0] > zeros[-1]),
+            "the caption is the wrong way round: its own text, and the norms, say that l1 is the sparse one",
+        ),
+        Statement(
+            "Not the synapses nearest to the target are potentiated most, but the most effective ones.",
+            "most effective synapses",
+            f"the largest weight (l2) spikes {dense['largest_before_ms']:.1f} ms before the target; "
+            f"the kernel peaks at {TABLE['tau']:g} ms",
+            abs(dense["largest_before_ms"] - TABLE["tau"]) < 0.25 * TABLE["tau"],
+        ),
+    ]
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw 6.5: left potential without spiking, right weights by spike time."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(11, 4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    for c in said["ratios"]:
+        label = f"{c['ratio'][0]:g} : {c['ratio'][1]:g}"
+        left.plot(said["times"], c["potential"], label=label, lw=1.3)
+        at, weights = np.array(c["at"]), np.array(c["weights"])
+        used = np.abs(weights) >= ZERO
+        right.plot(at[used], weights[used], ".", ms=6, label=f"{label} ({used.sum()} used)")
+    left.axhline(TABLE["theta_0"], color="k", ls="--", lw=0.8)
+    left.axvline(p["target"], color="0.6", lw=0.8)
+    left.set(xlabel="time, ms", ylabel="potential without spiking, mV")
+    left.legend(title="lambda 1 : lambda 2", fontsize="small")
+    right.set(xlabel="spike time of the synapse, ms", ylabel="weight, mV")
+    right.legend(fontsize="small")
+    return figure
+
+
+STUDY = Study(
+    name="fig6.5",
+    title="the l1 norm uses few synapses, l2 all of them; the spike stays where it is",
+    where="thesis 6.4.2, figure 6.5",
+    protocol=(
+        "As figure 6.4, with kappa 1 and lambda 1 : lambda 2 varied (lambda 3 = 0). The first pattern is drawn; the "
+        "statements are judged over all of them."
+    ),
+    parameters=PARAMETERS,
+    sizes={"toy": TOY},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+)

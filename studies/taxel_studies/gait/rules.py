@@ -1,0 +1,151 @@
+"""The plain rules that stand beside each neuron: count spikes, count what is on now, watch a sum.
+
+Every rule has few numbers; they and its offset are chosen in the training folds, as the neuron's weights are.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel_studies.gait.pieces import Piece
+
+__all__ = ["RULES", "grid", "said"]
+
+#: Rising events are told by ON spikes and counts that rise, the others by OFF spikes and counts that fall.
+RISING = {"contact"}
+
+RULES = {
+    "spikes": "spikes counted in a window",
+    "state": "sensors (and levels) that are on now, counted, with memory",
+    "level": "one level alone: sensors above it now",
+    "sum": "threshold on a sum of the sensors",
+}
+
+
+def grid(rule: str, levels: int, channels: int, largest: float) -> list[dict[str, Any]]:
+    """List the numbers that a rule may take.
+
+    Parameters
+    ----------
+    rule : one of `RULES`
+    levels, channels : int
+        Of the encoder whose spikes it hears.
+    largest : float
+        The largest value of the sum in training, for thresholds of "sum".
+    """
+    counts = [n for n in (1, 2, 3, 4, 6, 8, 12, 16) if n <= channels * levels]
+    if rule == "spikes":
+        return [{"window_ms": w, "count": n} for w, n in product((5.0, 10.0, 20.0, 30.0, 60.0), counts)]
+    if rule == "state":
+        return [{"count": n, "release": r} for n in counts for r in sorted({0, n // 4, n // 2}) if r < n]
+    if rule == "level":
+        few = [n for n in counts if n <= channels]
+        return [
+            {"level": k, "count": n, "release": r}
+            for k, n in product(range(levels), few)
+            for r in sorted({0, n // 2})
+            if r < n
+        ]
+    return [
+        {"threshold": largest * s, "release": largest * s * r}
+        for s, r in product((0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.08, 0.12, 0.2), (1.0, 0.5))
+    ]
+
+
+def said(
+    rule: str,
+    numbers: dict[str, Any],
+    piece: Piece,
+    event: str,
+    *,
+    levels: int,
+    channels: NDArray[np.int64] | None,
+    sum_name: str,
+    dead_ms: float,
+) -> NDArray[np.float64]:
+    """Return when a rule says the event in a piece, ms.
+
+    Parameters
+    ----------
+    rule, numbers
+        One of `RULES` and one point of its `grid`.
+    levels : int
+        Of the encoder; its trains are all ON, then all OFF, each channel by channel and level by level.
+    channels : int array or None
+        The sensors that count; all where None.
+    sum_name : str
+        Which sum "sum" watches.
+    dead_ms : float
+        After an event nothing is said for so long.
+    """
+    rising = event in RISING
+    if rule == "sum":
+        t, values = piece.sums[sum_name]
+        return _apart(_crossings(t, values, numbers["threshold"], numbers["release"], rising), dead_ms)
+    t, sign = _changes(piece, levels, channels, numbers.get("level"))
+    if rule == "spikes":
+        t = t[sign == (1 if rising else -1)]
+        enough = np.arange(len(t)) - np.searchsorted(t, t - numbers["window_ms"], side="left") + 1 >= numbers["count"]
+        return _apart(t[enough], dead_ms)
+    at_first = _on_at_first(piece, levels, channels, numbers.get("level"))
+    last = np.append(t[1:] > t[:-1], [True] * (len(t) > 0))  # changes of one instant are one change
+    t, count = np.append(-np.inf, t[last]), np.append(at_first, at_first + np.cumsum(sign)[last])
+    return _apart(_crossings(t, count, numbers["count"], numbers["release"] + 1, rising), dead_ms)
+
+
+def _crossings(
+    t: NDArray[np.float64], values: NDArray[np.int64] | NDArray[np.float64], on: float, off: float, rising: bool
+) -> NDArray[np.float64]:
+    """Return when a value comes to `on` after having been below `off`, or falls below `off` after `on`."""
+    state = (values >= on).astype(np.int64) - (values < off)
+    place = np.maximum.accumulate(np.where(state != 0, np.arange(len(state)), -1))
+    above = np.where(place >= 0, state[place] > 0, False)
+    edges = np.diff(above.astype(np.int64), prepend=int(above[0]) if len(above) else 0)
+    wanted: NDArray[np.float64] = t[edges == (1 if rising else -1)]
+    return wanted
+
+
+def _trains(piece: Piece, levels: int, channels: NDArray[np.int64] | None, level: int | None) -> NDArray[np.int64]:
+    """Return the ON trains that count; the OFF trains lie half of all trains behind them."""
+    every = np.arange(len(piece.spikes) // 2 // levels) if channels is None else channels
+    which = np.arange(levels) if level is None else np.array([level])
+    return (every[:, None] * levels + which).ravel()
+
+
+def _changes(
+    piece: Piece, levels: int, channels: NDArray[np.int64] | None, level: int | None
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return all ON (+1) and OFF (-1) spikes of the trains that count, by time."""
+    half = len(piece.spikes) // 2
+    which = np.zeros(2 * half, bool)
+    on = _trains(piece, levels, channels, level)
+    which[on] = which[half + on] = True
+    train = np.repeat(np.arange(2 * half), piece.spikes.counts)
+    keep = which[train]
+    t, sign = piece.spikes.times[keep], np.where(train[keep] < half, 1, -1)
+    order = np.argsort(t, kind="stable")
+    return t[order], sign[order]
+
+
+def _on_at_first(piece: Piece, levels: int, channels: NDArray[np.int64] | None, level: int | None) -> int:
+    """Count the trains that were on when the piece began: those whose OFF comes before any ON."""
+    half = len(piece.spikes) // 2
+    offsets, times = piece.spikes.offsets, np.append(piece.spikes.times, np.inf)
+    on = _trains(piece, levels, channels, level)
+    first_on = np.where(offsets[on] < offsets[on + 1], times[offsets[on]], np.inf)
+    first_off = np.where(offsets[half + on] < offsets[half + on + 1], times[offsets[half + on]], np.inf)
+    return int(np.count_nonzero(first_off < first_on))
+
+
+def _apart(t: NDArray[np.float64], dead_ms: float) -> NDArray[np.float64]:
+    """Keep the first of times and every next one that lies `dead_ms` or more behind the last kept."""
+    kept = []
+    k = 0
+    while k < len(t):
+        kept.append(t[k])
+        k = max(k + 1, int(np.searchsorted(t, t[k] + dead_ms, side="left")))
+    return np.array(kept)

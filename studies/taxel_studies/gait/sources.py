@@ -1,0 +1,364 @@
+"""The recordings of the study: where each lies, what its truth can show, and its pieces as spikes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel import FormatError, formats
+from taxel.array import Array
+from taxel.encode import Encoder, RunningRange
+from taxel.formats import Trial, plate
+from taxel.frames import Frames
+from taxel.spikes import to_ms
+from taxel_studies.gait import insole
+from taxel_studies.gait.pieces import Piece
+from taxel_studies.gait.recipes import RULE_ENCODERS
+from taxel_studies.runner import one_of
+from taxel_studies.study import refuse
+
+__all__ = ["SOURCES", "Cut", "Source", "cuts", "encoded", "fingerprint", "readable", "readings", "unread"]
+
+#: Silence before each footfall of the plate, ms: random, so that no cut marks time.
+SILENCE_MS = (300, 900)
+#: A footfall's piece ends so long after foot-off, ms; the encoder and the delay have spoken by then.
+TAIL_MS = 100
+#: How long a row of footfalls stays silent at its end, ms.
+END_MS = 500
+
+
+@dataclass(frozen=True)
+class Source:
+    """Describe one set of recordings.
+
+    Attributes
+    ----------
+    folder : str
+        Its name under the study's data folder.
+    events : tuple of str
+    truth, shows : str
+        Where the truth comes from; what it can and cannot show.
+    sums : mapping from event to name of a sum
+        Whose threshold is a plain rule of its own; none where the sum is the truth.
+    """
+
+    name: str
+    folder: str
+    title: str
+    events: tuple[str, ...]
+    truth: str
+    shows: str
+    sums: Mapping[str, str]
+    by_minute: bool = True
+
+
+SOURCES = {
+    source.name: source
+    for source in (
+        Source(
+            "plate",
+            "plate",
+            "Footfalls on a plate, cut to an insole of 92 taxels",
+            ("contact", "heel_off", "foot_off"),
+            "The full plate itself: contact and foot-off are its first and last loaded frame (2 ms), heel-off the fall "
+            "of the heel region below 5 % of its own peak.",
+            "Whether 92 taxels without a view of the future find what the whole plate shows in hindsight. Not the "
+            "ground: the plate starts itself, so contact can never be early, and a sum over all taxels is near perfect "
+            "by construction. The placement looks at the first loaded frame and at the person's other footfalls.",
+            {"heel_off": "heel"},
+            by_minute=False,
+        ),
+        Source(
+            "gaitpdb",
+            "insole_gaitpdb",
+            "Continuous walking, 8 force sensors a foot (PhysioNet gaitpdb)",
+            ("contact", "foot_off"),
+            "The foot's own total force: contact above 50 N, foot-off below 25 N (100 Hz).",
+            "Contact and off in real walking with turns, healthy and sick, to within a sample of 10 ms. Not the true "
+            "time at the ground. The truth is a threshold on the sum of the inputs, so a counter or a sum can be near "
+            "perfect.",
+            {},
+        ),
+        Source(
+            "gaitndd",
+            "insole_gaitndd",
+            "Five minutes of walking, one channel, left foot (PhysioNet gaitndd)",
+            ("contact", "foot_off"),
+            "Step times of the data's authors, derived from this very channel (300 Hz).",
+            "Timing against step times that somebody else derived; not against the ground, and not independent of the "
+            "channel. Turns and long pauses are in it.",
+            {},
+        ),
+        Source(
+            "moticon",
+            "insole_moticon",
+            "Moticon insoles, one person, 32 steps",
+            ("contact", "foot_off"),
+            "The maker's step finder: neither the first nor the last loaded frame (100 Hz).",
+            "That the way works; 14 to 18 footfalls cannot train much.",
+            {"contact": "total", "foot_off": "total"},
+        ),
+        Source(
+            "pedar",
+            "pressure_formats",
+            "novel pedar insoles, 2 x 99 sensors, one person, 17 steps",
+            ("contact", "foot_off"),
+            "The insole's own sum, 10 % of its largest: it has no truth of its own (100 Hz).",
+            "That the way works on the nearest thing to the thesis' insole; 8 footfalls cannot train 198 weights.",
+            {},
+        ),
+    )
+}
+
+
+def _present(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
+    """Return those of the wanted sources of which a folder holds files, each with its own folder."""
+    if not folder.is_dir():
+        raise FileNotFoundError(2, "No such folder", str(folder))
+    found = {}
+    for name in [one_of("sources", name, SOURCES) for name in wanted]:
+        place = folder / SOURCES[name].folder
+        if place.is_dir() and formats.FORMATS[name].files(place):
+            found[name] = place
+    return found
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Hold what a source's files gave.
+
+    Attributes
+    ----------
+    trials : tuple of Trial
+    files : tuple of Path
+        That were read.
+    unread : mapping from file (its folder before it) to why it could not be read
+    """
+
+    trials: tuple[Trial, ...]
+    files: tuple[Path, ...]
+    unread: Mapping[str, str]
+
+
+@lru_cache(maxsize=8)
+def readings(folder: Path, name: str) -> Readings:
+    """Read all of a source's files, once; what cannot be read, or is too short to be encoded, is left out."""
+    kind, least_s = formats.FORMATS[name], _least_s(name)
+    trials: list[Trial] = []
+    read, unread = [], {}
+    for file in kind.files(folder):
+        try:
+            found = list(kind.trials(file))
+        except (FormatError, OSError) as error:
+            why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+            unread[f"{folder.name}/{file.name}"] = why.removeprefix(f"{file.name}: ").removeprefix(f"{file.name}, ")
+        else:
+            long = [trial for trial in found if _lasts_s(trial) >= least_s]
+            short = [trial for trial in found if _lasts_s(trial) < least_s]
+            for trial in short if long else short[:1]:
+                which = trial.name if long else file.name
+                unread[f"{folder.name}/{which}"] = (
+                    f"lasts {_lasts_s(trial):g} s, and levels in shares of the running range want {least_s:g} s"
+                )
+            trials += map(_boxed, long) if name == "plate" else long
+            if long:
+                read.append(file)
+    return Readings(tuple(trials), tuple(read), unread)
+
+
+def _lasts_s(trial: Trial) -> float:
+    return (int(trial.frames.t[-1]) - int(trial.frames.t[0])) / 1e6
+
+
+def _least_s(name: str) -> float:
+    """Return how long a source's recordings must last at least: until its encoders' running ranges are full, s."""
+    ranges = [encoder["running_range"] for encoder in RULE_ENCODERS[name].values() if "running_range" in encoder]
+    return max((one.get("window_s", RunningRange().window_s) for one in ranges), default=0.0)
+
+
+def readable(folder: Path, wanted: Sequence[str]) -> dict[str, Path]:
+    """Return those of the wanted sources of which a folder holds files that can be read, each with its own folder."""
+    return {name: place for name, place in _present(folder, wanted).items() if readings(place, name).trials}
+
+
+def unread(folder: Path, wanted: Sequence[str]) -> dict[str, str]:
+    """Return which files of the wanted sources cannot be read, and why.
+
+    Raises
+    ------
+    FormatError : none of the sources is there; or there are files, and none can be read (says why, of the first)
+    ProblemError : a source that is none
+    """
+    here = _present(folder, wanted)
+    if not here:
+        names = ", ".join(SOURCES[name].folder for name in wanted)
+        raise FormatError(f"{folder}: holds no recordings; must have one or more of the folders {names}")
+    found = {file: why for name, place in here.items() for file, why in readings(place, name).unread.items()}
+    refuse(found, strict=not readable(folder, wanted))
+    return found
+
+
+def fingerprint(folder: Path, name: str) -> str:
+    """Return a short digest of a source's files that can be read: names, sizes and contents."""
+    digest = hashlib.sha256()
+    beside = [f for f in sorted(folder.iterdir()) if f.suffix in {".csv", ".let", ".ts"}]
+    for file in [*readings(folder, name).files, *beside]:
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Encoded:
+    """Pieces of a source, and what the encoder costs.
+
+    Attributes
+    ----------
+    pieces : dict of Piece by name
+    latency_ms : float
+    levels : int
+        How many levels a sensor has, so that trains can be told apart; 1 where the encoder has none.
+    """
+
+    pieces: dict[str, Piece]
+    latency_ms: float
+    levels: int
+
+
+def encoded(folder: Path, name: str, encoder: Mapping[str, Any], placed: str = "own") -> Encoded:
+    """Return a source's pieces as one encoder tells them; kept in memory, as many fits ask for the same.
+
+    Parameters
+    ----------
+    folder : Path
+    name : str
+        Of `SOURCES`.
+    encoder : mapping
+        Its `name` and parameters.
+    placed : {"own", "others"}
+        Whose footfalls tell the insole's size and toe-out on the plate: the person's other ones, or other people's.
+    """
+    return _encoded(folder, name, json.dumps(encoder, sort_keys=True), placed)
+
+
+@lru_cache(maxsize=12)
+def _encoded(folder: Path, name: str, encoder: str, placed: str) -> Encoded:
+    built = Encoder.from_json(encoder)
+    make = _footfalls if name == "plate" else _walks
+    pieces = {p.name: p for p in make(folder, name, built, placed)}
+    return Encoded(pieces, float(built.latency_ms), len(json.loads(encoder).get("levels", [0])))
+
+
+def _walks(folder: Path, name: str, encoder: Encoder, _placed: str) -> list[Piece]:
+    found = []
+    for trial in readings(folder, name).trials:
+        if not any(len(times) for times in trial.truth.values()):
+            continue
+        start, stop = (to_ms(float(t)) for t in (trial.frames.t[0], trial.frames.t[-1]))
+        spikes = encoder.encode(trial.frames).split_by_sign()
+        spikes = _moved(spikes, -start, stop - start)
+        assert trial.scored is not None
+        found.append(
+            Piece(
+                name=trial.name,
+                unit=trial.name,
+                person=trial.person,
+                group=trial.group,
+                spikes=spikes,
+                truth={e: to_ms(times) - start for e, times in trial.truth.items()},
+                scored=(to_ms(trial.scored[0]) - start, to_ms(trial.scored[1]) - start),
+                sums={name: (to_ms(trial.frames.t) - start, column) for name, column in trial.series.items()},
+            )
+        )
+    return found
+
+
+def _footfalls(folder: Path, name: str, encoder: Encoder, placed: str) -> list[Piece]:
+    all_cuts = cuts(folder, name, placed)
+    found = []
+    for person in dict.fromkeys(c.person for c in all_cuts):
+        found += _row([c for c in all_cuts if c.person == person], encoder)
+    return found
+
+
+def _row(cuts: list[Cut], encoder: Encoder) -> list[Piece]:
+    """Encode a person's footfalls as one row with random silences, and take it apart again into pieces."""
+    rng = np.random.default_rng([int.from_bytes(hashlib.sha256(cuts[0].person.encode()).digest()[:4])])
+    order = rng.permutation(len(cuts))
+    step = plate.FRAME_US // 1000
+    silences = rng.integers(SILENCE_MS[0] // step, SILENCE_MS[1] // step + 1, len(cuts)) * step
+    lengths = np.array([(len(c.values) - 1) * step for c in cuts])
+    begins = np.cumsum(silences + np.concatenate([[0], lengths[order][:-1]]))
+    values = np.zeros(((int(begins[-1] + lengths[order[-1]]) + END_MS) // step, insole.TAXELS), np.float32)
+    for at, k in zip(begins, order, strict=True):
+        values[at // step : at // step + len(cuts[k].values)] = cuts[k].values
+    t = np.arange(len(values)) * plate.FRAME_US
+    frames = Frames(values[:, None, :], t, unit="counts", array=Array(1, insole.TAXELS, name="insole"))
+    spikes = encoder.encode(frames).split_by_sign()
+    total, heel = values.sum(axis=1, dtype=np.float64), values[:, insole.HEEL].sum(axis=1, dtype=np.float64)
+    found = []
+    for at, silence, k in zip(begins, silences, order, strict=True):
+        start, stop = float(at - silence), float(at + lengths[k])
+        if at > silences[0]:  # the tail of the footfall before belongs to it
+            start += TAIL_MS
+        stop += TAIL_MS
+        rows = slice(int(start) // step, int(stop) // step)
+        part = spikes.between(start, stop)
+        found.append(
+            Piece(
+                name=cuts[k].name,
+                unit=cuts[k].person,
+                person=cuts[k].person,
+                group="healthy",
+                spikes=_moved(part, -start, stop - start),
+                truth={e: times + at - start for e, times in cuts[k].truth.items()},
+                scored=(0.0, stop - start),
+                sums={"total": (to_ms(t[rows]) - start, total[rows]), "heel": (to_ms(t[rows]) - start, heel[rows])},
+            )
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class Cut:
+    """One footfall as the insole feels it; truth in ms from its first frame."""
+
+    name: str
+    person: str
+    values: NDArray[np.float32]
+    truth: dict[str, NDArray[np.float64]]
+
+
+@lru_cache(maxsize=4)
+def cuts(folder: Path, name: str, placed: str) -> tuple[Cut, ...]:
+    """Cut every footfall, once all footprints are known."""
+    feet = readings(folder, name).trials
+    prints = [insole.footprint(t) for t in feet]
+    found = []
+    for k, trial in enumerate(feet):
+        others = [
+            prints[n] for n, other in enumerate(feet) if n != k and (other.person == trial.person) == (placed == "own")
+        ]
+        frames = insole.cut(trial, prints[k].origin_mm, insole.placement(others))
+        truth = {e: to_ms(times) for e, times in trial.truth.items()}
+        found.append(Cut(trial.name, trial.person, frames.values[:, 0, :], truth))
+    return tuple(found)
+
+
+def _boxed(trial: Trial) -> Trial:
+    """Return a footfall without the plate around it: the pictures of all people together have to fit in memory."""
+    loaded = np.any(trial.frames.values, axis=0)
+    rows, columns = np.flatnonzero(np.any(loaded, axis=1)), np.flatnonzero(np.any(loaded, axis=0))
+    y, x = slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1)
+    return replace(trial, recorded=trial.frames.region(x, y))
+
+
+def _moved(spikes: Any, by: float, stop: float) -> Any:
+    return type(spikes)(np.clip(spikes.times + by, 0.0, stop), spikes.offsets, 0.0, stop)

@@ -1,0 +1,114 @@
+"""Chapter 5's question on other people's recordings: how many bits do touches hold, and what else would tell as much.
+
+Footfalls on a plate, grasps of a robot's hand, postures on a mat; each beside chance, pictures and what is trivial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from taxel_studies.information import footfalls, grasps, postures
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+#: Folders of recordings, and what is asked of each.
+ASKED: dict[str, Any] = {"plate": footfalls, "touch_icub_grasp": grasps, "mat_popu": postures}
+
+PARAMETERS: dict[str, Any] = {
+    "periods_ms": [2.0, 4.0, 10.0, 20.0, 50.0],
+    "windows_ms": [10.0, 20.0, 50.0, 100.0],
+    "window_ms": 400.0,
+    "floor_counts": 25.0,
+    "taxels": [10, 30, 100, 300],
+    "pools": [2, 4, 7],
+    "draws": 5,
+    "shuffles": 20,
+    "slices": [1, 2, 4, 7],
+    "mat_taxels": [4, 16, 64, 256],
+    "most_trials": 0,
+    "seed": 1,
+}
+
+
+def tasks(p: Parameters, data: Path) -> list[Task]:
+    """List one realisation a question, of the recordings that are there."""
+    found = []
+    for folder, module in ASKED.items():
+        if (data / folder).is_dir():
+            common = {name: p[name] for name in module.USES}
+            found += [Task({"folder": folder, "ask": ask, **common}, p["seed"]) for ask in module.ASKS]
+    return found
+
+
+def realise(params: dict[str, Any], seed: int, data: Path) -> dict[str, Any]:
+    """Answer one question."""
+    found: dict[str, Any] = ASKED[params["folder"]].realise(params, seed, data / params["folder"])
+    return found
+
+
+def summarise(p: Parameters, rows: Sequence[Row], data: Path) -> Said:
+    """Keep every answer, by folder and question."""
+    del p, data
+    said: Said = {}
+    for row in rows:
+        said.setdefault(row.params["folder"], {})[row.params["ask"]] = row.result
+    return said
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Hold the answers against what was tried beforehand, with other code."""
+    return [one for folder, found in said.items() for one in ASKED[folder].statements(p, found)]
+
+
+def tables(p: Parameters, said: Said) -> list[Table]:
+    """Tell each set of recordings in a table."""
+    return [one for folder, found in said.items() for one in ASKED[folder].tables(p, found)]
+
+
+def draw(p: Parameters, said: Said) -> list[Figure]:
+    """Draw each set of recordings."""
+    return [one for folder, found in said.items() for one in ASKED[folder].draw(p, found)]
+
+
+STUDY = Study(
+    name="information",
+    title="how many bits real touches hold, and what else tells as much",
+    where="beside thesis 5.5 and 5.6",
+    protocol=(
+        "Bits of a classifier's answers, corrected by Panzeri and Treves; linear discriminants, smoothing and ridge "
+        "chosen inside the folds. Plate: who walked (trials left out) and how fast (people left out); footfalls are "
+        "aligned on contact, the middle of the heel in one column, a picture of rest before each (the plate records "
+        "none); change events with a floor of 25 counts, phases drawn. Hand: which object, by slice, as the source "
+        "gives no times; changes since the first slice, as that one names the object by itself. Mat: which of four "
+        "postures, whole poses with all their variants left out; it has no time, so only the number of taxels counts. "
+        "What was tried beforehand is our own, with other code, and stands where else published values stand."
+    ),
+    parameters=PARAMETERS,
+    sizes={
+        "toy": {
+            "periods_ms": [10.0, 50.0],
+            "windows_ms": [50.0],
+            "taxels": [30],
+            "pools": [7],
+            "draws": 1,
+            "shuffles": 2,
+            "slices": [1, 4],
+            "mat_taxels": [16],
+            "most_trials": 12,
+        }
+    },
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    tables=tables,
+    draw=draw,
+    data=tuple(ASKED),
+)

@@ -1,0 +1,197 @@
+"""Footfalls on a plate: who walked, and how fast."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from taxel.array import Array
+from taxel.encode import ChangeEvents
+from taxel.formats import plate
+from taxel.formats.trial import Trial
+from taxel.frames import Frames
+from taxel.information import LabelledTrial, answer
+from taxel_studies.study import Parameters, Said, Statement, Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["ASKS", "USES", "draw", "footfalls", "realise", "statements", "tables"]
+
+#: Person: trials left out. Condition (slow, normal, fast): people left out.
+ASKS = ("person", "condition")
+USES = (
+    "periods_ms",
+    "windows_ms",
+    "window_ms",
+    "floor_counts",
+    "taxels",
+    "pools",
+    "draws",
+    "shuffles",
+    "most_trials",
+)
+
+#: Rows and columns of sensors that hold every footfall, its heel in the middle.
+_ROWS, _COLUMNS = 44, 49
+
+
+def footfalls(folder: Path, ask: str, most: int = 0) -> list[LabelledTrial]:
+    """Return the footfalls as labelled trials: heels in the middle, a picture of rest before each.
+
+    Parameters
+    ----------
+    folder : Path
+    ask : {"person", "condition"}
+    most : int
+        Of each person; all where it is 0.
+    """
+    found, count = [], dict[str, int]()
+    for trial in plate.trials(folder):
+        count[trial.person] = count.get(trial.person, 0) + 1
+        if most and count[trial.person] > most:
+            continue
+        condition = str(trial.about.get("condition", ""))
+        label = trial.person if ask == "person" else condition
+        group = "" if ask == "person" else trial.person
+        frames, contact = _placed(trial)
+        found.append(LabelledTrial(frames, label, contact, int(trial.truth["foot_off"][0]), group, {}, name=trial.name))
+    return found
+
+
+def _placed(trial: Trial) -> tuple[Frames, int]:
+    """Return the pictures with the first touched place in the middle column, after one of rest."""
+    frames = trial.frames
+    contact = int(trial.truth["contact"][0])
+    first = frames.values[int(np.searchsorted(frames.t, contact))]
+    columns = np.arange(first.shape[1])
+    middle = round(float((first.sum(0) * columns).sum() / max(first.sum(), 1.0)))
+    values = np.zeros((len(frames) + 1, _ROWS, _COLUMNS), np.float32)
+    to = columns + _COLUMNS // 2 - middle
+    kept = (to >= 0) & (to < _COLUMNS)
+    rows = min(_ROWS, first.shape[0])
+    values[1:, :rows, to[kept]] = frames.values[:, :rows, columns[kept]]
+    t = np.concatenate([[frames.t[0] - plate.FRAME_US], frames.t])
+    return Frames(values, t, unit=frames.unit, array=Array(_ROWS, _COLUMNS, plate.COLUMN_MM, name="plate")), contact
+
+
+def realise(params: dict[str, Any], seed: int, folder: Path) -> dict[str, Any]:
+    """Ask the footfalls."""
+    return answer(
+        footfalls(folder, params["ask"], params["most_trials"]),
+        encoder=ChangeEvents(noise_floor=params["floor_counts"]),
+        window_ms=params["window_ms"],
+        windows_ms=params["windows_ms"],
+        periods_ms=params["periods_ms"],
+        taxels=params["taxels"],
+        pools=params["pools"],
+        taxels_at_ms=20.0 if 20.0 in params["periods_ms"] else None,
+        draws=params["draws"],
+        shuffles=params["shuffles"],
+        seed=seed,
+    ).to_dict()
+
+
+def _bits(said: dict[str, Any], period: float, window: float) -> float | None:
+    return next((p["bits"] for p in said["points"] if (p["period_ms"], p["window_ms"]) == (period, window)), None)
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Hold bits by period and time against what was tried beforehand."""
+    found = []
+    whole = p["most_trials"] == 0
+    if "person" in said:
+        person = said["person"]
+        before = {(2.0, 50.0): 2.40, (10.0, 50.0): 2.10, (20.0, 50.0): 1.56, (50.0, 50.0): 0.60}
+        before |= {(2.0, 10.0): 1.47, (2.0, 20.0): 1.90, (2.0, 400.0): 2.53, (50.0, 400.0): 2.49}
+        ours = {key: _bits(person, *key) for key in before}
+        there = {key: bits for key, bits in ours.items() if bits is not None}
+        found.append(
+            Statement(
+                "Who walked: bits by sampling period and time since contact.",
+                ", ".join(f"{a:g} ms to {b:g}: {before[a, b]:.2f}" for a, b in there),
+                ", ".join(f"{a:g} ms to {b:g}: {bits:.2f}" for (a, b), bits in there.items()),
+                all(abs(bits - before[key]) <= 0.2 for key, bits in there.items()) if whole and there else None,
+                "tried beforehand with other code; within .2 bit counts as the same",
+            )
+        )
+        fast, slow = _bits(person, p["periods_ms"][0], 50.0), _bits(person, p["periods_ms"][-1], 50.0)
+        if fast is not None and slow is not None:
+            late = [q["bits"] for q in person["points"] if q["window_ms"] == p["window_ms"]]
+            found.append(
+                Statement(
+                    "A fast period tells more early, and none tells more in the end (5.8, 5.13).",
+                    "figures 5.8 and 5.13",
+                    f"to 50 ms {fast:.2f} against {slow:.2f} bits; to {p['window_ms']:g} ms {min(late):.2f} to "
+                    f"{max(late):.2f}",
+                    (fast > slow + 0.2 and max(late) - min(late) < 0.2) if whole else None,
+                )
+            )
+    if "condition" in said:
+        condition = said["condition"]
+        length = next((c["bits"] for c in condition["controls"] if c["name"] == "length"), None)
+        full = condition["full"]["bits"]
+        found.append(
+            Statement(
+                "How fast a person not trained on walked: the length of the stance alone tells more than the events.",
+                "length .89; events to 400 ms .47",
+                f"length {length:.2f}; events {full:.2f}" if length is not None else "no length",
+                length > full if whole and length is not None else None,
+                "people left out; six people carry no curve",
+            )
+        )
+    return found
+
+
+def tables(p: Parameters, said: Said) -> list[Table]:
+    """Tell bits by period and time, and what else tells."""
+    found = []
+    for ask, one in said.items():
+        windows = sorted({q["window_ms"] for q in one["points"]})
+        rows = []
+        for period in p["periods_ms"]:
+            cells = {q["window_ms"]: q for q in one["points"] if q["period_ms"] == period}
+            last = cells[windows[-1]]
+            verdict = "" if last["verdict"] is None else last["verdict"]["says"]
+            rows.append(
+                [f"{period:g} ms", *(f"{cells[w]['bits']:.2f}" for w in windows), f"{last['kbps']:.3g}", verdict]
+            )
+        beside = [f"chance {one['zero']['level']:.2f} (labels shuffled, 95 % below)"]
+        beside += [f"{c['name']} {c['bits']:.2f}" for c in one["controls"] if "bits" in c]
+        beside += [f"pictures at {f['period_ms']:g} ms {f['bits']:.2f}" for f in one["frames"][:1]]
+        beside += [f"{name} {c['bits']:.2f}" for name, c in one["classifiers"].items()]
+        beside += [f"{q['taxels']} taxels {q['kind']} {q['bits']:.2f}" for q in one["taxels"]]
+        low, high = one["full"]["interval"]
+        beside.append(f"full [{low:.2f} {high:.2f}] of {one['full']['most']:.2f}")
+        head = [ask, *(f"to {w:g} ms" for w in windows), "kbit/s", "keeps 95 %?"]
+        found.append(Table(f"plate, {ask}: bits", head, rows, "; ".join(beside)))
+    return found
+
+
+def draw(p: Parameters, said: Said) -> list[Figure]:
+    """Draw bits over time, a line a period, and the confusion of the full setting."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    figure = Figure(figsize=(11, 4.2), layout="constrained")
+    axes = figure.subplots(1, len(said), squeeze=False)[0]
+    for ax, (ask, one) in zip(axes, said.items(), strict=True):
+        for period in p["periods_ms"]:
+            line = [q for q in one["points"] if q["period_ms"] == period]
+            ax.plot([q["window_ms"] for q in line], [q["bits"] for q in line], marker="o", ms=3, label=f"{period:g} ms")
+        for control in one["controls"]:
+            if "bits" in control:
+                ax.axhline(control["bits"], color="0.6", lw=1, ls=":")
+                ax.text(
+                    p["window_ms"], control["bits"], control["name"], ha="right", va="bottom", fontsize=8, color="0.4"
+                )
+        ax.set(
+            xscale="log",
+            ylim=(0, one["full"]["most"] * 1.03),
+            xlabel="time since contact, ms",
+            ylabel="bits",
+            title=ask,
+        )
+    axes[0].legend(frameon=False)
+    return [figure]

@@ -1,0 +1,228 @@
+"""A neuron that hears an array on which balls fall, untold (thesis 3.6.2 calls for such learning)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from taxel.array import Array
+from taxel.learn import STDP
+from taxel.simulate import Scene, Silence, play, truth
+from taxel.spikes import SpikeTrains, to_ms
+from taxel_studies.runner import Task
+from taxel_studies.study import Parameters, Row, Said, Statement, Study
+from taxel_studies.untold import moved, threshold, unlearning
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["STUDY"]
+
+PARAMETERS: dict[str, Any] = {
+    "touches": 240,
+    "same": 0.35,
+    "tau_m": 10.0,
+    "tau_s": 2.5,
+    "tau_plus": 16.8,
+    "tau_minus": 33.7,
+    "untrained_hz": 2.0,
+    "passes": 4,
+    "boards": 5,
+}
+#: How long after a contact a spike belongs to it, and how much before it a stamp may lie, ms.
+TOUCH_MS, STAMP_MS = 60.0, 0.5
+#: How far random places keep from the array's edge, and the one that comes again from its middle, mm.
+EDGE_MM, ASIDE_MM = 35.0, 20.0
+#: What counts as every touch, and as none.
+EVERY, NONE = 0.95, 0.1
+
+
+class Heard(NamedTuple):
+    """A play, as a neuron hears it."""
+
+    spikes: SpikeTrains
+    """Rises and falls of each taxel, beside each other."""
+    contacts: NDArray[np.float64]
+    """When balls touched, ms."""
+    same: NDArray[np.bool_]
+    """Whether it was the ball that falls again and again on one place."""
+
+
+def tasks(p: Parameters) -> list[Task]:
+    """List one board a task."""
+    shared = {name: value for name, value in p.items() if name != "boards"}
+    return [Task(shared, seed) for seed in range(p["boards"])]
+
+
+def played(p: Parameters, seed: int) -> Heard:
+    """Drop balls on one board: often the same one on the same place, else any ball from any height on any place."""
+    rng = np.random.default_rng([seed, 362])
+    same = rng.random(p["touches"]) < p["same"]
+    acts: list[Silence | Scene] = [Silence(100.0), *(_scene(rng, bool(one)) for one in same)]
+    events = play(acts, seed=seed).events
+    events = events.between(events.markers[0][0], np.inf).sorted()
+    train = 2 * events.array.index(events.x, events.y) + ~events.p
+    order = np.argsort(train, kind="stable")
+    offsets = np.concatenate([[0], np.cumsum(np.bincount(train, minlength=2 * 4096))])
+    times = to_ms(events.t)
+    spikes = SpikeTrains(times[order], offsets, 0.0, float(np.ceil(times[-1] + 1)))
+    contacts = [to_ms(contact.start_us) for contact in truth(acts)[0] if contact.kind == "first"]
+    return Heard(spikes, np.array(contacts), same)
+
+
+def _scene(rng: np.random.Generator, same: bool) -> Scene:
+    array = Array.thesis()
+    width = (array.columns - 1) * array.pitch_mm
+    if same:
+        x, y = width / 2 - ASIDE_MM + rng.normal(0, 1, 2)
+        radius, height = 30.0, 150 + rng.normal(0, 2)
+    else:
+        x, y = rng.uniform(EDGE_MM, width - EDGE_MM, 2)
+        radius, height = rng.uniform(25, 35), rng.uniform(100, 200)
+    fall_ms = float(np.sqrt(2 * height / 9.81e-3))
+    ending = {"left_to_rest": {"rest_ms": fall_ms + 40.0, "lift_mm_s": 500.0}}
+    ball = {
+        "shape": {"sphere": {"radius_mm": float(radius)}},
+        "mass_g": 36.0,
+        "x_mm": float(x),
+        "y_mm": float(y),
+        "motion": {"dropped": {"height_mm": float(height), "ending": ending}},
+    }
+    return Scene({"surface": "columns", "foam": {}, "bodies": [ball], "lead_ms": float(rng.uniform(0, 150))})
+
+
+def realise(params: dict[str, Any], seed: int) -> dict[str, Any]:
+    """Let a neuron hear half of the touches again and again, then the others; and another that learns nothing."""
+    heard = played(params, seed)
+    # Whole, so that pieces end where the next ones begin; and between two touches.
+    half = float(np.floor(heard.contacts[params["touches"] // 2] - 20))
+    first, second = heard.spikes.between(0, half), heard.spikes.between(half, heard.spikes.stop)
+    taus = {name: params[name] for name in ("tau_m", "tau_s", "tau_plus", "tau_minus")}
+    stdp = STDP(threshold=threshold(first, params["untrained_hz"], taus), **taus)
+    course: list[list[float]] = []
+    for k in range(params["passes"]):
+        stdp.partial_fit(moved(first, k * half))
+        late = latencies(stdp.spikes_ - k * half, heard.contacts)
+        course += [[len(heard.contacts) // 2 * k + n, round(float(t), 2)] for n, t in enumerate(late) if t < TOUCH_MS]
+    last = (params["passes"] - 1) * half
+    stdp.partial_fit(moved(second, last))
+    # As often, without learning: at another threshold.
+    hz = 1000 * len(stdp.spikes_) / (heard.spikes.stop - half)
+    deaf = unlearning(threshold(first, max(hz, params["untrained_hz"]), taus), taus).partial_fit(heard.spikes)
+    return {
+        "learnt": judged(stdp.spikes_ - last, heard, half),
+        "untrained": judged(deaf.spikes_[deaf.spikes_ >= half], heard, half),
+        "strong": int(np.count_nonzero(stdp.weights_ > 0.5)),
+        "course": course,
+    }
+
+
+def latencies(times: NDArray[np.float64], contacts: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how long after each contact the first spike came that belongs to it, ms; infinite where none did."""
+    touch = np.searchsorted(contacts, times + STAMP_MS, side="right") - 1
+    found = np.full(len(contacts), np.inf)
+    since = times - contacts[np.maximum(touch, 0)]
+    mine = (touch >= 0) & (since < TOUCH_MS)
+    np.minimum.at(found, touch[mine], since[mine])
+    return found
+
+
+def judged(times: NDArray[np.float64], heard: Heard, begin: float) -> dict[str, Any]:
+    """Return at which share of the touches from `begin` on a neuron fired, how soon, and how often beside them."""
+    there = heard.contacts >= begin
+    late = latencies(times, heard.contacts)
+    fired = np.isfinite(late)
+    touch = np.searchsorted(heard.contacts, times + STAMP_MS, side="right") - 1
+    beside = (touch < 0) | (times - heard.contacts[np.maximum(touch, 0)] >= TOUCH_MS)
+    share = {
+        name: round(float(np.mean(fired[there & which])), 4)
+        for name, which in (("same", heard.same), ("other", ~heard.same))
+    }
+    told = late[there & fired]
+    return {
+        **share,
+        "latency_ms": round(float(np.median(told)), 2) if len(told) else None,
+        "beside": int(beside.sum()),
+    }
+
+
+def summarise(p: Parameters, rows: Sequence[Row]) -> Said:
+    """List the boards."""
+    del p
+    boards = [{**row.result, "course": None} for row in rows]
+    return {"boards": boards, "course": rows[0].result["course"]}
+
+
+def statements(p: Parameters, said: Said) -> list[Statement]:
+    """Say what it found."""
+    boards = said["boards"]
+
+    def middle(how: str, what: str) -> float:
+        values = [one[how][what] for one in boards if one[how][what] is not None]
+        return float(np.median(values)) if values else float("nan")
+
+    size = (
+        f"medians of {len(boards)} boards, {p['touches'] - p['touches'] // 2} touches each that were not heard before"
+    )
+    same, other, beside = (middle("learnt", what) for what in ("same", "other", "beside"))
+    soon, untrained = middle("learnt", "latency_ms"), middle("untrained", "latency_ms")
+    return [
+        Statement(
+            "A neuron that is told nothing comes to fire at every touch, and at nothing else.",
+            "called for in 3.6.2",
+            f"at {same:.0%} of the touches that come again, {other:.0%} of the others, {beside:g} times beside them",
+            bool(min(same, other) >= EVERY and beside == 0),
+            f"every: {EVERY:.0%} or more; {size}",
+        ),
+        Statement(
+            "It comes to fire at the touch's beginning.",
+            "called for in 3.6.2",
+            f"{soon:.1f} ms after contact; a neuron that learns nothing and fires as often: {untrained:.1f} ms",
+            bool(soon < untrained),
+            size,
+        ),
+        Statement(
+            "It tells the touch that comes again from the others.",
+            "called for in 3.6.2",
+            f"it fires at {same:.0%} of these and {other:.0%} of those",
+            bool(same >= EVERY and other <= NONE),
+            f"told: at {EVERY:.0%} and at {NONE:.0%} at the most; nothing in the rule takes weights from taxels that "
+            "are silent, and in time all taxels are touched",
+        ),
+    ]
+
+
+def draw(p: Parameters, said: Said) -> Figure:
+    """Draw how soon after contact one neuron fires while it learns."""
+    from matplotlib.figure import Figure  # noqa: PLC0415  loads slowly
+
+    del p
+    figure = Figure(figsize=(6.5, 3.6), layout="constrained")
+    axes = figure.subplots()
+    if said["course"]:
+        axes.plot(*np.transpose(said["course"]), ".", markersize=3)
+    axes.set(xlabel="touches heard", ylabel="ms from contact to spike", ylim=(0, None))
+    return figure
+
+
+STUDY = Study(
+    name="stdp_touch",
+    title="a neuron hears an array on which balls fall, untold, and comes to fire as a touch begins",
+    where="thesis 3.6.2, which calls for it; the rule of Masquelier, Guyonneau and Thorpe 2008",
+    protocol="Balls fall on the emulated board: 35 % of them the same one from the same height on the same place (to "
+    "2 mm and 1 mm, standard deviations), the others of any radius (25 to 35 mm), height (10 to 20 cm) and place. One "
+    "neuron hears the rises and falls of all taxels, 8192 trains, with the paper's constants: half of the touches "
+    "four times, then the others for the first time, always learning; judged by these. Before it learns, its threshold "
+    "lets it fire twice a second; a touch comes three times a second. Beside it a neuron that never learns and fires "
+    "as often.",
+    parameters=PARAMETERS,
+    sizes={"toy": {"touches": 24, "boards": 1, "passes": 2}},
+    tasks=tasks,
+    realise=realise,
+    summarise=summarise,
+    statements=statements,
+    draw=draw,
+)

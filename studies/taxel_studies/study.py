@@ -1,0 +1,397 @@
+"""What a study is: a protocol, its parameters, the published values as data, a picture, and what holds."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import platform
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from importlib import metadata
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+from taxel import FormatError, ProblemError, __version__
+from taxel.report import write_whole
+from taxel.report.provenance import installed
+from taxel_studies.runner import HERE, Results, Task, Workers, one_of, run, whole
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "Parameters",
+    "Row",
+    "Said",
+    "Section",
+    "Statement",
+    "Study",
+    "Table",
+    "drawn",
+    "logarithmic",
+    "read_section",
+    "refuse",
+    "svg",
+]
+
+#: Experiment parameters by name: what JSON can hold.
+Parameters = Mapping[str, Any]
+#: What a study found, as JSON holds it: enough to judge its statements and to draw its picture.
+Said = dict[str, Any]
+#: One study's part of the page, as ``summary.json`` holds it.
+Section = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Statement:
+    """Hold a published statement beside what was found.
+
+    Attributes
+    ----------
+    says : str
+        The statement, in the source's words or close to them.
+    published : str
+        Its value.
+    ours : str
+    holds : bool, optional
+        None: nothing to hold it against (the picture is lost, or too little was run).
+    why : str
+        Why it does not hold; or the reading under which it does.
+    """
+
+    says: str
+    published: str
+    ours: str
+    holds: bool | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Hold a table of the page.
+
+    Attributes
+    ----------
+    title : str
+    head : sequence of str
+    rows : sequence of sequences of str
+        The first cell names the row.
+    note : str
+        What to know of it.
+    folded : bool
+        Shown on the page only where it is opened, and not by the command.
+    """
+
+    title: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    folded: bool = False
+
+
+@dataclass(frozen=True)
+class Row:
+    """Hold one realisation, its result and the CPU seconds that it took."""
+
+    params: dict[str, Any]
+    seed: int
+    result: Any
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Study:
+    """Describe a study: everything that the runner, the page and the command line need.
+
+    Of studies on recordings `tasks`, `then`, `realise` and `summarise` are also given ``data``, the folder of them; of
+    studies on simulated contact ``courses``, a folder in the report's that these share.
+
+    Attributes
+    ----------
+    name, title, where : str
+        As in ``taxel study NAME``; one line; its place in the source.
+    protocol : str
+        What is done, in plain words, with the readings that were used.
+    parameters : mapping
+        The experiment at full size.
+    sizes : mapping of mappings
+        What other sizes change of it; "toy" shows that it runs, in seconds.
+    tasks : function of parameters
+        The realisations.
+    realise : function of (params, seed)
+        Pure.
+    summarise : function of (parameters, rows)
+        Plain values for JSON: numbers and curves.
+    statements : function of (parameters, said)
+    draw : function of (parameters, said)
+        The picture, as the source draws it; or several.
+    then : function of (parameters, rows), optional
+        The realisations that depend on what others gave: asked again until it lists nothing new.
+    tables : function of (parameters, said), optional
+        Tables below the picture.
+    data : tuple of str
+        Folders of recordings that it needs.
+    courses : bool
+        Whether it is on simulated contact.
+    needs : tuple of str
+        Modules of the extra ``studies`` that it needs.
+    unread : function of (parameters, data)
+        Which of their files cannot be read, and why. It raises `FormatError` where none can.
+    """
+
+    name: str
+    title: str
+    where: str
+    protocol: str
+    parameters: Parameters
+    sizes: Mapping[str, Parameters]
+    tasks: Callable[..., Sequence[Task]]
+    realise: Callable[..., Any]
+    summarise: Callable[..., Said]
+    statements: Callable[[Parameters, Said], Sequence[Statement]]
+    draw: Callable[[Parameters, Said], Figure | Sequence[Figure]]
+    then: Callable[..., Sequence[Task]] | None = None
+    tables: Callable[[Parameters, Said], Sequence[Table]] | None = None
+    data: tuple[str, ...] = field(default=())
+    courses: bool = False
+    needs: tuple[str, ...] = ()
+    unread: Callable[[Parameters, Path], Mapping[str, str]] = lambda _parameters, _data: {}
+
+    def set(self, size: str = "full", **changes: Any) -> dict[str, Any]:
+        """Return the parameters of a size, with changes.
+
+        Raises
+        ------
+        ProblemError : a size or a parameter that is none, or a value of another kind
+        """
+        one_of("size", size, ("full", *self.sizes))
+        values = {**self.parameters, **self.sizes.get(size, {})}
+        for name, value in changes.items():
+            if name not in values:
+                raise ProblemError(f"{self.name} has no parameter {name!r}: there are {', '.join(values)}")
+            if not _alike(value, values[name]):
+                raise ProblemError(f"{name} is {value!r}: must be {_kind(values[name])}, as {values[name]!r}")
+            values[name] = value
+        if "realisations" in values:
+            whole("realisations", values["realisations"], 1)
+        return values
+
+    @property
+    def code(self) -> str:
+        """The digest of what a realisation is computed by: when it changes, results are computed anew."""
+        return installed("taxel_studies").digest(self.realise.__module__)
+
+    @property
+    def made_of(self) -> dict[str, str]:
+        """The digest of every source that what it shows is computed from, by name."""
+        return installed("taxel_studies").parts(f"taxel_studies.{self.name.replace('.', '_')}")
+
+    @property
+    def lacks(self) -> str | None:
+        """Say which modules are not installed; None where all are."""
+        missing = [name for name in self.needs if find_spec(name) is None]
+        return f'it needs {", ".join(missing)}: pip install "taxel[studies]"' if missing else None
+
+    def run(
+        self,
+        report: Path,
+        *,
+        size: str = "full",
+        changes: Mapping[str, Any] | None = None,
+        data: Path | None = None,
+        workers: Workers = HERE,
+        strict: bool = False,
+        quiet: bool = False,
+    ) -> Section:
+        """Run what is not in `report` yet, draw, judge; leave ``summary.json`` and the picture there.
+
+        Parameters
+        ----------
+        report : Path
+            Of all studies; this one's folder in it has its name.
+        size : str
+            "full", "toy" ...
+        changes : mapping, optional
+            Parameters that differ from the size's.
+        data : Path, optional
+            Where the recordings lie, for the studies that need some.
+        workers : Workers
+        strict : bool
+            A file of recordings that cannot be read ends it before it begins; else it is left out, and said.
+        quiet : bool
+            No progress line.
+
+        Returns
+        -------
+        dict
+
+        Raises
+        ------
+        ProblemError : a size or parameter that is none; a module that is not installed
+        FormatError : recordings that it needs are not there, or cannot be read (none of them; one, with `strict`)
+        """
+        parameters = self.set(size, **(changes or {}))
+        if self.lacks is not None:
+            raise ProblemError(f"{self.name}: {self.lacks}")
+        given: dict[str, Any] = {}
+        unread: Mapping[str, str] = {}
+        if self.data:
+            given["data"] = self._recordings(data)
+            unread = self.unread(parameters, given["data"])
+            refuse(unread, strict=strict)
+        folder = report / self.name
+        folder.mkdir(parents=True, exist_ok=True)
+        if self.courses:
+            given["courses"] = report / "courses"
+            given["courses"].mkdir(exist_ok=True)
+        results = Results(folder / "results.jsonl", self.code)
+        begun = time.time()
+        rows: dict[str, Row] = {}
+
+        def phase(title: str, wanted: Sequence[Task]) -> None:
+            run(partial(self.realise, **given), wanted, results, workers=workers, title=title, quiet=quiet)
+            for t in wanted:
+                rows[t.key("")] = Row(t.params, t.seed, results[t], results.seconds([t]))
+
+        phase(self.name, self.tasks(parameters, **given))
+        while self.then is not None:
+            wanted = [t for t in self.then(parameters, list(rows.values()), **given) if t.key("") not in rows]
+            if not wanted:
+                break
+            phase(f"{self.name}, next", wanted)
+        said = self.summarise(parameters, list(rows.values()), **given)
+        section = {
+            "name": self.name,
+            "title": self.title,
+            "where": self.where,
+            "protocol": self.protocol,
+            "size": size,
+            "parameters": parameters,
+            "changed": sorted(changes or {}),
+            "unread": dict(unread),
+            "realisations": len(rows),
+            "statements": [asdict(s) for s in self.statements(parameters, said)],
+            "tables": [asdict(t) for t in self.tables(parameters, said)] if self.tables is not None else [],
+            "said": said,
+            "cpu_seconds": round(sum(row.seconds for row in rows.values()), 1),
+            "wall_seconds": round(time.time() - begun, 1),
+            "made_of": self.made_of,
+            **_machine(),
+        }
+        _write_section(folder, section, drawn(self, parameters, said))
+        return section
+
+    def _recordings(self, data: Path | None) -> Path:
+        if data is not None and not data.is_dir():
+            raise FileNotFoundError(2, "No such folder", str(data))
+        missing = [name for name in self.data if data is None or not (data / name).is_dir()]
+        if data is None or len(missing) == len(self.data):
+            raise FormatError(
+                f"{data or self.name}: holds no recordings; name a folder with any of {', '.join(self.data)} by --data "
+                "(taxel study gait --help says where they can be had)"
+            )
+        return data
+
+
+def refuse(unread: Mapping[str, str], *, strict: bool) -> None:
+    """Raise `FormatError` for the first file that cannot be read, where that ends a study."""
+    if strict and unread:
+        file, why = next(iter(unread.items()))
+        more = f" ({len(unread) - 1} more cannot be read)" if len(unread) > 1 else ""
+        raise FormatError(f"{file}: {why}{more}")
+
+
+def _alike(value: Any, other: Any) -> bool:
+    if isinstance(other, bool) or isinstance(value, bool):
+        return isinstance(value, bool) and isinstance(other, bool)
+    if isinstance(other, int | float):
+        return isinstance(value, int | float) and (isinstance(value, int) or isinstance(other, float))
+    if isinstance(other, list | tuple):
+        return isinstance(value, list | tuple) and all(_alike(v, other[0]) for v in value if other)
+    return isinstance(value, type(other))
+
+
+def _kind(value: Any) -> str:
+    """Say in words what is alike."""
+    kinds = {bool: "true or false", int: "a whole number", float: "a number", list: "a list", tuple: "a list"}
+    return kinds.get(type(value), "a text")
+
+
+def _machine() -> dict[str, Any]:
+    """Return what a reader needs to place the times: processor, versions, date."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    cpu = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.processor())
+    return {
+        "machine": f"{platform.machine()}, {cpu}",
+        "versions": {
+            "python": platform.python_version(),
+            "taxel": __version__,
+            **{name: metadata.version(name) for name in ("numpy", "scipy", "matplotlib")},
+        },
+        "date": time.strftime("%Y-%m-%d", time.gmtime()),
+    }
+
+
+def svg(figure: Figure) -> bytes:
+    """Return a picture as SVG, the same bytes for the same numbers."""
+    from matplotlib import rc_context  # noqa: PLC0415  loads slowly
+
+    buffer = io.BytesIO()
+    with rc_context({"svg.hashsalt": "taxel", "svg.fonttype": "none"}):
+        figure.savefig(buffer, format="svg", metadata={"Date": None}, bbox_inches="tight", facecolor="white")
+    return buffer.getvalue()
+
+
+def logarithmic(axes: Axes, *, x: Sequence[float] = (), y: Sequence[float] = ()) -> None:
+    """Make the horizontal axis, the vertical one, or both logarithmic, marked in plain numbers at these places."""
+    if x:
+        axes.set_xscale("log")
+        axes.set_xticks(x, [f"{place:g}" for place in x])
+        axes.set_xticks([], minor=True)
+    if y:
+        axes.set_yscale("log")
+        axes.set_yticks(y, [f"{place:g}" for place in y])
+        axes.set_yticks([], minor=True)
+
+
+def drawn(study: Study, parameters: Parameters, said: Said) -> list[bytes]:
+    """Return a study's pictures of what it found, as SVG."""
+    figures = study.draw(parameters, said)
+    return [svg(figure) for figure in (figures if isinstance(figures, Sequence) else [figures])]
+
+
+def _write_section(folder: Path, section: Section, pictures: Sequence[bytes]) -> None:
+    """Write a study's summary and its pictures, each whole; the summary names the pictures."""
+    names = ["figure.svg"] if len(pictures) == 1 else [f"figure-{k}.svg" for k in range(1, len(pictures) + 1)]
+    for name, picture in zip(names, pictures, strict=True):
+        write_whole(folder / name, partial(_put, picture), overwrite=True)
+    text = json.dumps(section | {"pictures": names}) + "\n"
+    write_whole(folder / "summary.json", partial(_put, text.encode()), overwrite=True)
+
+
+def _put(data: bytes, file: BinaryIO) -> None:
+    file.write(data)
+
+
+def read_section(folder: Path) -> Section | None:
+    """Return what a study left, pictures as data addresses; None where nothing was run."""
+    path = folder / "summary.json"
+    if not path.exists():
+        return None
+    try:
+        section: Section = json.loads(path.read_text(encoding="utf-8"))
+        names = section["pictures"]
+    except (ValueError, KeyError, TypeError):
+        raise FormatError(f"{path}: is no summary of a study; name another folder by --report") from None
+    section["images"] = [
+        f"data:image/svg+xml;base64,{base64.b64encode((folder / name).read_bytes()).decode()}" for name in names
+    ]
+    return section

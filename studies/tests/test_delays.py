@@ -1,0 +1,43 @@
+"""The study of delays: what each arm hears, and that weights chosen among copies fire where they shall."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from taxel_studies import delays
+from taxel_studies.capacity import patterns
+
+PARAMS = {"inputs": 40, "classes": 3, "longest_ms": 90.0, "time": "continuous", "arm": "none"}
+
+
+def heard(arm: str, seed: int = 3) -> list:
+    return delays.delayed({**PARAMS, "arm": arm}, patterns(seed, 40, 4, 3)[0], seed)
+
+
+def test_random_delays_are_an_inputs_own_and_the_same_in_every_pattern() -> None:
+    plain, put_off = heard("none"), heard("random")
+    apart = np.array([b.times - a.times for a, b in zip(plain, put_off, strict=True)])
+    assert np.allclose(apart, apart[0])
+    assert (apart[0].min() >= 0.0, apart[0].max() <= 90.0, len(np.unique(apart[0]))) == (True, True, 40)
+    assert not np.allclose(apart[0], heard("random", seed=4)[0].times - heard("none", seed=4)[0].times)
+
+
+def test_copies_are_spaced_evenly_up_to_the_longest() -> None:
+    for plain, copied in zip(heard("none"), heard("4 copies"), strict=True):
+        assert copied == plain.delayed([0.0, 30.0, 60.0, 90.0])
+
+
+@pytest.mark.parametrize("arm", ["none", "4 copies"])
+def test_what_l1_chooses_fires_at_the_targets_and_nowhere_else(arm: str) -> None:
+    params = {**PARAMS, "inputs": 60, "arm": arm}
+    cone = delays.fit(params, 9, 1, (1.0, 0.0, 0.0))
+    assert cone.status_ == "solved"
+    drawn, targets = patterns(1, 60, 9, 3)
+    for pattern, target in zip(delays.delayed(params, drawn, 1), targets, strict=True):
+        fired = cone.neuron_.run(cone.weights_, pattern.between(0.0, 200.0))
+        assert len(fired) == 1
+        assert abs(fired[0] - target[0]) < 1e-6
+    told = delays.realise({**params, "asks": "weights", "share": 0.15}, 1)
+    assert told["weights"] == np.count_nonzero(np.abs(cone.weights_) > delays.NONE)
+    assert told["heard"] <= told["weights"] < len(cone.weights_)

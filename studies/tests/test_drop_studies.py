@@ -1,0 +1,272 @@
+"""Drops on the emulated board: the cut against the board's own events, the quick distances against taxel.metrics."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+
+from taxel import Array, ProblemError, SceneError, SpikeTrains
+from taxel.information.neighbours import distances_of
+from taxel.metrics import pairwise
+from taxel.spikes import to_ms
+from taxel.wire import FRAME_US
+from taxel_studies import dropped, drops, fig4_8, fig4_9, fig5_11
+from taxel_studies.dropped import FRAMES, REGION, TENNIS, Condition
+from taxel_studies.study import Row
+
+FEW, TENNIS_FEW = {**dropped.TABLE, "drops": 4}, {**dropped.TENNIS_TABLE, "drops": 3}
+SIDE, PERIOD_MS = 4, 0.5
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("drops")
+
+
+@pytest.fixture(scope="module")
+def fallen(folder):
+    return dropped.played(FEW, Condition(50.0, 100.0, 0.0), 1, folder)
+
+
+def patterns(seed=1, count=7, samples=12, layers=2):
+    """Return random patterns, as an array of spikes and as trains of spikes at the samples' times."""
+    spikes = (np.random.default_rng(seed).random((count, samples, layers, SIDE * SIDE)) < 0.06).astype(np.uint8)
+    spikes[0] = 0
+    trains = []
+    for one in spikes:
+        times = [PERIOD_MS * np.flatnonzero(one[:, layer, n]) for layer in range(layers) for n in range(SIDE * SIDE)]
+        trains.append(SpikeTrains.from_lists(times, start=0.0, stop=samples * PERIOD_MS))
+    return spikes, trains
+
+
+@pytest.mark.parametrize(("tau", "sigma"), [(0.1, 1.0), (0.4, 2.0), (2.0, 5.0)])
+def test_inner_products_give_the_distances_of_metrics(tau, sigma):
+    spikes, trains = patterns()
+    array = Array(SIDE, SIDE, pitch_mm=2.67)
+    kernel = dropped.smoothed(SIDE, array.pitch_mm, sigma)
+    gram = dropped.spatial_grams(spikes, PERIOD_MS, tau, [kernel], [spikes.shape[1]])[0][0]
+    wanted = pairwise("van_rossum_spatial", trains, array=array, tau=tau, sigma=sigma, normalisation="none")
+    np.testing.assert_allclose(distances_of(gram), wanted, atol=2e-3 * wanted.max())
+
+
+def test_an_end_leaves_out_what_comes_after_it():
+    spikes, _ = patterns()
+    kernels = [dropped.smoothed(SIDE, 2.67, sigma) for sigma in (1.0, 3.0)]
+    both = dropped.spatial_grams(spikes, PERIOD_MS, 0.7, kernels, [5, 12])
+    for kernel, (early, late) in zip(kernels, both, strict=True):
+        np.testing.assert_allclose(
+            early, dropped.spatial_grams(spikes[:, :5], PERIOD_MS, 0.7, [kernel], [5])[0][0], rtol=1e-6
+        )
+        np.testing.assert_allclose(late, dropped.spatial_grams(spikes, PERIOD_MS, 0.7, [kernel], [12])[0][0], rtol=1e-6)
+
+
+def test_absolute_differences_are_those_of_metrics():
+    spikes, trains = patterns(layers=1)
+    array, samples = Array(SIDE, SIDE, pitch_mm=2.67), spikes.shape[1]
+    found = dropped.absolute_distances(spikes, PERIOD_MS, 0.7, dropped.smoothed(SIDE, array.pitch_mm, 2.0))
+    # Samples at the spikes' own times, up to the last of them.
+    window = (0.0, (samples - 1) * PERIOD_MS)
+    wanted = pairwise(
+        "van_rossum_spatial_absolute", trains, array=array, tau=0.7, sigma=2.0, window=window, step_ms=PERIOD_MS
+    )
+    np.testing.assert_allclose(found, wanted, rtol=1e-4, atol=1e-4)
+
+
+def test_at_every_frame_the_events_are_the_boards(fallen):
+    """The encoder sees what the host holds; what it says is what the board said, event by event."""
+    assert fallen.ticks.shape == (4, 1 + FRAMES, REGION * REGION)
+    spikes = dropped.sampled(fallen.ticks, to_ms(FRAME_US), np.zeros(4))
+    np.testing.assert_array_equal(spikes.sum((1, 2, 3)), fallen.events)
+    moved = np.diff(fallen.ticks.astype(int), axis=1)
+    np.testing.assert_array_equal(spikes[:, :FRAMES, 0], (moved > 0)[:, : spikes.shape[1]])
+    assert (np.abs(moved[moved != 0]) > dropped.NOISE_FLOOR).all()
+    assert (fallen.lasted_us < 50_000).all()
+    assert (fallen.lasted_us > 15_000).all()  # an impact on this foam lasts that long
+
+
+def test_a_longer_period_and_another_phase_see_less(fallen):
+    counts = [dropped.sampled(fallen.ticks, period, np.zeros(4)).sum() for period in (0.5, 2.0, 10.0)]
+    assert counts[0] > counts[1] > counts[2] > 0
+    late = dropped.sampled(fallen.ticks, 2.0, np.array([0.0, 0.5, 1.0, 1.9]))
+    assert late[:, 0].any(axis=(1, 2)).all()  # sample 0 is the first at which anything fires
+    np.testing.assert_array_equal(late[0], dropped.sampled(fallen.ticks, 2.0, np.zeros(4))[0])
+
+
+def test_drops_are_kept_and_belong_to_what_made_them(folder, fallen):
+    again = dropped.played(FEW, Condition(50.0, 100.0, 0.0), 1, folder)
+    np.testing.assert_array_equal(again.ticks, fallen.ticks)
+    assert len(list(folder.glob("drops-50mm-100mm-0deg-*.npz"))) == 1
+    other = dropped.played({**FEW, "drops": 2}, Condition(50.0, 100.0, 0.0), 2, folder)
+    assert len(list(folder.glob("drops-50mm-100mm-0deg-*.npz"))) == 2
+    assert len(other.ticks) == 2
+    assert not np.array_equal(other.ticks, fallen.ticks[:2])
+
+
+def test_drops_of_one_condition_differ_and_higher_ones_tell_more(folder, fallen):
+    assert len({one.tobytes() for one in fallen.ticks}) == 4
+    high = dropped.played(FEW, Condition(50.0, 200.0, 0.0), 1, folder)
+    slanted = dropped.played(FEW, Condition(50.0, 200.0, 30.0), 1, folder)
+    assert fallen.events.mean() < slanted.events.mean() < high.events.mean()
+
+
+def test_a_ball_glances_off_along_the_rows_of_a_tilted_array_and_off_a_level_one_straight_up(folder, fallen):
+    """By some 13 mm, 5 taxels, in a contact of 18 ms: friction leaves five sevenths of 1 m/s."""
+    slanted = dropped.played(FEW, Condition(50.0, 200.0, 30.0), 1, folder)
+    column, row = np.arange(REGION * REGION) % REGION, np.arange(REGION * REGION) // REGION
+
+    def moved(drops, places):
+        above = drops.ticks.astype(float) - drops.ticks[:, :1]
+        early, late = (above[:, frames].sum(1) for frames in (slice(5, 25), slice(60, 80)))
+        return [np.average(places, weights=b) - np.average(places, weights=a) for a, b in zip(early, late, strict=True)]
+
+    assert min(moved(slanted, column)) > 1.5
+    assert max(np.abs(moved(slanted, row))) < 0.7
+    assert max(np.abs(moved(fallen, column))) < 0.7
+
+
+def test_the_region_holds_the_impact_and_not_a_taxel_of_noise(fallen):
+    """The middle of what answered lies in the middle of the region, in all drops."""
+    risen = fallen.ticks.max(1).astype(int) - fallen.ticks[:, 0]
+    x, y = np.arange(REGION * REGION) % REGION, np.arange(REGION * REGION) // REGION
+    for one in risen:
+        assert np.average(x, weights=one) == pytest.approx(REGION / 2 - 0.5, abs=1.5)
+        assert np.average(y, weights=one) == pytest.approx(REGION / 2 - 0.5, abs=1.5)
+
+
+def test_a_drop_that_nothing_answers_is_said(tmp_path):
+    with pytest.raises(SceneError, match="drop 0: no 3 taxels answered it"):
+        dropped.played(
+            {**FEW, "mass_g": 0.01, "mass_by_g": 0.0, "height_sd_mm": 0.0}, Condition(50.0, 5.0, 0.0), 1, tmp_path
+        )
+
+
+def test_none_is_its_own_neighbour():
+    distances = np.array([[0.0, 1.0, 9.0], [1.0, 0.0, 9.0], [9.0, 9.0, 0.0]])
+    said = dropped.named_by_neighbours(distances, np.array([0, 1, 1]), 1)
+    np.testing.assert_array_equal(said, [1, 0, 0])
+    assert not np.diag(distances).any()
+
+
+def test_search_first_then_details_at_each_periods_best(tmp_path):
+    p = fig5_11.STUDY.set("toy")
+    rows = [Row(t.params, t.seed, {}) for t in fig5_11.tasks(p, tmp_path)]
+    search = fig5_11.then(p, rows, tmp_path)
+    assert [t.params["ask"] for t in search] == ["search"] * 4
+    rows += [Row(t.params, t.seed, [2 - abs(t.params["tau_ms"] - 1.0)]) for t in search]
+    last = [t for t in fig5_11.then(p, rows, tmp_path) if t.params["ask"] != "search"]
+    assert [t.params["ask"] for t in last] == ["detail", "any phase", "detail", "any phase", "absolute"]
+    assert {(t.params["tau_ms"], t.params["sigma_mm"]) for t in last} == {(1.0, 2.0)}
+
+
+def test_frames_cost_what_the_thesis_says():
+    assert drops._frames_kbit_s(drops.INTENSITY_BITS) == pytest.approx(13_333, rel=1e-3)
+    assert drops._frames_kbit_s(drops.CHANGE_BITS) == pytest.approx(2_667, rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def tennis(folder):
+    return dropped.played(TENNIS_FEW, Condition(65.0, 400.0, 0.0), 1, folder, TENNIS)
+
+
+def test_a_tennis_ball_is_filmed_at_2_khz_around_the_first_taxel_that_answered(folder, tennis):
+    assert TENNIS.frame_us == pytest.approx(500, abs=1)
+    assert tennis.ticks.shape == (3, 1 + 80, 17 * 17)
+    film = dropped.pictures(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
+    np.testing.assert_array_equal(film, tennis.ticks[:, 1:].astype(int) - tennis.ticks[:, :1].astype(int))
+    middle = 17 * 8 + 8
+    assert (film[:, 0, middle] > 0).all()  # it answered in the impact's first frame
+    rise = film.sum(2)
+    assert (rise.argmax(1) * TENNIS.frame_us < 12_000).all()
+    assert (rise[:, -1] < 0.3 * rise.max(1)).all()  # the ball is off again
+
+
+def test_slower_films_hold_the_frames_before_their_times(tennis):
+    every = dropped.pictures(tennis.ticks, TENNIS.frame_us / 1000, np.zeros(3), TENNIS, 40.0)
+    late = np.array([0.0, 1.2, 4.9])
+    for k, film in enumerate(dropped.pictures(tennis.ticks, 5.0, late, TENNIS, 20.0)):
+        at = np.floor((late[k] + 5.0 * np.arange(4)) * 1000 / TENNIS.frame_us).astype(int)
+        np.testing.assert_array_equal(film, every[k, at])
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    """Both studies of a tennis ball leave their drops here, and share them."""
+    return tmp_path_factory.mktemp("tennis")
+
+
+def test_faster_films_of_a_tennis_ball_tell_more(report):
+    section = fig4_8.STUDY.run(report, size="toy", changes={"drops": 6}, quiet=True)
+    fast, slow = section["said"]["lines"]
+    assert (fast["period_ms"], slow["period_ms"]) == (2.0, 40.0)
+    assert fast["bits"] > slow["bits"] + 0.5
+    assert all(0 <= line[name] <= 2 for line in (fast, slow) for name in ("bits", "any_phase_bits"))
+
+
+def test_own_neighbours_are_those_of_scikit_learn():
+    from sklearn.neighbors import NearestNeighbors
+
+    rng = np.random.default_rng(3)
+    y = np.repeat([0, 1, 2], 20)
+    places = rng.normal(size=(60, 2)) + 1.5 * y[:, None]
+    near = NearestNeighbors(n_neighbors=fig4_9.NEIGHBOURS).fit(places).kneighbors(return_distance=False)
+    assert fig4_9.own_neighbours(places, y) == pytest.approx(np.mean(y[near] == y[:, None]))
+
+
+def test_t_sne_lays_classes_that_differ_apart(report):
+    section = fig4_9.STUDY.run(
+        report, size="toy", changes={"drops": 6, "rates_hz": [1000.0], "perplexity": 4.0}, quiet=True
+    )
+    (line,) = section["said"]["lines"]
+    assert len(line["map"]) == 24
+    assert line["own"] > 0.5  # by chance a quarter
+
+
+def test_without_its_package_a_study_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "sklearn", None)
+    with pytest.raises(ProblemError, match=r'fig4.9: it needs sklearn: pip install "taxel\[studies\]"'):
+        fig4_9.STUDY.run(tmp_path, size="toy", quiet=True)
+
+
+@pytest.mark.parametrize(
+    ("below", "height", "least", "radius"), [(0.002, 0.895, False, False), (0.05, 0.8, True, True)]
+)
+def test_a_difference_of_a_few_drops_is_none(below, height, least, radius):
+    """Bits and shares that differ by less than .02 do not make the best period, nor the parameter that suffers most."""
+
+    def line(period, bits, ball, tall):
+        by = {"ball_mm": (ball, 1.0), "height_mm": (tall, 1.585), "slant_deg": (0.5, 1.585)}
+        return {
+            "period_ms": period,
+            "bits": bits,
+            "by": {name: {"bits": share * most, "most": most} for name, (share, most) in by.items()},
+            "any_phase_bits": bits,
+            "absolute_bits": None,
+            "tau_ms": 0.4,
+            "sigma_mm": 2.0,
+            "searched": [],
+            "times": [[50.0, bits]],
+        }
+
+    lines = [line(0.5, 3.9 - below, 1.0, 1.0), line(1.0, 3.9, 1.0, 1.0), line(20.0, 0.5, 0.1, 1.0 - height)]
+    found = fig5_11.statements(fig5_11.STUDY.set("toy"), {"lines": lines, "conditions": 18})
+    holds = {
+        one.says.split(":")[0]: one.holds for one in found if one.says.startswith(("Figure 5.11: most", "Figure 5.12"))
+    }
+    assert holds == {"Figure 5.11": least, "Figure 5.12": radius}
+
+
+def test_the_gain_above_100_hz_is_told_from_100_hz_itself_too():
+    lines = [
+        {"period_ms": t, "bits": b, "any_phase_bits": a} for t, b, a in [(1, 1.8, 1.7), (10, 1.6, 0.4), (20, 0.1, 0.2)]
+    ]
+    said = {
+        "lines": lines,
+        "conditions": 4,
+        "sum": [[0.0, 0.0], [1.0, 9.0], [5.0, 0.0]],
+        "middle": [0.0, 0.0],
+        "full": 510,
+    }
+    *_, gain = fig4_8.statements(fig4_8.STUDY.set("toy"), said)
+    assert gain.ours.endswith("from 100 Hz itself on +0.20, begun at any phase +1.30")

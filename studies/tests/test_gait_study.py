@@ -1,0 +1,350 @@
+"""The gait study at toy size, on people made here: the whole way from files to the report."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from tests.formats.making import interpolated, write_gaitndd
+
+from taxel import FormatError, ProblemError
+from taxel.cli import main
+from taxel_studies import load
+from taxel_studies.gait import outcomes
+from taxel_studies.gait.protocols import PROTOCOLS
+from taxel_studies.gait.recipes import ENCODERS, SEARCH, SETTINGS
+from taxel_studies.page import write_page
+from taxel_studies.study import Section
+
+GAIT = load("gait")
+
+
+def study(data: Path | None, report: Path, *, strict: bool = False, **changes) -> Section:
+    """Run the study at toy size; its part of the page."""
+    return GAIT.run(report, size="toy", data=data, changes=changes, strict=strict, quiet=True)
+
+
+def walker(folder: Path, name: str, seed: int) -> None:
+    """Write 12 s of walking in the manner of gaitpdb: eight sensors that load from heel to toe."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(1200) / 100
+    columns = [t]
+    for foot in (0.0, 0.55):
+        phase = (t + foot + 0.2 * rng.random()) % 1.1 / 1.1
+        for k in range(8):
+            rise, fall = 0.02 + 0.04 * k, 0.35 + 0.035 * k
+            load = 120 * np.clip((phase - rise) / 0.04, 0, 1) * np.clip((fall - phase) / 0.04, 0, 1)
+            columns.append(np.round(load * (0.8 + 0.4 * rng.random()) + rng.normal(0, 0.5, len(t)).clip(0), 2))
+    values = np.column_stack([*columns, sum(columns[1:9]), sum(columns[9:17])])
+    lines = ["\t".join(f"{v:.4f}" for v in row) for row in values]
+    (folder / f"{name}_01.txt").write_text("\n".join(lines) + "\n")
+
+
+def stepper(folder: Path, name: str, seed: int, count: int = 5) -> None:
+    """Write footfalls in the manner of the plate: a foot that rolls from heel to toes."""
+    rng = np.random.default_rng(seed)
+    with h5py.File(folder / f"{name}.h5", "w") as h5:
+        for n in range(count):
+            frames = int(rng.integers(150, 190))
+            rows, columns, t = np.mgrid[0:34, 0:16, 0:frames].astype(float)
+            outline = (np.abs(columns - 7.5 - 0.1 * rows) < 5) & (rows > 1)
+            centre = 4 + 26 * np.clip((t - 0.2 * frames) / (0.7 * frames), 0, 1)
+            width = 9 - 5 * t / frames
+            load = 900 * outline * np.exp(-(((rows - centre) / width) ** 2)) * np.sin(np.pi * (t + 2) / (frames + 3))
+            load = np.where(load > 25, load + rng.integers(0, 9, load.shape), 0).astype(np.int64)
+            image = np.zeros((60, 18, 220), np.uint16)
+            image[:, :16, :frames] = interpolated(load, 3 + n % 3, 60)
+            h5[f"img{n:03d}"] = image
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("data")
+    (folder / "insole_gaitpdb").mkdir()
+    for k, name in enumerate(("GaCo90", "GaCo91", "GaPt90", "GaPt91")):
+        walker(folder / "insole_gaitpdb", name, k)
+    (folder / "plate").mkdir()
+    for k in range(3):
+        stepper(folder / "plate", f"subj90{k}", k)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def ran(data, tmp_path_factory) -> tuple[Path, Section]:
+    folder = tmp_path_factory.mktemp("report")
+    return folder, study(data, folder)
+
+
+def rows(section: Section, source: str, event: str) -> dict[str, dict]:
+    found = next(s for s in section["said"]["sources"] if s["source"] == source)
+    return {row["row"]: row for row in found["protocols"][0]["rows"] if row["event"] == event}
+
+
+def test_a_toy_study_has_all_its_rows_and_finds_easy_steps(ran):
+    _, said = ran
+    assert said["said"]["skipped"] == ["insole_gaitndd", "insole_moticon", "pressure_formats"]
+    contact = rows(said, "gaitpdb", "contact")
+    assert {"notes", "chosen", "printed", "tonic", "rule: spikes", "rule: state", "rule: level"} == set(contact)
+    assert contact["notes"]["figures"]["events"] >= 70
+    assert contact["notes"]["figures"]["found_percent"] >= 95
+    assert contact["chosen"]["figures"]["found_percent"] >= 95
+    assert contact["printed"]["figures"]["false"] > 10 * contact["notes"]["figures"]["false"]
+    footfall = rows(said, "plate", "contact")
+    assert {"notes", "chosen", "printed", "others", "rule: spikes", "rule: state", "rule: level"} == set(footfall)
+    assert footfall["notes"]["figures"]["events"] == 15
+    assert footfall["notes"]["figures"]["missed"] <= 1
+
+
+def test_every_figure_adds_up(ran):
+    _, said = ran
+    for source in said["said"]["sources"]:
+        for row in source["protocols"][0]["rows"]:
+            f = row["figures"]
+            assert f["found"] + f["missed"] == f["events"]
+            assert sum(p["events"] for p in row["by_person"].values()) == f["events"]
+            assert sum(p["false"] for p in row["by_person"].values()) == f["false"]
+
+
+def test_errors_take_off_the_delay_that_known_keeps(ran):
+    folder, _ = ran
+    for line in (folder / "gait" / "results.jsonl").read_text().splitlines():
+        row = json.loads(line)
+        if row["params"]["kind"] == "neuron" and row["params"]["source"] == "gaitpdb":
+            for units in row["result"]["tested"].values():
+                for unit in units.values():
+                    late = np.subtract(unit["delays"], unit["errors"])
+                    assert np.allclose(late, row["result"]["point"]["learner"]["delay_ms"], atol=0.2)
+
+
+def test_the_page_shows_every_row_and_the_folds_lie_with_the_numbers(ran):
+    folder, section = ran
+    assert json.loads((folder / "gait" / "summary.json").read_text())["said"] == json.loads(json.dumps(section["said"]))
+    assert len(json.loads((folder / "gait" / "summary.json").read_text())["pictures"]) == 2
+    page = write_page(folder).read_text()
+    assert "Table 6.2 as printed" in page
+    assert "a threshold on the sum of the inputs" in page
+    assert page.count("rule: state") >= 2, "a row a source"
+    assert "gaitpdb, people left out: contact, chosen, by person" in page
+    people = section["said"]["folds"]["gaitpdb/people left out"]
+    assert sum(len(group) for group in people[0]["groups"]) == 8
+
+
+def test_every_table_is_as_wide_as_its_head(ran):
+    for table in ran[1]["tables"]:
+        assert {len(row) for row in table["rows"]} == {len(table["head"])}, table["title"]
+
+
+def test_a_second_run_reckons_nothing_again(data, ran):
+    folder, section = ran
+    before = (folder / "gait" / "results.jsonl").stat().st_size
+    assert study(data, folder)["said"] == section["said"]
+    assert (folder / "gait" / "results.jsonl").stat().st_size == before
+
+
+def test_the_full_search_chooses_inside_each_fold_and_only_on_the_plate(data, ran, tmp_path):
+    section = study(data, tmp_path, search="full")
+    found = rows(section, "plate", "contact")
+    assert {"528: as printed", "528: recipe"} <= set(found)
+    assert not any(row.startswith("528") for row in rows(section, "gaitpdb", "contact"))
+    searched = section["said"]["full_search"]
+    assert sorted(one["left_out"] for one in searched) == sorted(["subj900", "subj901", "subj902"] * 2)
+    for one in searched:
+        assert one["tau"] in (10.0, 40.0)
+        assert one["lambda_1"] + one["lambda_2"] == 4
+    results = [json.loads(line) for line in (tmp_path / "gait" / "results.jsonl").read_text().splitlines()]
+    searches = [r for r in results if r["params"]["kind"] == "neuron" and r["params"].get("search") == {"count": 20}]
+    assert len(searches) == 2 * 3  # as printed and recipe; folds
+    for one in searches:
+        (judged,) = one["params"]["inner"]
+        assert not set(judged) & set(one["params"]["left_out"])
+        assert len(one["params"]["points"]) == 2 * 2 * 2
+        assert one["result"]["point"] in one["params"]["points"]
+        assert one["result"]["fit"]["status"] == "solved"
+    assert "The 528 settings of 6.5.2" in write_page(tmp_path).read_text()
+    assert ran[1]["said"]["full_search"] == []
+
+
+def test_the_settings_of_the_full_search_are_528():
+    assert np.prod([len(values) for values in SETTINGS.values()]) == 528
+    assert (SETTINGS["tau"][-1], SETTINGS["kappa"][-1], SETTINGS["lambda_1"][0]) == (220.0, 1.3, 4.0)
+
+
+def test_what_the_thesis_says_is_judged_by_the_rows_that_stand_for_it(ran):
+    says = [statement["says"] for statement in ran[1]["statements"]]
+    assert "On walking recordings it finds more than 95 % of contact." in says
+    assert {s["why"].split(";")[0] for s in ran[1]["statements"] if "walking" in s["says"]} == {
+        "gaitpdb, people left out"
+    }
+    with pytest.raises(ProblemError, match="gait has no parameter 'tau'"):
+        GAIT.set("toy", tau=3)
+
+
+def test_other_people_are_judged_by_all_of_these(data, tmp_path):
+    other = tmp_path / "other"
+    (other / "insole_gaitpdb").mkdir(parents=True)
+    walker(other / "insole_gaitpdb", "SiPt99", 9)
+    said = study(data, tmp_path / "report", test=str(other))
+    assert said["said"]["judged"] == "on another folder"
+    assert said["said"]["skipped"] == ["plate", "insole_gaitndd", "insole_moticon", "pressure_formats"]
+    contact = rows(said, "gaitpdb", "contact")
+    assert set(contact["chosen"]["by_person"]) == {"SiPt99"}
+    assert contact["chosen"]["figures"]["found_percent"] >= 90
+    assert contact["chosen"]["goal"]["found_percent"] == 98.0
+
+
+def test_ctrl_c_stops_the_command_and_the_next_run_goes_on(data, tmp_path):
+    command = [sys.executable, "-m", "taxel", "study", "gait", "--data", str(data), "--size", "toy"]
+    command += ["--report", str(tmp_path), "--only", "gaitpdb"]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        lines = tmp_path / "gait" / "results.jsonl"
+        while process.poll() is None and not (lines.exists() and lines.stat().st_size):
+            time.sleep(0.02)
+        if process.poll() is None:
+            os.kill(process.pid, signal.SIGINT)
+            assert process.wait(timeout=60) in (0, 130)
+    finally:
+        process.kill()
+        process.wait()
+    done = len(lines.read_text().splitlines())
+    said = study(data, tmp_path, sources=["gaitpdb"])
+    assert len(lines.read_text().splitlines()) >= done
+    assert rows(said, "gaitpdb", "contact")["notes"]["figures"]["found_percent"] >= 95
+
+
+def test_no_list_of_points_is_longer_than_24():
+    assert all(1 < len(points) <= 24 for events in SEARCH.values() for points in events.values())
+    assert len({len(points) for events in ENCODERS.values() for points in events.values()}) == 1
+    assert set(SEARCH) == {source for source, all_ in PROTOCOLS.items() if any("chosen" in p.rows for p in all_)}
+
+
+def test_no_delay_is_longer_than_12_ms():
+    points = [p for events in [*SEARCH.values(), *ENCODERS.values()] for points in events.values() for p in points]
+    assert max(p["learner"]["delay_ms"] for p in points) <= 12
+
+
+def test_a_goal_is_met_only_where_every_part_of_it_is():
+    units = [outcomes.Unit("a", "a", "", 10, 1, 1.0, (1.0,) * 10, (9.0,) * 10)]
+    f = outcomes.figures(units)
+    assert outcomes._met(f, {"found_percent": 100.0, "false_per_minute": 1.0, "within_10_ms_percent": 100.0})
+    assert not outcomes._met(f, {"missed": 0, "false": 0})
+    assert not outcomes._met(outcomes.figures([]), {"found_percent": 98.0})
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "said"),
+    [
+        ({"search": "all"}, ProblemError, "search is 'all'"),
+        ({"sources": ["emed"]}, ProblemError, "sources is 'emed'"),
+        ({"sources": 3}, ProblemError, "sources is 3"),
+        ({"protocols": ["by moon"]}, ProblemError, "protocols is 'by moon'"),
+        ({"test": 3}, ProblemError, "test is 3"),
+        ({"test": "nothing/here"}, FileNotFoundError, "nothing/here"),
+        (
+            {"sources": ["pedar"]},
+            FormatError,
+            "holds no recordings; must have one or more of the folders pressure_formats",
+        ),
+    ],
+)
+def test_nonsense_is_refused(data, tmp_path, changes, error, said):
+    with pytest.raises(error, match=said):
+        study(data, tmp_path, **changes)
+    assert not (tmp_path / "gait" / "results.jsonl").exists()
+
+
+def test_a_folder_that_is_not_there_is_told(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        study(tmp_path / "nothing", tmp_path)
+    with pytest.raises(FormatError, match="gait: holds no recordings; name a folder"):
+        study(None, tmp_path)
+
+
+def test_too_few_people_to_choose_inside_are_said(data, tmp_path):
+    few = tmp_path / "few"
+    (few / "insole_gaitpdb").mkdir(parents=True)
+    for name in ("GaCo90", "GaPt90"):
+        (few / "insole_gaitpdb" / f"{name}_01.txt").symlink_to(data / "insole_gaitpdb" / f"{name}_01.txt")
+    said = study(few, tmp_path / "report")
+    assert "gaitpdb, people left out: chosen inside (too few people)" in said["said"]["skipped"]
+    assert "chosen" not in rows(said, "gaitpdb", "contact")
+
+
+def test_one_person_alone_is_said(data, tmp_path):
+    (tmp_path / "plate").mkdir()
+    (tmp_path / "plate" / "subj900.h5").symlink_to(data / "plate" / "subj900.h5")
+    said = study(tmp_path, tmp_path / "report")["said"]
+    assert said["skipped"][-1] == "plate (too few people or recordings)"
+    assert said["sources"] == []
+
+
+@pytest.fixture
+def damaged(data, tmp_path) -> Path:
+    """The walkers' folder with a file cut short, one that may not be read, and a folder with nothing readable."""
+    folder = tmp_path / "damaged"
+    (folder / "insole_gaitpdb").mkdir(parents=True)
+    (folder / "pressure_formats").mkdir()
+    for file in (data / "insole_gaitpdb").iterdir():
+        (folder / "insole_gaitpdb" / file.name).symlink_to(file)
+    whole = (data / "insole_gaitpdb" / "GaCo90_01.txt").read_text()
+    (folder / "insole_gaitpdb" / "GaPt99_01.txt").write_text(whole[:5000])
+    (folder / "pressure_formats" / "pliance.asc").write_text("pressure values in kPa\n")
+    return folder
+
+
+def test_a_file_that_cannot_be_read_is_left_out_and_said(ran, damaged, tmp_path, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(["study", "gait", "--data", str(damaged), "--size", "toy", "--report", str(tmp_path / "report")])
+    assert not ended.value.code
+    out = capsys.readouterr().out
+    assert "left out: insole_gaitpdb/GaPt99_01.txt: line" in out
+    assert "left out: pressure_formats/pliance.asc: no line of column names" in out
+    said = json.loads((tmp_path / "report" / "gait" / "summary.json").read_text())
+    assert list(said["unread"]) == ["insole_gaitpdb/GaPt99_01.txt", "pressure_formats/pliance.asc"]
+    assert "pliance.asc" in (tmp_path / "report" / "index.html").read_text()
+    found, whole = (rows(s, "gaitpdb", "contact")["notes"]["figures"] for s in (said, ran[1]))
+    assert found == whole, "the people that can be read are judged as if the others were not there"
+
+
+def test_strict_ends_at_a_file_that_cannot_be_read_before_anything_is_reckoned(damaged, tmp_path):
+    report = tmp_path / "report"
+    with pytest.raises(FormatError, match=r"^insole_gaitpdb/GaPt99_01\.txt: line .* \(1 more cannot be read\)$"):
+        study(damaged, report, strict=True)
+    with pytest.raises(FormatError, match="GaPt99"):
+        load("fig6.15").run(report, size="toy", data=damaged, strict=True, quiet=True)
+    assert not report.exists()
+
+
+def test_a_folder_in_which_nothing_can_be_read_is_refused(damaged, tmp_path):
+    with pytest.raises(FormatError, match=r"pressure_formats/pliance\.asc: no line of column names"):
+        study(damaged, tmp_path / "report", sources=["pedar"])
+    (damaged / "insole_gaitpdb").rename(damaged / "elsewhere")
+    (damaged / "insole_gaitpdb").mkdir()
+    (damaged / "insole_gaitpdb" / "GaPt99_01.txt").write_text("no numbers\n")
+    with pytest.raises(FormatError, match=r"GaPt99_01\.txt"):
+        load("fig6.15").run(tmp_path / "report", size="toy", data=damaged, quiet=True)
+
+
+def test_a_recording_shorter_than_the_running_range_is_left_out_and_said(tmp_path):
+    folder = tmp_path / "insole_gaitndd"
+    folder.mkdir()
+    for name in ("control1", "control2", "park1", "park2"):
+        write_gaitndd(folder, name, samples=3900)
+    write_gaitndd(folder, "park3", samples=2700)
+    section = study(tmp_path, tmp_path / "report")
+    why = "lasts 8.99667 s, and levels in shares of the running range want 10 s"
+    assert section["unread"] == {"insole_gaitndd/park3.hea": why}
+    assert [one["source"] for one in section["said"]["sources"]] == ["gaitndd"]
+    alone = tmp_path / "alone"
+    (alone / "insole_gaitndd").mkdir(parents=True)
+    write_gaitndd(alone / "insole_gaitndd", "park3", samples=2700)
+    with pytest.raises(FormatError, match=f"^insole_gaitndd/park3.hea: {why}$"):
+        study(alone, tmp_path / "other")

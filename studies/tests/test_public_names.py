@@ -1,0 +1,74 @@
+"""Studies stand on public names of taxel alone."""
+
+from __future__ import annotations
+
+import ast
+import pkgutil
+import tomllib
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import taxel
+import taxel_studies
+
+FOLDER = Path(taxel_studies.__file__).parent
+ROOT = FOLDER.parents[1]
+FILES = sorted(FOLDER.rglob("*.py"))
+
+
+def is_module(name: str) -> bool:
+    first, _, inner = name.rpartition(".")
+    package = import_module(first) if inner and first.split(".")[0] == "taxel" else None
+    return package is not None and name.rpartition(".")[2] in {
+        module.name for module in pkgutil.iter_modules(getattr(package, "__path__", []))
+    }
+
+
+def wrong(source: str, taken: str) -> str | None:
+    """Say what is wrong with taking a name from a module of taxel; None where it is public."""
+    if any(part.startswith("_") and not part.startswith("__") for part in (*source.split("."), taken)):
+        return f"{source}.{taken} is private"
+    module: ModuleType = import_module(source)
+    public = set(getattr(module, "__all__", [])) | {"__version__"}
+    return None if taken in public or is_module(f"{source}.{taken}") else f"{source} does not name {taken} in __all__"
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(FOLDER)))
+def test_a_study_takes_public_names_of_taxel_alone(file: Path) -> None:
+    found = []
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "taxel":
+            found += [wrong(node.module, alias.name) for alias in node.names]
+        elif isinstance(node, ast.Import):
+            found += [
+                f"{alias.name} is private"
+                for alias in node.names
+                if alias.name.startswith("taxel.") and "._" in alias.name
+            ]
+        elif isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
+            own = isinstance(node.value, ast.Name) and node.value.id in ("self", "cls", "other")
+            # A named tuple's own methods have such names.
+            named = node.attr in ("_replace", "_asdict", "_fields", "_make")
+            found += [] if own or named else [f"line {node.lineno}: {ast.unparse(node)}"]
+    assert [said for said in found if said] == []
+
+
+def test_what_is_private_or_unnamed_is_found() -> None:
+    assert wrong("taxel", "Neuron") is None
+    assert wrong("taxel", "learn") is None
+    assert wrong("taxel.learn", "ConeX") is None
+    assert wrong("taxel._base.files", "write_whole") == "taxel._base.files.write_whole is private"
+    assert wrong("taxel.neuron", "_core") == "taxel.neuron._core is private"
+    assert wrong("taxel.neuron", "np") == "taxel.neuron does not name np in __all__"
+
+
+def test_both_distributions_have_one_version_and_want_each_other() -> None:
+    ours = tomllib.loads((ROOT / "studies" / "pyproject.toml").read_text())["project"]
+    theirs = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert ours["version"] == theirs["version"] == taxel.__version__
+    assert f"taxel=={theirs['version']}" in ours["dependencies"]
+    assert theirs["optional-dependencies"]["studies"] == [f"taxel_studies=={theirs['version']}"]
+    assert theirs["optional-dependencies"]["cluster"] == [f"taxel_studies[cluster]=={theirs['version']}"]

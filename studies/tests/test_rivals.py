@@ -1,0 +1,117 @@
+"""The comparison of rules that learn times, and the Tempotron's capacity: protocols, search, summary."""
+
+import json
+
+import numpy as np
+import pytest
+
+from taxel import ProblemError
+from taxel.learn import INST
+from taxel_studies import load
+from taxel_studies.rivals import comparison, protocols
+from taxel_studies.rivals.protocols import gardner_gruning, realise, share_right, thesis
+from taxel_studies.rivals.rules import CHOSEN_ON, RULES, learner
+
+
+@pytest.mark.parametrize("draw", [gardner_gruning, thesis])
+def test_a_larger_load_begins_with_the_patterns_of_a_smaller_one(draw):
+    few, many = draw(3, 20, 10), draw(3, 20, 25)
+    assert many[0][:10] == few[0]
+    assert many[1][:10] == few[1]
+    assert draw(4, 20, 10)[0] != few[0]
+
+
+def test_patterns_and_targets_are_those_of_the_protocols():
+    for seed in range(20):
+        patterns, targets = gardner_gruning(seed, 30, 10)
+        at = np.sort([t[0] for t in targets[:5]])
+        assert at.min() >= 40
+        assert at.max() <= 200
+        assert np.diff(at).min() >= 7
+        assert all(len(train) == 1 and 0 <= train[0] <= 200 for train in patterns[0])
+    patterns, targets = thesis(1, 500, 10)
+    assert [t[0] for t in targets[:5]] == pytest.approx([200 * c / 6 for c in range(1, 6)])
+    times = np.concatenate(list(patterns[0]))
+    assert np.array_equal(times, times.round())
+    assert (times.min(), times.max()) == (1, 200)
+
+
+def test_the_published_rate_is_what_inst_takes_by_itself():
+    given = learner("INST", "a", 200, 15, 0, epochs=1)
+    assert given.eta == pytest.approx(600 / (200 * 15))
+    assert given.initial == (0.0, 200 / 200)
+    assert INST(epochs=1).after_spike == given.after_spike == "subtract"
+
+
+@pytest.mark.parametrize("name", [n for n in RULES if n != "ConeX"])
+def test_each_rule_learns_something_in_each_protocol(name):
+    for protocol in ("a", "b"):
+        params = {"rule": name, "protocol": protocol, "inputs": 100, "epochs": 200}
+        assert share_right(params, 5, 1000) >= 0.6, protocol
+
+
+def test_constants_were_not_chosen_on_the_seeds_of_the_study():
+    assert min(CHOSEN_ON) > 100
+
+
+@pytest.mark.parametrize(("most", "begin"), [(40, 20), (40, 60), (0, 30), (40, 40)])
+@pytest.mark.parametrize("protocol", ["a", "b"])
+def test_the_search_ends_at_the_largest_load_that_holds(monkeypatch, most, begin, protocol):
+    looked = []
+
+    def share(_params, count, seed):
+        looked.append((count, seed))
+        return 1.0 if count <= most else 0.85
+
+    monkeypatch.setattr(protocols, "share_right", share)
+    inputs = round(begin / RULES["FILT"].begin)
+    found = realise({"rule": "FILT", "protocol": protocol, "inputs": inputs, "runs": 3, "epochs": 1}, 0)
+    assert found["p"] == most
+    assert found["load"] == round(most / inputs, 4)
+    failed = [entry for entry in found["tried"] if entry[0] > most]
+    assert all(runs == (1 if protocol == "b" else 3) for _, runs, _, _ in failed)
+    assert {count for count, _ in looked} == {entry[0] for entry in found["tried"]}
+
+
+def test_the_crossing_of_90_percent_lies_between_the_loads_around_it():
+    tried = [[25, 20, 0.96, 17], [30, 20, 0.88, 9]]
+    assert comparison._at_90(tried, 200) == pytest.approx((25 + 5 * 0.06 / 0.08) / 200, abs=1e-4)
+    assert comparison._at_90([[5, 20, 0.5, 1]], 200) is None
+
+
+def test_a_toy_run_leaves_a_summary_and_is_not_reckoned_again(tmp_path):
+    study = load("rivals")
+    section = study.run(tmp_path, size="toy", quiet=True)
+    assert json.loads((tmp_path / "rivals" / "summary.json").read_text())["said"] == section["said"]
+    lines = section["said"]["lines"]
+    assert {(line["protocol"], line["rule"]) for line in lines} == {(p, r) for p in "ab" for r in ("FILT", "ReSuMe")}
+    assert lines[0]["updates"] == "batch"
+    again = study.run(tmp_path, size="toy", quiet=True)
+    assert again["cpu_seconds"] == section["cpu_seconds"]
+    with pytest.raises(ProblemError, match="rivals has no parameter"):
+        study.set("toy", patterns=3)
+
+
+def test_the_tempotrons_toy_run_solves_small_loads(tmp_path):
+    section = load("tempotron").run(tmp_path, size="toy", changes={"loads": [0.5]}, quiet=True)
+    (line,) = section["said"]["lines"]
+    assert line["solved"] == line["runs"] == 3
+    assert all(share == 1.0 for share in line["right"])
+
+
+def test_no_curve_leaves_its_panel():
+    lines = [
+        {"protocol": protocol, "rule": rule, "updates": "batch", "published": 0.1, "inputs": [200, 400], "load": load}
+        for protocol, rule, load in [
+            ("a", "FILT", [0.1, 0.12]),
+            ("a", "ConeX", [0.2, 0.21]),
+            ("b", "FILT", [0.05, 0.06]),
+            ("b", "ConeX", [0.25, 0.3]),
+        ]
+    ]
+    figure = load("rivals").draw({"protocols": ["a", "b"], "rules": ["FILT", "ConeX"]}, {"lines": lines})
+    for ax in figure.axes:
+        low, high = ax.get_ylim()
+        for line in ax.lines:
+            assert low <= min(line.get_ydata())
+            assert max(line.get_ydata()) <= high

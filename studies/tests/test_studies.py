@@ -1,0 +1,201 @@
+"""Every study at toy size: its statements, its picture, its part of the page; and the command line."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from taxel import FormatError, ProblemError
+from taxel.cli import main
+from taxel_studies import STUDIES, load
+from taxel_studies.page import write_page
+
+#: Studies on recordings have tests of their own.
+MADE_HERE = [name for name in STUDIES if not load(name).data]
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("report")
+
+
+@pytest.fixture
+def small(tmp_path) -> list[str]:
+    """Name the command that runs the smallest study."""
+    return ["study", "fig6.11", "--size", "toy", "--realisations", "1", "--report", str(tmp_path)]
+
+
+@pytest.fixture(scope="module")
+def courses(tmp_path_factory) -> Path:
+    return tmp_path_factory.mktemp("courses")
+
+
+def ends(arguments: list[str]) -> int:
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    return int(end.value.code or 0)
+
+
+@pytest.mark.parametrize("name", MADE_HERE)
+def test_a_study_of_toy_size_gives_its_statements_and_a_picture(report, name):
+    study = load(name)
+    assert study.name == name
+    section = study.run(report, size="toy", quiet=True)
+    assert section["title"] == STUDIES[name]
+    for statement in section["statements"]:
+        assert statement["says"].endswith(".")
+        assert statement["published"]
+        assert statement["ours"]
+        assert statement["holds"] in (True, False, None)
+        assert statement["holds"] is not False or statement["why"]
+    assert (report / name / "summary.json").exists()
+    for picture in json.loads((report / name / "summary.json").read_text())["pictures"]:
+        data = (report / name / picture).read_bytes()
+        assert data.startswith(b"<?xml")
+        assert 3_000 < len(data) < 1_000_000
+
+
+@pytest.mark.parametrize("name", ["fig6.1", "fig6.2", "fig6.3", "fig6.4", "fig6.5", "fig6.6", "fig6.8", "fig6.9"])
+def test_what_the_thesis_says_holds_at_toy_size(report, name):
+    """All but one caption; of 6.9 in the reading of B that gives kappa its power."""
+    for statement in load(name).run(report, size="toy", quiet=True)["statements"]:
+        if statement["says"].startswith("Caption"):
+            assert not statement["holds"], statement
+        elif name != "fig6.9" or not statement["why"].startswith("B over B_max"):
+            assert statement["holds"], statement
+
+
+@pytest.mark.parametrize("name", MADE_HERE)
+def test_a_second_run_reckons_nothing_again_and_says_the_same(report, name):
+    study = load(name)
+    first = study.run(report, size="toy", quiet=True)
+    lines = (report / name / "results.jsonl").read_bytes()
+    second = study.run(report, size="toy", quiet=True)
+    assert (report / name / "results.jsonl").read_bytes() == lines
+    assert second["said"] == first["said"]
+    assert second["statements"] == first["statements"]
+
+
+@pytest.mark.parametrize("name", MADE_HERE)
+def test_a_realisation_is_a_pure_function_of_parameters_and_seed(name, courses):
+    study = load(name)
+    given = {"courses": courses} if study.courses else {}
+    tasks = study.tasks(study.set("toy"), **given)
+    task = tasks[-1]
+    first = json.dumps(study.realise(task.params, task.seed, **given))
+    study.realise(tasks[0].params, tasks[0].seed, **given)
+    np.random.default_rng().random()
+    assert json.dumps(study.realise(json.loads(json.dumps(task.params)), task.seed, **given)) == first
+
+
+class Page(HTMLParser):
+    """Collects what a page refers to and says."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.references: list[str] = []
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        del tag
+        self.references += [v for k, v in attributes if k in ("src", "href") and v]
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def test_the_page_holds_every_picture_and_names_what_was_not_run(report, tmp_path):
+    load(MADE_HERE[0]).run(report, size="toy", quiet=True)
+    page = Page()
+    page.feed(write_page(report).read_text())
+    assert all(r.startswith("#") for r in page.references)
+    assert '"axes":[' in page.text, "the study's figure, as a chart"
+    assert "it shows that the study runs, not what it finds" in page.text
+    empty = Page()
+    empty.feed(write_page(tmp_path).read_text())
+    assert [re.search(rf"taxel study {re.escape(name)}\b", empty.text) for name in STUDIES].count(None) == 0
+    assert '"axes":[' not in empty.text
+
+
+def test_the_page_adds_up_what_its_studies_took(report, tmp_path):
+    for name, seconds in zip(MADE_HERE, (3600.0, 3000.0), strict=False):
+        load(name).run(report, size="toy", quiet=True)
+        folder = shutil.copytree(report / name, tmp_path / name)
+        section = json.loads((folder / "summary.json").read_text())
+        (folder / "summary.json").write_text(json.dumps(section | {"cpu_seconds": seconds}))
+    page = Page()
+    page.feed(write_page(tmp_path).read_text())
+    assert "1.8 h of CPU" in page.text
+
+
+def test_a_page_shows_the_kept_picture_of_numbers_that_the_code_cannot_draw_any_more(report, tmp_path):
+    name = MADE_HERE[0]
+    load(name).run(report, size="toy", quiet=True)
+    folder = shutil.copytree(report / name, tmp_path / name)
+    section = json.loads((folder / "summary.json").read_text())
+    (folder / "summary.json").write_text(json.dumps(section | {"said": {}}))
+    page = Page()
+    page.feed(write_page(tmp_path).read_text())
+    picture = next(r for r in page.references if r.startswith("data:"))
+    assert base64.b64decode(picture.partition(",")[2]).startswith(b"<?xml")
+
+
+def test_the_command_prints_the_statements_and_where_the_page_is(small, tmp_path, capsys):
+    assert ends(small) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "index.html" in said
+    assert (tmp_path / "index.html").exists()
+
+
+def test_the_command_prints_json(small, capsys):
+    assert ends([*small, "--json"]) == 0
+    section = json.loads(capsys.readouterr().out)
+    assert section["name"] == "fig6.11"
+    assert section["parameters"]["realisations"] == 1
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--size", "huge"], "size is 'huge'"),
+        (["--set", "kapa=1"], "fig6.11 has no parameter 'kapa': there are"),
+        (["--set", "kappa=wide"], "kappa is 'wide': must be a number, as 1.04"),
+        (["--set", "kappa"], "--set kappa: must be KEY=VALUE"),
+        (["--realisations", "0"], "realisations is 0"),
+        (["--jobs", "0"], "jobs is 0"),
+        (["--backend", "slurm"], "backend is 'slurm'"),
+        (["--scheduler", "tcp://127.0.0.1:1"], "scheduler is for the backends"),
+    ],
+)
+def test_nonsense_ends_in_one_line(small, capsys, more, said):
+    assert ends([*small, *more]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+
+
+def test_a_name_that_is_no_study_is_refused(capsys):
+    assert ends(["study", "fig9.9"]) == 2
+    assert "fig9.9" in capsys.readouterr().err
+
+
+def test_a_folder_with_a_strange_summary_is_refused(tmp_path):
+    (tmp_path / MADE_HERE[0]).mkdir()
+    (tmp_path / MADE_HERE[0] / "summary.json").write_text("[]")
+    with pytest.raises(FormatError, match="is no summary of a study"):
+        write_page(tmp_path)
+
+
+def test_a_parameter_of_another_kind_is_refused():
+    study = load("fig6.11")
+    for changes in ({"kappa": True}, {"trainings": "clean"}, {"trainings": [3]}, {"realisations": 2.5}):
+        with pytest.raises(ProblemError):
+            study.set("toy", **changes)
+    assert study.set("toy", kappa=1)["kappa"] == 1

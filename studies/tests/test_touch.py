@@ -1,0 +1,104 @@
+"""The study of touch: its parts against what is known, and the recipe that it shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel.detect import Recipe, recipes
+from taxel_studies import touch
+
+
+def test_the_discriminant_finds_the_direction_of_two_clouds() -> None:
+    """With equal covariances the best direction is known; more dimensions than samples do little harm."""
+    rng = np.random.default_rng(1)
+    classes = np.arange(200) % 2
+    move = np.zeros(400)
+    move[:4] = 3.0
+
+    def cloud(of: np.ndarray) -> np.ndarray:
+        return (rng.normal(size=(len(of), 400)) + np.outer(of, move)).astype(np.float32)
+
+    tell, new = touch._lda(cloud(classes), classes), cloud(classes)
+    best = ((new - move / 2) @ move > 0) == classes
+    assert np.mean(tell(new) == classes) > np.mean(best) - 0.1
+    for kind in (0, 1):
+        assert np.mean(tell(cloud(np.full(2000, kind))) == kind) > 0.85
+
+
+def test_the_discriminant_knows_at_other_places_what_it_learnt_at_some() -> None:
+    """Two sizes of touch, learnt on the upper half of the array, are told apart on the lower half and at its edge."""
+    rng = np.random.default_rng(3)
+    kinds = np.arange(60) % 2
+    rows, columns = np.indices((64, 64))
+
+    def felt(rows_from: float, rows_to: float) -> list[taxel.Frames]:
+        pictures = []
+        for kind in kinds:
+            row, column = rng.uniform(rows_from, rows_to), rng.uniform(0, 63)
+            away = (rows - row) ** 2 + (columns - column) ** 2
+            value = 20.0 * np.maximum(1 - away / (9.0 + 20.0 * kind), 0) + rng.normal(0, 0.3, away.shape)
+            pictures.append(taxel.Frames(value[None], [0], unit="ticks"))
+        return pictures
+
+    tell = touch._lda(touch._around(felt(0, 30)), kinds)
+    assert np.mean(tell(touch._around(felt(34, 63))) == kinds) > 0.9
+
+
+def test_the_picture_around_a_touch_has_its_centre_in_the_middle_and_nothing_beyond_the_edge() -> None:
+    values = np.zeros((3, 20, 40))
+    values[0, 3:6, 30:33] = 9.0
+    values[1, 0, 0] = 9.0
+    values[2, 10, 20] = 3.0  # not loaded: the middle of the array is taken
+    inside, corner, nothing = touch._around([taxel.Frames(values, [0, 1, 2], unit="ticks")]).reshape(3, 16, 16)
+    assert np.argwhere(inside).mean(axis=0).tolist() == [8.0, 8.0]
+    assert np.count_nonzero(inside) == 9
+    assert np.argwhere(corner).tolist() == [[8, 8]]
+    assert np.argwhere(nothing).tolist() == [[8, 8]]
+
+
+def test_the_best_rule_is_the_feature_that_differs() -> None:
+    def felt(peak: float) -> taxel.Frames:
+        values = np.full((1, 4, 4), 10.0)
+        values[0, 0, 0] = peak
+        return taxel.Frames(values, [0], unit="ticks")
+
+    rng = np.random.default_rng(2)
+    kinds = np.arange(40) % 2
+    sets = [[felt(20 + 30 * kind + rng.normal(0, 2)) for kind in kinds] for _ in range(2)]
+    name, said = touch._best_rule(sets, kinds)
+    assert "peak" in name or "total" in name
+    assert (said == kinds).all()
+
+
+def test_scenes_come_back_from_their_files_with_their_labels(tmp_path) -> None:
+    params = {"question": "contact", "radii_mm": [25.0, 35.0], "drop_mm": [100.0, 200.0]}
+    trials = touch.drawn(params, 5, 2, tmp_path)
+    assert [trial.kind for trial in trials] == [0, 1]
+    for trial in trials:
+        assert trial.labels["contact"].tolist() == [round(c.start_us) for c in trial.contacts]
+        assert trial.labels["lift"].tolist() == [round(c.stop_us) for c in trial.contacts]
+        assert (trial.events.t <= trial.contacts[-1].stop_us + touch.AFTER_US).all()
+    told = touch._tally([touch._by_area(trial, 2) for trial in trials], trials, 10.0)
+    assert told["contact"]["missed"] == told["lift"]["missed"] == 0
+    assert abs(np.median(told["contact"]["error_ms"])) < 2.0
+    (tmp_path / "again").mkdir()
+    assert touch.drawn(params, 5, 1, tmp_path / "again")[0].events == trials[0].events
+
+
+def test_the_recipe_is_chosen_for_events_and_has_a_neuron_for_every_label() -> None:
+    events = taxel.Events([0], [0], [0], [1], array=taxel.Array(2, 2), intensity=[5])
+    assert recipes.fitting(events) == "touch"
+    recipe = Recipe.load("touch", labels=["contact", "Lift", "ball"])
+    assert isinstance(recipe.encoder, taxel.encode.Moments)
+    assert recipe.encoder.displacement_mm is None
+    assert [recipe.learner_of(label)[1] for label in ("contact", "Lift", "ball")] == [2.0, 4.0, 6.0]
+
+
+@pytest.mark.slow
+def test_the_spheres_are_told_apart_from_labels_alone() -> None:
+    params = {**touch.PARAMETERS, "question": "kind", "train": 100, "test": 40}
+    found = touch.realise(params, 300)
+    assert found["neuron"][params["times_ms"].index(10.0)] >= 0.9
+    assert 3.0 < np.median(found["said_ms"]) < 8.0

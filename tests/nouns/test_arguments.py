@@ -1,0 +1,160 @@
+"""What no argument may be: each is refused by name, in one line, at once."""
+
+import itertools
+import time
+
+import numpy as np
+import pytest
+
+import taxel
+from taxel import Detections, Frames, SpikeTrains
+from taxel._base import arguments
+from taxel.calibration import Calibration
+from taxel.detect import Recipe
+from taxel.encode import LevelCrossing
+from taxel.simulate import Faults, Flaws, Layer
+
+
+def twisted() -> list[object]:
+    """A list that holds itself twice: each level down is twice as long."""
+    own: list[object] = [1.0]
+    own += [own, own]
+    return own
+
+
+def deep() -> list[object]:
+    own: list[object] = []
+    for _ in range(100_000):
+        own = [own]
+    return own
+
+
+#: A billion values in the memory of one.
+REPEATED = np.broadcast_to(np.float64(1.0), 10**9)
+
+WRONG = {
+    "a list that holds itself": twisted(),
+    "a deep list": deep(),
+    "a masked constant": np.ma.masked,
+    "a masked entry": np.ma.masked_array([1.0, 2.0], [False, True]),
+    "a masked entry in a list": [1.0, np.ma.masked],
+    "an array that is repeated": REPEATED,
+    "objects that are repeated": np.broadcast_to(np.array([None]), 10**9),
+    "a span of time": np.timedelta64(5),
+    "a span of time in ms": np.timedelta64(5, "ms"),
+    "a lone surrogate": "\ud800",
+    "no end": itertools.count(),
+}
+
+CLASSES = {
+    "a level": LevelCrossing,
+    "a neuron": lambda value: taxel.Neuron(tau=value),
+    "a bound": lambda value: taxel.learn.ConeR(lb=value),
+    "a foam": lambda value: Layer({"poisson": value}),
+    "a scene": lambda value: taxel.simulate.Scene({"bodies": value}).motion(),
+    "times": SpikeTrains.from_lists,
+    "a column": lambda value: Detections(["a"], value, [1]),
+    "labels": lambda value: Detections(value, [1], [1]),
+    "chosen trains": SpikeTrains.from_lists([[1.0], [2.0]]).select,
+    "an array's pitch": lambda value: taxel.Array(2, 2, pitch_mm=value),
+    "an array's name": lambda value: taxel.Array(2, 2, name=value),
+}
+
+
+@pytest.mark.parametrize("value", WRONG)
+@pytest.mark.parametrize("name", CLASSES)
+def test_what_is_no_argument_is_refused_in_one_line(name, value):
+    begun = time.process_time()
+    with pytest.raises(taxel.Error) as error:
+        CLASSES[name](WRONG[value])
+    said = str(error.value)
+    assert "\n" not in said
+    assert len(said) < 300
+    said.encode()
+    # Seconds where it takes some milliseconds: an array that is repeated took 20.
+    assert time.process_time() - begun < 10
+
+
+@pytest.mark.parametrize("value", ["\ud800", "a\ud800.mcap", "a\0b", "", 5, b"here"])
+def test_what_is_no_path_is_refused(value):
+    with pytest.raises(taxel.ProblemError, match="must be a path"):
+        taxel.open(value)
+
+
+@pytest.mark.parametrize("rate", [5e-324, 1e-300, 1e-12, np.nan, np.inf, 0.0, -1.0])
+def test_a_rate_without_whole_us_is_refused(tmp_path, rate):
+    events = taxel.Events([0, 200], [0, 1], [0, 1], [True, False], array=taxel.Array(2, 2), intensity=[5, 6])
+    taxel.convert(events, tmp_path / "two.npz")
+    with pytest.raises(taxel.ProblemError, match=r"rate_hz is .*: must be"):
+        taxel.open(tmp_path / "two.npz").frames(rate)
+
+
+FRAMES = Frames(np.ones((1, 1, 3)), [0], array=taxel.Array(1, 3))
+TABLE = Calibration.table(taxel.Array(1, 3), [10.0], [1.0], unit="N", of="counts")
+
+NAN = {
+    "Calibration.apply": lambda nan: TABLE.apply(Frames(np.ones((1, 1, 3)), [0], array=TABLE.array), rest=nan),
+    "Calibration.apply, one taxel": lambda nan: TABLE.apply(
+        Frames(np.ones((1, 1, 3)), [0], array=TABLE.array), rest=[[0.0, nan, 0.0]]
+    ),
+    "Calibration.readings": lambda nan: TABLE.readings(
+        Frames(np.ones((1, 1, 3)), [0], unit="N", array=TABLE.array), rest=nan
+    ),
+    "Frames.area": lambda nan: FRAMES.area(above=nan),
+    "Recipe": lambda nan: Recipe(LevelCrossing([0.5]), {}, {}, run_threshold=nan),
+    "Detections": lambda nan: Detections(["a", "b"], [1, 2], [2, 3], [0.5, nan]),
+    "SpikeTrains": lambda nan: SpikeTrains([1.0], [0, 1], 0.0, 5.0, [nan]),
+    "SpikeTrains.from_lists": lambda nan: SpikeTrains.from_lists([[1.0], [2.0]], values=[[1.0], [nan]]),
+    **{
+        f"Faults({name})": lambda nan, name=name: Faults(**{name: nan})
+        for name in ("lost", "repeated", "reordered", "cut", "corrupted", "seed")
+    },
+    **{
+        f"Flaws({name})": lambda nan, name=name: Flaws(**{name: nan})
+        for name in ("gain", "threshold", "hysteresis", "drift", "dead", "stuck", "loose", "noise")
+    },
+}
+
+
+@pytest.mark.parametrize("name", NAN)
+def test_nan_is_refused_by_name(name):
+    with pytest.raises(taxel.ProblemError, match=r"(?i)nan"):
+        NAN[name](float("nan"))
+
+
+def test_detections_without_a_slope_are_carried_on():
+    found = Detections(["a", "b"], [1, 2], [2, 3])
+    assert np.isnan(found[1:].slope).all()
+    assert np.isnan((found + found).slope).all()
+    assert np.isnan(Detections.from_numpy(found.to_numpy()).slope).all()
+
+
+def test_faults_are_shares_together_too():
+    with pytest.raises(taxel.ProblemError, match=r"lost is 1\.5: must be from 0 to 1"):
+        Faults(lost=1.5)
+    with pytest.raises(taxel.ProblemError, match=r"are 1\.2 together: must be at most 1"):
+        Faults(lost=0.6, cut=0.6)
+
+
+@pytest.mark.parametrize("wrong", ["soon", float("nan"), -1.0, float("inf")])
+def test_arguments_that_a_call_does_not_need_are_checked_too(tmp_path, wrong):
+    events = taxel.Events([0, 200], [0, 1], [0, 1], [True, False], array=taxel.Array(2, 2))
+    taxel.convert(events, tmp_path / "two.npz")
+    recording = taxel.open(tmp_path / "two.npz")
+    for name in ("before_us", "after_us"):
+        with pytest.raises(taxel.ProblemError, match=f"{name} is"):
+            taxel.cut(recording, **{name: wrong})
+    example = taxel.detect.Example(SpikeTrains.from_lists([[10.0]], stop=90.0), {"a": [10_000]})
+    recipe = Recipe(LevelCrossing([0.5]), {"tau": 5.0}, {"a": {"ub": 1.0}})
+    for name in ("window_ms", "frame_us"):
+        with pytest.raises(taxel.ProblemError, match=f"{name} is"):
+            taxel.detect.choose([example, example], recipe, k=2, **{name: wrong})
+
+
+def test_a_value_in_an_error_is_one_short_line():
+    assert arguments.shown([0.0] * 10**7) == arguments.shown([0.0] * 100)
+    assert arguments.shown([[0.0] * 10**7] * 3) == arguments.shown([[0.0] * 100] * 3)
+    assert arguments.shown("a" * 10**8) == "'" + "a" * 56 + "..."
+    assert len(arguments.shown(twisted())) <= 60
+    assert arguments.shown("\ud800").encode()
+    assert arguments.shown([1, "two", (3.0, None)]) == "[1, 'two', (3.0, None)]"
