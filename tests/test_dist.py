@@ -47,7 +47,17 @@ def test_the_source_package_holds_what_a_build_needs_and_no_more() -> None:
         inside = {name.split("/", 1)[1] for name in archive.getnames() if "/" in name}
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()
     needed = {
-        path for path in tracked if path.startswith(("crates/taxel-core/src", "crates/taxel-live/src", "python/taxel/"))
+        path
+        for path in tracked
+        if path.startswith(
+            (
+                "crates/taxel-core/src",
+                "crates/taxel-live/src",
+                "crates/taxel-panel/src",
+                "crates/taxel-panel/web",
+                "python/taxel/",
+            )
+        )
     }
     assert needed | {"Cargo.lock", "pyproject.toml", "README.md", "LICENSE"} <= inside
     assert not {name for name in inside if name.startswith((".venv", "target"))}

@@ -64,7 +64,8 @@ def test_no_module_comes_back_to_itself_by_way_of_a_package() -> None:
 
 #: Who reckons with thousands that are no us and ms, and why.
 THOUSANDS = {
-    "taxel.spikes": "the home of us and ms; NWB counts in seconds",
+    "taxel.spikes.units": "the home of us and ms",
+    "taxel.spikes.exchange": "NWB counts in seconds",
     "taxel.recording": "ns of the host's clock",
     "taxel.cli.emulate": "seconds; ns of the host's clock",
     "taxel.clock": "ns of the host, us of the board",

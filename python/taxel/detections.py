@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import column, fields, nth, shown, window
+from taxel._base.arguments import bare, column, fields, nth, shown, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept, own
 from taxel._base.drawing import draw
@@ -136,7 +136,7 @@ class Detections(Columns):
         repaired: ArrayLike | None,
     ) -> None:
         try:
-            labels = np.asarray(label)
+            labels = np.asarray(bare("label", label))
             labels = labels.astype(np.str_) if labels.size == 0 else labels
         except (TypeError, ValueError) as error:
             raise ProblemError(f"label: {error}") from None

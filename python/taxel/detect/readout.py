@@ -30,6 +30,9 @@ from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
 
+#: Detection goes on for so long after the last event, ms.
+SILENCE_MS = 1000.0
+
 __all__ = ["Learner", "Readout", "ReadoutStream", "run"]
 
 
@@ -496,6 +499,7 @@ def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     """Return what the neurons of a readout detect in the spikes that its encoder made."""
     trains = trains.split_by_sign() if trains.signed else trains
     trains = trains.delayed(readout.delays_ms)
+    trains = SpikeTrains(trains.times, trains.offsets, trains.start, trains.stop + SILENCE_MS)
     found = Detections([], [], [])
     for label, one in readout.neurons.items():
         spikes, slopes = one.neuron._run(one.weights, trains, readout.run_threshold)
