@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -203,6 +204,14 @@ def test_a_value_is_read_once_and_an_error_is_no_value() -> None:
     with pytest.raises(OSError):  # noqa: PT011  any
         value()
     assert (value(), value(), len(asked)) == (5, 5, 2)
+
+
+def test_a_recording_goes_to_another_process_with_all_it_holds(tmp_path: Path) -> None:
+    recording = taxel.open(write(tmp_path / "a.mcap")).between(0, 200_000)
+    again = pickle.loads(pickle.dumps(recording))
+    (tmp_path / "a.mcap").unlink()
+    same(again, model_of(recording), "pickled")
+    assert list(again.sources) == ["board"]
 
 
 # random chains, against a reckoning of its own

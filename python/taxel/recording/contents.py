@@ -181,6 +181,10 @@ class Contents:
         value = object.__getattribute__(self, name)
         return value() if isinstance(value, Once) else value
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return all fields, read: what goes to another process needs no file."""
+        return {name: getattr(self, name) for name in FIELDS}
+
     def holds(self, name: str) -> bool:
         """Tell whether a field holds anything; reads no more than that takes."""
         value = vars(self)[name]

@@ -109,7 +109,7 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
     verdicts = [verdict_of(part) for part in parts]
     alike = len(set(verdicts)) == 1
     said = verdicts[0] if alike else "; ".join(f"{p.name}: {v}" for p, v in zip(parts, verdicts, strict=True))
-    return after(
+    together = after(
         "merge",
         parts[0].but(lost=tuple(dict.fromkeys(line for part in parts for line in part.lost))),
         lambda: [*_others(parts), *lost],
@@ -127,6 +127,8 @@ def merged(parts: Sequence[Contents], gap: float | None = None, *, beside: bool 
         truncated=any(part.truncated for part in parts),
         **fields,
     )
+    # All was read for it; so the parts need not be kept.
+    return together.but(lost=together.lost)
 
 
 def _at(t: int | None, shift: int, change: Any) -> Any:
