@@ -36,7 +36,7 @@ pub enum Heard {
         /// Whether the board was reset before it.
         reset: bool,
     },
-    /// It had come before, or is too old to tell.
+    /// It was received before, or is too old to know.
     Repeated,
     /// No datagram of this board.
     Refused(Refused),
@@ -44,8 +44,8 @@ pub enum Heard {
 
 /// Turns one board's datagrams into events, in the order in which they come.
 ///
-/// It keeps what each taxel holds, so that differences are added up and a state that says something else becomes an event,
-/// marked as repaired. A difference from what was not heard gives an event without a value. Memory is bounded, whatever comes.
+/// It keeps what each taxel holds, so that differences are added up and a state with another value becomes an event,
+/// marked as repaired. A difference from an unknown value gives an event without a value. Memory is bounded, whatever comes.
 #[derive(Debug, Clone)]
 pub struct Decoder {
     array: Array,
@@ -54,20 +54,20 @@ pub struct Decoder {
     sessions: Vec<Session>,
     /// Missing numbers of sessions that are remembered no more.
     missed_before: u64,
-    /// When, by the host's clock, and what time, us, was heard last.
-    heard: Option<(i64, i64)>,
+    /// When the last datagram arrived, by the host's clock, and the latest time then, us.
+    last_arrival: Option<(i64, i64)>,
     latest: i64,
     /// Whether there was time before the first session.
     goes_on: bool,
     held: Held,
     status: Option<Status>,
-    /// The number of the datagram that told it, in the latest session.
-    told: i64,
+    /// The number of the datagram that had it, in the latest session.
+    status_number: i64,
     counts: Counts,
 }
 
 impl Decoder {
-    /// A decoder for the given array; it belongs to the first board that it hears.
+    /// A decoder for the given array; it belongs to the first board of which it receives a datagram.
     #[must_use]
     pub fn new(array: Array) -> Self {
         let held = Held::new(&array);
@@ -77,12 +77,12 @@ impl Decoder {
             board: None,
             sessions: vec![],
             missed_before: 0,
-            heard: None,
+            last_arrival: None,
             latest: 0,
             goes_on: false,
             held,
             status: None,
-            told: i64::MIN,
+            status_number: i64::MIN,
             counts: Counts::default(),
         }
     }
@@ -103,38 +103,38 @@ impl Decoder {
         &self.array
     }
 
-    /// What was heard and missed so far.
+    /// What was received and missed so far.
     #[must_use]
     pub fn counts(&self) -> Counts {
         let missing = self.missed_before + self.sessions.iter().map(Session::missing).sum::<u64>();
         Counts { missing, ..self.counts }
     }
 
-    /// What the board last said of itself.
+    /// The totals that the board last sent.
     #[must_use]
     pub fn status(&self) -> Option<&Status> {
         self.status.as_ref()
     }
 
-    /// Says that the board was heard before by other means: at `latest` us, by the host's clock at `heard`.
-    pub(crate) fn go_on_from(&mut self, latest: i64, heard: Option<i64>) {
+    /// Continues what was received by other means: time reached `latest` us, by the host's clock at `arrived`.
+    pub(crate) fn go_on_from(&mut self, latest: i64, arrived: Option<i64>) {
         self.latest = self.latest.max(latest);
-        self.heard = heard.map(|now| (now, latest));
+        self.last_arrival = arrived.map(|now| (now, latest));
         self.goes_on = true;
     }
 
-    /// The latest time that was heard or promised, us.
+    /// The latest time that was received or promised, us.
     pub(crate) fn latest(&self) -> i64 {
         self.latest
     }
 
-    /// Says what the taxels hold, by index, none where that is not known: differences add up from there, and a state that says the
+    /// Sets what the taxels hold, by index, none where that is not known: differences add up from there, and a state of the
     /// same is no event. It holds until the board's next reset.
     pub fn begin_with(&mut self, held: impl IntoIterator<Item = Option<u16>>) {
         self.held.begin_with(held);
     }
 
-    /// What each taxel holds as far as was heard, by index.
+    /// What each taxel holds, by index; none where that is not known.
     #[must_use]
     pub fn held(&self) -> Vec<Option<u16>> {
         self.held.by_index()
@@ -142,8 +142,8 @@ impl Decoder {
 
     /// Takes a datagram; appends its events.
     ///
-    /// `arrived` is the host's clock in us. After a reset it says how much time has passed, else time goes on from the latest
-    /// that was heard.
+    /// `arrived` is the host's clock in us. After a reset it shows how much time has passed, else time goes on from the latest
+    /// that was received.
     #[inline]
     pub fn push(&mut self, datagram: &[u8], arrived: Option<i64>, out: &mut Events) -> Heard {
         self.push_table(datagram, arrived, out)
@@ -167,7 +167,7 @@ impl Decoder {
         match self.sessions.last() {
             Some(session) if taken.datagrams > 0 => {
                 let Taken { base, span, .. } = taken;
-                self.heard = arrived.map(|now| (now, latest.max(base))).or(self.heard);
+                self.last_arrival = arrived.map(|now| (now, latest.max(base))).or(self.last_arrival);
                 let until = (span > 0).then(|| base + i64::from(span));
                 Heard::Intact { until, missing: session.missing(), reset: false }
             }
@@ -231,14 +231,14 @@ impl Decoder {
         if which + 1 == self.sessions.len() {
             self.body(header, body, base, Some(number), out);
         } else {
-            // A straggler of before a reset says nothing of what the taxels hold since.
+            // An event of before a reset changes nothing that the taxels hold since.
             let blank = self.held.blank();
             let since = std::mem::replace(&mut self.held, blank);
             self.body(header, body, base, None, out);
             self.held = since;
         }
         if let Some(now) = arrived {
-            self.heard = Some((now, self.latest));
+            self.last_arrival = Some((now, self.latest));
         }
         let until = (header.span > 0).then(|| base + i64::from(header.span));
         self.latest = self.latest.max(until.unwrap_or(i64::MIN));
@@ -294,20 +294,20 @@ impl Decoder {
         let offset = if began && !self.goes_on {
             0
         } else {
-            let passed = match (arrived, self.heard) {
+            let passed = match (arrived, self.last_arrival) {
                 (Some(now), Some((before, time))) => time + silence(before, now) - self.latest,
                 _ => 0,
             };
             self.latest + passed.max(0) - header.base as i64
         };
-        // After its reset the board compares with 0, and tells every taxel that differs from it. What it said first may not have
-        // been heard, and where it spoke version 1 before there may have been no reset.
+        // After its reset the board compares with 0, and sends every taxel that differs from it. Its first datagrams may be lost,
+        // and where it sent version 1 before there may have been no reset.
         let whole = header.sequence == 0 && !(began && self.goes_on);
         if whole || !began {
             self.held.forget(whole.then_some(0));
         }
         self.counts.resets += u64::from(!began);
-        self.told = i64::MIN;
+        self.status_number = i64::MIN;
         if self.sessions.len() == SESSIONS {
             self.missed_before += self.sessions.remove(0).missing();
         }

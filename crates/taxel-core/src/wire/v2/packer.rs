@@ -124,7 +124,7 @@ impl Packer {
         self.last_event = Some(t);
     }
 
-    /// Says that everything before `now` was added, and that this is said again at `next`; sends what is due: events, or a
+    /// Ends a frame: everything before `now` was added, and the next frame ends at `next`; sends what is due: events, or a
     /// heartbeat.
     pub fn over(&mut self, now: u64, next: u64, sink: &mut impl FnMut(&[u8], usize)) {
         if self.events > 0 {

@@ -44,8 +44,8 @@ impl Decoder {
             }
             Kind::Status if body.len() < STATUS_BYTES => self.counts.malformed += 1,
             Kind::Status => {
-                let Some(number) = number.filter(|number| *number > self.told) else { return };
-                self.told = number;
+                let Some(number) = number.filter(|number| *number > self.status_number) else { return };
+                self.status_number = number;
                 let mut totals =
                     body.chunks_exact(8).map(|b| u64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]));
                 let mut next = || totals.next().unwrap_or_default();
