@@ -102,7 +102,7 @@ lint: build $(VENV)/.for-test $(VENV)/.for-lint
 	cargo fmt --all --check
 	cargo fmt --manifest-path crates/taxel-bridge/Cargo.toml --check
 	rustfmt --edition 2024 --check crates/taxel-core/src/encode/*.rs crates/taxel-core/src/learn/rivals/*.rs crates/taxel-core/src/metrics/*.rs  # the registries' macros hide them from cargo
-	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	cargo clippy --workspace --all-targets --all-features --quiet -- -D warnings
 	RUSTDOCFLAGS="-D warnings" cargo doc --workspace --no-deps --quiet
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .

@@ -1,4 +1,9 @@
-"""A peer in a process of its own, stopped where it takes too long."""
+"""A peer in a process of its own, stopped where it takes too long; what needs minutes is kept.
+
+A peer has a minute of CPU. One that needs more is stopped, unless ``taxel bench --peers`` (`PATIENT`) waits for it:
+then its time is kept in ``results/peers.json`` with the date, the processor's model, and a digest of the benchmark's
+code with the peer's version. It counts on that model alone, until one of them changes.
+"""
 
 from __future__ import annotations
 
@@ -8,9 +13,21 @@ import os
 import resource
 import subprocess
 import sys
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+from _rounds import processor, version
+
+from taxel.report import write_whole
+from taxel.report.provenance import Sources
+
+#: Set where peers that need minutes are waited for.
+PATIENT = "TAXEL_BENCH_PEERS"
+#: CPU seconds of a peer that is not waited for; what took longer is kept.
+LONG_S = 60
+KEPT = Path(__file__).parent / "results" / "peers.json"
 
 
 def missing(peers: Mapping[str, str]) -> dict[str, str]:
@@ -27,7 +44,7 @@ def missing(peers: Mapping[str, str]) -> dict[str, str]:
     return {name: f"{' and '.join(modules)} not installed" for name, modules in lacks.items() if modules}
 
 
-def ask(script: str, *arguments: object, limit: int) -> dict[str, Any]:
+def ask(script: str, *arguments: object, packages: str, limit: int, quick: bool) -> dict[str, Any]:
     """Run `script` in one thread; return what it says as JSON in its last line, or how it ended.
 
     Parameters
@@ -36,10 +53,49 @@ def ask(script: str, *arguments: object, limit: int) -> dict[str, Any]:
         A benchmark that is a program of its own where it is given arguments.
     *arguments : object
         As text.
+    packages : str
+        The peer's, with spaces between them: their versions belong to what is kept.
     limit : int
-        Seconds of CPU after which it is stopped.
-    """
+        Seconds of CPU after which it is stopped, where it is waited for.
+    quick : bool
+        Whether this is no measurement: nothing is read from what was kept, nor written.
 
+    Returns
+    -------
+    dict
+        With ``kept``, of when and where it is, where it was not measured in this run.
+    """
+    name = " ".join([Path(script).stem, *map(str, arguments)])
+    key = {"cpu": processor(), "digest": _digest(script, packages)}
+    kept = {} if quick or not KEPT.exists() else json.loads(KEPT.read_text())
+    if name in kept and {part: kept[name][part] for part in key} == key:
+        return kept[name]["found"] | {"kept": f"{kept[name]['date']}, {key['cpu']}"}
+    patient = bool(os.environ.get(PATIENT)) and not quick
+    found = _run(script, arguments, limit if patient else LONG_S)
+    if patient and ("stopped" in found or found.get("cpu_s", 0.0) > LONG_S):
+        kept[name] = key | {"date": time.strftime("%Y-%m-%d", time.gmtime()), "found": found}
+        text = json.dumps(kept, indent=1, sort_keys=True) + "\n"
+        write_whole(KEPT, lambda file: file.write(text.encode()), overwrite=True)
+    return found
+
+
+def kept_of(cases: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:
+    """Return which peers' times were not measured in this run, by case and peer, and of when and where they are."""
+    return {
+        f"{case}, {name}": found["kept"]
+        for case, all_of in cases.items()
+        for name, found in all_of.items()
+        if isinstance(found, dict) and "kept" in found
+    }
+
+
+def _digest(script: str, packages: str) -> str:
+    """Return a digest of the benchmark's own code and of the versions of a peer's packages."""
+    own = Sources({Path(script).stem: Path(script)}, {}).digest(Path(script).stem)
+    return " ".join([own, *(version(package) for package in packages.split())])
+
+
+def _run(script: str, arguments: tuple[object, ...], limit: int) -> dict[str, Any]:
     def cap() -> None:
         resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
 
@@ -56,5 +112,5 @@ def ask(script: str, *arguments: object, limit: int) -> dict[str, Any]:
         found: dict[str, Any] = json.loads(said.stdout.splitlines()[-1])
         return found
     if said.returncode in (-9, -24):
-        return {"stopped": f"after {limit} s of CPU, without a verdict"}
+        return {"stopped": f"after {limit} s of CPU, without a verdict", "limit_s": limit}
     return {"failed": said.stderr.strip().splitlines()[-1:] or [f"exit status {said.returncode}"]}

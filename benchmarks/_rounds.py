@@ -74,16 +74,8 @@ def thread_seconds() -> dict[str, float]:
 
 def stamp(*packages: str) -> dict[str, Any]:
     """Return machine, versions and commit; `taxel bench` writes a result only where that is all that ran."""
-    cpu = next(
-        (line.split(":", 1)[1].strip() for line in _read("/proc/cpuinfo") if line.startswith("model name")),
-        platform.processor(),
-    )
     versions = {"python": platform.python_version()}
-    for package in ("taxel", "numpy", *packages):
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            versions[package] = "in the checkout" if package == "taxel" else "absent"
+    versions |= {package: version(package) for package in ("taxel", "numpy", *packages)}
     said = subprocess.run(
         ["git", "rev-parse", "--short", "HEAD"],
         capture_output=True,
@@ -92,10 +84,29 @@ def stamp(*packages: str) -> dict[str, Any]:
         cwd=Path(__file__).parent,
     )
     return {
-        "machine": {"cpu": cpu, "cores": os.cpu_count(), "load": os.getloadavg()[0], "system": platform.platform()},
+        "machine": {
+            "cpu": processor(),
+            "cores": os.cpu_count(),
+            "load": os.getloadavg()[0],
+            "system": platform.platform(),
+        },
         "versions": versions,
         "commit": said.stdout.strip() or "unknown",
     }
+
+
+def processor() -> str:
+    """Return the processor's model."""
+    named = (line.split(":", 1)[1].strip() for line in _read("/proc/cpuinfo") if line.startswith("model name"))
+    return next(named, platform.processor())
+
+
+def version(package: str) -> str:
+    """Return the version of an installed package."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "in the checkout" if package == "taxel" else "absent"
 
 
 def _read(path: str) -> list[str]:

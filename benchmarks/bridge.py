@@ -172,7 +172,9 @@ def killed() -> dict[str, float]:
 def run(*, quick: bool) -> dict[str, Any]:
     absent = missing({"taxel-bridge": "taxel_bridge"})
     if absent:
-        raise ProblemError("bridge: the wheel taxel-bridge is not built: make bridge")
+        if not quick:
+            raise ProblemError("bridge: the wheel taxel-bridge is not built: make bridge")
+        return stamp() | {"left out": {"all of it": "taxel-bridge not installed: make bridge"}, "ratios": {}}
     rounds, seconds = (1, 1.0) if quick else (3, 2.0)
     load = os.getloadavg()[0]
     rows: dict[str, dict[str, list[dict[str, Any]]]] = {name: {"block": [], "drop": []} for name in STREAMS}

@@ -37,6 +37,18 @@ def test_a_benchmark_loads_where_no_peer_is_installed(path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("path", BENCHMARKS, ids=lambda path: path.stem)
+def test_a_benchmark_runs_without_peers_and_names_those_that_it_leaves_out(path: Path) -> None:
+    done = without_peers("bench", path.stem, "--quick")
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
+    assert done.stdout.startswith(f"{path.stem}: ratios")
+    wanted = re.search(r"^PEERS\b[^{]*\{(.*?)\}", path.read_text(), re.MULTILINE | re.DOTALL)
+    named = re.findall(r'"([^"]+)":', wanted[1]) if wanted else []
+    assert [name for name in named if f"left out: {name}" not in done.stdout] == []
+
+
 def test_a_peer_that_is_not_installed_is_left_out_and_said() -> None:
     done = without_peers("bench", "recording_write", "--quick")
     assert (done.returncode, done.stderr) == (0, "")

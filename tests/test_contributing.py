@@ -18,7 +18,9 @@ FORMAT, STUDY, LEARNER = "channel", "quiet", "echo"
 #: Where the laws and registries of formats, studies and learners are tried.
 TESTS = {
     FORMAT: ["tests/formats/test_registry.py", "tests/formats/test_channel.py"],
-    STUDY: ["tests/studies/test_registry.py", "tests/studies/test_quiet.py", "tests/studies/test_studies.py"],
+    STUDY: [
+        f"studies/tests/{name}.py" for name in ("test_registry", "test_quiet", "test_studies", "test_public_names")
+    ],
     LEARNER: ["tests/learn/test_manners.py", "tests/learn/test_echo.py"],
 }
 
@@ -65,7 +67,8 @@ def copy(tmp_path: Path) -> Path:
     shutil.copytree(ROOT / "python", tmp_path / "python", ignore=unneeded)
     for compiled in (ROOT / "python" / "taxel").glob("_core*.so"):
         (tmp_path / "python" / "taxel" / compiled.name).symlink_to(compiled)
-    for room in ("formats", "learn", "studies"):
+    shutil.copytree(ROOT / "studies", tmp_path / "studies", ignore=unneeded)
+    for room in ("formats", "learn"):
         shutil.copytree(ROOT / "tests" / room, tmp_path / "tests" / room, ignore=unneeded)
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
     return tmp_path
@@ -79,7 +82,7 @@ def tried(root: Path, name: str) -> subprocess.CompletedProcess[str]:
     command = [sys.executable, "-m", "pytest", *quietly, *tests]
     about = {STUDY: f"{name} or registry or without_weight", LEARNER: "echo or Echo or nothing_is_left_out"}
     chosen = ["-k", about[name]] if name in about else []
-    environment = os.environ | {"PYTHONPATH": str(root / "python")}
+    environment = os.environ | {"PYTHONPATH": f"{root / 'python'}:{root / 'studies'}"}
     return subprocess.run([*command, *chosen], cwd=root, env=environment, capture_output=True, text=True, check=False)
 
 
@@ -91,9 +94,9 @@ def test_the_pieces_are_a_file_a_line_and_a_test_each() -> None:
         ("tests/formats/test_channel.py", False),
     ]
     assert [(p.path, bool(p.after)) for p in of(STUDY)] == [
-        ("python/taxel/studies/quiet.py", False),
-        ("python/taxel/studies/__init__.py", True),
-        ("tests/studies/test_quiet.py", False),
+        ("studies/taxel_studies/quiet.py", False),
+        ("studies/taxel_studies/__init__.py", True),
+        ("studies/tests/test_quiet.py", False),
     ]
     assert [(p.path, bool(p.after)) for p in of(LEARNER)] == [
         ("crates/taxel-core/src/learn/rivals/echo.rs", False),
@@ -121,9 +124,9 @@ def test_what_contributing_says_is_enough(copy: Path, name: str) -> None:
         (FORMAT, "making.py", "write_channel"),
         (FORMAT, "test_channel.py", "add tests/formats/test_channel.py"),
         (FORMAT, "formats/channel.py", "No module named 'taxel.formats.channel'"),
-        (STUDY, "studies/__init__.py", "STUDIES lacks quiet"),
-        (STUDY, "test_quiet.py", "no test of tests/studies imports or names quiet"),
-        (STUDY, "studies/quiet.py", "No module named 'taxel.studies.quiet'"),
+        (STUDY, "taxel_studies/__init__.py", "STUDIES lacks quiet"),
+        (STUDY, "test_quiet.py", "no test of studies/tests imports or names quiet"),
+        (STUDY, "taxel_studies/quiet.py", "No module named 'taxel_studies.quiet'"),
     ],
 )
 def test_a_part_that_is_left_out_is_named(copy: Path, name: str, without: str, said: str) -> None:

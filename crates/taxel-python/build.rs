@@ -9,9 +9,7 @@ mod sources;
 
 fn main() {
     let crates = Path::new(&env::var("CARGO_MANIFEST_DIR").unwrap()).parent().unwrap().to_path_buf();
-    for name in sources::CRATES {
-        println!("cargo::rerun-if-changed={}", crates.join(name).join("src").display());
-    }
+    println!("cargo::rerun-if-changed={}", crates.display());
     let mut text = String::from("/// The digest of what each name of the extension is made of.\n");
     text += "const DIGESTS: &[(&str, &str)] = &[\n";
     for (name, digest) in sources::Sources::read(&crates).unwrap().digests() {

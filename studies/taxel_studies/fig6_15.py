@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from taxel_studies.gait import folds, protocols, sources
+from taxel_studies.gait import protocols, sources
 from taxel_studies.gait.outcomes import EVENTS
 from taxel_studies.gait.realise import realise
 from taxel_studies.gait.recipes import NOTES, PRINTED
@@ -45,11 +45,12 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
     for source, folder in sources.readable(data, p["sources"]).items():
         protocol = protocols.of(source, STANDS_FOR[source][0])
         scopes = protocols.scopes(folder, source, protocol.name)
+        names = protocols.names(folder, source)
         common = {
             "source": source,
             "protocol": protocol.name,
             "data": fingerprint(folder, source),
-            "folds": hashlib.sha256(json.dumps(folds.to_json(scopes)).encode()).hexdigest()[:16],
+            "folds": hashlib.sha256(json.dumps(protocols.to_json(scopes, names)).encode()).hexdigest()[:16],
             "train": dict(protocol.train),
             "placed": "own",
         }
@@ -58,10 +59,10 @@ def tasks(p: Parameters, *, data: Path) -> list[Task]:
                 for scope in scopes[: p["scopes"] or None]:
                     for group in range(len(scope.groups))[: p["folds"] or None]:
                         fold = {"recipe": recipe, "event": event, "scope": scope.name, "left_out": [group]}
-                        both = common | fold | {"point": point}
+                        both = common | fold
                         skim = {"pulse_ms": p["pulse_ms"], "ridge": p["ridge"]}
-                        listed.append(Task(both | {"kind": "neuron"}, 1))
-                        listed.append(Task(both | {"kind": "skim", "skim": skim}, 1))
+                        listed.append(Task(both | {"kind": "neuron", "points": [point]}, 1))
+                        listed.append(Task(both | {"kind": "skim", "point": point, "skim": skim}, 1))
     return listed
 
 

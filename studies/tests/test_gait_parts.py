@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from taxel import Array, Frames, ProblemError, SpikeTrains
 from taxel.formats import Trial
-from taxel_studies.gait import folds, insole, rules
+from taxel_studies.gait import insole, protocols, rules
 from taxel_studies.gait.pieces import Piece, joined
 
 # the insole
@@ -115,8 +115,8 @@ def people(count: int) -> list[Piece]:
 @given(st.integers(2, 12), st.integers(2, 6), st.integers(0, 99))
 def test_folds_by_person_part_people_and_spread_patients(count, number, seed):
     pieces = people(count)
-    (scope,) = folds.by_person(pieces, number, seed)
-    of = [{part.piece.split("/")[0] for part in group} for group in scope.groups]
+    (scope,) = protocols.by_person(pieces, number, seed)
+    of = [{pieces[part.example].person for part in group} for group in scope.groups]
     assert sum(len(group) for group in of) == count
     assert set().union(*of) == {p.person for p in pieces}
     patients = [sum(name[0] == "p" for name in group) for group in of]
@@ -125,24 +125,27 @@ def test_folds_by_person_part_people_and_spread_patients(count, number, seed):
 
 def test_footfalls_are_tested_once_a_split():
     pieces = [piece(f"h/{k}", [[1.0]], [[]], []) for k in range(60)]
-    scopes = folds.by_count(pieces, 3, repeats=2, seed=1)
+    scopes = protocols.by_count(pieces, 3, repeats=2, seed=1)
     assert len(scopes) == 2
     for scope in scopes:
         assert [len(g) for g in scope.groups] == [20, 20, 20]
-        assert len({part.piece for g in scope.groups for part in g}) == 60
+        assert len({part.example for g in scope.groups for part in g}) == 60
 
 
 def test_folds_by_time_cover_the_recording_without_overlap():
-    (scope,) = folds.by_time([piece("h/1", [[1.0]], [[]], [], stop=4000.0)], 4)
+    (scope,) = protocols.by_time([piece("h/1", [[1.0]], [[]], [], stop=4000.0)], 4)
     parts = [part for group in scope.groups for part in group]
-    assert parts[0].start_ms == 0.0
-    assert parts[-1].stop_ms == 4000.0
-    assert all(a.stop_ms == b.start_ms for a, b in pairwise(parts))
+    assert parts[0].start == 0.0
+    assert parts[-1].stop == 4_000_000.0
+    assert all(a.stop == b.start for a, b in pairwise(parts))
 
 
-def test_folds_come_back_from_json():
-    scopes = [*folds.by_person(people(6), 3, 1), *folds.by_time(people(1), 2)]
-    assert folds.from_json(folds.to_json(scopes)) == scopes
+def test_folds_by_piece_test_recordings_or_else_feet():
+    pieces = [piece(name, [[1.0]], [[]], []) for name in ("a left", "a right", "b left", "b right")]
+    (two,), (one,) = protocols.by_piece(pieces), protocols.by_piece(pieces[:2])
+    assert [[part.example for part in group] for group in two.groups] == [[0, 1], [2, 3]]
+    assert [[part.example for part in group] for group in one.groups] == [[0], [1]]
+    assert protocols.to_json([one], ["a left", "a right"])[0]["groups"] == [["a left"], ["a right"]]
 
 
 # plain rules: two sensors, one level

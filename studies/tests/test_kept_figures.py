@@ -2,13 +2,16 @@
 
 import importlib.util
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from matplotlib.container import BarContainer
 
-from taxel_studies import load
+from taxel import FormatError, ProblemError
+from taxel_studies import kept, load
+from taxel_studies.page import write_page
 
 _spec = importlib.util.spec_from_file_location("figures", Path(__file__).parents[2] / "docs" / "figures.py")
 assert _spec is not None
@@ -63,3 +66,66 @@ def test_bars_begin_at_zero(file: Path) -> None:
         for bars in (holder for holder in axes.containers if isinstance(holder, BarContainer)):
             low, high = sorted(axes.get_ylim() if bars.orientation == "vertical" else axes.get_xlim())
             assert low <= 0 <= high, f"{axes.get_ylabel()} from {low:g} to {high:g}"
+
+
+@pytest.fixture
+def figure(tmp_path: Path) -> Path:
+    """A folder that keeps one small figure with its coarse result."""
+    section = load("fig6.1").run(tmp_path / "report", size="toy", quiet=True)
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "fig6.1.json").write_text(json.dumps(section))
+    kept.keep_coarse("fig6.1", tmp_path / "kept")
+    return tmp_path / "kept"
+
+
+def spoil(file: Path, change: Callable[[dict[str, Any]], Any]) -> None:
+    value = json.loads(file.read_text())
+    change(value)
+    file.write_text(json.dumps(value))
+
+
+def test_a_figure_of_this_code_is_not_stale(figure: Path) -> None:
+    assert kept.stale_figures(figure) == {}
+    with pytest.raises(FormatError, match="holds no kept figure"):
+        kept.stale_figures(figure / "coarse")
+
+
+def test_a_figure_of_other_code_is_stale_until_its_coarse_result_is_confirmed(figure: Path) -> None:
+    spoil(figure / "fig6.1.json", lambda section: section["made_of"].update({"taxel.neuron": "other"}))
+    assert kept.stale_figures(figure) == {"fig6.1": ["taxel.neuron"]}
+    assert kept.confirm("fig6.1", figure) == "confirmed"
+    assert kept.stale_figures(figure) == {}
+
+
+def test_a_figure_whose_coarse_result_is_another_one_stays_stale(figure: Path) -> None:
+    spoil(figure / "fig6.1.json", lambda section: section["made_of"].update({"taxel.neuron": "other"}))
+    spoil(figure / "coarse" / "fig6.1.json", lambda result: result["said"].update({"spikes": [1.0]}))
+    with pytest.raises(ProblemError, match="its coarse result is another one"):
+        kept.confirm("fig6.1", figure)
+    assert kept.stale_figures(figure) == {"fig6.1": ["taxel.neuron"]}
+
+
+def test_a_figure_whose_sources_were_not_recorded_is_stale(figure: Path) -> None:
+    spoil(figure / "fig6.1.json", lambda section: section.pop("made_of"))
+    assert kept.stale_figures(figure) == {"fig6.1": ["its sources were not recorded"]}
+
+
+def test_a_stale_figure_is_marked_on_the_page(tmp_path: Path) -> None:
+    load("fig6.1").run(tmp_path, size="toy", quiet=True)
+    assert "Stale" not in write_page(tmp_path).read_text()
+    spoil(tmp_path / "fig6.1" / "summary.json", lambda section: section["made_of"].update({"taxel.neuron": "other"}))
+    assert "Stale: made by other code than today's; changed since: taxel.neuron." in write_page(tmp_path).read_text()
+
+
+@pytest.mark.parametrize(
+    ("changed", "stale", "counts"),
+    [
+        ("taxel._core.neuron_run", {"fig6.1", "fig6.9", "fig6.11"}, {"fig4.3", "drops"}),
+        ("taxel._core.circuit_volts", {"fig4.6"}, {"fig6.1", "fig5.11", "stdp"}),
+        ("taxel.learn.cone_x", {"fig6.9", "fig6.7"}, {"fig4.3", "drops", "codes"}),
+        ("taxel/detect/recipes/touch.toml", {"touch"}, {"fig6.1", "fig6.9"}),
+    ],
+)
+def test_a_change_makes_those_stale_that_use_it(changed: str, stale: set[str], counts: set[str]) -> None:
+    uses = {name for name in stale | counts if changed in load(name).made_of}
+    assert uses == stale

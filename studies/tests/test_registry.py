@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import taxel_studies as studies
+from taxel.cli import main
 
 HERE = Path(__file__).parent
 
@@ -63,3 +64,36 @@ def test_every_kept_figure_lies_beside_its_numbers() -> None:
     assert pictures.keys() <= studies.STUDIES.keys()
     wanted = sorted(name for names in pictures.values() for name in names)
     assert sorted(file.name for file in folder.glob("*.svg")) == wanted, "run docs/figures.py"
+
+
+def test_every_figure_and_table_of_the_thesis_has_its_study_or_its_drawing() -> None:
+    """Those of its results, chapters 3 to 7; a study says in `where` which it holds."""
+    last = {3: 6, 4: 10, 5: 14, 6: 15}
+    figures = {f"fig{chapter}.{n}" for chapter, most in last.items() for n in range(1, most + 1)}
+    # Figures 3.1, 3.2 and 3.4 are of other people's work.
+    figures -= {"fig3.1", "fig3.2", "fig3.4"}
+    tables = {f"table{n}" for n in ("3.1", "4.1", "5.1", "5.2", "5.3", "6.1", "6.2", "7.1")}
+    held = {name for name in studies.STUDIES if name.startswith("fig")} | studies.FIGURES.keys()
+    assert held | studies.DRAWN.keys() == figures | tables
+    assert not held & studies.DRAWN.keys()
+
+
+@pytest.mark.parametrize("place", sorted(set(studies.DRAWN.values())))
+def test_where_a_drawing_is_said_to_be_is_a_page(place: str) -> None:
+    assert (HERE.parents[1] / place).exists()
+
+
+def test_a_figure_runs_the_study_that_holds_it_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["study", "table6.1", "--size", "toy", "--report", str(tmp_path), "--json"])
+    assert not ended.value.code
+    said = capsys.readouterr()
+    assert said.err == "table6.1 is held by the study fig6.1\n"
+    assert json.loads(said.out)["name"] == "fig6.1"
+
+
+def test_a_figure_that_is_a_drawing_says_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["study", "fig4.1"])
+    assert ended.value.code == 2
+    assert "docs/sensor.md" in capsys.readouterr().err

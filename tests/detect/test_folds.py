@@ -8,8 +8,7 @@ import pytest
 from test_readout import recipe, tare, touches
 
 import taxel
-from taxel.detect import Example, choose, judge, run, score, train
-from taxel.detect import Fold, Part
+from taxel.detect import Example, Fold, Part, Score, choose, judge, run, score, train
 from taxel.detect.folds import _folds as folds
 
 
@@ -95,3 +94,103 @@ def test_every_recipe_lists_points_that_its_learner_knows() -> None:
     for name in taxel.detect.recipes.names():
         plan = taxel.detect.Recipe.load(name, labels=["contact"])
         assert len(plan.points_of("contact")) > 1, name
+
+
+def test_folds_that_are_stated_are_those_that_are_judged() -> None:
+    data = examples(1, 2, 9)
+    stated = [Fold([Part(k) for k in range(3) if k != n], [Part(n)]) for n in range(3)]
+    by_number, by_data = judge(data, recipe(), 3, window_ms=10.0), judge(data, recipe(), stated, window_ms=10.0)
+    assert [one.to_dict() for one in by_data.scores] == [one.to_dict() for one in by_number.scores]
+    assert by_data.how == "3 given folds"
+    for fold, made in zip(stated, by_data.trained, strict=True):
+        alone = train([data[part.example] for part in fold.train], recipe())
+        assert made.readout == alone
+        assert set(made.learners) == {"contact", "lift"}
+
+
+def test_only_what_a_fold_tests_is_scored() -> None:
+    data = examples(1, 2)
+    times = np.sort(np.concatenate(list(data[1].labels.values())))
+    middle = float(times[4] + times[5]) / 2
+    judged = judge(data, recipe(), [Fold([Part(0)], [Part(1, middle)])], window_ms=10.0)
+    assert len(judged.scores) == 1
+    assert judged.together.events == int(np.count_nonzero(times >= middle)) == judged.together.found
+
+
+@pytest.mark.parametrize(
+    ("stated", "complaint"),
+    [
+        ([], "folds is empty"),
+        ([Fold([Part(0)], [])], "fold 0 is .* must be a Fold with parts to train on and parts to test"),
+        ([Fold([Part(0)], [Part(2)])], "no Part of 2 examples"),
+        ([Fold([Part(0)], [Part(1, 5.0, 5.0)])], "must start before it stops"),
+        ([Fold([Part(0)], [Part(1)]), Fold([Part(0)], [Part(1, 0.0, 9.0)])], "fold 1: .* is tested twice"),
+        ([Fold([Part(0)], [Part(1)], [Fold([Part(7)], [Part(1)])])], "no Part of 2 examples"),
+        ([((0,), (1,))], "must be a Fold"),
+    ],
+)
+def test_folds_that_make_no_sense_are_refused(stated: list[Fold], complaint: str) -> None:
+    with pytest.raises(taxel.ProblemError, match=complaint):
+        judge(examples(1, 2), recipe(), stated)
+
+
+def test_a_search_chooses_in_the_inner_folds_that_are_stated() -> None:
+    """A point that detects is best where the inner fold has events, one that never does where it has none."""
+    plan = recipe()
+    own = dict(plan.neurons["contact"])
+    plan = dataclasses.replace(plan, neurons={"contact": {**own, "search": [{"ub": 1e-6}]}})
+    data = [one._replace(labels={"contact": one.labels["contact"]}) for one in examples(1, 2, 3, 9)]
+    empty = data[3]._replace(labels={})
+    for inside, ub in ((3, 3.0), (4, 1e-6)):
+        inner = [Fold([Part(0), Part(1)], [Part(inside)])]
+        judged = judge([*data, empty], plan, [Fold([Part(0), Part(1)], [Part(2)], inner)], search=True, window_ms=10.0)
+        assert judged.trained[0].recipe.learner_of("contact")[0].ub == ub
+
+
+def test_spike_trains_are_learnt_and_judged_as_their_events_are() -> None:
+    data = examples(1, 2, 9)
+    encoder = recipe().encoder
+    spikes = [one._replace(source=encoder.with_tare(one.tare).encode(one.source), tare=None) for one in data]
+    assert (
+        train(spikes, recipe()).neurons["lift"].weights.tolist()
+        == train(data, recipe()).neurons["lift"].weights.tolist()
+    )
+    both = [judge(one, recipe(), 3, window_ms=10.0).together for one in (data, spikes)]
+    assert both[0].found == both[1].found == both[0].events
+    # On a grid the first step lies where the input begins, so that a crossing moves by a step at most.
+    assert np.abs(both[0].errors_ms - both[1].errors_ms).max() <= 0.2
+
+
+def test_points_that_differ_in_lambdas_alone_come_to_what_each_comes_to_by_itself() -> None:
+    from taxel.detect.training import Fitting, encoded
+
+    plans = [
+        dataclasses.replace(
+            recipe(), neurons={"lift": {**recipe().neurons["lift"], "lambdas": [l1, 1.0, 1.0, 9.0, 9.0]}}
+        )
+        for l1 in (0.0, 1.0, 4.0)
+    ]
+    data = [one._replace(labels={"lift": one.labels["lift"]}) for one in examples(1, 2)]
+    patterns = encoded(data, plans[0], lambda _: None)
+    rows = Fitting(patterns, plans[0], "lift", lambda _: None)
+    for plan in plans:
+        assert rows.fits(plan)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            together = rows.fit(plan)
+            alone = Fitting(patterns, plan, "lift", lambda _: None).fit(plan)
+        assert together.weights_ == pytest.approx(alone.weights_, abs=1e-3)
+    slower = dataclasses.replace(plans[0], neurons={"lift": {**plans[0].neurons["lift"], "tau": 9.0}})
+    assert not rows.fits(slower)
+
+
+def test_the_better_rank_misses_less_and_then_lies_nearer() -> None:
+    def ranked(*times: int) -> Score:
+        found = taxel.Detections(["a"] * len(times), list(times), list(times))
+        return score(found, {"a": [10_000, 20_000]}, 5.0)
+
+    order = [ranked(10_000, 20_000), ranked(10_500, 20_000), ranked(10_000), ranked()]
+    assert [one.rank[0] for one in order] == [0, 0, 1, 2]
+    assert sorted(order, key=lambda one: one.rank) == order
+    assert ranked(11_000, 20_000).rank[1] == pytest.approx(np.sqrt(0.5))
+    assert ranked().rank[1] == np.inf

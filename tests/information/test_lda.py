@@ -22,7 +22,7 @@ from taxel.information import (
     nested_predictions,
     training_curve,
 )
-from taxel.information.lda import ClassMoments
+from taxel.information.primal import ClassMoments
 
 
 def clouds(trials, features, classes, seed, apart=1.0):

@@ -103,11 +103,11 @@ def test_without_a_readout_it_is_kept_and_what_it_rested_at_before_is_unknown(tm
         heard(live)
         (done,) = live.zero(1, 2)
         for wrong, said in [
-            ((0, 0), "taxel at row 0, column 0: not heard of yet"),
+            ((0, 0), "taxel at row 0, column 0: no event so far"),
             ((4, 0), "taxel at row 0, column 4: none there in 4 x 4"),
             (([1, 1], [2]), "x has 2 columns, y 1 rows: must be as many"),
             ((-1, 0), "x: holds -1, must be a taxel's"),
-            (([1, 0], [2, 0]), "not heard of yet"),
+            (([1, 0], [2, 0]), "no event so far"),
         ]:
             with pytest.raises(ProblemError, match=said):
                 live.zero(*wrong)

@@ -16,7 +16,7 @@ from taxel.wire import PRESETS, Registers
 ROOT = Path(__file__).parents[2]
 PANEL = "crates/taxel-panel/web/registers.js"
 MADE = (
-    "crates/taxel-core/src/wire/registers/table.rs",
+    *(f"crates/taxel-core/src/wire/registers/{part}.rs" for part in ("table", "fields", "presets", "rules", "power_law")),
     "crates/taxel-live/src/recording/schemas/Registers.json",
     PANEL,
     "docs/registers.md",

@@ -1,8 +1,8 @@
-//! UDP datagrams in, counted: by whoever takes them, or by a thread of its own between the socket and a bounded queue; or
-//! what another computer received ([`Feed`]), into the same queue.
+//! UDP datagrams in, counted: received by the caller, or by a thread of its own between the socket and a bounded queue; or by
+//! another computer ([`Feed`]), into the same queue.
 //!
-//! Who takes datagrams receives them himself, which spares a wake-up and a copy. Who may be held up meanwhile (by a disk) asks
-//! for a thread ([`Receiver::apart`]): it receives while he is.
+//! A caller who takes datagrams receives them in its own thread, which saves a wake-up and a copy. A caller that a disk may hold up
+//! asks for a thread ([`Receiver::apart`]), which receives meanwhile.
 //!
 //! The sums close. At the socket: messages that came = [`Counts::messages`] + [`Counts::dropped_by_kernel`]. Behind it:
 //! [`Counts::datagrams`] = those taken + those waiting + [`Counts::dropped_by_queue`].
@@ -37,7 +37,7 @@ pub use queue::{Batch, Datagram};
 pub use sender::{SendCounts, Sender};
 use socket::Socket;
 
-/// How often the thread looks whether it was asked to stop.
+/// How often the thread checks whether it is to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// What is received at once at most, bytes.
@@ -71,7 +71,7 @@ pub struct Receiver {
 
 #[derive(Debug)]
 enum From {
-    /// The socket as long as no thread has it, locked by the one who takes, all the while that he waits; and the thread.
+    /// The socket as long as no thread has it, locked by the caller who takes datagrams while it waits; and the thread.
     Socket(Mutex<Option<Socket>>, Mutex<Option<JoinHandle<()>>>),
     Feed(Feed),
 }
@@ -102,7 +102,7 @@ impl Receiver {
         Ok(Self { queue, place: Origin::Udp(address), from })
     }
 
-    /// From now on a thread of its own receives, until the end; a feed has one anyway. Where nobody waits for what comes it may
+    /// From now on a thread of its own receives, until the end; a feed has one anyway. Where no readout waits for events it may
     /// `gather` for so long after each time: fewer wake-ups, the kernel keeps and stamps what comes meanwhile.
     ///
     /// # Errors
@@ -124,7 +124,7 @@ impl Receiver {
         Ok(())
     }
 
-    /// Hears what another computer receives; parcels go into the [`Feed`].
+    /// Receives what another computer received; parcels go into the [`Feed`].
     #[must_use]
     pub fn fed(name: &str, options: ReceiverOptions) -> (Self, Feed) {
         let queue = Arc::new(Queue::new(options.queue_bytes, Counts::default()));
@@ -132,7 +132,7 @@ impl Receiver {
         (Self { queue, place: Origin::Bridge(name.to_owned()), from: From::Feed(feed.clone()) }, feed)
     }
 
-    /// Where it listens; the port that was found where 0 was asked for.
+    /// Where datagrams come from, with the port that was found where 0 was asked for.
     #[must_use]
     pub fn place(&self) -> &Origin {
         &self.place
@@ -179,7 +179,7 @@ impl Receiver {
                     Some(own) => {
                         let taken = self.receive(own, batch, timeout);
                         if self.queue.is_done() {
-                            // The address is free for the next, also while somebody still looks at the counts.
+                            // The address is free for the next one, also while the counts are still read.
                             *socket = None;
                         }
                         taken
@@ -192,7 +192,7 @@ impl Receiver {
         taken.map_err(Error::socket(&self.place))
     }
 
-    /// Receives in the thread of the one who takes.
+    /// Receives in the caller's thread.
     fn receive(&self, socket: &mut Socket, batch: &mut Batch, timeout: Duration) -> io::Result<bool> {
         batch.begin(AT_ONCE);
         if self.queue.is_done() {
@@ -221,7 +221,7 @@ impl Receiver {
         self.queue.is_done()
     }
 
-    /// Asks for the end: what has come by now is taken in, then nothing more.
+    /// Asks for the end: what has come by now is received, then nothing more.
     pub fn stop(&self) {
         self.queue.stop();
         if let From::Feed(_) = self.from {
@@ -241,7 +241,7 @@ impl Drop for Receiver {
     }
 }
 
-/// The thread's one job: from the socket into the queue, until told to stop or the socket fails.
+/// The thread: receives from the socket into the queue, until it is to stop or the socket fails.
 fn receive(mut socket: Socket, queue: &Queue, gather: Duration) {
     let mut scratch = Batch::new();
     let ended = loop {
@@ -263,7 +263,7 @@ fn receive(mut socket: Socket, queue: &Queue, gather: Duration) {
             Err(error) => break Err(error),
         }
     };
-    // The address is free before anybody hears of the end.
+    // The address is free before the queue is closed.
     drop(socket);
     queue.close(ended.err());
 }

@@ -9,32 +9,27 @@
 //! below are balanced about the mean time. Of fewer than a hundred points none lies below, and it is the edge of the lower
 //! convex hull above the mean time.
 
+mod offset;
+mod points;
+mod stretch;
+
 use std::collections::VecDeque;
 
-use serde::Serialize;
 use taxel_core::wire::{Took, WORD_BYTES};
+
+pub use offset::Offset;
+use points::Points;
+use stretch::{Point, Stretch};
 
 /// The hull is kept in stretches of this length, us of the board's clock ...
 const STRETCH_US: i64 = 250_000;
 /// ... of which so many are looked at: 64 s, within which a quartz keeps its rate.
 const STRETCHES: usize = 256;
-/// Of each such part of a stretch the quickest points are kept, us: within it no drift of a quartz tilts what is quick ...
-const PART_US: i64 = 10_000;
-/// ... so many of them.
-const QUICK: usize = 2;
 /// Of stretches that are over longer than so many, only those are kept which a line can still pass near.
 const NEW: usize = 8;
 
-/// Which share of the points may lie below the line.
-const EARLY: f64 = 0.01;
-
 /// While a clock is new its line is drawn each stretch, later each so many: it hardly moves any more.
 const DRAWN_EACH: usize = 4;
-
-/// How well a slope is known when it is searched no further, ns/us.
-const FINE: f64 = 2e-6;
-/// How far from the last one a slope is looked for first, ns/us.
-const NEAR: f64 = 2e-3;
 
 /// A second of points that lie this far from what was expected is another clock: a board that was reset, a host whose clock
 /// was set; ns. A pause allows for more, as a drift was known no better than that.
@@ -60,143 +55,6 @@ pub fn leaves(took: &Took, last: Option<i64>, bytes: usize, frame_us: i64) -> Op
         2 => took.until,
         // What a frame saw leaves at its end, but for a full datagram, which leaves as soon as it is full.
         _ => last.filter(|_| bytes < FULL).map(|t| t + frame_us),
-    }
-}
-
-/// What the host's clock shows when the board's shows a time: a line.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct Offset {
-    /// A time of the board, us ...
-    pub board_us: i64,
-    /// ... and what the host's clock showed then, ns since 1970.
-    pub host_ns: i64,
-    /// How much faster the host's clock runs, parts per million.
-    pub drift_ppm: f64,
-}
-
-impl Offset {
-    /// The host's time at a time of the board, ns since 1970.
-    #[must_use]
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
-    pub fn host_ns(&self, board_us: i64) -> i64 {
-        let since = board_us - self.board_us;
-        self.host_ns + since * 1000 + (since as f64 * self.drift_ppm * 1e-3) as i64
-    }
-
-    /// The board's time at a time of the host, us.
-    #[must_use]
-    #[allow(clippy::cast_precision_loss, clippy::cast_possible_truncation)]
-    pub fn board_us(&self, host_ns: i64) -> i64 {
-        let since = (host_ns - self.host_ns) as f64 * 1e-3;
-        self.board_us + (since / (1.0 + self.drift_ppm * 1e-6)) as i64
-    }
-}
-
-/// Board time us, arrival less board time ns.
-type Point = (i64, i64);
-
-/// The quick points of a stretch, and the mean time of all.
-#[derive(Debug, Clone, Default)]
-struct Stretch {
-    /// Those of a part stand beside one another where they came in order.
-    quick: Vec<Point>,
-    points: u64,
-    /// Sum of board times since the first, us.
-    sum: i64,
-    first: i64,
-    last: i64,
-}
-
-impl Stretch {
-    fn push(&mut self, point: Point) {
-        if self.points > 0 && point.0 == self.last {
-            // A train of datagrams that could leave at one time is one point: its quickest.
-            if let Some(same) = self.quick.iter_mut().rev().find(|quick| quick.0 == point.0) {
-                same.1 = same.1.min(point.1);
-                return;
-            }
-        } else {
-            if self.points == 0 {
-                (self.first, self.last) = (point.0, point.0);
-            }
-            self.points += 1;
-            self.sum += point.0 - self.first;
-            self.last = self.last.max(point.0);
-        }
-        let part = point.0.div_euclid(PART_US);
-        let (mut rivals, mut slowest) = (0, 0);
-        for (k, quick) in self.quick.iter().enumerate().rev().filter(|(_, quick)| quick.0.div_euclid(PART_US) == part) {
-            if rivals == 0 || quick.1 > self.quick[slowest].1 {
-                slowest = k;
-            }
-            rivals += 1;
-            if rivals == QUICK {
-                break;
-            }
-        }
-        if rivals < QUICK {
-            self.quick.push(point);
-        } else if point.1 < self.quick[slowest].1 {
-            self.quick[slowest] = point;
-        }
-    }
-
-    /// The lowest point.
-    fn lowest(&self) -> Option<Point> {
-        self.quick.iter().copied().min_by_key(|quick| quick.1)
-    }
-
-    /// How many points may lie below the line: where so many came that few were kept, as many as can be told.
-    #[allow(clippy::cast_precision_loss)]
-    fn early(&self) -> f64 {
-        (EARLY * self.points as f64).min(self.quick.len() as f64 / 2.0)
-    }
-
-    /// Leaves out what lies far above a line.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn thin(&mut self, line: Offset) {
-        self.quick.sort_unstable_by_key(|&(t, late)| late + t * 1000 - line.host_ns(t));
-        self.quick.truncate((2.0 * self.early()).ceil() as usize);
-    }
-}
-
-/// Points, times from their mean time on, of which so many may lie below a line.
-struct Points {
-    all: Vec<(f64, f64)>,
-    early: f64,
-}
-
-impl Points {
-    /// The line of a slope that so many points lie below: its height at the mean time, and to which side of that those below
-    /// it lie, the sum of their times.
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    fn under(&self, slope: f64) -> (f64, f64) {
-        let mut above: Vec<(f64, f64)> = self.all.iter().map(|&(t, late)| (late - slope * t, t)).collect();
-        let whole = (self.early.floor() as usize).min(above.len() - 1);
-        let (below, &mut (height, at), _) = above.select_nth_unstable_by(whole, |a, b| a.0.total_cmp(&b.0));
-        let sum: f64 = below.iter().map(|point| point.1).sum();
-        (height, sum + self.early.fract() * at)
-    }
-
-    /// The slope within `most` of 0 at which those below the line are balanced; `last` is where it was.
-    fn slope(&self, last: f64, most: f64) -> f64 {
-        let (mut low, mut high) = (-most, most);
-        let mut narrow = |slope: f64| {
-            if slope <= low || slope >= high {
-            } else if self.under(slope).1 > 0.0 {
-                high = slope;
-            } else {
-                low = slope;
-            }
-            (low, high)
-        };
-        narrow(last - NEAR);
-        let (mut low, mut high) = narrow(last + NEAR);
-        while high - low > FINE {
-            (low, high) = narrow(f64::midpoint(low, high));
-        }
-        // No finer than it was searched, and 0 where it is as good as that.
-        (f64::midpoint(low, high) / FINE).round() * FINE + 0.0
     }
 }
 
@@ -346,6 +204,7 @@ mod tests {
     use rand::rngs::StdRng;
     use rand::{Rng, SeedableRng};
 
+    use super::stretch::{PART_US, QUICK};
     use super::*;
 
     /// Arrivals each `every_us`, of a host clock that starts at `start_ns` and drifts, delayed at random: by 5 us, more of some,

@@ -1,10 +1,10 @@
 //! Datagrams to detections, as they come.
 //!
-//! One thread receives, decodes and reads out; who has something to say leaves that to another one first. While something is
-//! recorded, which a disk may hold up, *receive*, *decode and record*, *encode and read out* have a thread each
-//! ([`crate::capture`]), and the last one has also where it is slower than what comes. What waits between two of them is bounded,
-//! and what finds no room is counted where it was lost. Who looks on gets copies ([`Live::counters`], [`Live::picture`]) and slows
-//! nothing.
+//! The stages are *receive*, *decode*, *record* and *read out* ([`stages`]). One thread runs them all, and gives them to another
+//! one before it calls a sink ([`threads`]). While something is recorded, which a disk may hold up, receiving ([`crate::capture`]),
+//! decoding with recording, and reading out have a thread each; reading out also has one where it is slower than what comes. The
+//! queues between them are bounded, and what finds no room is counted where it was lost. Viewers get copies ([`Live::counters`],
+//! [`Live::picture`]) and cannot slow the pipeline.
 
 mod ahead;
 mod copies;
@@ -67,10 +67,10 @@ use stages::Stages;
 pub use tap::{Change, Outlet, Piece, UNKNOWN};
 use threads::Threads;
 
-/// How long a wait lasts before it is asked whether to stop.
+/// How long a wait lasts before the caller is asked whether to stop.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// How many detections wait for [`Live::next`]; more are counted and lost to it, not to the sinks.
+/// How many detections wait for [`Live::next`]; more are lost to it, and counted, but not lost to the sinks.
 const SAID_WAITING: usize = 1 << 14;
 
 /// Datagrams to detections, from [`Live::start`] until [`Live::stop`].
@@ -223,7 +223,7 @@ impl Live {
         Ok(())
     }
 
-    /// The address that it listens on, the port that was found where 0 was asked for; unspecified, with port 0, where a
+    /// The address that it receives on, with the port that was found where 0 was asked for; unspecified, with port 0, where a
     /// bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
@@ -236,7 +236,7 @@ impl Live {
         self.shared.receiver.place()
     }
 
-    /// What others may do with it.
+    /// What others may do with it while it runs.
     #[must_use]
     pub fn handle(&self) -> Handle {
         Handle { shared: Arc::clone(&self.shared), recordings: Arc::clone(&self.recordings) }
@@ -246,14 +246,14 @@ impl Live {
     ///
     /// # Errors
     ///
-    /// What ended the way early: the disk is full, the socket failed, the encoder cannot use what comes.
+    /// The error that ended the pipeline early: the disk is full, the socket failed, the encoder cannot use what comes.
     pub fn next(&self, timeout: Duration) -> Result<Option<Said>> {
         match self.said.recv_timeout(timeout) {
             Ok(said) => Ok(Some(said)),
             Err(channel::RecvTimeoutError::Timeout) => self.check().map(|()| None),
             Err(channel::RecvTimeoutError::Disconnected) => {
                 self.check()?;
-                // Without a readout nobody ever speaks: wait as asked, but not after the end.
+                // Without a readout there are no detections: wait as asked, but not after the end.
                 if !self.is_over() {
                     std::thread::sleep(timeout);
                 }
@@ -262,7 +262,7 @@ impl Live {
         }
     }
 
-    /// As [`Live::next`], but looks now and then whether to stop waiting; `None` then.
+    /// As [`Live::next`], but returns `None` as soon as `stop` asks for it.
     ///
     /// # Errors
     ///
@@ -271,7 +271,7 @@ impl Live {
         let until = Instant::now().checked_add(timeout);
         loop {
             let left = until.map_or(LOOK_EVERY, |t| t.saturating_duration_since(Instant::now()));
-            // Asked before: what ended it was then noted before, and `next` gives it.
+            // Before `next`: an error that ended the pipeline is then known, and `next` returns it.
             let over = self.is_over();
             let said = self.next(left.min(LOOK_EVERY))?;
             if said.is_some() || over || left.is_zero() || stop.asked() {
@@ -284,13 +284,13 @@ impl Live {
         self.shared.published().failed.take().map_or(Ok(()), Err)
     }
 
-    /// Whether the way has ended, by [`Live::end`] or by an error, and everything was worked through.
+    /// Whether the pipeline has ended, by [`Live::end`] or by an error, and everything was processed.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.shared.ended.load(Ordering::Acquire)
     }
 
-    /// What came and what became of it up to now.
+    /// What came, what became of it and what was lost, up to now.
     #[must_use]
     pub fn counters(&self) -> Counters {
         let others = lock(&self.others);
@@ -299,13 +299,14 @@ impl Live {
         Counters { sources: boards.chain(numbers).collect(), ..self.shared.counters() }
     }
 
-    /// Where another board of the recording is listened to; `None` where there is none of that name.
+    /// The address that another board of the recording sends to; `None` where there is none of that name.
     #[must_use]
     pub fn source_address(&self, name: &str) -> Option<SocketAddr> {
         lock(&self.others).boards.iter().find(|(known, _)| known == name).map(|(_, board)| board.address())
     }
 
-    /// Keeps numbers of a source that is given, one for each of its columns, which came at `arrived_ns` (ns since 1970).
+    /// Records numbers of a source whose values a program gives, one for each of its columns, which came at `arrived_ns` (ns since
+    /// 1970).
     ///
     /// # Errors
     ///
@@ -318,25 +319,25 @@ impl Live {
         }
     }
 
-    /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 until a taxel was heard of.
+    /// The values that the taxels hold, ticks, by taxel index, ten times a second; 0 of a taxel without any event so far.
     #[must_use]
     pub fn picture(&self) -> Vec<u16> {
         self.shared.published().picture.clone()
     }
 
-    /// The tare that was taken, once it is complete.
+    /// The fresh tare, once it is complete.
     #[must_use]
     pub fn tare(&self) -> Option<Tare> {
         self.shared.published().tare.clone()
     }
 
-    /// The starts and stops that came since this was asked last.
+    /// The starts and stops that came since the last call.
     #[must_use]
     pub fn take_markers(&self) -> Vec<Marker> {
         std::mem::take(&mut self.shared.published().markers)
     }
 
-    /// Writes something down in the recording, with the time of now.
+    /// Writes a note into the recording, with the time of now.
     ///
     /// # Errors
     ///
@@ -345,8 +346,8 @@ impl Live {
         self.shared.note(text, true)
     }
 
-    /// Says that the host told the board to speak this version of the wire (a write of REG0): what comes of it is believed
-    /// at once, not after a second.
+    /// Announces that the host told the board to speak this version of the wire (a write of REG0): datagrams of it are decoded at
+    /// once, not after a second.
     ///
     /// # Errors
     ///
@@ -359,8 +360,8 @@ impl Live {
         Ok(())
     }
 
-    /// Records what comes from here on, of all sources, beginning with the registers and what the taxels hold. A recording that
-    /// runs ends with what came before, and is given back: each datagram, and each line, belongs to one of them.
+    /// Records what comes from here on, of all sources, beginning with the registers and the values that the taxels hold. A recording
+    /// that runs ends with what came before, and is returned: each datagram, and each line, belongs to one of them.
     ///
     /// # Errors
     ///
@@ -373,10 +374,10 @@ impl Live {
         self.handle().record(record)
     }
 
-    /// Has the recording that runs begin anew, where nothing came into it of any source; gives whether it does.
+    /// Lets the recording that runs begin anew, where no source has given anything; returns whether it does.
     #[must_use]
     pub fn record_again(&self) -> bool {
-        // Before the lock: who counts and who records must not wait for each other.
+        // Before the recorder is locked: counting and recording must not wait for each other.
         let now = self.shared.counters();
         lock(&self.shared.recorder).as_mut().is_some_and(|recorder| recorder.again(&now))
     }
@@ -396,16 +397,16 @@ impl Live {
         self.handle().records()
     }
 
-    /// Asks all threads to end once they have worked through what came; [`Live::stop`] waits for them.
+    /// Asks all threads to end once they have processed what came; [`Live::stop`] waits for them.
     pub fn end(&self) {
         self.shared.receiver.stop();
     }
 
-    /// Ends: works through what came, closes the file, and says what was lost.
+    /// Ends: processes what came, closes the file, and returns what was lost.
     ///
     /// # Errors
     ///
-    /// What ended the way early, or `File` where the end of the recording cannot be written.
+    /// The error that ended the pipeline early, or `File` where the end of the recording cannot be written.
     pub fn stop(mut self) -> Result<Summary> {
         let others = lock(&self.others).stop(|board| Ok(board.stop()?.counters));
         let joined = self.join();

@@ -11,8 +11,6 @@ use std::str::FromStr;
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
-/// The crates whose sources count.
-pub const CRATES: [&str; 4] = ["taxel-core", "taxel-live", "taxel-panel", "taxel-python"];
 /// The crate whose rooms bind names.
 const BINDING: &str = "taxel_python";
 
@@ -26,14 +24,16 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// Reads the sources of all crates in a folder.
+    /// Reads the sources of all crates in a folder: those that no path leads to do no harm.
     pub fn read(crates: &Path) -> io::Result<Self> {
         let mut texts = vec![];
-        for name in CRATES {
-            let root = crates.join(name).join("src");
-            for file in files(&root)? {
+        for entry in std::fs::read_dir(crates)? {
+            let entry = entry?;
+            let root = entry.path().join("src");
+            for file in if root.is_dir() { files(&root)? } else { vec![] } {
                 let inside = file.strip_prefix(&root).unwrap().to_path_buf();
-                texts.push((name.replace('-', "_"), inside, std::fs::read_to_string(&file)?));
+                let package = entry.file_name().to_str().unwrap().replace('-', "_");
+                texts.push((package, inside, std::fs::read_to_string(&file)?));
             }
         }
         Ok(Self::of(texts))

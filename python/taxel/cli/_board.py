@@ -1,4 +1,4 @@
-"""What the commands that listen to a board have in common."""
+"""What the commands that receive from a board have in common."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import contextlib
 import signal
 import threading
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -15,19 +16,26 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.cli._app import OUTSIDE, WRONG_INPUT
 from taxel.live import Remote, Summary, delays
+from taxel.live.options import about
 from taxel.tare import Tare
-from taxel.wire import PRESETS
 
 __all__ = [
-    "QUOTED_PRESETS",
     "REDRAW_S",
     "ArrayOption",
+    "CompressionOption",
     "CongestionOption",
     "DifferencesOption",
     "FromOption",
+    "GuardFramesOption",
     "HostOption",
+    "NameOption",
+    "OverwriteOption",
     "PortOption",
     "PresetOption",
+    "ReadoutOption",
+    "RecordOption",
+    "SendOption",
+    "SourceOption",
     "TareOption",
     "asked_to_end",
     "counters_table",
@@ -37,41 +45,31 @@ __all__ = [
     "rest_of",
 ]
 
-#: How often the display is drawn anew, and the end looked for, s.
+#: How often the display is drawn anew, and the end checked, s.
 REDRAW_S = 0.1
 
-#: The names of all presets, for a text.
-QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
 
-PortOption = Annotated[int, typer.Option(min=0, max=65_535, help="The UDP port that the board sends to.")]
-HostOption = Annotated[str, typer.Option(help="The address of this machine to listen on; 0.0.0.0: every one.")]
-ArrayOption = Annotated[
-    str | None,
-    typer.Option(
-        metavar="ROWSxCOLUMNS[xMM]",
-        help="The sensor and its pitch, as 24x20x5 (2.67 mm where it is left out); without it 64x64x2.67, or what is "
-        "told with --from.",
-    ),
-]
-PresetOption = Annotated[
-    str | None,
-    typer.Option(
-        help=f'The board\'s registers, "5.2 kHz" where left out: one of {QUOTED_PRESETS}. With --from they are told.'
-    ),
-]
+def live_option(name: str, *flags: str, metavar: str | None = None) -> Any:
+    """Return the option of the command line that sets an option of `Live`: its text and range."""
+    return typer.Option(*flags, metavar=metavar, **about(name))
 
-DifferencesOption = Annotated[bool, typer.Option("--differences", help="The board sends intensity differences.")]
-TareOption = Annotated[
-    str | None, typer.Option(help="Seconds at rest for a fresh one, or the file of an earlier one (JSON).")
-]
-FromOption = Annotated[
-    str | None,
-    typer.Option(
-        "--from",
-        metavar="ADDRESS",
-        help="A board of another computer, in place of --port: zenoh:HOST:PORT/NAME, as taxel bridge says it there.",
-    ),
-]
+
+PortOption = Annotated[int, live_option("port")]
+HostOption = Annotated[str, live_option("host")]
+ArrayOption = Annotated[str | None, live_option("array", metavar="ROWSxCOLUMNS[xMM]")]
+PresetOption = Annotated[str | None, live_option("registers")]
+DifferencesOption = Annotated[bool, live_option("differences", "--differences")]
+TareOption = Annotated[str | None, typer.Option(help=about("tare")["help"])]
+RecordOption = Annotated[Path | None, live_option("record")]
+CompressionOption = Annotated[str, live_option("compression")]
+NameOption = Annotated[str, live_option("name")]
+SourceOption = Annotated[list[str] | None, live_option("sources", metavar="NAME=WHAT")]
+OverwriteOption = Annotated[bool, live_option("overwrite", "--overwrite")]
+GuardFramesOption = Annotated[float, live_option("guard_frames")]
+SendOption = Annotated[list[str] | None, live_option("send", metavar="WHERE")]
+ReadoutOption = Annotated[Path | None, live_option("readout")]
+FromOption = Annotated[str | None, live_option("remote", "--from", metavar="ADDRESS")]
+
 CongestionOption = Annotated[
     str | None,
     typer.Option(
@@ -84,7 +82,7 @@ CongestionOption = Annotated[
 def remote(
     address: str | None, congestion: str | None, *, keeps: bool
 ) -> contextlib.AbstractContextManager[Remote | None]:
-    """Return what hears the board of another computer, where one is named."""
+    """Return the receiver of another computer's board, where one is named."""
     if address is None:
         if congestion is not None:
             raise ProblemError("--congestion belongs to a board of another computer: give --from ADDRESS")
@@ -105,12 +103,12 @@ def rest_of(said: str | None) -> Tare | float | None:
     return seconds
 
 
-#: From so many words outside the array, and from this share of all on, they are no damage: it is another array.
+#: Words outside the array are not damage, but another array, from so many and from this share of all on.
 _OUTSIDE, _OUTSIDE_SHARE = 100, 0.01
 
 
 def outside(counters: dict[str, Any], array: Array) -> str | None:
-    """Return what to say where the board has more taxels than `array`; None where it has not."""
+    """Return a warning where the board has more taxels than `array`; None where it has not."""
     first, second = counters["wire"], counters["wire_v2"]
     beyond = first["outside"] + second["outside"]
     words = first["words"] + second["events"] + second["states"] + second["outside"]
@@ -121,7 +119,7 @@ def outside(counters: dict[str, Any], array: Array) -> str | None:
 
 
 def exit_code(summary: Summary, array: Array) -> int:
-    """Return the exit code that what was heard deserves."""
+    """Return the exit code for what came and what was lost."""
     unsent = any(one["lost"] for one in summary.counters["sent"])
     if summary.nothing_came or summary.lost or summary.counters["events_dropped"] or unsent:
         return OUTSIDE
@@ -129,34 +127,34 @@ def exit_code(summary: Summary, array: Array) -> int:
 
 
 def _bridged(counted: dict[str, Any] | None) -> list[tuple[str, str, str]]:
-    """Return what to show of the way from another computer."""
+    """Return the rows of the table on the connection to another computer."""
     if counted is None:
         return []
     if counted["ended"]:
-        said = "ended there; waiting for another"
+        state = "ended there; waiting for another"
     elif counted["heard"]:
-        said = "heard"
+        state = "connected"
     else:
-        said = "SILENT: the other computer, or the way to it, is gone; waiting"
+        state = "SILENT: the other computer, or the network to it, is gone; waiting"
     lost = f"{counted['missing']:,} on the way, {counted['dropped'] + counted['dropped_by_kernel']:,} there"
     clock = counted["clock"]
     compared = "not compared yet"
     if clock is not None:
         ahead, within = (clock[name] / 1e6 for name in ("ahead_ns", "within_ns"))
         compared = f"{ahead:+,.3f} ms, within {within:.3f} ms, {clock['drift_ppm']:+.1f} ppm"
-    return [("other computer", said, ""), ("lost between", lost, ""), ("its clock", compared, "")]
+    return [("other computer", state, ""), ("lost between", lost, ""), ("its clock", compared, "")]
 
 
 @contextlib.contextmanager
 def asked_to_end() -> Iterator[threading.Event]:
-    """Hear the first Ctrl-C as a flag: nothing is lost between being taken and being said; the next one raises."""
+    """Turn the first Ctrl-C into a flag, so that no detection is lost before it is printed; the next one raises."""
     asked, before = threading.Event(), signal.getsignal(signal.SIGINT)
 
-    def hear(*_: object) -> None:
+    def note(*_: object) -> None:
         asked.set()
         signal.signal(signal.SIGINT, before)
 
-    signal.signal(signal.SIGINT, hear)
+    signal.signal(signal.SIGINT, note)
     try:
         yield asked
     finally:

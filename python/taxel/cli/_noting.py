@@ -13,7 +13,7 @@ from taxel._core import Error
 
 __all__ = ["noting"]
 
-#: How often it looks whether the recording has ended, s.
+#: How often it checks whether the recording has ended, s.
 _LOOK_S = 0.1
 
 
@@ -26,7 +26,7 @@ def noting(write: Callable[[str], None], tell: Callable[[str], None]) -> Iterato
     write : function
         Takes the label.
     tell : function
-        Takes one line for the user: what was noted, or why it was not.
+        Takes one line for the user: the note, or why it was not written.
 
     Yields
     ------
@@ -46,7 +46,7 @@ def noting(write: Callable[[str], None], tell: Callable[[str], None]) -> Iterato
         return
     over = threading.Event()
     with _by_key(source) if keys else contextlib.nullcontext():
-        thread = threading.Thread(target=_listen, args=(source, keys, over, write, tell), daemon=True)
+        thread = threading.Thread(target=_read, args=(source, keys, over, write, tell), daemon=True)
         thread.start()
         try:
             yield "a key writes a note" if keys else "a line on standard input writes a note"
@@ -55,7 +55,7 @@ def noting(write: Callable[[str], None], tell: Callable[[str], None]) -> Iterato
             thread.join()
 
 
-def _listen(
+def _read(
     source: int, keys: bool, over: threading.Event, write: Callable[[str], None], tell: Callable[[str], None]
 ) -> None:
     waiting = b""
@@ -63,14 +63,14 @@ def _listen(
         if not select.select([source], [], [], _LOOK_S)[0]:
             continue
         try:
-            said = os.read(source, 4096)
+            typed = os.read(source, 4096)
         except OSError:
             return
-        waiting += said
+        waiting += typed
         if keys:
             labels, waiting = _keys(waiting.decode("utf-8", "replace")), b""
         else:
-            *lines, waiting = waiting.split(b"\n") if said else (waiting, b"")
+            *lines, waiting = waiting.split(b"\n") if typed else (waiting, b"")
             labels = [label for line in lines if (label := line.decode("utf-8", "replace").strip())]
         for label in labels:
             try:
@@ -78,12 +78,12 @@ def _listen(
                 tell(f"noted: {label}")
             except (Error, OSError) as error:
                 tell(f"not noted: {error}")
-        if not said:
+        if not typed:
             return
 
 
 def _keys(typed: str) -> list[str]:
-    """Return a label a key; the keys without a letter of their own are marks, arrows and the like are nothing."""
+    """Return a label for each key: its letter, "mark" for space and return; arrows and the like give none."""
     if typed.startswith("\x1b"):
         return []
     return [
@@ -95,7 +95,7 @@ def _keys(typed: str) -> list[str]:
 
 @contextlib.contextmanager
 def _by_key(source: int) -> Iterator[None]:
-    """Have a terminal give each key at once, without showing it; Ctrl-C stays what it is."""
+    """Let a terminal give each key at once, without showing it; Ctrl-C works as before."""
     import termios  # noqa: PLC0415  Unix only
     import tty  # noqa: PLC0415
 

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
+import time
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, BinaryIO
@@ -15,18 +18,30 @@ import typer
 from taxel._base.files import write_whole
 from taxel._core import ProblemError
 from taxel.cli._app import app
+from taxel.report.provenance import Sources, installed
 
-__all__ = ["bench"]
+__all__ = ["bench", "stale_results"]
+
+#: Set for benchmarks where peers that need minutes are waited for (benchmarks/_peer.py).
+_PATIENT = "TAXEL_BENCH_PEERS"
 
 
 @app.command()
 def bench(
-    name: Annotated[str, typer.Argument(help="A file of benchmarks/ without its ending, or all.")],
+    name: Annotated[str, typer.Argument(help="A file of benchmarks/ without its ending, or all.")] = "all",
     folder: Annotated[Path, typer.Option(help="Where the benchmarks lie: a checkout's folder.")] = Path("benchmarks"),
     quick: Annotated[bool, typer.Option(help="Few rounds: to see that it runs; writes no result.")] = False,
+    peers: Annotated[
+        bool, typer.Option("--peers", help="Wait for peers that need minutes, and keep their times for this processor.")
+    ] = False,
+    stale: Annotated[
+        bool, typer.Option("--stale", help="List the results that are older than a change in what they measure.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Measure taxel beside its peers in one run and write the ratios to benchmarks/results/.
+
+    Peers that are not installed are left out, and named.
 
     Example: taxel bench wire_decode
     """
@@ -37,6 +52,10 @@ def bench(
         )
     if name != "all" and name not in files:
         raise ProblemError(f"no benchmark {name!r}: there are {', '.join(files)} and all")
+    names = list(files) if name == "all" else [name]
+    if stale:
+        _list_stale(folder, files, names)
+        return
     changed = [] if quick else _changed(folder)
     if changed:
         raise ProblemError(
@@ -44,10 +63,15 @@ def bench(
             "which a result names; commit first, or say --quick"
         )
     # What benchmarks share lies beside them, in files that begin with an underscore.
-    sys.path.insert(0, str(folder))
-    for stem in files if name == "all" else [name]:
+    sys.path.insert(0, str(folder.resolve()))
+    if peers:
+        os.environ[_PATIENT] = "1"
+    for stem in names:
+        begun = time.monotonic()
         result = _load(files[stem]).run(quick=quick)
+        result["took_s"] = round(time.monotonic() - begun, 1)
         if not quick:
+            result["made_of"] = _sources(folder).parts(stem)
             place = folder / "results" / f"{stem}.json"
             place.parent.mkdir(exist_ok=True)
             text = json.dumps(result, indent=1) + "\n"
@@ -58,6 +82,33 @@ def bench(
             typer.echo(json.dumps(result))
         else:
             typer.echo(_table(stem, result))
+
+
+def _sources(folder: Path) -> Sources:
+    """Return the sources of the benchmarks and of what they measure."""
+    return installed("taxel_studies", *sorted(folder.glob("*.py")))
+
+
+def stale_results(folder: Path, names: Sequence[str]) -> dict[str, list[str]]:
+    """Return the results that are older than a change in what they measure, and what has changed of each."""
+    sources = _sources(folder)
+    found = {}
+    for name in names:
+        place = folder / "results" / f"{name}.json"
+        before = json.loads(place.read_text(encoding="utf-8")).get("made_of") if place.exists() else None
+        now = sources.parts(name)
+        if before is None:
+            found[name] = ["its sources were not recorded" if place.exists() else "no result"]
+        elif before != now:
+            found[name] = sorted(part for part in before.keys() | now.keys() if before.get(part) != now.get(part))
+    return found
+
+
+def _list_stale(folder: Path, files: Mapping[str, Path], names: Sequence[str]) -> None:
+    found = stale_results(folder, names)
+    for name, parts in found.items():
+        typer.echo(f"{name}: {', '.join(parts)}")
+    typer.echo(f"{len(found)} of {len(files)} results are stale" if found else "no result is stale")
 
 
 def _changed(folder: Path) -> list[str]:
@@ -93,4 +144,6 @@ def _table(stem: str, result: dict[str, Any]) -> str:
         f"  {key}: {value:.3g}" if isinstance(value, float) else f"  {key}: {value}" for key, value in ratios.items()
     ]
     left_out = [f"  left out: {peer}: {why}" for peer, why in result.get("left out", {}).items()]
-    return "\n".join([f"{stem}: ratios (ours over the peer's, above 1 is faster)", *rows, *left_out])
+    kept = [f"  kept, not measured now: {peer}: of {when}" for peer, when in result.get("kept", {}).items()]
+    head = f"{stem}: ratios (ours over the peer's, above 1 is faster); {result['took_s']:g} s"
+    return "\n".join([head, *rows, *left_out, *kept])

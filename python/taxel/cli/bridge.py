@@ -32,17 +32,18 @@ from taxel.cli._board import (
 from taxel.detect import Readout
 from taxel.live import Bridge, Live
 from taxel.live.bridge import PLACE
+from taxel.live.options import LiveOptions
 
 __all__ = ["bridge"]
 
 
 @app.command()
 def bridge(
-    port: PortOption = 5208,
-    host: HostOption = "0.0.0.0",
+    port: PortOption = LiveOptions.port,
+    host: HostOption = LiveOptions.host,
     array: ArrayOption = None,
     preset: PresetOption = None,
-    differences: DifferencesOption = False,
+    differences: DifferencesOption = LiveOptions.differences,
     name: Annotated[str, typer.Option(help="Of the board: letters, digits, - _ or .")] = "board",
     listen: Annotated[
         list[str], typer.Option(help="HOST:PORT (TCP) of this computer for others to connect to; may be repeated.")

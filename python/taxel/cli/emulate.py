@@ -19,9 +19,9 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from taxel._base.files import try_whole
 from taxel._core import ProblemError
 from taxel.cli._app import app
-from taxel.cli._board import QUOTED_PRESETS
 from taxel.cli._recordings import told
 from taxel.demo.script import TRAINING_SEED, drawn, endless, left_to_rest, script
+from taxel.live.options import QUOTED_PRESETS
 from taxel.recording.opening import open_any
 from taxel.simulate import Act, Contact, EmulatorReport, Faults, Flaws, Pipe, Replay, Scene, SceneFile, Version2
 from taxel.simulate import emulate as run

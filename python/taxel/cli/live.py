@@ -23,9 +23,13 @@ from taxel.cli._board import (
     CongestionOption,
     DifferencesOption,
     FromOption,
+    GuardFramesOption,
     HostOption,
     PortOption,
     PresetOption,
+    ReadoutOption,
+    RecordOption,
+    SendOption,
     TareOption,
     asked_to_end,
     counters_table,
@@ -40,6 +44,7 @@ from taxel.cli._viewers import SpikesOption, SpikesSetOption, ToOption, report_v
 from taxel.detect import Readout
 from taxel.device import Cable
 from taxel.live import Live, Panel, Said, Summary, Viewer, delays
+from taxel.live.options import LiveOptions
 from taxel.spikes import to_ms
 from taxel.tare import Tare
 
@@ -48,17 +53,15 @@ __all__ = ["live"]
 
 @app.command()
 def live(
-    readout: Annotated[
-        Path | None, typer.Option(help="A trained readout (JSON), as taxel train writes it; the panel needs none.")
-    ] = None,
-    port: PortOption = 5208,
-    host: HostOption = "0.0.0.0",
+    readout: ReadoutOption = None,
+    port: PortOption = LiveOptions.port,
+    host: HostOption = LiveOptions.host,
     array: Annotated[
         str | None,
         typer.Option(metavar="ROWSxCOLUMNS[xMM]", help="The sensor and its pitch; the readout's where left out."),
     ] = None,
     preset: PresetOption = None,
-    differences: DifferencesOption = False,
+    differences: DifferencesOption = LiveOptions.differences,
     address: FromOption = None,
     congestion: CongestionOption = None,
     tare: TareOption = None,
@@ -69,17 +72,10 @@ def live(
         ),
     ] = None,
     save_tare: Annotated[Path | None, typer.Option(help="Keep the fresh tare in a new file (JSON).")] = None,
-    record: Annotated[Path | None, typer.Option(help="Keep everything in a new file (.mcap or .lsa).")] = None,
+    record: RecordOption = None,
     seconds: SecondsOption = None,
-    guard_frames: Annotated[float, typer.Option(min=0.0, help="In silence, frames behind the host's clock.")] = 5.0,
-    send: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="WHERE",
-            help="Send each detection as a line of --json to udp:HOST:PORT, pipe:PATH or serial:PATH@BAUD; may be "
-            "repeated.",
-        ),
-    ] = None,
+    guard_frames: GuardFramesOption = LiveOptions.guard_frames,
+    send: SendOption = None,
     report: Annotated[
         Path | None,
         typer.Option(help="With --record: a folder for a page: potential, weights, errors, the worst events."),
@@ -141,13 +137,13 @@ def live(
             lines=as_json,
             send=send or (),
         ) as pipeline:
-            # Whoever reads our lines and has enough is as good an end as Ctrl-C.
+            # A program that stops reading the lines ends it as Ctrl-C does.
             shows: Panel | None = None
             looks: list[Viewer] = []
             with contextlib.ExitStack() as shown, contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
                 if panel:
                     if isinstance(rest, float):
-                        # One line has one user: the tare first.
+                        # A serial line has one user at a time: the tare first.
                         _tared(pipeline, at_rest, console)
                     shows = shown.enter_context(
                         Panel(pipeline, control=control, folder=folder, host=panel_host, port=panel_port)
@@ -161,7 +157,7 @@ def live(
             last = pipeline if shows is None or shows.live is None else shows.live
             summary = last.stop()
             taken = summary.tare
-            # What was still under way when it was asked to end.
+            # Detections that were made while it was ending.
             _drain(last, console, typer.echo)
     if save_tare is not None and taken is not None:
         taken.save(save_tare)
@@ -183,7 +179,7 @@ def live(
 
 
 def _report(folder: Path, readout: Readout, path: Path, tare: Tare | float | None) -> None:
-    """Write what was heard and said, from the recording."""
+    """Write the report on a recording: its events and its detections."""
     import taxel  # noqa: PLC0415
     from taxel.report import Listened, write_listening  # noqa: PLC0415  pictures load slowly
 
@@ -213,7 +209,7 @@ def _say(summary: Summary, guard_frames: float) -> None:
 
 
 def _unsent(summary: Summary) -> None:
-    """Say what did not reach those to whom it was sent."""
+    """Report lines that did not reach their destination."""
     for one in summary.counters["sent"]:
         if one["lost"]:
             why = one["trouble"] or "read too slowly"
@@ -254,7 +250,7 @@ def _tared(pipeline: Live, at_rest: contextlib.ExitStack, console: Console) -> N
 
 
 def _unheard(tare: Tare) -> None:
-    """Warn where a fresh tare knows few taxels: encoders leave the others out."""
+    """Warn where a fresh tare knows few taxels: encoders ignore the others."""
     known = int(np.count_nonzero(~np.isnan(tare.rest)))
     if 2 * known < tare.array.taxels:
         typer.echo(
@@ -275,8 +271,8 @@ def _watch(
     *,
     fresh: bool,
 ) -> None:
-    """Show what comes and what is said until the time is over; what holds `at_rest` ends with a `fresh` tare."""
-    # Above the display where both go to one terminal; else what was said is the command's output.
+    """Show rates and detections until the time is over; what holds `at_rest` ends with a `fresh` tare."""
+    # Above the display where both go to one terminal; else detections are the command's output.
     above = console.is_terminal and sys.stdout.isatty()
     say: Callable[[str], None] = (lambda line: console.print(Text(line))) if above else typer.echo
     console.print(f"listening on {pipeline.place}; Ctrl-C ends")
@@ -315,19 +311,19 @@ def _watch(
 
 
 def _tell(said: Said, console: Console, say: Callable[[str], None]) -> None:
-    """Say a detection in a line, with how long after `known` it was said; with --json its thread has written it."""
+    """Print a detection, with its delay after `known`; with --json the thread that made it has written it."""
     if not console.quiet:
         say(f"{said.t / 1e6:10.4f} s  {said.label:<16} said {to_ms(said.said - said.known):.2f} ms after it was known")
 
 
 def _drain(pipeline: Live, console: Console, say: Callable[[str], None]) -> None:
-    """Say all detections that wait."""
+    """Print all detections that wait."""
     while (said := pipeline.next(0.0)) is not None:
         _tell(said, console, say)
 
 
 def _state(now: dict[str, Any]) -> Text:
-    """Return what goes on beside what was said: the tare, lines and events that were lost."""
+    """Return the lines below the table: the tare, lines and events that were lost."""
     if now["taring"]:
         return Text("taking a tare: leave the sensor at rest")
     sent = "".join(f"\n{one['lost']} lines lost to {one['to']}" for one in now["sent"] if one["lost"])

@@ -21,11 +21,15 @@ from taxel.cli._array import geometry
 from taxel.cli._board import (
     REDRAW_S,
     ArrayOption,
+    CompressionOption,
     DifferencesOption,
     FromOption,
     HostOption,
+    NameOption,
+    OverwriteOption,
     PortOption,
     PresetOption,
+    SourceOption,
     counters_table,
     exit_code,
     outside,
@@ -33,6 +37,7 @@ from taxel.cli._board import (
 )
 from taxel.cli._noting import noting
 from taxel.live import Live, Summary
+from taxel.live.options import LiveOptions
 
 __all__ = ["record"]
 
@@ -43,25 +48,18 @@ _EMPTY = 3
 @app.command()
 def record(
     file: Annotated[Path, typer.Argument(help="A new file: .mcap keeps all that is known, .lsa raw bytes.")],
-    port: PortOption = 5208,
-    host: HostOption = "0.0.0.0",
+    port: PortOption = LiveOptions.port,
+    host: HostOption = LiveOptions.host,
     array: ArrayOption = None,
     preset: PresetOption = None,
     address: FromOption = None,
     seconds: SecondsOption = None,
     markers: Annotated[bool, typer.Option("--markers", help="End where the board marks a stop.")] = False,
-    compression: Annotated[str, typer.Option(help="Of .mcap: none, lz4 or zstd.")] = "none",
-    name: Annotated[str, typer.Option(help="What the board is called among the recording's sources.")] = "board",
-    source: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=WHAT",
-            help="Record this too: another board (udp:HOST:PORT,array=16x16), lines of numbers as an IMU's "
-            "(serial:PATH@BAUD, pipe:PATH, columns=t_us:ax:ay); may be repeated.",
-        ),
-    ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file that is there.")] = False,
-    differences: DifferencesOption = False,
+    compression: CompressionOption = LiveOptions.compression,
+    name: NameOption = LiveOptions.name,
+    source: SourceOption = None,
+    overwrite: OverwriteOption = LiveOptions.overwrite,
+    differences: DifferencesOption = LiveOptions.differences,
     length: Annotated[
         float | None, typer.Option(min=0.0, help="Automatic mode: record again and again, so long each, s.")
     ] = None,
@@ -135,45 +133,48 @@ def _automatic(
             raise FileExistsError(errno.EEXIST, "exists already", str(name))
         return name
 
-    def say(ended: Summary | None) -> None:
-        """Say how a trial ended; one to which nothing came leaves its number to the next."""
+    def report(ended: Summary | None) -> None:
+        """Print how a trial ended; one to which nothing came leaves its number to the next."""
         nonlocal empty
         if ended is not None and ended.path is not None:
             _say(ended, as_json)
-            codes.append(exit_code(ended, heard.array))
+            codes.append(exit_code(ended, receiver.array))
             empty = 0
         else:
-            typer.echo(f"taxel: {name}: nothing arrived at {heard.place}; not kept", err=True)
+            typer.echo(f"taxel: {name}: nothing arrived at {receiver.place}; not kept", err=True)
             empty += 1
 
     name = following(0)
-    with remote(live["remote"], None, keeps=True) as far, Live(record_later=True, **{**live, "remote": far}) as heard:
-        takes = noting(heard.note, console.print) if _takes_notes(file, live["sources"]) else nullcontext("")
-        with takes as keys:
+    with (
+        remote(live["remote"], None, keeps=True) as far,
+        Live(record_later=True, **{**live, "remote": far}) as receiver,
+    ):
+        notes = noting(receiver.note, console.print) if _takes_notes(file, live["sources"]) else nullcontext("")
+        with notes as keys:
             try:
                 while trials is None or (len(codes) < trials and empty < _EMPTY):
-                    if not heard.records:
+                    if not receiver.records:
                         _count_down(name, countdown, console)
-                        heard.record(name, **how)
-                    _watch(heard, name, length, markers, console, keys, trial=True)
-                    if countdown or len(codes) + 1 == trials or not heard.records:
-                        say(heard.end_recording())
+                        receiver.record(name, **how)
+                    _watch(receiver, name, length, markers, console, keys, trial=True)
+                    if countdown or len(codes) + 1 == trials or not receiver.records:
+                        report(receiver.end_recording())
                         name = following(len(codes)) if trials is None or len(codes) < trials else name
-                    elif heard.record_again():
-                        say(None)
+                    elif receiver.record_again():
+                        report(None)
                     else:
                         try:
                             after = following(len(codes) + 1)
                         except FileExistsError:
-                            say(heard.end_recording())
+                            report(receiver.end_recording())
                             raise
-                        say(heard.record(after, **how))
+                        report(receiver.record(after, **how))
                         name = after
             except KeyboardInterrupt:
                 pass
             gave_up = trials is not None and empty >= _EMPTY
-            if heard.records and ((ended := heard.end_recording()).path is not None or not gave_up):
-                say(ended)
+            if receiver.records and ((ended := receiver.end_recording()).path is not None or not gave_up):
+                report(ended)
     return max([*codes, OUTSIDE if gave_up or not codes else 0])
 
 
@@ -182,7 +183,7 @@ def _count_down(name: Path, seconds: int, console: Console) -> None:
         console.bell()
         console.print(f"{name}: in {left} s")
         time.sleep(1.0)
-    # The manual's last beep is a higher one; a terminal has one bell, so it rings twice.
+    # The manual's last beep is higher; a terminal has one bell, so it rings twice.
     console.bell()
     console.bell()
 
@@ -192,15 +193,15 @@ def _one(
 ) -> tuple[Summary, int]:
     """Record one file until its time is over, the board marks a stop, or Ctrl-C; return how it ended, and a code."""
     with remote(options["remote"], None, keeps=True) as far, Live(record=file, **{**options, "remote": far}) as live:
-        takes = noting(live.note, console.print) if _takes_notes(file, options["sources"]) else nullcontext("")
-        with suppress(KeyboardInterrupt), takes as keys:
+        notes = noting(live.note, console.print) if _takes_notes(file, options["sources"]) else nullcontext("")
+        with suppress(KeyboardInterrupt), notes as keys:
             _watch(live, file, seconds, markers, console, keys, trial=False)
         summary = live.stop()
         return summary, exit_code(summary, live.array)
 
 
 def _takes_notes(file: Path, sources: dict[str, str]) -> bool:
-    """Return whether what is typed is noted: a .lsa holds no notes, a source may have the input for itself."""
+    """Return whether typed lines are notes: a .lsa holds none, and a source may read the input itself."""
     return file.suffix == ".mcap" and not any(what.startswith("pipe:-") for what in sources.values())
 
 
@@ -215,7 +216,7 @@ def _watch(
         before, told = live.counters, False
         began = before["seconds"]
         if trial:
-            # What was marked before is none of its business.
+            # Markers from before belong to an earlier trial.
             live.take_markers()
         while seconds is None or before["seconds"] - began < seconds:
             left = REDRAW_S if seconds is None else min(REDRAW_S, seconds - (before["seconds"] - began))

@@ -17,7 +17,7 @@ from taxel._base.arguments import path as checked_path
 from taxel._base.files import write_whole
 from taxel._core import FormatError, NotFittedError, ProblemError
 from taxel.array import Array
-from taxel.detect.exchange import read_nir, write_nir
+from taxel.detect.exchange import Parts, read_nir, write_nir
 from taxel.detect.trained import TrainedNeuron
 from taxel.detections import Detections
 from taxel.encode import Encoder
@@ -29,6 +29,9 @@ from taxel.recording import Recording
 from taxel.spikes import SpikeTrains, to_us
 from taxel.tare import Tare
 from taxel.wire import FRAME_US
+
+#: Detection goes on for so long after the last event, ms.
+SILENCE_MS = 1000.0
 
 __all__ = ["Learner", "Readout", "ReadoutStream", "run"]
 
@@ -242,7 +245,14 @@ class Readout:
         Input, for each delay a `Delay` (where above 0) and a `Linear`, then `CubaLIF` (alpha kernel: both time
         constants equal) or `LIF` (exponential kernel).
         """
-        return write_nir(self, path, spike_ms=spike_ms, overwrite=overwrite)
+        return write_nir(self._exchanged(), path, spike_ms=spike_ms, overwrite=overwrite)
+
+    def _exchanged(self) -> Parts:
+        """Return the parts that the exchange format is made of."""
+        return Parts(
+            self.encoder, self.neurons, self.array, self.delays_ms, self.run_threshold, self.time, self.after_spike,
+            self.to_json(),
+        )  # fmt: skip
 
     @classmethod
     def from_nir(
@@ -279,7 +289,20 @@ class Readout:
         ProblemError : no encoder is known
         ImportError : nir is not installed (``pip install taxel[nir]``)
         """
-        return read_nir(cls, path, encoder=encoder, neuron=neuron, spike_ms=spike_ms)
+
+        def build(parts: Parts) -> Readout:
+            if parts.text:
+                return cls.from_json(parts.text)
+            return cls(parts.encoder, parts.neurons, array=parts.array, delays_ms=parts.delays_ms)
+
+        return read_nir(
+            path,
+            lambda text: cls.from_json(text)._exchanged(),
+            build,
+            encoder=encoder,
+            neuron=neuron,
+            spike_ms=spike_ms,
+        )
 
     def stream(
         self,
@@ -476,6 +499,7 @@ def _run_spikes(readout: Readout, trains: SpikeTrains) -> Detections:
     """Return what the neurons of a readout detect in the spikes that its encoder made."""
     trains = trains.split_by_sign() if trains.signed else trains
     trains = trains.delayed(readout.delays_ms)
+    trains = SpikeTrains(trains.times, trains.offsets, trains.start, trains.stop + SILENCE_MS)
     found = Detections([], [], [])
     for label, one in readout.neurons.items():
         spikes, slopes = one.neuron._run(one.weights, trains, readout.run_threshold)

@@ -18,7 +18,7 @@ from taxel._core import ProblemError
 from taxel.array import Array
 from taxel.detect import recipes
 from taxel.detect.examples import Example, array_of, checked
-from taxel.detect.readout import Readout
+from taxel.detect.readout import SILENCE_MS, Readout
 from taxel.encode import Encoder
 from taxel.learn import ConeR
 from taxel.neuron import Neuron
@@ -26,9 +26,6 @@ from taxel.spikes import SpikeTrains, to_ms
 
 __all__ = ["Recipe", "train"]
 
-
-#: How long after its last event something may still happen in an example, ms: a readout listens as long.
-SILENCE_MS = 1000.0
 
 #: What a recipe's file says and a recipe does not hold: for which recordings it is, whose parameters other labels take.
 _OF_THE_FILE = ("fits", "other")

@@ -22,9 +22,8 @@ from taxel.information.codes import (
 from taxel.information.estimate import Estimate, ZeroTest, estimate, zero_test
 from taxel.information.fold_sums import FoldSums, fold_predictions
 from taxel.information.folds import folds
-from taxel.information.gram_lda import GramLDA
 from taxel.information.keeping import Verdict, keeps
-from taxel.information.lda import LDA
+from taxel.information.lda import LDA, GramLDA
 from taxel.information.neighbours import NearestNeighbours, distances_of
 from taxel.information.nested import Nested, nested_predictions, training_curve
 from taxel.information.spiking import ConeRReadout, TempotronReadout

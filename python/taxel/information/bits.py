@@ -7,6 +7,7 @@ takes one table or a stack of them, and all trials count alike.
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +25,9 @@ __all__ = [
     "quadratic_extrapolation",
     "relevant_responses",
 ]
+
+#: So many cells one NumPy call works on: Ctrl-C is answered between calls.
+_AT_ONCE = 1 << 20
 
 
 def confusion_matrix(
@@ -160,8 +164,15 @@ def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
     """
     table = _counts(counts)
     rows = table.reshape(-1, table.shape[-1])
+    found = np.empty(len(rows), np.int64)
+    for mine in _blocks(*rows.shape):
+        found[mine] = _relevant(rows[mine])
+    return np.asarray(found.reshape(table.shape[:-1]))
+
+
+def _relevant(rows: NDArray[np.int64]) -> NDArray[np.int64]:
     trials, seen = rows.sum(-1), (rows > 0).sum(-1)
-    found, most = seen.copy(), table.shape[-1]
+    found, most = seen.copy(), rows.shape[-1]
     share = rows / np.maximum(trials, 1)[:, None]
     off = np.abs(seen - _once(share, trials[:, None]).sum(-1))
     rising = np.flatnonzero((seen < most) & (trials > 0))
@@ -178,7 +189,7 @@ def relevant_responses(counts: ArrayLike) -> NDArray[np.int64]:
         nearer = now < off[rising]
         rising = rising[nearer]
         off[rising], found[rising] = now[nearer], seen[rising] + extra
-    return np.asarray(found.reshape(table.shape[:-1]))
+    return np.asarray(found)
 
 
 def panzeri_treves(counts: ArrayLike) -> NDArray[np.float64] | np.float64:
@@ -256,11 +267,11 @@ def quadratic_extrapolation(counts: ArrayLike, *, repetitions: int = 20, seed: i
     means = [float(plug_in(table))]
     for parts in (2, 4):
         ends = np.linspace(0, trials, parts + 1).astype(int)
-        found = []
+        found: list[Any] = []
         for _ in range(rounds):
             dealt = random.permutation(cells)
-            tables = [np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends)]
-            found.append(plug_in(np.reshape(tables, (parts, *table.shape))))
+            tables = (np.bincount(dealt[a:b], minlength=table.size) for a, b in pairwise(ends))
+            found += [plug_in(one.reshape(table.shape)) for one in tables]
         means.append(float(np.mean(found)))
     # Through (1, whole), (2, half), (4, quarter) in units of 1/N: the value at 0.
     at_zero = (8 * means[0] - 6 * means[1] + means[2]) / 3
@@ -285,8 +296,13 @@ def local_information(counts: ArrayLike) -> NDArray[np.float64]:
     table = _table(counts).astype(np.float64)
     total = table.sum((-1, -2), keepdims=True)
     expected = table.sum(-1, keepdims=True) * table.sum(-2, keepdims=True)
-    there = table > 0
-    return np.asarray(np.log2(np.divide(table * total, expected, out=np.ones_like(table), where=there)))
+    found = np.zeros_like(table)
+    flat = [np.broadcast_to(x, table.shape).reshape(-1, table.shape[-1]) for x in (table, total, expected)]
+    for mine in _blocks(*flat[0].shape):
+        here, every, even = (x[mine] for x in flat)
+        ratio = np.divide(here * every, even, out=np.ones_like(here), where=here > 0)
+        found.reshape(-1, table.shape[-1])[mine] = np.log2(ratio)
+    return np.asarray(found)
 
 
 def _once(p: NDArray[np.float64], trials: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -296,9 +312,19 @@ def _once(p: NDArray[np.float64], trials: NDArray[np.int64]) -> NDArray[np.float
 
 
 def _entropy(counts: NDArray[np.int64]) -> NDArray[np.float64]:
-    total = counts.sum(-1, keepdims=True)
-    p = counts / np.maximum(total, 1)
-    return np.asarray(-(p * np.log2(np.where(p > 0, p, 1.0))).sum(-1) + 0.0)
+    rows = counts.reshape(-1, counts.shape[-1])
+    total, found = np.maximum(rows.sum(-1, keepdims=True), 1), np.zeros(len(rows))
+    for mine in _blocks(*rows.shape):
+        for part in _blocks(rows.shape[1], 1):
+            p = rows[mine, part] / total[mine]
+            found[mine] -= (p * np.log2(np.where(p > 0, p, 1.0))).sum(-1)
+    return np.asarray(found.reshape(counts.shape[:-1]) + 0.0)
+
+
+def _blocks(rows: int, columns: int) -> list[slice]:
+    """Return the rows of a table as slices of about `_AT_ONCE` cells."""
+    step = max(1, _AT_ONCE // max(1, columns))
+    return [slice(first, first + step) for first in range(0, rows, step)]
 
 
 def _counts(counts: ArrayLike) -> NDArray[np.int64]:

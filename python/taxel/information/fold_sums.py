@@ -13,7 +13,8 @@ from taxel._base.arguments import callback, instance, numbers, text, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import labelled
 from taxel.information._labels import words
-from taxel.information.lda import LDA, ClassMoments, blocks, feature_table, is_exact
+from taxel.information.lda import LDA
+from taxel.information.primal import ClassMoments, blocks, feature_table, is_exact
 
 __all__ = ["FoldSums", "fold_predictions"]
 

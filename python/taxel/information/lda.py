@@ -1,129 +1,20 @@
-"""Linear discriminant analysis, exact, from sums over the trials; its folds cost next to nothing."""
+"""Linear discriminant analysis: of features (`LDA`), or of the trials' inner products (`GramLDA`)."""
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from taxel._base.arguments import number, numbers, shown, text
+from taxel._base.arguments import number, numbers, shown, text, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
-from taxel.information.gram_lda import GramLDA
+from taxel.information.dual import Regression, gram_matrix, solved_without_ridge
+from taxel.information.primal import ClassMoments, blocks, feature_table, solved
 
-__all__ = ["LDA", "ClassMoments", "blocks", "feature_table", "is_exact"]
-
-#: Rows that are turned into floats at a time.
-_ROWS = 2048
-#: Whole numbers up to this size are exact in float32.
-_EXACT = 2**24
-#: Below this share of its variance that is its own, a feature is told by the others: scatter counts as singular.
-_SINGULAR = 1e-10
-#: Above it all others that are kept must lie, or eigenvectors decide what is told.
-_CLEAR = 1e-6
-
-
-class ClassMoments:
-    """Hold counts, sums and the scatter of trials by class: all that a linear discriminant asks for.
-
-    Moments add and subtract, so those of a training set are the whole less the fold that is tested.
-
-    Parameters
-    ----------
-    classes, features : int
-    dtype : {numpy.float32, numpy.float64}
-        Of the scatter. float32 is exact where values are whole numbers and trials times the largest square stay below
-        2^24, as with spikes of -1, 0 and 1.
-
-    Attributes
-    ----------
-    counts : int64, shape (classes,)
-    sums : float64, shape (classes, features)
-    scatter : shape (features * (features + 1) / 2,)
-        The lower triangle of the sum of x x', in LAPACK's rectangular full packed form.
-    """
-
-    def __init__(self, classes: int, features: int, dtype: type[Any] = np.float64) -> None:
-        self.counts = np.zeros(classes, np.int64)
-        self.sums = np.zeros((classes, features))
-        self.scatter = np.zeros(features * (features + 1) // 2, dtype)
-
-    @classmethod
-    def of(
-        cls,
-        x: NDArray[Any],
-        y: NDArray[np.int64],
-        classes: int,
-        *,
-        rows: NDArray[np.int64] | None = None,
-        dtype: type[Any] = np.float64,
-        shift: NDArray[np.float64] | None = None,
-    ) -> ClassMoments:
-        """Sum up trials.
-
-        Parameters
-        ----------
-        x : shape (trials, features)
-            Any numbers; may be a memory map, which is read by blocks of rows.
-        y : int64, shape (trials,)
-            The number of each trial's class.
-        classes : int
-        rows : int64, optional
-            Which trials; all where it is left out.
-        dtype : {numpy.float32, numpy.float64}
-        shift : float64, shape (features,), optional
-            Taken off every trial, so that values far from 0 keep their digits.
-        """
-        from scipy.linalg import blas, lapack  # noqa: PLC0415  loads slowly
-
-        moments = cls(classes, x.shape[1], dtype)
-        product, pack = (blas.ssyrk, lapack.strttf) if dtype == np.float32 else (blas.dsyrk, lapack.dtrttf)
-        square = np.zeros((x.shape[1], x.shape[1]), dtype, order="F")
-        for block, mine in blocks(x, rows, dtype, shift):
-            square = product(1.0, block.T, beta=1.0, c=square, lower=1, overwrite_c=1)
-            label = y[mine]
-            moments.counts += np.bincount(label, minlength=classes)
-            which = np.zeros((classes, len(label)), dtype)
-            which[label, np.arange(len(label))] = 1
-            moments.sums += which @ block
-        moments.scatter = pack(square, uplo="L")[0]
-        return moments
-
-    def __add__(self, other: ClassMoments) -> ClassMoments:
-        return self._joined(other, np.add)
-
-    def __sub__(self, other: ClassMoments) -> ClassMoments:
-        return self._joined(other, np.subtract)
-
-    def merged(self, into: NDArray[np.int64], classes: int) -> ClassMoments:
-        """Return the sums of coarser classes: class k goes into class ``into[k]``. The scatter is shared."""
-        merged = ClassMoments.__new__(ClassMoments)
-        merged.counts, merged.sums = np.zeros(classes, np.int64), np.zeros((classes, self.sums.shape[1]))
-        np.add.at(merged.counts, into, self.counts)
-        np.add.at(merged.sums, into, self.sums)
-        merged.scatter = self.scatter
-        return merged
-
-    def first(self, features: int) -> ClassMoments:
-        """Return the sums of the first so many features."""
-        from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
-
-        single = self.scatter.dtype == np.float32
-        unpack, pack = (lapack.stfttr, lapack.strttf) if single else (lapack.dtfttr, lapack.dtrttf)
-        square = unpack(self.sums.shape[1], self.scatter, uplo="L")[0]
-        part = ClassMoments.__new__(ClassMoments)
-        part.counts, part.sums = self.counts, self.sums[:, :features]
-        part.scatter = pack(np.asfortranarray(square[:features, :features]), uplo="L")[0]
-        return part
-
-    def _joined(self, other: ClassMoments, how: Callable[..., Any]) -> ClassMoments:
-        joined = ClassMoments.__new__(ClassMoments)
-        for name in ("counts", "sums", "scatter"):
-            setattr(joined, name, how(getattr(self, name), getattr(other, name)))
-        return joined
+__all__ = ["LDA", "GramLDA"]
 
 
 class LDA(Classifier):
@@ -217,49 +108,15 @@ class LDA(Classifier):
 
     def from_moments(self, moments: ClassMoments, shift: NDArray[np.float64] | None = None) -> Self:
         """Learn from sums over trials from which `shift` was taken off; `classes_` is the caller's to set."""
-        from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
-
-        there = moments.counts > 0
-        counts = moments.counts[there]
-        trials = int(counts.sum())
-        if len(counts) < 2 or trials <= len(counts):
-            raise ProblemError(
-                f"{trials} trials of {len(counts)} classes: must be of two classes, and more than classes"
-            )
-        means, centre = moments.sums[there] / counts[:, None], moments.sums.sum(0) / trials
-        within, squares = _within(moments)
-        # What rounding alone leaves of a feature's sum of squares is no variance.
-        rounding = 1e-13 * squares
-        varying = squares - trials * centre**2 > rounding
-        if not varying.any():
-            raise ProblemError("x: no feature varies")
-        variance = np.where(within.diagonal() > rounding, within.diagonal(), 0.0)
-        variance += _ridge(self.ridge) * variance[varying].mean()
-        # A feature that varies between classes alone cannot be weighed: left out, as scikit-learn's svd does.
-        weighed = varying & (variance > 0)
-        scale = np.divide(1.0, np.sqrt(variance), out=np.zeros_like(variance), where=weighed)
-        right = np.asfortranarray(((means - centre) * scale).T)
-        factor, fault = lapack.dpotrf(_scaled(within, scale), lower=1, clean=0, overwrite_a=1)
-        self.rank_ = int(weighed.sum())
-        if fault == 0 and factor.diagonal().min() ** 2 > _SINGULAR:
-            solved = lapack.dpotrs(factor, right, lower=1)[0]
-        else:
-            # The factor has taken the matrix' place: it is made again.
-            del factor, within
-            solved, self.rank_ = _where_classes_vary(_scaled(_within(moments)[0], scale), weighed, right)
+        found = solved(moments, _ridge(self.ridge), self.priors, shift)
+        self.coef_, self.intercept_, self.rank_ = found[:3]
+        if found.rank < found.weighed:
             warnings.warn(
-                f"LDA: features tell each other within classes, so {self.rank_} of {int(weighed.sum())} directions are "
-                f"weighed",
+                f"LDA: features tell each other within classes, so {found.rank} of {found.weighed} directions are "
+                "weighed",
                 UserWarning,
                 stacklevel=3,
             )
-        weights = solved.T * scale * trials
-        prior = counts / trials if self.priors == "training" else np.full(len(counts), 1 / len(counts))
-        self.coef_ = np.zeros((len(there), weights.shape[1]))
-        self.intercept_ = np.full(len(there), -np.inf)
-        self.coef_[there] = weights
-        off = centre if shift is None else centre + shift
-        self.intercept_[there] = -(weights * (means - centre)).sum(1) / 2 - weights @ off + np.log(prior)
         return self
 
     def decision_function(self, x: ArrayLike) -> NDArray[np.float64]:
@@ -284,116 +141,114 @@ class LDA(Classifier):
         return np.asarray(self.classes_[scores.argmax(1)])
 
 
-def _within(moments: ClassMoments) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the scatter within classes (lower triangle), and the sum of squares of each feature."""
-    from scipy.linalg import blas, lapack  # noqa: PLC0415  loads slowly
+class GramLDA(Classifier):
+    """Classify by the `LDA` of features that are known by their inner products only.
 
-    square = lapack.dtfttr(moments.sums.shape[1], moments.scatter.astype(np.float64), uplo="L")[0]
-    squares = square.diagonal().copy()
-    there = moments.counts > 0
-    rooted = np.asfortranarray((moments.sums[there] / np.sqrt(moments.counts[there, None])).T)
-    return blas.dsyrk(-1.0, rooted, beta=1.0, c=square, lower=1, overwrite_c=1), squares
+    Parameters
+    ----------
+    features : int, 1 or more
+        How many features vary: the mean variance is reckoned over them.
+    ridge : float, 0 or more
+        As in `LDA`, and the same discriminants. 0 leaves out the directions in which no class varies.
+    priors : {"training", "equal"}
 
+    Attributes
+    ----------
+    classes_ : shape (classes,)
+    dual_ : float64, shape (trials, classes)
+        Weights of the training trials.
+    intercept_ : float64, shape (classes,)
+    rank_ : int
 
-def _scaled(square: NDArray[np.float64], scale: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Scale a lower triangle in place to a diagonal of 1; features of scale 0 stand alone."""
-    for j, factor in enumerate(scale):
-        square[j + 1 :, j] *= scale[j + 1 :] * factor
-    np.fill_diagonal(square, 1.0)
-    return square
+    Raises
+    ------
+    ProblemError : a parameter that makes no sense
 
+    Notes
+    -----
+    With a ridge: regression on the classes by the centred Gram matrix, and a correction of classes by classes that
+    makes it the discriminant (Hastie, Tibshirani and Buja 1994, J. Am. Stat. Assoc. 89:1255).
 
-def _where_classes_vary(
-    square: NDArray[np.float64], weighed: NDArray[np.bool_], right: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], int]:
-    """Solve by the pseudo-inverse of a singular scatter (lower triangle), and return in how many directions.
-
-    Spikes of an array tell each other exactly: one factor with pivots finds which (a tenth of an eigendecomposition's
-    time). Where what is told is not parted clearly from what is not, eigenvectors decide.
+    Examples
+    --------
+    >>> x = np.random.default_rng(1).normal(size=(20, 400)) + np.repeat([0, 1], 10)[:, None]
+    >>> lda = GramLDA(features=400, ridge=1.0).fit(x[::2] @ x[::2].T, np.repeat([0, 1], 5))
+    >>> lda.predict(x[1::2] @ x[::2].T)
+    array([0, 0, 0, 0, 0, 1, 1, 1, 1, 1])
     """
-    where = np.flatnonzero(weighed)
-    square = np.asfortranarray(square[np.ix_(where, where)])
-    found = _by_pivots(square, right[where])
-    values, rank = _by_eigenvectors(square, right[where]) if found is None else found
-    solved = np.zeros_like(right)
-    solved[where] = values
-    return solved, rank
 
+    _pairwise = True
+    dual_: NDArray[np.float64]
+    intercept_: NDArray[np.float64]
+    rank_: int
 
-def _by_pivots(square: NDArray[np.float64], right: NDArray[np.float64]) -> tuple[NDArray[np.float64], int] | None:
-    """Solve by a Cholesky factor with pivots and the null space that it tells; None where the rank is not clear.
+    def __init__(self, *, features: int, ridge: float = 1.0, priors: str = "training") -> None:
+        self.features = features
+        self.ridge = ridge
+        self.priors = priors
+        super().__init__()
 
-    With features in the order of pivots the factor is [L1; L2], and the columns of [-inv(L1') L2'; 1] span the
-    directions in which no class varies. What lies in these is taken off the right side and off a solution.
-    """
-    from scipy.linalg import blas, lapack  # noqa: PLC0415  loads slowly
+    def _check(self) -> None:
+        whole("features", self.features, 1)
+        _ridge(self.ridge)
+        text("priors", self.priors, ("training", "equal"))
 
-    factor, pivots, rank, _ = lapack.dpstrf(square, tol=_SINGULAR, lower=1)
-    if rank == len(square) or factor[rank - 1, rank - 1] ** 2 < _CLEAR:
-        return None
-    order = pivots - 1
-    upper = np.asfortranarray(factor[:rank, :rank])
-    told = -blas.dtrsm(1.0, upper, np.asfortranarray(factor[rank:, :rank].T), lower=1, trans_a=1)
-    gram, fault = lapack.dpotrf(np.eye(told.shape[1]) + told.T @ told, lower=1)
-    if fault != 0:
-        return None
+    def fit(self, gram: ArrayLike, y: ArrayLike) -> Self:
+        """Learn from inner products.
 
-    def without_told(values: NDArray[np.float64]) -> NDArray[np.float64]:
-        along = lapack.dpotrs(gram, told.T @ values[:rank] + values[rank:], lower=1)[0]
-        return np.concatenate((values[:rank] - told @ along, values[rank:] - along))
+        Parameters
+        ----------
+        gram : shape (trials, trials)
+            Inner products of the training trials.
+        y : shape (trials,)
 
-    basic = np.zeros_like(right)
-    basic[:rank] = lapack.dpotrs(upper, without_told(right[order])[:rank], lower=1)[0]
-    solved = np.empty_like(right)
-    solved[order] = without_told(basic)
-    return solved, int(rank)
+        Raises
+        ------
+        ProblemError : a matrix that is not square, or labels that make no sense
+        """
+        square = gram_matrix(gram)
+        self.classes_, row = labelled(y, len(square))
+        trials, classes = len(square), len(self.classes_)
+        if trials <= classes:
+            raise ProblemError(f"{trials} trials of {classes} classes: must be more trials than classes")
+        which = np.zeros((trials, classes))
+        which[np.arange(trials), row] = 1.0
+        counts = which.sum(0)
+        prior = counts / trials if self.priors == "training" else np.full(classes, 1 / classes)
+        spread = float(np.trace(square) - ((which / counts) * (square @ which)).sum())
+        if self.ridge > 0 and spread > 0:
+            weights, offset = Regression(square, which, self.ridge * spread / self.features).discriminants()
+            self.rank_ = trials - classes
+        else:
+            weights, offset, self.rank_ = solved_without_ridge(square, which)
+        # Weights of a class sum up to 0, so that only inner products with the mean's place taken off count.
+        self.dual_ = weights - weights.mean(0)
+        self.intercept_ = offset + np.log(prior)
+        if self.ridge > 0 and spread > 0:
+            self.intercept_ -= square.mean(0) @ self.dual_
+        return self
 
+    def decision_function(self, gram: ArrayLike) -> NDArray[np.float64]:
+        """Return each class' discriminant, shape (trials, classes).
 
-def _by_eigenvectors(square: NDArray[np.float64], right: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
-    """Solve by the directions in which classes vary at all, to a relative cut of 1e-10."""
-    from scipy.linalg import eigh  # noqa: PLC0415  loads slowly
+        Parameters
+        ----------
+        gram : shape (trials, training trials)
+            Inner products with the training trials.
 
-    values, vectors = eigh(square, lower=True)
-    kept = values > _SINGULAR * values[-1]
-    vectors = vectors[:, kept]
-    return vectors @ ((vectors.T @ right) / values[kept, None]), int(kept.sum())
+        Raises
+        ------
+        ProblemError : not fitted, or another number of training trials
+        """
+        weights = self._fitted("dual_")
+        across = numbers("gram", gram, np.float64)
+        if across.ndim != 2 or across.shape[1] != len(weights):
+            raise ProblemError(f"gram has shape {across.shape}: must be (trials, {len(weights)})")
+        return np.asarray(across @ weights + self.intercept_)
 
-
-def is_exact(table: NDArray[Any]) -> bool:
-    """Return whether sums of products of these trials are exact in float32."""
-    if table.dtype.kind not in "biu":
-        return False
-    largest = max(
-        max(abs(int(part.min())), abs(int(part.max())))
-        for part in (table[k : k + _ROWS] for k in range(0, len(table), _ROWS))
-    )
-    return largest**2 * len(table) <= _EXACT
-
-
-def blocks(
-    table: NDArray[Any], rows: NDArray[np.int64] | None, dtype: type[Any], shift: NDArray[np.float64] | None
-) -> Iterator[tuple[NDArray[Any], NDArray[np.int64]]]:
-    """Give trials as floats, some at a time, with their numbers."""
-    every = np.arange(len(table)) if rows is None else rows
-    for first in range(0, len(every), _ROWS):
-        mine = every[first : first + _ROWS]
-        run = len(mine) and mine[-1] - mine[0] + 1 == len(mine)
-        part = table[mine[0] : mine[-1] + 1] if run else table[mine]
-        block = np.ascontiguousarray(part, dtype)
-        yield (block if shift is None else block - shift), mine
-
-
-def feature_table(x: ArrayLike) -> NDArray[Any]:
-    """Return trials by features; raise `ProblemError` for what is no such table."""
-    table = x if isinstance(x, np.ndarray) and x.dtype.kind in "biuf" else numbers("x", x, np.float64)
-    if table.ndim != 2 or 0 in table.shape:
-        raise ProblemError(f"x has shape {table.shape}: must be (trials, features)")
-    if table.dtype.kind == "f":
-        for first in range(0, len(table), _ROWS):
-            wrong = np.argwhere(~np.isfinite(table[first : first + _ROWS]))
-            if len(wrong):
-                raise ProblemError(f"x[{first + wrong[0][0]}, {wrong[0][1]}] is not finite")
-    return table
+    def predict(self, gram: ArrayLike) -> NDArray[Any]:
+        """Return the class of the largest discriminant, trial by trial."""
+        return np.asarray(self.classes_[self.decision_function(gram).argmax(1)])
 
 
 def _ridge(ridge: object) -> float:

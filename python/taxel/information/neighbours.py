@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from taxel._base.arguments import numbers, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import Classifier, labelled
-from taxel.information.gram_lda import gram_matrix
-from taxel.information.nested import majority
+from taxel.information.dual import gram_matrix
 
-__all__ = ["NearestNeighbours", "distances_of"]
+__all__ = ["NearestNeighbours", "distances_of", "majority", "squared_distances"]
 
 
 class NearestNeighbours(Classifier):
@@ -112,6 +111,21 @@ def distances_of(gram: ArrayLike) -> NDArray[np.float64]:
     >>> distances_of([[1.0, 0.0], [0.0, 1.0]]).round(3).tolist()
     [[0.0, 1.414], [1.414, 0.0]]
     """
-    square = gram_matrix(gram)
+    return np.asarray(np.sqrt(np.maximum(squared_distances(gram_matrix(gram)), 0.0)))
+
+
+def squared_distances(square: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the squares of the distances that inner products tell, down to their rounding."""
     length = np.diag(square)
-    return np.asarray(np.sqrt(np.maximum(length + length[:, None] - 2 * square, 0.0)))
+    return np.asarray(length + length[:, None] - 2 * square)
+
+
+def majority(near: NDArray[np.int64], classes: int) -> NDArray[np.int64]:
+    """Return the most frequent class of each row; of equals that whose members come first."""
+    votes = np.zeros((len(near), classes))
+    rows = np.repeat(np.arange(len(near)), near.shape[1])
+    np.add.at(votes, (rows, near.ravel()), 1.0)
+    # A vote more weighs more than all places together.
+    place = np.tile(np.linspace(0, 1, near.shape[1]) / (near.shape[1] + 1), len(near))
+    np.add.at(votes, (rows, near.ravel()), -place / near.shape[1])
+    return np.asarray(votes.argmax(1))

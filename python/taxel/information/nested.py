@@ -12,15 +12,14 @@ from taxel._base.arguments import instance, numbers, several, shown, whole
 from taxel._core import ProblemError
 from taxel.information._estimator import labelled
 from taxel.information._labels import belonging
+from taxel.information.dual import Regression, gram_matrix, left_out
 from taxel.information.folds import folds as dealt
-from taxel.information.gram_lda import discriminant, gram_matrix
+from taxel.information.neighbours import majority, squared_distances
 
-__all__ = ["RIDGES", "Nested", "majority", "nested_predictions", "training_curve"]
+__all__ = ["RIDGES", "Nested", "nested_predictions", "training_curve"]
 
 #: Ridges that are tried, in units of the mean variance.
 RIDGES = (10.0, 1.0, 0.1)
-#: Of what the regression says, and of discriminants.
-_DIGITS = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,51 +213,23 @@ class _Discriminants(_Ways):
         classes: int,
         ridges: NDArray[np.float64],
     ) -> None:
-        from scipy.linalg import lapack  # noqa: PLC0415  loads slowly
-
-        trials = len(row)
-        self.which = np.zeros((trials, classes))
-        self.which[np.arange(trials), row] = 1.0
+        which = np.zeros((len(row), classes))
+        which[np.arange(len(row)), row] = 1.0
         self.ridges = ridges
-        self.residual = []
+        self.regressions = []
         for square, size in zip(squares, features, strict=True):
-            mean = square.mean(0)
-            centred = square - mean - mean[:, None] + mean.mean()
+            spread = float(np.trace(square) - square.mean(0).sum())
             # Where all trials are alike only rounding is left, and must not be taken for what varies.
-            unit = max(float(np.trace(centred)) / size, 1e-9 * float(np.trace(square)) / trials, 1e-300)
-            for ridge in ridges:
-                level = ridge * unit
-                factor, fault = lapack.dpotrf(centred / level + np.eye(trials), lower=1, clean=1)
-                if fault:
-                    raise ProblemError(
-                        "grams: a matrix has a direction of negative length, so it is of no inner product"
-                    )
-                inverse = lapack.dpotri(factor, lower=1, overwrite_c=1)[0]
-                # The regression with an intercept leaves this of the classes; the small solves undo leaving out.
-                self.residual.append(inverse + np.tril(inverse, -1).T - 1 / trials)
-        self.left = [one @ self.which for one in self.residual]
-        self.sums = [self.which.T @ one for one in self.left]
-        self.count = len(self.residual)
+            unit = max(spread / size, 1e-9 * float(np.trace(square)) / len(row), 1e-300)
+            self.regressions += [Regression(square, which, ridge * unit) for ridge in ridges]
+        self.count = len(self.regressions)
 
     def way(self, number: int) -> tuple[int, float]:
         return number // len(self.ridges), float(self.ridges[number % len(self.ridges)])
 
     def named(self, test: NDArray[np.int64], held: NDArray[np.int64], only: int | None = None) -> NDArray[np.int64]:
-        out = np.concatenate([test, held])
-        ways = range(self.count) if only is None else [only]
-        mine = np.ix_(out, out)
-        left = np.stack([self.left[k][out] for k in ways])
-        off = np.linalg.solve(np.stack([self.residual[k][mine] for k in ways]), left)
-        counts = self.which.sum(0) - self.which[out].sum(0)
-        share = counts / counts.sum()
-        # What the regression on the others says of them, summed by class, less the classes' shares.
-        sums = np.diag(counts) - np.stack([self.sums[k] for k in ways]) + np.swapaxes(left, 1, 2) @ off
-        turn, offset = discriminant(sums - counts[:, None] * share, np.broadcast_to(counts, (len(off), len(counts))))
-        # Rounding knows the trial's own label, and would name trials in which nothing varies: ties are to be ties.
-        told = np.round(self.which[out] - off - share, _DIGITS)
-        with np.errstate(divide="ignore"):
-            scores = told @ turn + (offset + np.log(share))[:, None, :]
-        return np.asarray(np.round(scores, _DIGITS).argmax(-1))
+        ways = self.regressions if only is None else [self.regressions[only]]
+        return left_out(ways, np.concatenate([test, held]))
 
 
 class _Neighbours(_Ways):
@@ -266,10 +237,7 @@ class _Neighbours(_Ways):
         self, squares: list[NDArray[np.float64]], row: NDArray[np.int64], classes: int, nearest: list[int]
     ) -> None:
         self.row, self.classes, self.nearest = row, classes, nearest
-        self.order = []
-        for square in squares:
-            length = np.diag(square)
-            self.order.append(np.argsort(length + length[:, None] - 2 * square, axis=1, kind="stable"))
+        self.order = [np.argsort(squared_distances(one), axis=1, kind="stable") for one in squares]
         self.count = len(squares) * len(nearest)
 
     def way(self, number: int) -> tuple[int, float]:
@@ -286,14 +254,3 @@ class _Neighbours(_Ways):
             near = order[kept[order]].reshape(len(out), -1)[:, : self.nearest[number % len(self.nearest)]]
             found[k] = majority(self.row[near], self.classes)
         return found
-
-
-def majority(near: NDArray[np.int64], classes: int) -> NDArray[np.int64]:
-    """Return the most frequent class of each row; of equals that whose members come first."""
-    votes = np.zeros((len(near), classes))
-    rows = np.repeat(np.arange(len(near)), near.shape[1])
-    np.add.at(votes, (rows, near.ravel()), 1.0)
-    # A vote more weighs more than all places together.
-    place = np.tile(np.linspace(0, 1, near.shape[1]) / (near.shape[1] + 1), len(near))
-    np.add.at(votes, (rows, near.ravel()), -place / near.shape[1])
-    return np.asarray(votes.argmax(1))

@@ -25,7 +25,7 @@ from taxel.labels import Labels, write_labels
 from taxel.recording import open_recording
 from taxel.recording.convert import convert
 from taxel.recording.health import Told, judged
-from taxel.recording.parts import cut
+from taxel.recording.cut import cut
 from taxel.wire import Command
 
 __all__ = ["RequestHandler", "own_addresses", "presets_path"]

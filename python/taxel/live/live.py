@@ -23,7 +23,7 @@ from taxel.live.lsl import LslInlet, LslOutlet
 from taxel.live.options import LiveOptions, takes
 from taxel.live.said import Said
 from taxel.live.summary import Summary, summary_of
-from taxel.recording.remarks import Zeroing
+from taxel.recording.notes import Zeroing
 from taxel.tare import Tare
 
 __all__ = ["Live"]
@@ -57,48 +57,49 @@ class Live:
         The sensor; by default the remote board's or the readout's own, or the thesis' 64 x 64.
     registers : str or taxel.wire.Registers
         What the board's registers hold: themselves, or a preset's name, "5.2 kHz", "2 kHz" or "20.8 kHz", of
-        which a smaller array drives fewer lines. Left out: as a board of this array is at reset, up to 64 x 64 at
-        5.2 kHz; a remote board says what they hold.
+        which a smaller array drives fewer lines. Left out: those of a board of this array at reset, up to 64 x 64 at
+        5.2 kHz; a remote board reports its own.
     differences : bool
         Whether the board sends differences for intensities (the panel's "delta intensity").
     readout : Readout, optional
-        What listens. Left out, nothing is detected.
+        Reads the events out. Left out, nothing is detected.
     tare : Tare or float (s), optional
         For a readout whose encoder needs one: a tare, or how long to take a fresh one from the first event on, which
         ends early where the board marks a start. The board must be at rest then, with its noise floor at 0.
     record : path, optional
         A new file: `.mcap` keeps all that is known, `.lsa` the manual's raw bytes.
     record_later : bool
-        Whether recordings are begun and ended while all is heard (`record`, `end_recording`); then none is begun here,
-        and `sources` are kept where one runs.
+        Whether recordings begin and end while it runs (`record`, `end_recording`); then none begins here, and `sources`
+        are recorded while one runs.
     name : str
-        What the board is called in the recording.
+        The board's name in the recording.
     sources : mapping of str to str, optional
-        What else the recording (`.mcap`) holds, by name, each with its own clock:
+        The other sources of the recording (`.mcap`), by name, each with its own clock:
         "udp:HOST:PORT,array=16x16,preset=2 kHz" another board, which sends to that address of this machine;
         "serial:PATH@BAUD" or "pipe:PATH" lines of numbers, as an IMU's ("-" is the standard input); "given" numbers
-        that a program gives (`sample`). Of numbers ``columns=t_us:ax:ay`` says what a line holds (else its first line
-        is waited for), and ``time=NAME:UNIT`` which column is its clock, where not one called `t_us`,
-        `time_ms` ... is; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, a line's time is when it
+        that a program gives (`sample`). Of numbers ``columns=t_us:ax:ay`` names the columns of a line (else the first
+        line is waited for), and ``time=NAME:UNIT`` the column that is its clock, where that is not one called `t_us`,
+        `time_ms` ...; "lsl:NAME" is a stream of the lab streaming layer. Without a clock, a line's time is when it
         came.
     compression : {"none", "lz4", "zstd"}
         Of `.mcap`.
     overwrite : bool
         Whether an existing file may be replaced.
     guard_frames : float, 0 or more
-        In silence the readout's time moves on by the host's clock, so many frames behind it.
+        In silence the readout's time moves on by the host's clock, this many frames behind it.
     gap_frames : float, 0 or more
         At a gap in the sequence of wire version 2 time waits so many frames for what may only be late.
     say : callable, optional
-        Called with each `Said` in the thread that made it, one at a time; what it raises ends the way and is raised by
-        `next`. Where it takes longer than 2 ms another thread goes on receiving; up to 16 384 detections wait for it.
+        Called with each `Said` in the thread that made it, one at a time; what it raises ends everything and is
+        raised by `next`. It must not call `stop`. Where it takes longer than 2 ms another thread goes on receiving; up
+        to 16 384 detections wait for it.
     lines : bool
         Write each detection to the standard output as one line of JSON, from the thread that made it.
     send : str or sequence of str
-        Send each detection as such a line to "udp:HOST:PORT" (a datagram a line), "pipe:PATH" (a named pipe that is
-        there) or "serial:PATH@BAUD", from the thread that made it; "lsl:NAME" says its label in a stream of markers of
-        the lab streaming layer. Up to 1024 lines wait for who reads slowly; what
-        finds no room, or nobody who reads, is lost and counted, and nothing waits for it.
+        Send each detection as such a line to "udp:HOST:PORT" (a datagram a line), "pipe:PATH" (a named pipe that
+        exists) or "serial:PATH@BAUD", from the thread that made it; "lsl:NAME" sends its label in a stream of markers
+        of the lab streaming layer. Up to 1024 lines wait for a slow reader; lines that find no room, or no reader, are
+        lost and counted, and nothing waits for them.
     kernel_buffer_bytes, queue_bytes, readout_events : int, optional
         How much may wait in the kernel, before the decoder and before the readout.
     gro : bool, optional
@@ -106,14 +107,14 @@ class Live:
 
     Raises
     ------
-    OSError : the port is taken, the file cannot be created
+    OSError : the port is taken; the file cannot be created, or is being recorded by another program
     FileExistsError : the file is there already and `overwrite` is false
     ProblemError : arguments that make no sense; a readout that needs a tare and has none
     DeviceError : registers that break a rule
 
     Notes
     -----
-    `t` and `known` of a detection are the same here and from the recording; `said` is when it was said in fact. The
+    `t` and `known` of a detection are the same here and from the recording; `said` is when it was output in fact. The
     clocks' offset and drift are estimated from arrivals: nothing comes early, so the lower envelope of arrival less
     board time is the offset.
 
@@ -133,11 +134,11 @@ class Live:
         options = options.completed()
         remote, readout, tare, say = options.remote, options.readout, options.tare, options.say
         self.array = Array._of(options.array)
-        #: With what it can begin again on another address.
+        #: To begin another one on another address.
         self._options = replace(options, array=self.array)
-        goes, heard_of = options.destinations(), options.named_sources()
-        outlets = [LslOutlet(to.removeprefix(_LSL)) for to in goes if to.startswith(_LSL)]
-        inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in heard_of if how.startswith(_LSL)}
+        destinations, sources = options.destinations(), options.named_sources()
+        outlets = [LslOutlet(to.removeprefix(_LSL)) for to in destinations if to.startswith(_LSL)]
+        inlets = {what: LslInlet(how.removeprefix(_LSL)) for what, how in sources if how.startswith(_LSL)}
         self._inlets = list(inlets.values())
         self._labels = None if readout is None else list(json.loads(readout.to_json())["neurons"])
         receivers: list[Callable[[Said], object]] = [*outlets, *([] if say is None else [say])]
@@ -149,8 +150,8 @@ class Live:
             self.array._parts(),
             parameters(
                 options.for_rust(
-                    send=[to for to in goes if not to.startswith(_LSL)],
-                    sources=[(what, _given(inlets[what]) if what in inlets else how) for what, how in heard_of],
+                    send=[to for to in destinations if not to.startswith(_LSL)],
+                    sources=[(what, _given(inlets[what]) if what in inlets else how) for what, how in sources],
                 )
             ),
             options.recording(),
@@ -174,14 +175,14 @@ class Live:
 
     @property
     def address(self) -> tuple[str, int]:
-        """Host and port that it listens on.
+        """Host and port that it receives on.
 
         Raises
         ------
         ProblemError : the board is another computer's
         """
         if self._remote is not None:
-            raise ProblemError(f"live: hears {self.place}, and listens on no address of this computer")
+            raise ProblemError(f"live: receives from {self.place}, and on no address of this computer")
         return self._core.address()
 
     @property
@@ -212,7 +213,7 @@ class Live:
 
     @property
     def counters(self) -> dict[str, Any]:
-        """What came, what became of it and what was lost where, up to now.
+        """Counts of what came, what became of it and what was lost where, up to now.
 
         Keys: `capture` (messages, datagrams, bytes, dropped_by_kernel, dropped_by_queue, waiting, ...), `decoded`
         (datagrams), `wire` (bytes, words, skipped, changes, ... by cause), `wire_version`, `wire_v2` (as
@@ -220,8 +221,8 @@ class Live:
         `wire_late` (events of version 2 that came when time had gone on without them), `bridged` (None, or of a board
         of another computer: parcels, missing, dropped, dropped_by_kernel, repeated, refused, restarts, silences, heard,
         ended, and clock: here_ns, ahead_ns, drift_ppm, within_ns), `events`, `read_out`, `events_dropped`,
-        `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those said in a silence
-        that was none, because events came later than the guard), `detections_dropped`, `sources` (what came of
+        `late` (events out of order, or more than 0.1 s after a silence), `detections`, `wrong` (those output in a
+        silence that an event then interrupted, later than the guard), `detections_dropped`, `sources` (the counts of
         each other source), `sent` (of each destination: to,
         sent, lost, waiting, trouble), `decode_latency` and
         `said_latency` (count, p50_us, p99_us, max_us; None where nothing was measured), `offset` (board_us, host_ns,
@@ -238,7 +239,7 @@ class Live:
 
     @property
     def picture(self) -> NDArray[np.uint16]:
-        """What the taxels hold, ticks, shape (rows, columns), ten times a second; 0 until a taxel was heard of."""
+        """Values that the taxels hold, ticks, shape (rows, columns), ten times a second; 0 without any event so far."""
         return self._core.picture().reshape(self.array.shape)
 
     @property
@@ -250,11 +251,11 @@ class Live:
         return None if taken is None else Tare.from_json(taken)
 
     def take_markers(self) -> list[tuple[int, bool]]:
-        """Return the markers that came since this was asked last: (t us, start)."""
+        """Return the markers that came since the last call: (t us, start)."""
         return self._core.take_markers()
 
     def expect_version(self, version: int) -> None:
-        """Say that the board was told to speak this version of the wire: it is believed at once, not after a second.
+        """Announce that the board was told to speak this version of the wire: decoded at once, not after a second.
 
         Raises
         ------
@@ -263,7 +264,7 @@ class Live:
         self._core.expect_version(whole("version", version, 1, 2))
 
     def source_address(self, name: str) -> tuple[str, int]:
-        """Return host and port that another board of the recording is listened to on.
+        """Return host and port that another board of the recording sends to.
 
         Raises
         ------
@@ -275,7 +276,7 @@ class Live:
         return address
 
     def sample(self, name: str, values: ArrayLike, arrived_ns: int | None = None) -> None:
-        """Keep numbers of a source that is given.
+        """Record numbers of a source whose values a program gives.
 
         Parameters
         ----------
@@ -293,11 +294,11 @@ class Live:
         self._core.sample(text("name", name), numbers("values", values, np.float64).reshape(-1).tolist(), came)
 
     def zero(self, x: ArrayLike, y: ArrayLike) -> tuple[Zeroing, ...]:
-        """Take what taxels hold now for their rest from now on: for taxels that drift.
+        """Take the values that taxels hold for their rest from now on: for taxels that drift.
 
-        The readout's encoder hears them above that rest, where it reads a tare; the recording keeps the command, with
-        the rests before and after, and `taxel.detect.run` applies it. Never done but when asked for: what stands on
-        a taxel then would be taken for rest.
+        The readout's encoder reads them above that rest, where it uses a tare; the recording states the zeroing, with
+        the rests before and after, and `taxel.detect.run` applies it. Only done on request: a load that stands on a
+        taxel then would be taken for its rest.
 
         Parameters
         ----------
@@ -306,8 +307,8 @@ class Live:
 
         Raises
         ------
-        ProblemError : a taxel that does not exist or was not heard of yet (names it; then none is zeroed), a tare that
-            is being taken, or a `.lsa` that is recorded, which could not keep it
+        ProblemError : a taxel that does not exist or has had no event so far (names it; then none is zeroed), a tare
+            that is being taken, or a `.lsa` that is recorded, which cannot hold it
         OSError : the disk is full
         """
         columns, rows = (numbers(name, given, np.int64).reshape(-1) for name, given in (("x", x), ("y", y)))
@@ -322,11 +323,11 @@ class Live:
 
     @property
     def zeroed(self) -> tuple[Zeroing, ...]:
-        """What was zeroed last at each taxel that was, by `zero` or a panel."""
+        """The latest zeroing of each taxel that was zeroed, by `zero` or a panel."""
         return tuple(Zeroing(*one) for one in self._core.zeroed())
 
     def note(self, said: str) -> None:
-        """Write something down in the recording, with the time of now.
+        """Write a note into the recording, with the time of now.
 
         Raises
         ------
@@ -337,7 +338,7 @@ class Live:
     def record(
         self, path: str | os.PathLike[str], *, compression: str = "none", overwrite: bool = False
     ) -> Summary | None:
-        """Record what comes from here on, of all sources, beginning with what the taxels hold and the registers.
+        """Record what comes from here on, of all sources, beginning with the registers and the taxels' values.
 
         A recording that runs ends with what came before: each datagram, and each line, belongs to one of the two.
 
@@ -356,14 +357,14 @@ class Live:
         ------
         FileExistsError : the file is there already and `overwrite` is false; the recording that runs goes on
         OSError : the file cannot be created; the disk was full before the end of the one that ran
-        ProblemError : `record_later` was not said
+        ProblemError : `record_later` was not given
         """
         place = checked_path("path", path)
         ended = self._core.record(place, text("compression", compression), flag("overwrite", overwrite))
         return None if ended is None else summary_of(ended)
 
     def record_again(self) -> bool:
-        """Have the recording that runs begin anew, where nothing came into it of any source; return whether it does."""
+        """Let the recording that runs begin anew, where no source has given anything; return whether it does."""
         return self._core.record_again()
 
     def end_recording(self) -> Summary:
@@ -406,7 +407,7 @@ class Live:
         if error is None:
             self.stop()
         elif self._summary is None:
-            # The first error is the one to hear of.
+            # The first error is the one to report.
             with contextlib.suppress(OSError, _core.Error):
                 self.stop()
 

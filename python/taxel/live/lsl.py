@@ -1,7 +1,7 @@
 """The lab streaming layer: its streams as sources of a recording, and detections as one of its streams.
 
 Its library listens on every address of the machine, TCP and UDP from port 16572 on, whatever taxel asks of it: so
-nothing here is begun unless it is named, and a warning says so.
+nothing here begins unless it is named, and then with a warning.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from taxel._core import Error, ProblemError
 
 __all__ = ["LslInlet", "LslOutlet"]
 
-#: How long a stream is looked for, and a sample waited for, s.
+#: How long a stream is searched for, and a sample waited for, s.
 _LOOK_S, _WAIT_S = 3.0, 0.05
 
 
@@ -33,7 +33,7 @@ def _pylsl() -> Any:
 
 
 class LslInlet:
-    """Hear a stream of numbers of the lab streaming layer.
+    """Receive a stream of numbers of the lab streaming layer.
 
     Parameters
     ----------
@@ -59,23 +59,23 @@ class LslInlet:
         if found[0].channel_format() == lsl.cf_string:
             raise ProblemError(f"lsl:{name}: a stream of texts; only numbers are recorded")
         self.name = name
-        # What it says of itself comes with the connection; stamps stay the sender's own.
+        # Labels come with the connection; stamps stay the sender's own.
         self._inlet = lsl.StreamInlet(found[0], processing_flags=lsl.proc_none)
         try:
             labels = self._inlet.info(_LOOK_S).get_channel_labels() or []
         except Exception as error:  # its library's errors have no base of their own
-            raise ProblemError(f"lsl:{name}: does not say what it holds ({error})") from None
+            raise ProblemError(f"lsl:{name}: does not name its channels ({error})") from None
         count = found[0].channel_count()
-        said = [str(label) for label in labels if label]
-        plain = len(set(said)) == count and not any(set(one) & set(",:=") for one in said) and "t_s" not in said
-        self.columns = ["t_s", *(said if plain else [f"channel_{k}" for k in range(count)])]
+        names = [str(label) for label in labels if label]
+        plain = len(set(names)) == count and not any(set(one) & set(",:=") for one in names) and "t_s" not in names
+        self.columns = ["t_s", *(names if plain else [f"channel_{k}" for k in range(count)])]
         self._ends = threading.Event()
         self._thread: threading.Thread | None = None
 
     def begin(self, take: Callable[[list[float], int], object]) -> None:
         """Call `take` with stamp and values, and when they came (ns since 1970), in a thread of its own."""
 
-        def listen() -> None:
+        def receive() -> None:
             while not self._ends.is_set():
                 values, stamp = self._inlet.pull_sample(_WAIT_S)
                 if values is None:
@@ -83,14 +83,14 @@ class LslInlet:
                 try:
                     take([stamp, *map(float, values)], time.time_ns())
                 except (Error, OSError):
-                    # The recording has ended, and said why.
+                    # The recording has ended; its own end reports why.
                     return
 
-        self._thread = threading.Thread(target=listen, name="taxel-lsl", daemon=True)
+        self._thread = threading.Thread(target=receive, name="taxel-lsl", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
-        """Let go of the stream."""
+        """Close the stream."""
         self._ends.set()
         if self._thread is not None:
             self._thread.join()
@@ -98,12 +98,12 @@ class LslInlet:
 
 
 class LslOutlet:
-    """Say detections as a stream of markers of the lab streaming layer: each its label, at the time of its event.
+    """Send detections as a stream of markers of the lab streaming layer: the label of each, at the time of its event.
 
     Parameters
     ----------
     name : str
-        What the stream is called; its type is Markers.
+        The stream's name; its type is Markers.
 
     Raises
     ------
@@ -116,6 +116,6 @@ class LslOutlet:
         self._clock, self._outlet = lsl.local_clock, lsl.StreamOutlet(about)
 
     def __call__(self, said: Any) -> None:
-        """Say one: a `taxel.live.Said`."""
+        """Send one: a `taxel.live.Said`."""
         ago_s = (time.time_ns() - said.said_ns) * 1e-9 + (said.said - said.t) * 1e-6
         self._outlet.push_sample([said.label], self._clock() - ago_s)

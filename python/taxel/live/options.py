@@ -23,7 +23,10 @@ from taxel.wire import PRESETS, Registers
 if TYPE_CHECKING:
     from taxel.live.said import Said
 
-__all__ = ["LiveOptions", "about", "takes"]
+__all__ = ["QUOTED_PRESETS", "LiveOptions", "about", "takes"]
+
+#: The names of all presets, for a text.
+QUOTED_PRESETS = ", ".join(f'"{name}"' for name in PRESETS)
 
 _P = ParamSpec("_P")
 _Self = TypeVar("_Self")
@@ -37,7 +40,7 @@ def _option(default: Any, about: str, *, least: float | None = None, most: float
 
 @dataclass(frozen=True)
 class LiveOptions:
-    """What a `Live` may be told, with its defaults; `Live` describes each."""
+    """Hold the options of a `Live`, which documents each, with their defaults."""
 
     port: int = _option(PORT, "The UDP port that the board sends to.", least=0, most=65_535)
     _: KW_ONLY
@@ -52,9 +55,7 @@ class LiveOptions:
     )
     registers: str | Registers | None = _option(
         None,
-        'The board\'s registers, "5.2 kHz" where left out: one of '
-        + ", ".join(f'"{name}"' for name in PRESETS)
-        + ". With --from they are told.",
+        f'The board\'s registers, "5.2 kHz" where left out: one of {QUOTED_PRESETS}. With --from they are told.',
     )
     differences: bool = _option(False, "The board sends intensity differences.")
     readout: Readout | None = _option(None, "A trained readout (JSON), as taxel train writes it; the panel needs none.")
@@ -85,7 +86,7 @@ class LiveOptions:
     gro: bool | None = _option(None, "Let the kernel hand over trains of datagrams in one piece.")
 
     def completed(self) -> LiveOptions:
-        """Return them with what the remote board and the readout say of the sensor; refuse what makes no sense."""
+        """Return them with the sensor of the remote board or the readout; refuse what makes no sense."""
         readout, remote, array, registers, differences = (
             self.readout, self.remote, self.array, self.registers, self.differences,
         )  # fmt: skip
@@ -111,7 +112,7 @@ class LiveOptions:
         return [text("send", to) for to in ([self.send] if isinstance(self.send, str) else several("send", self.send))]
 
     def named_sources(self) -> list[tuple[str, str]]:
-        """Return the other sources of a recording: their names, and what they are."""
+        """Return the other sources of a recording, by name."""
         if self.sources is None:
             return []
         if not isinstance(self.sources, Mapping):
@@ -128,7 +129,7 @@ class LiveOptions:
         return path, text("compression", self.compression), flag("overwrite", self.overwrite)
 
     def for_rust(self, *, send: list[str], sources: list[tuple[str, str]]) -> dict[str, Any]:
-        """Return what Rust reads; `send` and `sources` are those that it can open itself."""
+        """Return the options that Rust reads; `send` and `sources` are those that it can open itself."""
         registers: object = self.registers
         held = json.loads(registers._json()) if isinstance(registers, Registers) else text("registers", registers)
         sizes = {name: getattr(self, name) for name in ("kernel_buffer_bytes", "queue_bytes", "readout_events")}
@@ -158,10 +159,10 @@ def takes(
     """Let a constructor that is written for a dataclass of options take the fields of that dataclass."""
 
     def decorate(begin: Callable[[_Self, _Options], None]) -> Callable[Concatenate[_Self, _P], None]:
-        @functools.wraps(begin)
         def init(self: _Self, *arguments: _P.args, **keywords: _P.kwargs) -> None:
             begin(self, options(*arguments, **keywords))
 
+        functools.update_wrapper(init, begin)
         own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
         named = inspect.signature(options).parameters.values()
         init.__signature__ = inspect.Signature([own, *named])  # type: ignore[attr-defined]

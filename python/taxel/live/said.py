@@ -11,7 +11,7 @@ __all__ = ["Said", "heard"]
 
 
 class Said(NamedTuple):
-    """Say what was detected, and when: all times but the last in us of the board's clock.
+    """Report what was detected, and when: all times but the last in us of the board's clock.
 
     Attributes
     ----------
@@ -19,11 +19,11 @@ class Said(NamedTuple):
     t : int, us
         When the event was: the crossing less the encoder's latency and the trained delay.
     known : int, us
-        When it could first be said: the end of the board's frame in which the potential crosses.
+        When it could first be known: the end of the board's frame in which the potential crosses.
     slope : float, mV/ms
         How steeply the potential crossed its threshold, as a measure of how sure.
     said : int, us
-        When it was said, by the host's clock less the estimated offset between the clocks.
+        When it was output, by the host's clock less the estimated offset between the clocks.
     said_ns : int, ns since 1970
         The same by the host's clock.
     repaired : bool
@@ -40,8 +40,8 @@ class Said(NamedTuple):
 
 
 def heard(said: Sequence[Said]) -> Detections:
-    """Return what was said live as `Detections`."""
-    return Detections(
+    """Return detections of a `Live` as `Detections`."""
+    return Detections._of(
         [s.label for s in said],
         [s.t for s in said],
         [s.known for s in said],

@@ -1,4 +1,4 @@
-"""What a board sends, without one: to try a receiver, or to measure it."""
+"""Sends datagrams as a board does, to try a receiver or to measure it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def send(
 ) -> dict[str, Any]:
     """Send datagrams over and over, `each` of them every `period_us`, for `seconds`; return what was sent.
 
-    What a board does, without one: to try a receiver, or to measure it.
+    As a board does: to try a receiver, or to measure it.
 
     Parameters
     ----------

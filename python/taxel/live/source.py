@@ -23,7 +23,7 @@ _MOST = 2**16 - 1
 class Source:
     """Make any sensor that Python can read live: frames become events by the board's rules, and travel as a board's.
 
-    Whatever listens to a board listens to this: `Live`, ``taxel record``, ``taxel live``, with this array and, as
+    Whatever receives from a board receives from this: `Live`, ``taxel record``, ``taxel live``, with this array and, as
     `registers`, these registers.
 
     Parameters
@@ -32,11 +32,11 @@ class Source:
     rate : float, 1/s
         Frames a second; each push moves the source's clock on by one frame.
     bits : int, 1 to 16
-        Of the values. More than so fast a scan can tell are halved `shift` times.
+        Of the values. Where so fast a scan resolves fewer, values are halved `shift` times.
     noise_floor : int, 0 to 255
         A change above it makes an event.
     to : str
-        Where the datagrams go.
+        Address and port that the datagrams are sent to.
     board : int, 0 to 65535
         Its number: sources on one address are told apart by it.
 
@@ -52,8 +52,8 @@ class Source:
     >>> with Live(0, host="127.0.0.1", array=array) as live:
     ...     host, port = live.address
     ...     source = Source(array, 100.0, bits=12, to=f"{host}:{port}")
-    ...     heard = [source.push(np.full((2, 3), value)) for value in (0, 700, 702, 900)]
-    >>> heard
+    ...     events = [source.push(np.full((2, 3), value)) for value in (0, 700, 702, 900)]
+    >>> events
     [0, 6, 0, 6]
     """
 

@@ -14,7 +14,7 @@ __all__ = ["Summary", "delays"]
 
 @dataclass(frozen=True)
 class Summary:
-    """Say how a `Live` ended.
+    """Report how a `Live`, or a recording of one, ended.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class Summary:
     verdict : str
         One line: nothing lost after arrival, what was lost where, or that nothing came.
     path : Path or None
-        The recording; none where nothing came: then an empty one is not kept, and an earlier one is not replaced.
+        The recording; none where nothing came: then a new file is removed, and an earlier one stays.
     tare : Tare or None
         The fresh tare, where one was completed.
     """
@@ -46,7 +46,7 @@ class Summary:
 
     @property
     def nothing_came(self) -> bool:
-        """Whether not even a datagram that was lost has come."""
+        """Whether no datagram has come, lost ones included."""
         capture = self.counters["capture"]
         return not capture["messages"] + capture["dropped_by_kernel"]
 

@@ -74,7 +74,8 @@ class Sources:
                 found |= {} if compiled is None else {name: compiled}  # what is only there for types has none
             elif (module := self._module(name)) is not None:
                 found[name] = module.digest
-                found |= {self._shown(file): _digest(file.read_bytes()) for file in module.data}
+                data = module.data if self._roots[name.split(".")[0]].is_dir() else []
+                found |= {self._shown(file): _digest(file.read_bytes()) for file in data}
                 open_ += self._used(module)
         return dict(sorted(found.items()))
 

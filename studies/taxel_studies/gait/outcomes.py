@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from taxel_studies.gait import folds, insole, sources
-from taxel_studies.gait.plans import Known, Plan, chooses, chosen, each, fixed, plans, searched
+from taxel_studies.gait import insole, sources
+from taxel_studies.gait.plans import Plan, chooses, each, plans
 from taxel_studies.gait.protocols import ROWS, Protocol
 from taxel_studies.gait.realise import TEST
 from taxel_studies.gait.recipes import FULL, NOTES, SEARCH
 from taxel_studies.gait.sources import SOURCES
+from taxel_studies.runner import Task
 from taxel_studies.study import Parameters, Row, Said
 
 __all__ = ["EVENTS", "GOALS", "Outcome", "Unit", "figures", "summarise"]
@@ -41,6 +42,21 @@ GOALS: dict[str, dict[str, dict[str, float]]] = {
 }
 
 
+class Known:
+    """Look up what realisations gave, by their tasks."""
+
+    def __init__(self, rows: Sequence[Row]) -> None:
+        self._rows = {Task(row.params, row.seed).key(""): row for row in rows}
+
+    def __getitem__(self, task: Task) -> Any:
+        """Return a task's result."""
+        return self._rows[task.key("")].result
+
+    def seconds(self, tasks: Sequence[Task]) -> float:
+        """Return the CPU seconds that tasks took."""
+        return sum(self._rows[task.key("")].seconds for task in tasks)
+
+
 @dataclass(frozen=True)
 class Unit:
     """What was found at one foot in one fold."""
@@ -64,7 +80,7 @@ class Outcome:
     points : list
         The parameters of each fold, where they were chosen inside.
     seconds : float
-        CPU time of the folds' own fits.
+        CPU time of the folds' fits, the choice inside them included.
     """
 
     source: str
@@ -152,7 +168,7 @@ def summarise(p: Parameters, rows: Sequence[Row], *, data: Path) -> Said:
         "sources": [
             _source(name, [plan for plan in listed if plan.source == name], known) for name in SOURCES if name in there
         ],
-        "folds": {f"{plan.source}/{plan.protocol.name}": folds.to_json(plan.scopes) for plan in listed},
+        "folds": {f"{plan.source}/{plan.protocol.name}": plan.folds for plan in listed},
         "conversion": _conversion(data) if "plate" in there else None,
     }
 
@@ -209,9 +225,9 @@ def _full_search(plan: Plan, known: Known) -> Iterator[dict[str, Any]]:
     """List what each fold chose of the 528 settings, what it had found of it inside, and what it came to."""
     for scope, event, row in each(plan):
         for left_out in plan.outer(scope) if row in FULL else ():
-            point, inside = searched(plan, scope, left_out, event, row, known)
-            tested = known[plan.neuron(scope, left_out, event, point)]["tested"]
-            units = [_unit(name, unit) for group in tested.values() for name, unit in group.items()]
+            fitted = known[plan.task(scope, left_out, event, row)]
+            point = fitted["point"]
+            units = [_unit(name, unit) for group in fitted["tested"].values() for name, unit in group.items()]
             found = figures(units)
             yield {
                 "event": event,
@@ -221,7 +237,7 @@ def _full_search(plan: Plan, known: Known) -> Iterator[dict[str, Any]]:
                 "kappa": point["learner"]["kappa"],
                 "lambda_1": point["learner"]["lambdas"][0],
                 "lambda_2": point["learner"]["lambdas"][1],
-                "inside": inside,
+                "inside": fitted["inside"],
                 **{name: found[name] for name in ("missed", "false", "error_ms")},
             }
 
@@ -244,14 +260,9 @@ def _outcomes(plan: Plan, known: Known) -> list[Outcome]:
     for scope, event, row in each(plan):
         units, points, tasks = [], [], []
         for left_out in plan.outer(scope):
-            if chooses(row):
-                point = chosen(plan, scope, left_out, event, row, known)
-                points.append(point)
-                task = plan.neuron(scope, left_out, event, point)
-            else:
-                task = fixed(plan, scope, left_out, event, row)
-                if row.startswith("rule: "):
-                    points.append(known[task]["fit"])
+            task = plan.task(scope, left_out, event, row)
+            if chooses(row) or row.startswith("rule: "):
+                points.append(known[task]["point" if chooses(row) else "fit"])
             tasks.append(task)
             for group in [TEST] if plan.testing else [str(g) for g in left_out]:
                 units += [_unit(name, unit) for name, unit in known[task]["tested"][group].items()]

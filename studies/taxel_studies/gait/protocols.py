@@ -1,4 +1,4 @@
-"""What is run on which recordings, and in which folds."""
+"""What is run on which recordings, and in which folds: by person, by count, by time, by piece."""
 
 from __future__ import annotations
 
@@ -6,15 +6,31 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
-from taxel_studies.gait import folds
-from taxel_studies.gait.folds import Scope
+import numpy as np
+
+from taxel.detect import Part
+from taxel.spikes import to_ms, to_us
 from taxel_studies.gait.pieces import Piece
 from taxel_studies.gait.recipes import ENCODERS, NOTES
 from taxel_studies.gait.rules import RULES
 from taxel_studies.gait.sources import encoded
 
-__all__ = ["PROTOCOLS", "ROWS", "Protocol", "of", "scopes"]
+__all__ = [
+    "PROTOCOLS",
+    "ROWS",
+    "Protocol",
+    "Scope",
+    "by_count",
+    "by_person",
+    "by_piece",
+    "by_time",
+    "names",
+    "of",
+    "scopes",
+    "to_json",
+]
 
 #: The three rows of the study, and what stands beside them.
 ROWS = {
@@ -28,6 +44,89 @@ ROWS = {
     **{f"rule: {name}": f"plain rule: {text}" for name, text in RULES.items()},
     **{f"encoder: {name}": f"encoder: {name}" for name in ENCODERS},
 }
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What is judged by itself: all people, or one person. Each fold tests one of its groups and trains on the others.
+
+    Attributes
+    ----------
+    name : str
+        "all people", or a person.
+    groups : tuple of tuples of taxel.detect.Part
+        By number of the source's pieces, in their order.
+    """
+
+    name: str
+    groups: tuple[tuple[Part, ...], ...]
+
+
+def by_person(pieces: Sequence[Piece], folds: int, seed: int) -> list[Scope]:
+    """Leave whole people out: as many folds as asked, each with its share of healthy people and patients.
+
+    With no more people than folds each fold is one person.
+    """
+    rng = np.random.default_rng(seed)
+    groups: list[list[str]] = [[] for _ in range(folds)]
+    k = 0
+    for group in sorted({p.group for p in pieces}):
+        people = sorted({p.person for p in pieces if p.group == group})
+        for person in rng.permutation(people):
+            groups[k % folds].append(str(person))
+            k += 1
+    return [Scope("all people", tuple(tuple(n for person in g for n in _of(pieces, person)) for g in groups if g))]
+
+
+def by_count(pieces: Sequence[Piece], folds: int, repeats: int, seed: int) -> list[Scope]:
+    """Split each person's footfalls at random: with 3 folds 40 of 60 train and 20 test, `repeats` times."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for person in sorted({p.person for p in pieces}):
+        mine = _of(pieces, person)
+        for r in range(repeats):
+            order = rng.permutation(len(mine))
+            groups = tuple(tuple(mine[k] for k in sorted(order[g::folds])) for g in range(folds))
+            found.append(Scope(person if repeats == 1 else f"{person}, split {r + 1}", groups))
+    return found
+
+
+def by_time(pieces: Sequence[Piece], folds: int) -> list[Scope]:
+    """Cut each person's recording into stretches of equal length, as 6.5.3 does."""
+    found = []
+    for person in sorted({p.person for p in pieces}):
+        groups: list[list[Part]] = [[] for _ in range(folds)]
+        for whole in _of(pieces, person):
+            piece = pieces[whole.example]
+            ends = np.linspace(*piece.scored, folds + 1)
+            ends[0], ends[-1] = 0.0, piece.duration
+            for g, part in enumerate(to_us(ends)[:-1]):
+                groups[g].append(Part(whole.example, float(part), float(to_us(ends[g + 1]))))
+        found.append(Scope(person, tuple(tuple(g) for g in groups)))
+    return found
+
+
+def by_piece(pieces: Sequence[Piece]) -> list[Scope]:
+    """Let one recording train and the other test; where there is only one, one foot trains and the other tests."""
+    recordings = [p.name.rsplit(" ", 1)[0] for p in pieces]
+    if len(set(recordings)) == 1:
+        return [Scope("all", tuple((Part(n),) for n in range(len(pieces))))]
+    groups = (tuple(Part(n) for n, of in enumerate(recordings) if of == name) for name in sorted(set(recordings)))
+    return [Scope("all", tuple(groups))]
+
+
+def _of(pieces: Sequence[Piece], person: str) -> list[Part]:
+    return [Part(n) for n, piece in enumerate(pieces) if piece.person == person]
+
+
+def to_json(scopes: Sequence[Scope], names: Sequence[str]) -> list[dict[str, Any]]:
+    """Return scopes as plain values: a part is the name of a piece, or that with start and stop in ms."""
+
+    def plain(part: Part) -> str | list[Any]:
+        name = names[part.example]
+        return name if np.isinf(part.stop) else [name, to_ms(part.start), to_ms(part.stop)]
+
+    return [{"scope": s.name, "groups": [[plain(p) for p in g] for g in s.groups]} for s in scopes]
 
 
 @dataclass(frozen=True)
@@ -60,12 +159,12 @@ class Protocol:
     def scopes(self, all_pieces: Sequence[Piece]) -> list[Scope]:
         """Split pieces as this protocol says."""
         if self.split == "people":
-            return folds.by_person(all_pieces, self.folds, seed=1)
+            return by_person(all_pieces, self.folds, seed=1)
         if self.split == "footfalls":
-            return folds.by_count(all_pieces, self.folds, self.repeats, seed=1)
+            return by_count(all_pieces, self.folds, self.repeats, seed=1)
         if self.split == "time":
-            return folds.by_time(all_pieces, self.folds)
-        return folds.by_piece(all_pieces)
+            return by_time(all_pieces, self.folds)
+        return by_piece(all_pieces)
 
 
 PROTOCOLS: dict[str, tuple[Protocol, ...]] = {
@@ -162,6 +261,15 @@ def of(source: str, name: str) -> Protocol:
 @lru_cache(maxsize=32)
 def scopes(folder: Path, source: str, protocol: str, least: int = 2) -> tuple[Scope, ...]:
     """Split the recordings of a source's folder as one of its protocols says; scopes of fewer groups are left out."""
-    encoder = next(iter(NOTES[source].values()))["encoder"]  # any will do: the pieces' names and lengths count
-    pieces = list(encoded(folder, source, encoder).pieces.values())
-    return tuple(scope for scope in of(source, protocol).scopes(pieces) if len(scope.groups) >= least)
+    found = of(source, protocol).scopes(list(_pieces(folder, source).values()))
+    return tuple(scope for scope in found if len(scope.groups) >= least)
+
+
+def names(folder: Path, source: str) -> list[str]:
+    """Return the names of a source's pieces, in their order."""
+    return list(_pieces(folder, source))
+
+
+def _pieces(folder: Path, source: str) -> Mapping[str, Piece]:
+    # Any encoder will do: the names and lengths of the pieces count.
+    return encoded(folder, source, next(iter(NOTES[source].values()))["encoder"]).pieces

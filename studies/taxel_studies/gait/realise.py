@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Mapping
+import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from taxel import ProblemError
-from taxel.detect import score
-from taxel.detect.training import learner_from
+from taxel.detect import Example, Fold, Part, Recipe, Score, judge, score
 from taxel.detections import Detections
+from taxel.encode import Encoder
 from taxel.learn import SKIM, ConeR
-from taxel.spikes import to_us
+from taxel.spikes import to_ms, to_us
 from taxel_studies.gait import insole, protocols, rules
-from taxel_studies.gait.folds import Scope
 from taxel_studies.gait.pieces import Piece, joined
+from taxel_studies.gait.protocols import Scope
 from taxel_studies.gait.sources import SOURCES, Encoded, encoded
 
 __all__ = ["TEST", "realise"]
@@ -37,11 +37,11 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     Parameters
     ----------
     params : dict
-        ``kind`` ("neuron", "skim", "search" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of
-        groups; none: the folder ``test`` is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls
-        a person), ``placed``; of a neuron its ``point``; of SKIM a ``point`` and its own options ``skim``; of a search
-        a ``point``, the ``lambda_1`` to try one after the other, and which of the groups left out are ``judged``; of a
-        rule ``rule`` and ``encoder``.
+        ``kind`` ("neuron", "skim" or "rule"), ``source``, ``protocol``, ``scope``, ``left_out`` (numbers of groups;
+        none: the folder ``test`` is judged), ``event``, ``train`` (``seconds`` a piece, or ``count`` footfalls a
+        person), ``placed``; of a neuron its ``points``, and of several the folds to choose in: ``inner`` (the groups
+        that each of them tests) and ``search`` (how much trains there); of SKIM a ``point`` and its own options
+        ``skim``; of a rule ``rule`` and ``encoder``.
     seed : int
         Draws the footfalls and their order in the training row.
     data : Path
@@ -51,45 +51,58 @@ def realise(params: dict[str, Any], seed: int, *, data: Path) -> dict[str, Any]:
     -------
     dict
         ``tested``: by group and unit what was found (of SKIM so ``by_threshold``); ``fit``: what the learner says of
-        itself, or the rule's numbers.
+        itself, or the rule's numbers; of a neuron also its ``point``, and what that came to ``inside`` the folds.
     """
     source = params["source"]
-    encoder = params["encoder"] if params["kind"] == "rule" else params["point"]["encoder"]
-    folder = SOURCES[source].folder
-    split = protocols.scopes(data / folder, source, params["protocol"], 1 if params.get("test") else 2)
+    folder = data / SOURCES[source].folder
+    split = protocols.scopes(folder, source, params["protocol"], 1 if params.get("test") else 2)
     scope = next(s for s in split if s.name == params["scope"])
-    told = encoded(data / folder, source, encoder, params["placed"])
-    training = _training(scope, params, told, seed)
-    tested = {str(g): [part.of(told.pieces) for part in scope.groups[g]] for g in params["left_out"]}
-    if not tested:
-        tested = {TEST: list(encoded(Path(params["test"]) / folder, source, encoder, params["placed"]).pieces.values())}
-    rows = {g: _rows(pieces, source) for g, pieces in tested.items()}
     if params["kind"] == "neuron":
-        return _neuron(params, told, training, rows, seed)
+        return _neuron(params, scope, folder, seed)
+    encoder = params["encoder"] if params["kind"] == "rule" else params["point"]["encoder"]
+    told = encoded(folder, source, encoder, params["placed"])
+    training = _training(scope, params["left_out"], params["train"], told, seed)
+    rows = _tested(params, scope, told, encoder)
     if params["kind"] == "skim":
         return _skim(params, told, training, rows, seed)
-    if params["kind"] == "search":
-        judged = [row for g in params["judged"] for row in rows[str(g)]]
-        return _search(params, told, training, judged, seed)
     return _rule(params, told, training, rows)
 
 
-def _training(scope: Scope, params: Mapping[str, Any], data: Encoded, seed: int) -> list[Piece]:
+def _tested(
+    params: Mapping[str, Any], scope: Scope, told: Encoded, encoder: Mapping[str, Any]
+) -> dict[str, list[Piece]]:
+    """Return the rows that are tested, by group: those left out, or another folder's."""
+    source = params["source"]
+    if params["left_out"]:
+        return {str(g): _rows(_pieces(scope.groups[g], told), source) for g in params["left_out"]}
+    other = encoded(Path(params["test"]) / SOURCES[source].folder, source, encoder, params["placed"])
+    return {TEST: _rows(list(other.pieces.values()), source)}
+
+
+def _pieces(parts: Sequence[Part], told: Encoded) -> list[Piece]:
+    """Return the pieces, or stretches of them, that parts stand for."""
+    pieces = list(told.pieces.values())
+    return [
+        pieces[n] if np.isinf(stop) else pieces[n].between(float(to_ms(start)), float(to_ms(stop)))
+        for n, start, stop in parts
+    ]
+
+
+def _training(scope: Scope, left_out: Sequence[int], size: Mapping[str, int], told: Encoded, seed: int) -> list[Piece]:
     """Return the training pieces, cut down to so many seconds a piece or footfalls a person."""
-    parts = [p for g, group in enumerate(scope.groups) if g not in params["left_out"] for p in group]
-    pieces = [part.of(data.pieces) for part in parts]
-    if "seconds" in params["train"]:
-        length = 1000.0 * params["train"]["seconds"]
+    pieces = _pieces([p for g, group in enumerate(scope.groups) if g not in left_out for p in group], told)
+    if "seconds" in size:
+        length = 1000.0 * size["seconds"]
         return [
             p.between(p.scored[0], min(p.scored[0] + length, p.scored[1])) for p in pieces if p.scored[1] > p.scored[0]
         ]
     rng = np.random.default_rng([seed, 1])
     order = [pieces[k] for k in rng.permutation(len(pieces))]
-    taken: dict[str, int] = {}
+    counts: dict[str, int] = {}
     chosen = []
     for piece in order:
-        taken[piece.person] = taken.get(piece.person, 0) + 1
-        if taken[piece.person] <= params["train"]["count"]:
+        counts[piece.person] = counts.get(piece.person, 0) + 1
+        if counts[piece.person] <= size["count"]:
             chosen.append(piece)
     return chosen
 
@@ -102,52 +115,60 @@ def _rows(pieces: list[Piece], source: str) -> list[Piece]:
     return [joined([p for p in pieces if p.unit == unit], unit) for unit in units]
 
 
-def _neuron(
-    params: Mapping[str, Any], data: Encoded, training: list[Piece], rows: dict[str, list[Piece]], seed: int
-) -> dict[str, Any]:
-    point, event = params["point"], params["event"]
-    cone, delay_ms = learner_from("point", point["learner"])
-    later = data.latency_ms + delay_ms
-    patterns = _patterns(params, training, seed)
-    with warnings.catch_warnings():  # what the learner warns of is kept in the result
-        warnings.simplefilter("ignore", UserWarning)
-        cone.fit([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
-    tested = {
-        g: {p.unit: _scored(cone.neuron_.run(cone.weights_, p.spikes), p, event, later) for p in pieces}
-        for g, pieces in rows.items()
-    }
-    return {"tested": tested, "fit": _told(cone, patterns, event)}
+def _neuron(params: Mapping[str, Any], scope: Scope, folder: Path, seed: int) -> dict[str, Any]:
+    """Train the neuron of the best point, and test it; the points of each encoder are one recipe."""
+    encoders = {json.dumps(point["encoder"], sort_keys=True): point["encoder"] for point in params["points"]}
+    tries = [
+        _recipe(params, scope, folder, encoder, [p for p in params["points"] if p["encoder"] == encoder], seed)
+        for encoder in encoders.values()
+    ]
+    return min(tries, key=lambda one: one[0])[1]
 
 
-def _search(
-    params: Mapping[str, Any], data: Encoded, training: list[Piece], judged: list[Piece], seed: int
-) -> dict[str, Any]:
-    """Try lambda_1 : lambda_2 one after the other on the same rows, each from the fit before."""
-    point, event = params["point"], params["event"]
-    later = data.latency_ms + point["learner"]["delay_ms"]
-    patterns = _patterns(params, training, seed)
-    rows, before, tried = None, None, []
-    for l1 in params["lambda_1"]:
-        lambdas = [l1, round(4 - l1, 1), *point["learner"]["lambdas"][2:]]
-        cone, _ = learner_from("point", point["learner"] | {"lambdas": lambdas})
-        if rows is None:
-            rows = cone.prepare([p.spikes for p in patterns], [p.truth[event] + later for p in patterns])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)
-            before = rows.fit(cone, start=before)
-        found = [_scored(cone.neuron_.run(cone.weights_, p.spikes), p, event, later) for p in judged]
-        errors = np.concatenate([np.empty(0), *(f["errors"] for f in found)])
-        tried.append(
-            {
-                "lambdas": lambdas,
-                "missed": sum(f["events"] - len(f["errors"]) for f in found),
-                "false": sum(f["false"] for f in found),
-                "rms_ms": round(float(np.sqrt(np.mean(errors**2))), 3) if len(errors) else None,
-                "status": cone.status_,
-                "engine": cone.engine_,
-            }
+def _recipe(
+    params: Mapping[str, Any], scope: Scope, folder: Path, encoder: dict[str, Any], points: list[Any], seed: int
+) -> tuple[tuple[float, float], dict[str, Any]]:
+    """Train and test the best of points with one encoder; return the rank that it has inside, and the result."""
+    event = params["event"]
+    told = encoded(folder, params["source"], encoder, params["placed"])
+    rows = [(g, row) for g, group in _tested(params, scope, told, encoder).items() for row in group]
+    pieces = [row for _, row in rows]
+
+    def fold(left_out: Sequence[int], size: str, tested: Sequence[Piece]) -> Fold:
+        """Add the pieces of a fold to the examples, and return it."""
+        training = _patterns(params, _training(scope, left_out, params[size], told, seed), seed)
+        first, last = len(pieces), len(pieces) + len(training)
+        pieces.extend([*training, *tested])
+        scored = [to_us(np.array(piece.scored)) for piece in tested]
+        test = [Part(last + n, float(start), float(stop) + 1) for n, (start, stop) in enumerate(scored)]
+        return Fold([Part(n) for n in range(first, last)], test)
+
+    inner = [
+        fold(
+            sorted([*params["left_out"], *groups]),
+            "search",
+            [row for g in groups for row in _rows(_pieces(scope.groups[g], told), params["source"])],
         )
-    return {"tried": tried}
+        for groups in params.get("inner", [])
+    ]
+    outer = fold(params["left_out"], "train", [row for _, row in rows])._replace(inner=inner)
+    examples = [Example(p.spikes, {event: np.rint(to_us(p.truth[event])).astype(np.int64)}) for p in pieces]
+    first, *others = (point["learner"] for point in points)
+    recipe = Recipe(Encoder.from_json(json.dumps(dict(encoder))), {}, {event: first | {"search": others}})
+    judged = judge(examples, recipe, [outer], search=bool(others), window_ms=WINDOW_MS)
+    ((chosen, learners, _),) = judged.trained
+    inside = judge(examples, chosen, inner, window_ms=WINDOW_MS).together if inner else None
+    tested: dict[str, dict[str, Any]] = {g: {} for g, _ in rows}
+    for (g, row), result in zip(rows, judged.scores, strict=True):
+        tested[g][row.unit] = _plain(result, row)
+    told_of = {"missed": inside.missed, "false": inside.false, "rms_ms": _finite(inside.rank[1])} if inside else None
+    point = {"encoder": encoder, "learner": {k: v for k, v in chosen.neurons[event].items() if k != "search"}}
+    found = {"tested": tested, "fit": _told(learners[event], [pieces[n] for n, *_ in outer.train], event)}
+    return inside.rank if inside else (0, 0.0), found | {"point": point, "inside": told_of}
+
+
+def _finite(value: float) -> float | None:
+    return round(value, 3) if np.isfinite(value) else None
 
 
 def _patterns(params: Mapping[str, Any], training: list[Piece], seed: int) -> list[Piece]:
@@ -203,7 +224,10 @@ def _scored(spikes: NDArray[np.float64], piece: Piece, event: str, later: float)
     micros = (np.rint(to_us(x[inside])).astype(np.int64) for x in (t, spikes))
     truth = piece.truth[event]
     truth = np.rint(to_us(truth[(truth >= piece.scored[0]) & (truth <= piece.scored[1])])).astype(np.int64)
-    result = score(Detections([event] * int(inside.sum()), *micros), {event: truth}, WINDOW_MS)
+    return _plain(score(Detections([event] * int(inside.sum()), *micros), {event: truth}, WINDOW_MS), piece)
+
+
+def _plain(result: Score, piece: Piece) -> dict[str, Any]:
     return {
         "person": piece.person,
         "group": piece.group,

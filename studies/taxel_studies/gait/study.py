@@ -18,13 +18,12 @@ STUDY = Study(
     protocol=(
         "The protocols of 6.5.2 and 6.5.3 on recordings of other people, as far as each recording's truth allows. "
         "Errors are neuron minus reference (negative: early), window ±50 ms, one to one; every further spike counts as "
-        "false, inside the window too. First phase: fixed rows, plain rules, and the fits that choose inside the "
-        "folds; second phase: the folds' own fits with what was chosen."
+        "false, inside the window too. Where parameters are chosen, they are chosen inside each training fold "
+        "(taxel.detect.choose)."
     ),
     parameters=plans.PARAMETERS,
     sizes={"toy": plans.TOY},
     tasks=plans.tasks,
-    then=plans.then,
     realise=realise,
     summarise=summarise,
     statements=statements,

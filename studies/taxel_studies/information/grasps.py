@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from taxel.encode import ChangeEvents
 from taxel.formats import icub
 from taxel.frames import Frames
-from taxel.information import estimate, nested_predictions, zero_test
-from taxel.information.gram_lda import GramLDA
+from taxel.information import GramLDA, estimate, nested_predictions, zero_test
 from taxel_studies.study import Parameters, Said, Statement, Table
 
 if TYPE_CHECKING:

@@ -20,11 +20,13 @@
 mod checksum;
 mod counts;
 mod decoder;
+mod encode;
 mod packer;
 mod stream;
 
 pub use counts::{Counts, Status};
 pub use decoder::{Decoder, Heard, stream_rows};
+pub use encode::{Encoded, encode};
 pub use packer::{Packer, Settings};
 pub use stream::{Decoded, StreamReader, decode};
 

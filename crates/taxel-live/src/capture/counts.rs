@@ -13,7 +13,7 @@ pub struct Counts {
     pub bytes: u64,
     /// Messages that the kernel threw away because its own queue was full.
     pub dropped_by_kernel: u64,
-    /// Datagrams that were thrown away because nobody took them in time.
+    /// Datagrams that were dropped because they were not taken in time.
     pub dropped_by_queue: u64,
     /// Payload bytes in those.
     pub bytes_dropped_by_queue: u64,

@@ -10,7 +10,7 @@ use crate::bridged::Bridged;
 use crate::host_clock::{HostClock, RoundTrip};
 use crate::locked::lock;
 
-/// A bridge sends something each 10 ms: one that was not heard for so long is gone, or the way to it.
+/// A bridge sends something each 10 ms: after so long without anything it is gone, or the network between.
 const SILENT: Duration = Duration::from_secs(1);
 
 #[derive(Debug, Clone, Copy)]
@@ -86,7 +86,7 @@ impl Feed {
         for (arrived_ns, bytes) in parcel.datagrams() {
             batch.push_arrived(offset.here_ns(arrived_ns), bytes);
         }
-        // What is promised holds for those who find the queue empty afterwards.
+        // The promise holds for a caller who finds the queue empty afterwards.
         self.queue.put(batch, u64::from(parcel.count > 0), 0);
         self.queue.promise(offset.here_ns(parcel.until_ns()));
         true
@@ -119,7 +119,7 @@ impl Feed {
         self.queue.close(Some(io::Error::other(said.to_owned())));
     }
 
-    /// Whether nobody takes any more.
+    /// Whether the pipeline has ended, and takes no more.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.queue.stopped_ns().is_some()

@@ -1,11 +1,11 @@
-//! How a receiver is told to listen.
+//! The options of a receiver.
 
-/// How a [`Receiver`](super::Receiver) listens.
+/// How a [`Receiver`](super::Receiver) works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ReceiverOptions {
-    /// Asked of the kernel for its own queue, bytes; [`Counts::kernel_buffer_bytes`](super::Counts::kernel_buffer_bytes) says what it gave.
+    /// Asked of the kernel for its own queue, bytes; [`Counts::kernel_buffer_bytes`](super::Counts::kernel_buffer_bytes) is what it gave.
     pub kernel_buffer_bytes: usize,
-    /// How much may wait for the one who takes, bytes; memory is bounded by twice this.
+    /// How much may wait in taxel's queue, bytes; memory is bounded by twice this.
     pub queue_bytes: usize,
     /// Take trains of datagrams in one call where the kernel can (`UDP_GRO`).
     pub gro: bool,

@@ -164,7 +164,7 @@ impl Packer {
         if self.count == 0 {
             (self.base_ns, self.before) = (until_ns, self.next);
         }
-        // What is not told is as old as can be; what is beyond, no promise.
+        // Without a time the parcel promises nothing.
         let until = until_ns.saturating_sub(self.base_ns).clamp(i64::from(i32::MIN), i64::from(i32::MAX));
         let mut parcel = Vec::with_capacity(HEADER + self.body.len());
         parcel.extend_from_slice(&MAGIC);

@@ -1,4 +1,4 @@
-//! What waits between the receiving thread and the one who takes.
+//! The queue between the receiving thread and the caller who takes datagrams.
 
 use std::io;
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -158,7 +158,7 @@ impl Queue {
         }
     }
 
-    /// Counts and numbers what was received by the one who takes it.
+    /// Counts and numbers datagrams that the caller received itself.
     pub(super) fn count(&self, received: &mut Batch, messages: u64, dropped_by_kernel: u64) {
         let (datagrams, bytes) = (received.datagrams.len(), received.bytes.len());
         let first = self.state().counts.add(datagrams, bytes, messages, dropped_by_kernel);

@@ -78,7 +78,7 @@ impl Sender {
         let mut from = unspecified(to);
         from.set_port(port);
         let socket = UdpSocket::bind(from).map_err(Error::socket(format!("UDP from port {port} to {to}")))?;
-        // Not connected: a connected socket would fail where nobody listens yet, and a board does not care.
+        // Not connected: a connected socket would fail while no receiver is there yet; a board sends all the same.
         let segmenting =
             segment && super::socket::set(socket.as_raw_fd(), libc::SOL_UDP, libc::UDP_SEGMENT, &0).is_ok();
         let counts = SendCounts { segmenting, ..SendCounts::default() };
@@ -191,7 +191,7 @@ impl Sender {
         io::Error::new(io::ErrorKind::InvalidInput, text)
     }
 
-    /// What the kernel knows of the largest packet on the way, bytes: it says so of a connected socket.
+    /// The largest packet that the route carries as far as the kernel knows, bytes: it tells for a connected socket.
     fn path_mtu(&self) -> Option<usize> {
         let ask = UdpSocket::bind(unspecified(self.to)).ok()?;
         ask.connect(self.to).ok()?;

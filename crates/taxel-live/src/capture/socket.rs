@@ -45,7 +45,7 @@ impl Socket {
         set(fd, libc::SOL_SOCKET, libc::SO_TIMESTAMPNS, &1_i32)?;
         set(fd, libc::SOL_SOCKET, libc::SO_RXQ_OVFL, &1_i32)?;
         socket.set_nonblocking(true)?;
-        // Kernels before 5.0 have no UDP_GRO: then each datagram costs a call of its own, and `gro` says so.
+        // Kernels before 5.0 have no UDP_GRO: then each datagram costs a call of its own, and `gro` is false.
         let gro = options.gro && set(fd, libc::SOL_UDP, libc::UDP_GRO, &1_i32).is_ok();
         Ok(Self { socket, gro, dropped: 0 })
     }

@@ -1,40 +1,40 @@
-//! A readout that looks ahead in silence, and takes nothing back that the board's own time would say.
+//! A readout that runs ahead in silence: what it detects from the events alone is the same as without that.
 
 use taxel_core::detect::{Detection, ReadoutStream};
 use taxel_core::encode::Zeroing;
 use taxel_core::events::FARTHEST_BACK_US;
 use taxel_core::{EventsView, Result};
 
-/// Two copies of a readout. One hears what came and nothing else, so it says what the recording will say. The other runs
-/// ahead of it where the host's clock says that nothing comes; it is thrown away when something does. So an event that
-/// comes later than the silence was believed changes nothing but what was said too early.
+/// Two copies of a readout. One gets the events that came and nothing else, so its detections are those of the recording. The
+/// other runs ahead of it by the host's clock while nothing comes, and is discarded when something does. So an event that comes
+/// later than the silence was assumed to last affects only detections that were output too early.
 pub(super) struct Ahead {
-    heard: Box<ReadoutStream>,
+    certain: Box<ReadoutStream>,
     ahead: Option<Box<ReadoutStream>>,
-    /// What was said ahead and has not been heard yet.
+    /// Detections of the copy ahead that the other has not confirmed yet.
     early: Vec<Detection>,
     wrong: u64,
     found: Vec<Detection>,
 }
 
 impl Ahead {
-    pub(super) fn new(heard: Box<ReadoutStream>) -> Self {
-        Self { heard, ahead: None, early: vec![], wrong: 0, found: vec![] }
+    pub(super) fn new(certain: Box<ReadoutStream>) -> Self {
+        Self { certain, ahead: None, early: vec![], wrong: 0, found: vec![] }
     }
 
-    /// Takes the next events; adds to `out` what is certain now and was not said before.
+    /// Takes the next events; adds to `out` the detections that are certain now and were not output before.
     pub(super) fn push(&mut self, events: EventsView<'_>, out: &mut Vec<Detection>) -> Result<()> {
         if !events.is_empty() {
             self.ahead = None;
-            self.heard.push_events(events, &mut self.found)?;
+            self.certain.push_events(events, &mut self.found)?;
             self.settle(out);
         }
         Ok(())
     }
 
-    /// Believes that nothing comes before `t` us; adds to `out` what is to be said then.
+    /// Assumes that nothing comes before `t` us; adds to `out` the detections that follow.
     pub(super) fn quiet(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
-        let ahead = self.ahead.get_or_insert_with(|| self.heard.clone());
+        let ahead = self.ahead.get_or_insert_with(|| self.certain.clone());
         ahead.advance(t, &mut self.found)?;
         for detection in self.found.drain(..) {
             if !self.early.iter().any(|e| same(e, &detection)) {
@@ -42,39 +42,39 @@ impl Ahead {
                 out.push(detection);
             }
         }
-        // A silence is settled once nothing that is still believed to be late can fall into it.
+        // A silence is certain once no event can fall into it that would still be accepted as late.
         self.advance(t - FARTHEST_BACK_US, out)
     }
 
     /// Knows that nothing comes before `t` us.
     pub(super) fn advance(&mut self, t: i64, out: &mut Vec<Detection>) -> Result<()> {
-        self.heard.advance(t, &mut self.found)?;
+        self.certain.advance(t, &mut self.found)?;
         self.settle(out);
         Ok(())
     }
 
-    /// Zeroes a taxel; what was said ahead of that time stays said.
+    /// Zeroes a taxel; detections that were output ahead of that time are not withdrawn.
     pub(super) fn zero(&mut self, zeroing: &Zeroing) -> Result<()> {
         self.ahead = None;
-        self.heard.zero(zeroing)
+        self.certain.zero(zeroing)
     }
 
     /// What each taxel rests at, as [`ReadoutStream::rest`].
     pub(super) fn rest(&self) -> Vec<Option<f64>> {
-        self.heard.rest()
+        self.certain.rest()
     }
 
-    /// How many events came later than a silence that was settled, or out of order.
+    /// How many events came out of order, or later than a silence that was certain.
     pub(super) fn late(&self) -> u64 {
-        self.heard.late()
+        self.certain.late()
     }
 
-    /// How many detections were said in a silence that was none.
+    /// How many detections were output in a silence that an event then interrupted.
     pub(super) fn wrong(&self) -> u64 {
         self.wrong
     }
 
-    /// What was heard is compared with what was said ahead of it.
+    /// Compares certain detections with those that were output ahead of them.
     fn settle(&mut self, out: &mut Vec<Detection>) {
         for detection in self.found.drain(..) {
             match self.early.iter().position(|e| same(e, &detection)) {
@@ -83,7 +83,7 @@ impl Ahead {
             }
         }
         let before = self.early.len();
-        let now = self.heard.now().unwrap_or(i64::MIN);
+        let now = self.certain.now().unwrap_or(i64::MIN);
         self.early.retain(|e| e.known > now);
         self.wrong += (before - self.early.len()) as u64;
     }
@@ -102,7 +102,7 @@ mod tests {
 
     use super::*;
 
-    /// Speaks once, some 7 ms after a change at taxel 0.
+    /// Detects once, some 7 ms after a change at taxel 0.
     fn readout() -> Ahead {
         let neuron = Neuron { tau: 20.0, refractory: 500.0, theta_0: 0.3, ..Neuron::default() };
         let one = TrainedNeuron { delay_ms: 0.0, weights: vec![1.2; 8], neuron };
@@ -128,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_in_silence_is_not_said_again_when_events_bear_it_out() {
+    fn a_detection_in_silence_is_not_repeated_when_events_confirm_it() {
         let (mut ahead, mut out) = (readout(), vec![]);
         ahead.push(event(0, 10).view(), &mut out).unwrap();
         ahead.push(event(1000, 20).view(), &mut out).unwrap();
@@ -142,12 +142,12 @@ mod tests {
     }
 
     #[test]
-    fn an_event_that_comes_late_is_heard_in_its_own_time() {
+    fn an_event_that_comes_late_counts_at_its_own_time() {
         let (mut ahead, mut out) = (readout(), vec![]);
         ahead.push(event(0, 10).view(), &mut out).unwrap();
         ahead.push(event(1000, 20).view(), &mut out).unwrap();
         ahead.quiet(5000, &mut out).unwrap();
-        // 2 ms behind the silence that was believed.
+        // 2 ms before the end of the silence that was assumed.
         ahead.push(event(3000, 30).view(), &mut out).unwrap();
         ahead.quiet(150_000, &mut out).unwrap();
         let mut straight = readout();
@@ -161,13 +161,13 @@ mod tests {
     }
 
     #[test]
-    fn what_was_said_in_a_silence_that_was_none_is_counted() {
+    fn a_detection_in_a_silence_that_was_interrupted_is_counted() {
         let (mut ahead, mut out) = (readout(), vec![]);
         ahead.push(event(0, 10).view(), &mut out).unwrap();
         ahead.push(event(1000, 20).view(), &mut out).unwrap();
         ahead.quiet(20_000, &mut out).unwrap();
         let early = out.clone();
-        // It came before the crossing, which therefore lay earlier: said anew, as the recording will say it.
+        // It came before the crossing, which therefore lay earlier: output again, as from the recording.
         ahead.push(event(2000, 30).view(), &mut out).unwrap();
         ahead.advance(40_000, &mut out).unwrap();
         assert_eq!((early.len(), out.len(), ahead.wrong(), ahead.late()), (1, 2, 1, 0));

@@ -1,4 +1,4 @@
-//! What goes to other computers: datagrams as they came, the low-rate picture, detections as they are said.
+//! Copies for other computers: datagrams as they came, the low-rate picture, detections.
 //!
 //! The decoding thread gathers datagrams into parcels and hands them over where there is room; it never waits. What finds
 //! no room is counted in the parcels that follow.
@@ -16,7 +16,7 @@ use crate::recording::now_ns;
 
 /// So long a parcel gathers ...
 pub(super) const GATHER: Duration = Duration::from_millis(5);
-/// ... and after so long without one an empty parcel says how far time has come.
+/// ... and after so long without one an empty parcel states up to when nothing came.
 const STILL_HERE: Duration = Duration::from_millis(10);
 
 /// From picture to picture.
@@ -36,7 +36,7 @@ pub enum Copied {
     Said(Vec<u8>),
 }
 
-/// Where they come out.
+/// The receiving end.
 pub struct Copies {
     shared: Arc<Shared>,
     parcels: channel::Receiver<Vec<u8>>,
@@ -50,19 +50,19 @@ impl Copies {
         Self { shared, parcels, said, pictured: Instant::now(), decoded: 0 }
     }
 
-    /// The next; `None` after `timeout` without one.
+    /// The next copy; `None` after `timeout` without one.
     pub fn next(&mut self, timeout: Duration) -> Option<Copied> {
         if let Some(picture) = self.picture() {
             return Some(picture);
         }
         channel::select! {
             recv(self.parcels) -> parcel => parcel.ok().map(Copied::Parcel),
-            recv(self.said) -> said => said.ok().and_then(spoken),
+            recv(self.said) -> said => said.ok().and_then(detection),
             default(timeout) => None,
         }
     }
 
-    /// Whether all is over, and everything was given.
+    /// Whether the pipeline has ended, and every copy was taken.
     #[must_use]
     pub fn is_over(&self) -> bool {
         self.shared.has_ended() && self.parcels.is_empty() && self.said.is_empty()
@@ -90,7 +90,7 @@ impl Copies {
     }
 }
 
-fn spoken(said: Said) -> Option<Copied> {
+fn detection(said: Said) -> Option<Copied> {
     said.line().ok().map(Copied::Said)
 }
 
@@ -102,7 +102,7 @@ pub(super) struct Copier {
     since: Instant,
 }
 
-/// A copier that begins after so many datagrams, and where its parcels come out.
+/// A copier that begins after so many datagrams, and the receiver of its parcels.
 pub(super) fn copier(received: u64) -> (Copier, channel::Receiver<Vec<u8>>) {
     let (give, parcels) = channel::bounded(WAITING);
     (Copier { parcels: give, packer: Packer::after(received), since: Instant::now() }, parcels)
@@ -123,8 +123,8 @@ impl Copier {
         }
     }
 
-    /// Closes what has gathered for long enough, or says that nothing came before `silent_until`; false where nobody
-    /// listens any more.
+    /// Closes a parcel that has gathered for long enough, or states that nothing came before `silent_until`; false where no
+    /// receiver is left.
     pub(super) fn tick(&mut self, silent_until: Option<i64>, dropped_by_kernel: u64) -> bool {
         let since = self.since.elapsed();
         let due =
@@ -140,7 +140,7 @@ impl Copier {
     /// The last parcel, with what still waits.
     pub(super) fn finish(&mut self, dropped_by_kernel: u64) {
         let parcel = self.packer.close(now_ns(), dropped_by_kernel, true);
-        // It waits for room, as what it says of losses is said nowhere else; who listens no more lets it go.
+        // It waits for room, as its counts of losses are nowhere else; without a receiver it is dropped at once.
         let _ = self.parcels.send_timeout(parcel, STILL_HERE * 10);
     }
 

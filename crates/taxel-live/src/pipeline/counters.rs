@@ -19,9 +19,9 @@ use crate::latency::Quantiles;
 /// `wire.bytes = 5 wire.words + wire.skipped`; `events = read_out + events_dropped` where there is a readout.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Counters {
-    /// At the socket and in the queue behind it.
+    /// Counts of the socket and of the queue behind it.
     pub capture: capture::Counts,
-    /// On the way from another computer, where that receives.
+    /// Losses between another computer, which receives the board's datagrams, and this one.
     pub bridged: Option<Bridged>,
     /// Datagrams that were decoded.
     pub decoded: u64,
@@ -29,7 +29,7 @@ pub struct Counters {
     pub wire: wire::Counts,
     /// The version of the wire that the board speaks.
     pub wire_version: u8,
-    /// What was heard and missed of version 2.
+    /// What came and what was missing of version 2.
     pub wire_v2: wire::v2::Counts,
     /// Bytes of version 1 that were refused, because the board speaks version 2.
     pub wire_refused: u64,
@@ -40,17 +40,17 @@ pub struct Counters {
     pub wire_late: u64,
     /// Events that it gave.
     pub events: u64,
-    /// Events that the readout has heard.
+    /// Events that the readout has processed.
     pub read_out: u64,
     /// Events that found no room before the readout.
     pub events_dropped: u64,
-    /// Events that came out of order, or more than 0.1 s after a silence that was believed: the readout heard them as of
+    /// Events that came out of order, or more than 0.1 s after a silence that was assumed: the readout took them at
     /// the time that it had come to.
     pub late: u64,
-    /// Detections that were said.
+    /// Detections that were output.
     pub detections: u64,
-    /// Those among them that were said in a silence that was none: an event came later than the guard, and what the
-    /// recording says was said after them.
+    /// Those among them that were output in a silence which an event then interrupted: it came later than the guard, and the
+    /// detections of the recording were output after them.
     pub wrong: u64,
     /// Detections that [`Live::next`](super::Live::next) was too slow for; the sinks had them.
     pub detections_dropped: u64,
@@ -60,7 +60,7 @@ pub struct Counters {
     pub sources: BTreeMap<String, SourceCounts>,
     /// From the kernel's stamp to the end of decoding, a datagram each.
     pub decode_latency: Quantiles,
-    /// From `known` to said, by the board's clock.
+    /// From `known` to the output, by the board's clock.
     pub said_latency: Quantiles,
     /// What the host's clock shows when the board's shows a time; from the first datagram on.
     pub offset: Option<Offset>,
@@ -83,8 +83,7 @@ impl Counters {
         self.capture.messages + self.capture.dropped_by_kernel == 0
     }
 
-    /// What came since an earlier time, and what became of it. What is of a moment (clocks, versions) and the latencies stay
-    /// those of now; what waits at the end is left out.
+    /// The counts since an earlier time. Clocks, versions and latencies are those of now; what waits at the end is left out.
     #[must_use]
     pub(super) fn since(&self, earlier: &Self) -> Self {
         let decoded = self.decoded - earlier.decoded;
@@ -128,11 +127,11 @@ impl Counters {
 /// How a [`Live`](super::Live) ended.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
-    /// All of them, closed.
+    /// At the end, with closed sums.
     pub counters: Counters,
     /// One line: nothing lost after arrival, what was lost where, or that nothing came.
     pub verdict: String,
-    /// The file, where something was recorded: one to which nothing came is not kept, and none is replaced by it.
+    /// The file, where something was recorded: one to which nothing came is removed, and replaces none.
     pub path: Option<PathBuf>,
     /// The fresh tare, where one was completed.
     pub tare: Option<Tare>,
@@ -148,9 +147,9 @@ pub enum SourceCounts {
     Numbers {
         /// Lines, or samples given.
         lines: u64,
-        /// Those that could not be read; they are kept as they came.
+        /// Those that could not be parsed; they are recorded as they came.
         strange: u64,
-        /// What the system said last, where the line broke.
+        /// The system's last error, where the line broke.
         trouble: Option<String>,
     },
 }

@@ -1,4 +1,4 @@
-//! What others may do with a pipeline while it runs: look on, record, tell it of the board.
+//! What other parts may do with a pipeline while it runs: get its events, record, announce what was written to the board.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -36,7 +36,7 @@ impl Handle {
         &self.shared.options
     }
 
-    /// The address that it listens on; unspecified, with port 0, where a bridge feeds it.
+    /// The address that it receives on; unspecified, with port 0, where a bridge feeds it.
     #[must_use]
     pub fn address(&self) -> SocketAddr {
         self.shared.receiver.address()
@@ -60,23 +60,23 @@ impl Handle {
         self.shared.ended.load(Ordering::Acquire)
     }
 
-    /// What the registers hold, as far as it was told.
+    /// The board's registers, as far as they are known.
     #[must_use]
     pub fn registers(&self) -> Registers {
         *lock(&self.shared.registers)
     }
 
-    /// Tells what was written to the board's registers: the recording keeps it, and the version of the wire is expected.
+    /// Announces what was written to the board's registers: it is recorded, and the version of the wire is expected.
     pub fn wrote(&self, registers: Registers) {
         *lock(&self.shared.registers) = registers;
         self.shared.request(Request::Registers(registers));
     }
 
-    /// Lets somebody look on, from the next batch on.
+    /// Gives a viewer the events from the next batch on.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where all is over.
+    /// `Core(Problem)` where the pipeline has ended.
     pub fn look(&self) -> Result<Outlet> {
         let (give, outlet) = channel::bounded(1);
         self.shared.request(Request::Tap(give));
@@ -87,7 +87,7 @@ impl Handle {
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where all is over.
+    /// `Core(Problem)` where the pipeline has ended.
     pub fn copy(&self) -> Result<Copies> {
         let (give, parcels) = channel::bounded(1);
         let said = self.hear(COPIED_WAITING);
@@ -95,7 +95,7 @@ impl Handle {
         Ok(Copies::new(Arc::clone(&self.shared), self.shared.wait(&parcels)?, said))
     }
 
-    /// Hears detections as they are said; so many may wait, and who is too slow misses some.
+    /// Gives each detection from here on; so many may wait, and a slow receiver misses some.
     #[must_use]
     pub fn hear(&self, waiting: usize) -> channel::Receiver<Said> {
         let (say, said) = channel::bounded(waiting);
@@ -144,7 +144,7 @@ impl Handle {
         self.shared.note(text, true)
     }
 
-    /// Writes down what holds for the whole recording, such as the name of a trial: a note without a time, which is no event.
+    /// Writes a note that holds for the whole recording, such as the name of a trial: a note without a time, which is no event.
     ///
     /// # Errors
     ///
@@ -153,27 +153,27 @@ impl Handle {
         self.shared.note(text, false)
     }
 
-    /// Takes what these taxels (column, row) hold now for their rest from now on, in the readout and in the recording's
-    /// pictures; the recording keeps when it was done, and the rests before and after. Never done but when asked for.
+    /// Takes the values that these taxels (column, row) hold for their rest from now on, in the readout and in the recording's
+    /// pictures; the recording states when that was, and the rests before and after. Only done on request.
     ///
     /// # Errors
     ///
-    /// `Core(Problem)` where a taxel does not exist or was not heard of yet, a tare is being taken, or a `.lsa` is recorded, which
-    /// could not keep it: then none is zeroed. `File` where the disk is full.
+    /// `Core(Problem)` where a taxel does not exist or has had no event so far, a tare is being taken, or a `.lsa` is recorded, which
+    /// cannot hold it: then none is zeroed. `File` where the disk is full.
     pub fn zero(&self, taxels: &[(u16, u16)]) -> Result<Vec<Zeroing>> {
         let (give, zeroed) = channel::bounded(1);
         self.shared.request(Request::Zero(taxels.to_vec(), give));
         self.shared.wait(&zeroed).and_then(std::convert::identity)
     }
 
-    /// What was zeroed last at each taxel that was, by taxel index; and how often something was.
+    /// The latest zeroing of each taxel that was zeroed, by taxel index; and how often taxels were.
     #[must_use]
     pub fn zeroed(&self) -> (Vec<Zeroing>, u64) {
         let published = self.shared.published();
         (published.zeroed.values().copied().collect(), published.zeroings)
     }
 
-    /// How often something was zeroed.
+    /// How often taxels were zeroed.
     #[must_use]
     pub fn zeroings(&self) -> u64 {
         self.shared.published().zeroings

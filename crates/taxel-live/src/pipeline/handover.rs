@@ -1,4 +1,4 @@
-//! What waits between decoding and reading out.
+//! The queue between decoding and reading out.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
@@ -27,9 +27,9 @@ struct Waiting {
 /// After the events that were handed over nothing comes before this time, us.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Quiet {
-    /// As the host's clock has it: what comes late may prove it wrong.
+    /// By the host's clock: an event that comes late may contradict it.
     Believed(i64),
-    /// The board has promised it.
+    /// As the board has promised.
     Promised(i64),
 }
 
@@ -42,7 +42,7 @@ impl Quiet {
     }
 }
 
-/// What the readout takes at once.
+/// What the readout processes at once, beside the events.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Taken {
     /// How far time has come after the events.
@@ -58,8 +58,8 @@ impl Handover {
         Self { state: Mutex::new(state), came: Condvar::new(), limit }
     }
 
-    /// Hands events over, with what the board promises behind them, and leaves `events` empty; those that find no room are dropped,
-    /// and counted in what this gives. One wake-up.
+    /// Adds events, with the board's promise after them, and leaves `events` empty; those that find no room are dropped. Returns how
+    /// many were so far. One wake-up.
     pub(super) fn put(&self, events: &mut Events, promised: Option<i64>) -> u64 {
         let mut state = self.state();
         let room = self.limit.saturating_sub(state.events.len());
@@ -78,19 +78,19 @@ impl Handover {
         dropped
     }
 
-    /// Says how far time has come after all that was handed over.
+    /// Sets up to when nothing comes after the events that wait.
     pub(super) fn quiet(&self, quiet: Quiet) {
         self.state().quiet = Some(quiet);
         self.came.notify_one();
     }
 
-    /// Hands on what is to be zeroed: it has its own time.
+    /// Adds zeroings, each of which has its own time.
     pub(super) fn zero(&self, zeroings: &[Zeroing]) {
         self.state().zeroings.extend_from_slice(zeroings);
         self.came.notify_one();
     }
 
-    /// Ends it; `quiet` is how far time has come.
+    /// Ends it; `quiet` is up to when nothing came.
     pub(super) fn close(&self, quiet: Option<Quiet>) {
         let mut state = self.state();
         state.quiet = quiet.or(state.quiet);
@@ -99,7 +99,7 @@ impl Handover {
         self.came.notify_one();
     }
 
-    /// Waits for something and takes all of it; what is to be zeroed is added to `zeroings`.
+    /// Waits until something is there and takes all of it; adds to `zeroings`.
     pub(super) fn take(&self, events: &mut Events, zeroings: &mut Vec<Zeroing>) -> Taken {
         events.clear();
         let nothing = |s: &mut Waiting| {

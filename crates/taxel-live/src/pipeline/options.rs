@@ -1,4 +1,4 @@
-//! How the pipeline is told to work.
+//! The options of the pipeline.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ use crate::recording::Compression;
 pub struct LiveOptions {
     /// The sensor.
     pub array: Array,
-    /// The board's registers, as far as they are known: its frame's length is taken from them.
+    /// The board's registers, as far as they are known: they state how long a frame lasts.
     pub registers: Registers,
     /// Whether the board sends differences for intensities (the panel's "delta intensity").
     pub differences: bool,
@@ -28,15 +28,15 @@ pub struct LiveOptions {
     pub readout_events: usize,
     /// The socket and the queue behind it.
     pub capture: ReceiverOptions,
-    /// Where everything is kept, if anywhere.
+    /// The recording from the beginning, if any.
     pub record: Option<Record>,
-    /// Whether recordings are begun and ended while all is heard ([`Live::record`](super::Live::record)); then none from the beginning.
+    /// Whether recordings begin and end while it runs ([`Live::record`](super::Live::record)); then none from the beginning.
     pub record_later: bool,
     /// Where detections go as lines, besides to the sinks.
     pub send: Vec<Destination>,
-    /// What the board is called in a recording.
+    /// The board's name in a recording.
     pub name: String,
-    /// What else the recording holds.
+    /// The other sources of the recording.
     pub sources: Vec<Source>,
 }
 
@@ -60,7 +60,7 @@ impl LiveOptions {
         }
     }
 
-    /// How long the board's frames last, and what their stamps count, by its registers.
+    /// How long the board's frames last, and the unit of their stamps, by its registers.
     #[must_use]
     pub fn frames(&self) -> FrameTime {
         FrameTime::on_wire(self.registers.frame_us(), self.registers.wire_version)

@@ -5,7 +5,7 @@ use taxel_core::encode::{Tare, TareBuilder};
 use taxel_core::{Events, Intensities, Result};
 
 /// Takes a tare from the first event on for a stretch of the board's time, or until the board marks a start. However
-/// long that is, of what came it keeps the last event of each taxel: what the taxel holds.
+/// long that is, it stores only the last event of each taxel, and so the value that it holds.
 pub(super) struct Rest {
     stretch_us: i64,
     readout: Box<Readout>,
@@ -28,7 +28,7 @@ impl Rest {
         Self { stretch_us, readout, builder, first: None, last: vec![None; array.len()], array: array.clone() }
     }
 
-    /// Takes the next events and says, once the rest is over, when it ended (us) and how many of them belong to it.
+    /// Takes the next events; once the rest is over, returns when it ended (us) and how many of them belong to it.
     pub(super) fn push(&mut self, events: &Events, quiet_until: Option<i64>) -> Result<Option<(i64, usize)>> {
         if self.first.is_none() {
             self.first = events.t.first().copied();

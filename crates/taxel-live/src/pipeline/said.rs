@@ -1,20 +1,20 @@
-//! Detections as they are said, and who hears them.
+//! Detections with the time of their output, and where they go.
 
 use taxel_core::detect::Detection;
 
-/// A detection, and when it was said.
+/// A detection, and when it was output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Said {
-    /// What was said.
+    /// What was detected.
     pub detection: Detection,
-    /// When it was said by the host's clock, ns since 1970.
+    /// When it was output by the host's clock, ns since 1970.
     pub said_ns: i64,
     /// The same by the board's clock, as far as the host can tell: `said_ns` less the estimated offset; us.
     pub said: i64,
 }
 
 impl Said {
-    /// A line of JSON with the keys of `taxel detect --json` and when it was said, its end included.
+    /// A line of JSON with the keys of `taxel detect --json` and the time of the output, its end included.
     ///
     /// # Errors
     ///
@@ -35,13 +35,13 @@ impl Said {
     }
 }
 
-/// Takes detections in the thread that made them; what it does there, the next detection waits for.
+/// Takes detections in the thread that made them; the next detection waits until it returns.
 pub trait Sink: Send {
-    /// One was said.
+    /// Takes one.
     ///
     /// # Errors
     ///
-    /// Where it cannot be handed on: then the whole way ends.
+    /// Where it cannot be handed on: then the pipeline ends.
     fn take(&mut self, said: &Said) -> std::io::Result<()>;
 }
 

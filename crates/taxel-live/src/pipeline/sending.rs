@@ -1,7 +1,7 @@
 //! Detections on their way to other programs and machines: a line of JSON each, by UDP, into a pipe, over a serial line.
 //!
 //! A line leaves from the thread that made it where there is room; what finds none waits, bounded, for a thread of its own.
-//! Who reads too slowly, or not at all, loses lines, which are counted; nobody waits for him.
+//! A reader that is too slow, or absent, loses lines, which are counted; the pipeline never waits for it.
 
 use std::collections::VecDeque;
 use std::fmt::{self, Display, Formatter};
@@ -29,7 +29,7 @@ const WAITING: usize = 1024;
 /// How often a line that broke is tried again, and the end looked for.
 const AGAIN: Duration = Duration::from_millis(250);
 
-/// How long, at the end, who reads slowly is waited for.
+/// How long a slow reader is waited for at the end.
 const LAST: Duration = Duration::from_secs(1);
 
 /// Of a serial line, where no speed is named.
@@ -40,7 +40,7 @@ const BAUD: u32 = 115_200;
 pub enum Destination {
     /// A datagram a line.
     Udp(SocketAddr),
-    /// A named pipe that is there; lines that come while nobody reads are lost.
+    /// A named pipe, which must exist; lines are lost while it has no reader.
     Pipe(PathBuf),
     /// A serial line, 8 data bits, no parity, 1 stop bit; opened again where it was pulled.
     Serial(PathBuf, u32),
@@ -85,11 +85,11 @@ pub struct Sent {
     pub to: String,
     /// Lines that the system took whole.
     pub sent: u64,
-    /// Lines that found no room, or nobody who reads.
+    /// Lines that found no room, or no reader.
     pub lost: u64,
     /// Lines that wait.
     pub waiting: u64,
-    /// What the system said last where lines were lost for another reason than too slow a reader.
+    /// The system's last error, where lines were lost for another reason than a slow reader.
     pub trouble: Option<String>,
 }
 
@@ -126,7 +126,7 @@ impl Sending {
     ///
     /// # Errors
     ///
-    /// `File` or `Socket` where it cannot be opened, `Core(Problem)` where it is no pipe. That nobody reads a pipe yet is none.
+    /// `File` or `Socket` where it cannot be opened, `Core(Problem)` where it is no pipe. A pipe without a reader is no error.
     pub(super) fn open(to: &Destination) -> Result<Self> {
         let device = Device::open(to)?;
         let counts = Sent { to: to.to_string(), ..Sent::default() };
@@ -147,7 +147,7 @@ impl Sink for Sending {
     fn take(&mut self, said: &Said) -> io::Result<()> {
         let mut state = lock(&self.line.state);
         if state.device.is_none() && matches!(self.line.to, Destination::Pipe(_)) {
-            // Somebody may read by now; a serial line takes longer to open, and is the other thread's.
+            // It may have a reader by now; a serial line takes longer to open, which the other thread does.
             state.opened(Device::open(&self.line.to));
         }
         if state.device.is_none() || state.waiting.len() >= WAITING {
@@ -204,7 +204,7 @@ impl Line {
                 None => {
                     state = self.came.wait_timeout(state, AGAIN).unwrap_or_else(PoisonError::into_inner).0;
                     if state.device.is_none() && !state.closed {
-                        // A serial line may take its time: nobody waits meanwhile.
+                        // Opening a serial line may take long: the lock is released meanwhile.
                         drop(state);
                         let opened = Device::open(&self.to);
                         state = lock(&self.state);
@@ -239,7 +239,7 @@ impl SendingState {
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => return,
                 Err(error) if matches!(device, Device::Udp(..)) => {
-                    // A datagram that the system refuses says nothing of the next.
+                    // The system may refuse one datagram and send the next.
                     self.waiting.pop_front();
                     self.counts.lost += 1;
                     self.counts.trouble = Some(error.to_string());
@@ -267,7 +267,7 @@ impl SendingState {
 }
 
 impl Device {
-    /// Opens a destination; `None` for a pipe that nobody reads.
+    /// Opens a destination; `None` for a pipe without a reader.
     fn open(to: &Destination) -> Result<Option<Self>> {
         match to {
             Destination::Udp(address) => {
@@ -306,7 +306,7 @@ impl Device {
     }
 }
 
-/// A serial line that takes what it has room for, and never waits.
+/// A serial line to which writes never wait.
 pub(super) fn serial(path: &Path, baud: u32) -> Result<serialport::TTYPort> {
     let place = path.display().to_string();
     let opened = serialport::new(place, baud).timeout(Duration::ZERO).open_native();

@@ -23,7 +23,7 @@ use crate::{Error, Result, address};
 /// How long the first line of a source is waited for, from which its columns are known.
 const FIRST_LINE: Duration = Duration::from_secs(3);
 
-/// How often a line that broke is tried again, and the end looked for.
+/// How often a line that broke is opened again, and the end checked.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// The longest line, bytes; more is no line of numbers.
@@ -46,7 +46,7 @@ pub struct Source {
 pub enum SourceKind {
     /// A board that sends to this address of ours.
     Board(SocketAddr, Box<Array>, Registers),
-    /// Lines of numbers; opened already where the first one had to tell what they hold.
+    /// Lines of numbers; opened already where their columns had to be read from the first one.
     Lines(Place, Stream, Opened),
     /// Numbers that a program gives ([`Live::sample`](super::Live::sample)).
     Given(Stream),
@@ -61,8 +61,8 @@ pub enum Place {
     Pipe(PathBuf),
 }
 
-/// Lines that were opened to see what they hold, with what came behind the first. Who reads them goes on there: what came is
-/// theirs, and the writer of a pipe that nobody reads any more is killed.
+/// Lines that were opened to read their columns, with what came after the first. The reader goes on there: to open them again would
+/// lose what came, and a pipe without a reader ends the program that writes to it.
 #[derive(Clone, Default)]
 pub struct Opened(Arc<Mutex<Option<Tap>>>);
 
@@ -78,7 +78,7 @@ impl std::fmt::Debug for Opened {
     }
 }
 
-/// What has come of a source is no part of what it is.
+/// Lines that were read already do not make two sources different.
 impl PartialEq for Opened {
     fn eq(&self, _: &Self) -> bool {
         true
@@ -95,7 +95,7 @@ impl std::fmt::Display for Place {
 }
 
 impl Source {
-    /// What the recording says of it.
+    /// Its header in the recording.
     pub(super) fn header(&self) -> taxel_core::Result<Header> {
         match &self.kind {
             SourceKind::Board(address, array, registers) => {
@@ -142,12 +142,12 @@ impl FromStr for SourceKind {
                     },
                 };
                 let place = Place::Serial(path.into(), baud);
-                let (stream, opened) = told_or_heard(stream_of(text, &mut options)?, &place)?;
+                let (stream, opened) = named_or_read(stream_of(text, &mut options)?, &place)?;
                 Self::Lines(place, stream, opened)
             }
             Some(("pipe", place)) if !place.is_empty() => {
                 let place = Place::Pipe(place.into());
-                let (stream, opened) = told_or_heard(stream_of(text, &mut options)?, &place)?;
+                let (stream, opened) = named_or_read(stream_of(text, &mut options)?, &place)?;
                 Self::Lines(place, stream, opened)
             }
             None if what == "given" => match stream_of(text, &mut options)? {
@@ -182,7 +182,7 @@ fn array_of(text: &str, size: &str) -> Result<Array> {
     Ok(Array::new(rows, columns, thesis.pitch_mm, size)?)
 }
 
-/// What the options say of the columns; `None` where they say nothing.
+/// The columns that the options name, if they do.
 fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<Stream>> {
     let columns = options.remove("columns").map(|names| names.split(':').map(str::to_owned).collect());
     let time = options.remove("time");
@@ -205,16 +205,16 @@ fn stream_of(text: &str, options: &mut BTreeMap<&str, &str>) -> Result<Option<St
     Ok(Some(stream))
 }
 
-/// What was said of lines, or what their first one tells.
-fn told_or_heard(told: Option<Stream>, place: &Place) -> Result<(Stream, Opened)> {
-    told.map_or_else(|| first_line(place), |stream| Ok((stream, Opened::default())))
+/// The columns that were named, or those of the first line.
+fn named_or_read(named: Option<Stream>, place: &Place) -> Result<(Stream, Opened)> {
+    named.map_or_else(|| first_line(place), |stream| Ok((stream, Opened::default())))
 }
 
-/// Opens lines and waits for the first that tells the columns: a line of names, or of numbers, which are then called a, b, c ...
+/// Opens lines and waits for the first that states the columns: a line of names, or of numbers, which are then called a, b, c ...
 fn first_line(place: &Place) -> Result<(Stream, Opened)> {
     let mut tap = Tap::open(place)?;
     let until = Instant::now() + FIRST_LINE;
-    // Who opens a serial line in the middle of a line hears its end first.
+    // A serial line that is opened in the middle of a line gives the rest of that line first.
     let mut skip = matches!(place, Place::Serial(..));
     let mut numbers = None;
     while Instant::now() < until {
@@ -273,7 +273,7 @@ impl Tap {
         matches!(self.place, Place::Serial(..))
     }
 
-    /// Waits a little for more; gives whether nothing comes any more.
+    /// Waits a little for more; returns whether nothing can come any more.
     pub(super) fn fill(&mut self) -> io::Result<bool> {
         let is_input = self.place == Place::Pipe(PathBuf::from("-"));
         let Some(file) = &mut self.file else {
@@ -285,7 +285,7 @@ impl Tap {
         }
         let mut piece = [0; 4096];
         match file.read(&mut piece) {
-            // A pipe that nobody writes to, or the end of a file: somebody may write again.
+            // A pipe without a writer, or the end of a file: a program may write to it again.
             Ok(0) if is_input => return Ok(true),
             Ok(0) if matches!(self.place, Place::Serial(..)) => return Err(ErrorKind::BrokenPipe.into()),
             Ok(0) => std::thread::sleep(LOOK_EVERY),
@@ -313,7 +313,7 @@ impl Tap {
         Error::file(path)(error)
     }
 
-    /// Tries the line again; what had come of a line is no line.
+    /// Opens the line again, and discards the part of a line that had come.
     pub(super) fn again(&mut self) {
         self.bytes.clear();
         self.file = open(&self.place).ok();
@@ -328,7 +328,7 @@ fn open(place: &Place) -> Result<Box<dyn ReadsAsItComes>> {
     match place {
         Place::Serial(path, baud) => Ok(Box::new(serial(path, *baud)?)),
         Place::Pipe(path) if path == Path::new("-") => {
-            // Not through the program's own buffer: what lies in that is no sign that something came.
+            // Not through the program's own buffer: `poll` does not see what that holds.
             let input = io::stdin().as_fd().try_clone_to_owned().map_err(Error::file(path))?;
             Ok(Box::new(File::from(input)))
         }

@@ -1,7 +1,7 @@
 //! The further sources of a recording, at work.
 //!
-//! Each keeps its own clock beside the host's arrival times, and is counted apart. A thread of its own hears it; what it
-//! cannot take the system holds, or drops.
+//! Each has its own clock beside the host's arrival times, counts of its own and a thread of its own; what that cannot read in
+//! time the system buffers, or drops.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -23,7 +23,7 @@ use crate::{Error, Result};
 /// A stream of numbers at work.
 pub(super) struct Numbers {
     part: Part,
-    /// Whether they are kept from the first one on; else where a recording runs.
+    /// Whether they are recorded from the first one on; else while a recording runs.
     always: bool,
     track: Mutex<Kept>,
     stream: Stream,
@@ -55,7 +55,7 @@ impl Numbers {
         }
     }
 
-    /// Keeps numbers that came.
+    /// Records numbers that came.
     pub(super) fn sample(&self, arrived_ns: i64, values: &[f64]) -> Result<()> {
         if !self.stream.takes(values) {
             let columns = self.stream.columns.join(", ");
@@ -65,7 +65,7 @@ impl Numbers {
         self.keep(|track, number| track.sample(arrived_ns, number, values))
     }
 
-    /// Counts a line, and keeps it where it is to be kept. One belongs to one recording.
+    /// Counts a line, and records it while a recording runs. Each line belongs to one recording.
     fn keep(&self, keep: impl FnOnce(&Track, u64) -> Result<()>) -> Result<()> {
         let mut kept = lock(&self.track);
         if self.always && kept.track.is_none() {
@@ -75,11 +75,11 @@ impl Numbers {
         kept.track.as_ref().map_or(Ok(()), |track| keep(track, number))
     }
 
-    /// Keeps a line that came.
+    /// Records a line that came.
     fn line(&self, arrived_ns: i64, line: &str) -> Result<()> {
         match self.stream.parse(line) {
             Some(values) => self.sample(arrived_ns, &values),
-            // A line that names the columns again is none.
+            // A line that names the columns again holds no numbers.
             None if fields(line).eq(self.stream.columns.iter().map(String::as_str)) || line.trim().is_empty() => Ok(()),
             None => self.keep(|track, number| {
                 self.strange.fetch_add(1, Ordering::Relaxed);
@@ -88,7 +88,8 @@ impl Numbers {
         }
     }
 
-    /// What comes from here on goes to this part of a recording, or to none; says in the one before what came, and gives that.
+    /// Records what comes from here on into this part of a recording, or none; ends the part before with its counts, and returns
+    /// those.
     pub(super) fn keep_in(&self, track: Option<Track>) -> SourceCounts {
         let mut kept = lock(&self.track);
         let now = (self.lines.load(Ordering::Relaxed), self.strange.load(Ordering::Relaxed));
@@ -108,7 +109,7 @@ impl Numbers {
         SourceCounts::Numbers { lines, strange, trouble: lock(&self.trouble).clone() }
     }
 
-    /// Nothing is taken any more: says in the recording what came.
+    /// Takes no more lines: ends its part of the recording with its counts.
     pub(super) fn end(&self) {
         self.ends.store(true, Ordering::Release);
         self.keep_in(None);
@@ -121,7 +122,7 @@ impl Numbers {
         let (numbers, mut tap) = (Arc::clone(self), begun.map_or_else(|| Tap::open(place), Ok)?);
         let thread = std::thread::Builder::new().name("taxel-lines".to_owned());
         let job = move || {
-            // Who opens a serial line in the middle of a line hears its end first.
+            // A serial line that is opened in the middle of a line gives the rest of that line first.
             let mut first = !whole;
             while !numbers.ends.load(Ordering::Acquire) {
                 let ended = match tap.fill() {
@@ -164,7 +165,7 @@ pub(super) struct Others<Board> {
 }
 
 impl<Board> Others<Board> {
-    /// Begins to hear the sources of a pipeline; `begin` does so with a board.
+    /// Begins the sources of a pipeline; `begin` begins a board.
     pub(super) fn start(
         shared: &Arc<Shared>,
         begin: impl Fn(SocketAddr, LiveOptions, Part) -> Result<Board>,
@@ -196,8 +197,8 @@ impl<Board> Others<Board> {
         Ok(others)
     }
 
-    /// Lets nothing more come of numbers.
-    fn hush(&mut self) {
+    /// Ends the threads that read numbers.
+    fn end_lines(&mut self) {
         self.numbers.iter().for_each(|(_, numbers)| numbers.ends.store(true, Ordering::Release));
         for thread in self.threads.drain(..) {
             if let Err(panic) = thread.join() {
@@ -206,9 +207,9 @@ impl<Board> Others<Board> {
         }
     }
 
-    /// Ends them all, and gives what was counted of the boards at their end.
+    /// Ends them all, and returns their counts.
     pub(super) fn stop(&mut self, end: impl Fn(Board) -> Result<Counters>) -> Result<BTreeMap<String, SourceCounts>> {
-        self.hush();
+        self.end_lines();
         let mut counts = BTreeMap::new();
         for (name, numbers) in &self.numbers {
             numbers.end();
@@ -227,6 +228,6 @@ impl<Board> Others<Board> {
 
 impl<Board> Drop for Others<Board> {
     fn drop(&mut self) {
-        self.hush();
+        self.end_lines();
     }
 }

@@ -6,17 +6,17 @@ use std::time::{Duration, Instant};
 /// How often a recording gets a picture where something comes.
 const PICTURE_EVERY: Duration = Duration::from_millis(100);
 
-/// How often one is kept for the time being: a recording never gets more.
+/// How often a picture is stored until it is decided: a recording never gets more.
 const KEPT_EVERY: Duration = Duration::from_millis(10);
 
-/// How many are kept: half a second. What was said of longer ago has no picture before it any more.
+/// How many are stored: half a second. An event of longer ago gets no picture before it.
 const KEPT: usize = 50;
 
 /// The pictures of the last half second, a hundredth of a second apart, until it is known whether the recording gets them.
 #[derive(Debug)]
 pub(super) struct Stills {
     kept: VecDeque<Still>,
-    /// Times of events, us, that still have no picture from them on.
+    /// Times of events, us, after which no picture was stored yet.
     awaited: Vec<i64>,
     taken: Option<Instant>,
     wanted: Option<Instant>,
@@ -29,7 +29,7 @@ pub(super) struct Still {
     pub(super) at_ns: i64,
     /// The board's time of the last event in it, us.
     pub(super) t_us: i64,
-    /// Ticks by taxel index; 0 of one that was never heard of.
+    /// Ticks by taxel index; 0 of a taxel without any event so far.
     pub(super) held: Vec<u16>,
     state: StillState,
 }
@@ -59,13 +59,13 @@ impl Stills {
         self.taken.is_none_or(|taken| now.saturating_duration_since(taken) >= KEPT_EVERY)
     }
 
-    /// Nothing is recorded: nothing is kept.
+    /// Nothing is recorded: discards all.
     pub(super) fn clear(&mut self) {
         self.kept.clear();
         self.awaited.clear();
     }
 
-    /// Takes what the taxels hold.
+    /// Stores the values that the taxels hold.
     pub(super) fn take(&mut self, now: Instant, at_ns: i64, t_us: i64, held: impl Iterator<Item = u16>) {
         let mut memory = if self.kept.len() >= KEPT { self.kept.pop_front().map(|old| old.held) } else { None };
         let values = memory.get_or_insert_default();
@@ -85,7 +85,7 @@ impl Stills {
         self.kept.push_back(still);
     }
 
-    /// Something happened at `t` us: the recording gets the last picture before it and the first from it on.
+    /// For an event at `t` us the recording gets the last picture before it and the first from it on.
     pub(super) fn around(&mut self, t: i64) {
         if let Some(before) = self.kept.iter_mut().rev().find(|still| still.t_us < t) {
             before.want();
@@ -97,7 +97,7 @@ impl Stills {
         }
     }
 
-    /// Gives those that the recording gets and has not got, in order of time.
+    /// Those that the recording is to get, in order of time, once each.
     pub(super) fn give(&mut self) -> impl Iterator<Item = &Still> {
         self.kept.iter_mut().filter(|still| still.state == StillState::Wanted).map(|still| {
             still.state = StillState::Given;

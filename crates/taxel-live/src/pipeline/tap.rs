@@ -1,4 +1,4 @@
-//! What those who look on get of the events: packed pieces, twice as often as pictures while somebody looks.
+//! Copies of the events for viewers: in pieces, twice as often as pictures while a viewer is connected.
 //!
 //! The decoding thread fills a piece of bounded size and hands it over where there is room; it never waits. What finds no
 //! room is counted, and the next piece begins with the held values, so that a picture is right again within 0.1 s.
@@ -10,12 +10,12 @@ use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 use std::sync::Arc;
 use taxel_core::{Array, Events, Marker};
 
-/// A taxel that was never heard of, and a change without a value.
+/// The value of a taxel without any event so far, and of a change without a value.
 pub const UNKNOWN: u16 = u16::MAX;
 
-/// From piece to piece while somebody looks ...
+/// From piece to piece while a viewer is connected ...
 const LOOKED_AT: Duration = Duration::from_millis(8);
-/// ... and while nobody does: looking back begins where a piece does.
+/// ... and while none is: a viewer that looks back begins where a piece does.
 const UNSEEN: Duration = Duration::from_millis(100);
 
 /// How often a piece begins with the held values.
@@ -41,7 +41,7 @@ pub struct Change {
     pub ticks: u16,
     /// More pressure.
     pub up: bool,
-    /// Whether a state of version 2 told it, not the taxel itself.
+    /// Whether it comes from a state of version 2, not from an event.
     pub repaired: bool,
 }
 
@@ -50,7 +50,7 @@ pub struct Change {
 pub struct Piece {
     /// The changes.
     pub changes: Vec<Change>,
-    /// What the taxels held before the first of them, where it is told.
+    /// The values that the taxels held before the first of them, in some pieces.
     pub held: Option<Vec<u16>>,
     /// The board's time before the first of them; `None` before anything came.
     pub since: Option<i64>,
@@ -64,7 +64,7 @@ pub struct Piece {
     pub markers: Vec<Marker>,
 }
 
-/// Where pieces come out.
+/// The receiving end.
 #[derive(Debug)]
 pub struct Outlet {
     pieces: Receiver<Piece>,
@@ -78,7 +78,7 @@ impl Outlet {
         self.pieces.try_recv().ok()
     }
 
-    /// Says whether somebody looks: then pieces come often enough for sixty pictures a second, else ten times.
+    /// Sets whether a viewer is connected: then pieces come often enough for sixty pictures a second, else ten times.
     pub fn look(&self, somebody: bool) {
         self.looked_at.store(somebody, Ordering::Relaxed);
     }
@@ -93,13 +93,13 @@ pub(super) struct Tap {
     held: Vec<u16>,
     latest: Option<i64>,
     events: u64,
-    /// Whether what waits to be sent begins with the held values.
+    /// When a piece last began with the held values.
     told: Instant,
     sent: Instant,
     columns: usize,
 }
 
-/// A tap for an array whose taxels hold these values, as far as they are known, and where it comes out.
+/// A tap for an array whose taxels hold these values, and its receiving end.
 pub(super) fn tap(array: &Array, held: Vec<u16>, latest: Option<i64>, events: u64) -> (Tap, Outlet) {
     let (sender, pieces) = bounded(WAITING);
     let looked_at = Arc::new(AtomicBool::new(true));
@@ -151,7 +151,7 @@ impl Tap {
         let room = MARKERS.saturating_sub(self.piece.markers.len());
         self.piece.markers.extend(events.markers.iter().take(room));
         if taken < events.len() {
-            // Too much waits: what is there is given up, and the next piece begins anew with what is held.
+            // Too much waits: it is dropped, and the next piece begins anew with the held values.
             let missing = self.piece.missing + (self.piece.changes.len() + events.len() - taken) as u64;
             let reset = self.piece.reset;
             self.begin(true);
@@ -159,7 +159,7 @@ impl Tap {
         }
     }
 
-    /// Hands over what waits, where it is time; false where nobody listens any more.
+    /// Hands over what waits, where it is time; false where the receiving end is gone.
     pub(super) fn tick(&mut self) -> bool {
         let every = if self.looked_at.load(Ordering::Relaxed) { LOOKED_AT } else { UNSEEN };
         let nothing = self.piece.changes.is_empty() && self.piece.held.is_none() && self.piece.markers.is_empty();
@@ -180,7 +180,7 @@ impl Tap {
         }
     }
 
-    /// The board was reset: its taxels hold nothing until they are heard again.
+    /// The board was reset: its taxels hold no value until their next event.
     pub(super) fn forget(&mut self) {
         let waits = std::mem::take(&mut self.piece);
         let (missing, markers) = match self.pieces.try_send(waits) {
@@ -239,6 +239,6 @@ mod tests {
         drop(outlet);
         tap.take(&events(&[2000], 7));
         tap.sent = Instant::now() - UNSEEN;
-        assert!(!tap.tick(), "nobody listens any more");
+        assert!(!tap.tick(), "the receiving end is gone");
     }
 }

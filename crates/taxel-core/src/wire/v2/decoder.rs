@@ -1,5 +1,6 @@
 //! Datagrams of version 2 to events: each intact one exactly once, whatever was lost, repeated, reordered or damaged.
 
+mod body;
 mod held;
 #[cfg(target_arch = "x86_64")]
 mod run;
@@ -8,24 +9,20 @@ mod taken;
 mod words;
 
 use super::counts::{Counts, Status};
-use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Kind, Refused, START, STOP};
+use super::{DIFFERENCES, DROPPED, FRAME_SYNC, Header, Refused};
 use crate::vectors::Instructions;
 use crate::wire::columns::{Columns, Laid, Room, Table};
 use crate::wire::silence::silence;
-use crate::{Array, Events, Marker, Result, problem};
+use crate::{Array, Events, Result, problem};
 use held::Held;
 #[cfg(target_arch = "x86_64")]
 use run::Run;
 use session::{Session, WINDOW};
 use taken::Taken;
 pub use words::stream_rows;
-use words::{Body, Meaning};
 
 /// Sessions that are remembered, for datagrams that come behind a reset.
 const SESSIONS: usize = 4;
-
-/// Five totals of 64 bits.
-const STATUS_BYTES: usize = 40;
 
 /// What one datagram was.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -317,66 +314,6 @@ impl Decoder {
         self.sessions.push(Session::new(header, offset));
         (self.sessions.len() - 1, !began)
     }
-
-    /// `number` is the datagram's, where it is of the latest session.
-    fn body(&mut self, header: &Header, body: &[u8], base: i64, number: Option<i64>, out: &mut impl Table) {
-        let Some(kind) = Kind::of(header.kind) else {
-            self.counts.unknown_kind += 1;
-            return;
-        };
-        match kind {
-            Kind::Changes | Kind::Small | Kind::Large | Kind::SmallStates | Kind::LargeStates => {
-                let Some(word) = kind.layout() else { return };
-                let meaning = match kind {
-                    Kind::SmallStates | Kind::LargeStates if number.is_none() => Meaning::StaleStates,
-                    Kind::SmallStates | Kind::LargeStates => Meaning::States,
-                    _ if header.flags & DIFFERENCES != 0 && word.value > 0 => Meaning::Differences,
-                    _ => Meaning::Changes,
-                };
-                self.words(Body::new(word, meaning, header, base, body), out);
-            }
-            Kind::Markers => {
-                self.counts.malformed += u64::from(!body.len().is_multiple_of(8));
-                for marker in body.chunks_exact(8) {
-                    let offset = u32::from_le_bytes([marker[0], marker[1], marker[2], marker[3]]);
-                    let code = u16::from_le_bytes([marker[4], marker[5]]);
-                    if code != START && code != STOP {
-                        self.counts.unknown_marker += 1;
-                        continue;
-                    }
-                    let t = base + i64::from(offset);
-                    self.counts.markers += 1;
-                    self.latest = self.latest.max(t);
-                    out.mark(Marker { t, start: code == START });
-                }
-            }
-            Kind::Status if body.len() < STATUS_BYTES => self.counts.malformed += 1,
-            Kind::Status => {
-                let Some(number) = number.filter(|number| *number > self.told) else { return };
-                self.told = number;
-                let mut totals =
-                    body.chunks_exact(8).map(|b| u64::from_le_bytes([b[0], b[1], b[2], b[3], b[4], b[5], b[6], b[7]]));
-                let mut next = || totals.next().unwrap_or_default();
-                let (frames, events, dropped, datagrams, faults) = (next(), next(), next(), next(), next());
-                self.status = Some(Status { frames, events, dropped, datagrams, faults });
-            }
-        }
-    }
-
-    fn words(&mut self, mut body: Body<'_>, out: &mut impl Table) {
-        let states = matches!(body.meaning, Meaning::States | Meaning::StaleStates);
-        let valued = body.layout.value > 0;
-        let Self { instructions, held, counts, latest, .. } = self;
-        // SAFETY: `words::decode` writes each row that it counts, and with `paired` its ticks and present.
-        unsafe {
-            out.rows(words::most_rows(body.left()), valued, states, |room, first, paired| {
-                body.rows = first;
-                words::decode(&mut body, *instructions, held, room, paired, counts);
-                *latest = body.latest.max(*latest);
-                body.rows - first
-            });
-        }
-    }
 }
 
 /// Columns with room for what so many bytes may give.
@@ -389,102 +326,4 @@ pub(in crate::wire::v2) fn check_room(room: Room<'_>, bytes: usize) -> Result<Ro
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::board::Board;
-    use crate::wire::Registers;
-
-    /// A datagram with its checksum.
-    fn datagram(kind: Kind, session: u16, sequence: u32, base: u64, body: &[u8]) -> Vec<u8> {
-        let (kind, stride) = (kind as u8, crate::wire::v2::stride(64));
-        let header = Header { kind, board: 0, sequence, base, session, stride, line: 0, flags: 0, span: 0 };
-        let mut bytes = vec![];
-        header.write(body, &mut bytes);
-        bytes
-    }
-
-    #[test]
-    fn changes_as_they_are_go_the_short_way_where_the_machine_has_it() {
-        let short = usize::from(Instructions::best() == Instructions::Avx512Bytes);
-        for (kind, body, flags, taken) in [
-            (Kind::Small, vec![], 0, short),
-            (Kind::Small, vec![5, 0x80, 7, 0x03], FRAME_SYNC, short),
-            // Advances, and more words than eight.
-            (Kind::Small, [1, 0x7f, 5, 0x83].repeat(6), 0, short),
-            (Kind::Changes, vec![5, 0x80], 0, short),
-            (Kind::Large, vec![5, 1, 0, 0x80], 0, short),
-            // A time, differences, what the board dropped, states, a part of a word, a place beyond the array, a long one.
-            (Kind::Small, vec![0, 0xff, 9, 0, 5, 0x83], 0, 0),
-            (Kind::Small, vec![5, 0x80], DIFFERENCES, 0),
-            (Kind::Small, vec![5, 0x80], DROPPED, 0),
-            (Kind::SmallStates, vec![5, 0x80], 0, 0),
-            (Kind::Small, vec![5, 0x80, 7], 0, 0),
-            (Kind::Small, vec![63, 0x7f, 0, 0], 0, 0),
-            (Kind::Small, [5, 0x80].repeat(30), 0, 0),
-        ] {
-            let mut decoder = Decoder::new(Array::thesis());
-            let mut events = Events::empty(Array::thesis());
-            decoder.push(&datagram(Kind::Small, 1, 0, 0, &[9, 0]), None, &mut events);
-            let mut bytes = datagram(kind, 1, 1, 192, &body);
-            bytes[17] |= flags;
-            let sum = bytes.len() - 4;
-            let sealed = crc32c::crc32c(&bytes[..sum]).to_le_bytes();
-            bytes[sum..].copy_from_slice(&sealed);
-            let plain = decoder.plain(std::iter::once(&bytes[..]), stream_rows(bytes.len()), &mut events);
-            assert_eq!(plain.datagrams, taken, "{kind:?}, flags {flags}, {body:?}");
-        }
-    }
-
-    #[test]
-    fn the_newest_status_of_the_latest_session_counts() {
-        let mut decoder = Decoder::new(Array::thesis());
-        let mut events = Events::empty(Array::thesis());
-        let totals = |n: u64| [n; 5].map(u64::to_le_bytes).concat();
-        for (session, sequence, body, frames) in [
-            (1, 5, totals(50), 50),
-            (1, 4, totals(40), 50),
-            (1, 7, totals(70)[..39].to_vec(), 50),
-            (2, 0, totals(1), 1),
-            (1, 9, totals(90), 1),
-            (2, 1, totals(2), 2),
-        ] {
-            decoder.push(&datagram(Kind::Status, session, sequence, 1000, &body), None, &mut events);
-            assert_eq!(decoder.status().unwrap().frames, frames, "session {session}, number {sequence}");
-        }
-        assert_eq!((decoder.counts().malformed, decoder.counts().intact), (1, 6));
-    }
-
-    #[test]
-    fn a_straggler_of_before_a_reset_changes_nothing_that_is_held_since() {
-        let array = Array::thesis();
-        let registers = Registers { wire_version: 2, ..Registers::default() };
-        let mut board = Board::new(registers, &array).unwrap();
-        let mut said = |ticks: u16, taxels: usize| {
-            let mut out = vec![];
-            for level in [0, ticks, ticks + 20] {
-                let mut pressed = vec![0; 4096];
-                pressed[..taxels].fill(level);
-                board
-                    .frame(&pressed, |datagram| {
-                        out.push(datagram.to_vec());
-                        true
-                    })
-                    .unwrap();
-            }
-            board.reset().unwrap();
-            out
-        };
-        let (before, since) = (said(50, 4096), said(200, 100));
-        let (late, begun) = before.split_last().unwrap();
-        let mut decoder = Decoder::new(array.clone());
-        let mut events = Events::empty(array);
-        for datagram in begun.iter().chain(&since) {
-            decoder.push(datagram, None, &mut events);
-        }
-        let held = decoder.held();
-        let heard = events.len();
-        assert!(matches!(decoder.push(late, None, &mut events), Heard::Intact { reset: false, .. }));
-        assert!(events.len() > heard, "its events are events");
-        assert_eq!(decoder.held(), held);
-    }
-}
+mod tests;

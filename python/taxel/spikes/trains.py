@@ -4,46 +4,27 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, overload
-from uuid import uuid4
-from warnings import catch_warnings, filterwarnings
-from zipfile import BadZipFile
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from taxel import _core
-from taxel._base.arguments import bare, column, floats, nth, number, several, shown, text, window
+from taxel._base.archive import read_arrays
+from taxel._base.arguments import bare, column, floats, nth, number, several, shown, window
 from taxel._base.arguments import path as checked_path
 from taxel._base.columns import Columns, frozen, kept
-from taxel._base.files import whole_file, write_whole
+from taxel._base.drawing import draw
+from taxel._base.files import write_whole
 from taxel._core import FormatError, ProblemError
+from taxel.spikes.exchange import read_nwb, write_nwb
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["SpikeTrains", "to_ms", "to_us"]
-
-
-@overload
-def to_ms(us: float | np.integer[Any]) -> float: ...
-@overload
-def to_ms(us: NDArray[Any]) -> NDArray[np.float64]: ...
-def to_ms(us: Any) -> Any:
-    """Return times of the wire, us, as neurons count them, ms."""
-    return us / 1000.0
-
-
-@overload
-def to_us(ms: float) -> float: ...
-@overload
-def to_us(ms: NDArray[Any]) -> NDArray[np.float64]: ...
-def to_us(ms: Any) -> Any:
-    """Return times of neurons, ms, as the wire counts them, us; not rounded."""
-    return ms * 1000.0
+__all__ = ["SpikeTrains"]
 
 
 class SpikeTrains(Columns):
@@ -203,7 +184,7 @@ class SpikeTrains(Columns):
         ProblemError : a number outside the trains
         """
         try:
-            chosen = np.atleast_1d(np.asarray(trains))
+            chosen = np.atleast_1d(np.asarray(bare("trains", trains)))
         except ValueError as error:
             raise ProblemError(f"trains: {error}") from None
         if chosen.dtype == bool:
@@ -342,28 +323,15 @@ class SpikeTrains(Columns):
         FileExistsError : the file is there already and `overwrite` is false
         ImportError : pynwb is not installed (``pip install taxel[nwb]``)
         """
-        from pynwb import NWBHDF5IO, NWBFile  # noqa: PLC0415  heavy, and an extra
-
-        if begun is None:
-            begun = datetime.now()
-        if not isinstance(begun, datetime):
-            raise ProblemError(f"begun is {shown(begun)}: must be a datetime")
-        try:
-            begun = begun.astimezone()
-        except (OverflowError, ValueError, OSError):
-            raise ProblemError(f"begun is {begun}: must be a date that this machine's clock knows") from None
-        if "\0" in text("description", description):
-            raise ProblemError(f"description is {shown(description)}: NWB takes no zero in a text")
-        file = NWBFile(description, str(uuid4()), begun)
-        if self.values is not None:
-            file.add_unit_column("value", "signed value of each spike: polarity or bits", index=True)
-        window_s = np.array([[self.start, self.stop]]) / 1000.0
-        for n in range(len(self)):
-            signed = {} if self.values is None else {"value": self.values[self.offsets[n] : self.offsets[n + 1]]}
-            file.add_unit(id=n, spike_times=self[n] / 1000.0, obs_intervals=window_s, **signed)
-        with whole_file(path, overwrite=overwrite) as part, _quiet_about_names(), NWBHDF5IO(part, "w") as io:
-            io.write(file)
-        return Path(path)
+        return write_nwb(
+            path,
+            list(self),
+            self._values(),
+            (self.start, self.stop),
+            begun=begun,
+            description=description,
+            overwrite=overwrite,
+        )
 
     @classmethod
     def from_nwb(
@@ -384,39 +352,13 @@ class SpikeTrains(Columns):
         FileNotFoundError : no such file
         ImportError : pynwb is not installed (``pip install taxel[nwb]``)
         """
-        from pynwb import NWBHDF5IO  # noqa: PLC0415  heavy, and an extra
-
-        place = checked_path("path", path)
-        window_ms = [
-            None if edge is None else number(name, edge, "ms") for name, edge in (("start", start), ("stop", stop))
-        ]
-        open(place, "rb").close()  # a missing file is Python's own error
-        try:
-            with _quiet_about_names(), NWBHDF5IO(place, "r") as io:
-                units = io.read().units
-                columns = () if units is None else units.colnames
-                if "spike_times" not in columns:
-                    raise FormatError(f"{place}: an NWB file without spike times in a table of units")
-                times = [1000.0 * np.asarray(units["spike_times"][n], np.float64) for n in range(len(units))]
-                values = None
-                if "value" in columns:
-                    values = [np.asarray(units["value"][n], np.float32) for n in range(len(units))]
-                watched = np.empty((0, 2))
-                if "obs_intervals" in columns and len(units):
-                    watched = 1000.0 * np.concatenate([np.reshape(i, (-1, 2)) for i in units["obs_intervals"][:]])
-        except FormatError:
-            raise
-        except Exception as error:  # whatever h5py and pynwb say of a foreign or broken file
-            raise FormatError(f"{place}: no NWB file that can be read: {shown(str(error))}") from None
-        every = np.concatenate([*times, [0.0]])
-        widest = (watched[:, 0].min(), watched[:, 1].max()) if len(watched) else (every.min(), every.max())
-        first, last = (float(found) if said is None else said for said, found in zip(window_ms, widest, strict=True))
+        times, first, last, values = read_nwb(path, start, stop)
         try:
             return cls.from_lists(times, first, last, values)
         except ProblemError as error:
             # With the caller's own window the fault may be the window's, else it is the file's.
             kind = FormatError if start is None and stop is None else ProblemError
-            raise kind(f"{place}: {error}") from None
+            raise kind(f"{path}: {error}") from None
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the trains to a .npz (``times offsets start stop``, and ``values`` of signed ones); return its path.
@@ -441,22 +383,21 @@ class SpikeTrains(Columns):
         """
         place = checked_path("path", path)
         try:
-            with open(place, "rb") as file, np.load(file) as columns:
-                held = {name: columns[name] for name in columns.files}
+            held = read_arrays(place, ("times", "offsets", "start", "stop", "values"))
             return cls(held["times"], held["offsets"], held["start"].item(), held["stop"].item(), held.get("values"))
-        except (ValueError, KeyError, AttributeError, EOFError, BadZipFile, ProblemError) as error:
+        except (ValueError, KeyError, ProblemError, FormatError) as error:
             raise FormatError(f"{place}: holds no spike trains: {shown(str(error))}") from None
 
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the raster: time (ms) to the right, trains upwards, OFF spikes in another colour."""
-        from taxel.plot import raster  # noqa: PLC0415  matplotlib loads slowly
-
-        return raster(self, ax)
+        return draw("raster", self, ax)  # type: ignore[no-any-return]
 
     def _repr_html_(self) -> str:
-        from taxel.plot import html  # noqa: PLC0415  matplotlib loads slowly
+        return draw("html", self)  # type: ignore[no-any-return]
 
-        return html(self)
+    def _values(self) -> list[NDArray[np.float32]] | None:
+        """Return the values train by train."""
+        return None if self.values is None else np.split(self.values, self.offsets[1:-1])
 
     def _parts(self) -> tuple[Any, ...]:
         return self.times, self.offsets, self.values, self.start, self.stop
@@ -512,14 +453,6 @@ def _by_train(name: str, lists: Sequence[ArrayLike], dtype: type[Any]) -> tuple[
         each = [np.atleast_1d(np.asarray(entry, object)) for entry in entries]
         columns = [column(f"{name}[{n}]", array, dtype) for n, array in enumerate(each)]
         return np.concatenate(columns), [len(values) for values in columns]
-
-
-@contextmanager
-def _quiet_about_names() -> Iterator[None]:
-    """Keep pynwb from complaining that the file beside its place has another name, and of columns of one's own."""
-    with catch_warnings():
-        filterwarnings("ignore", category=UserWarning, module="pynwb|hdmf")
-        yield
 
 
 def _finite_values(values: NDArray[np.float32] | None) -> None:

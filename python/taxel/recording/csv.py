@@ -1,138 +1,52 @@
-"""Tables of events or pictures: .csv and .npz.
+"""Tables of text: a .csv of events or of pictures.
 
 A .csv is either ``t_us,x,y,p[,intensity][,repaired]`` (an empty intensity is one that did not come), or ``t_us`` and
-a column a taxel, named ``x3y5``. A .npz holds the same columns as arrays, and beside them, as JSON in ``about``, what
-a .csv cannot hold: the sensor, registers, notes, detections and what was lost.
+a column a taxel, named ``x3y5``.
 """
 
 from __future__ import annotations
 
 import io
-import math
 import re
-import zipfile
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
-from typing import IO, Any, BinaryIO, cast
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from taxel._base.arguments import shown
 from taxel._base.columns import frozen
-from taxel._base.limits import COLUMNS, DESCRIPTION, TAXELS, UNPACKED, VALUE, unpacked
+from taxel._base.limits import COLUMNS, TAXELS, VALUE, unpacked
 from taxel._core import FormatError, ProblemError
 from taxel.array import Array
 from taxel.events import Events
 from taxel.formats.checks import table as limited
 from taxel.frames import Frames
-from taxel.recording.remarks import Remarks
+from taxel.recording.contents import Contents
+from taxel.recording.npz import around
 
-__all__ = ["columns_of", "read_csv", "read_npz", "table_of", "write_csv", "write_npz"]
+__all__ = ["array_in_csv", "read_csv", "write_csv"]
 
 _EVENTS = ("t_us", "x", "y", "p")
 _MORE = ("intensity", "repaired")
-_COLUMNS = ("t", "x", "y", "p", "intensity", "present", "repaired", "markers", "values", "unit", "about")
 _TAXEL = re.compile(r"x(\d{1,5})y(\d{1,5})")
 
 
-def columns_of(table: Events | Frames) -> dict[str, NDArray[Any]]:
-    """Return a table as columns by name, as .npz and .h5 hold it."""
-    if isinstance(table, Frames):
-        return {"values": table.values, "t": table.t, "unit": np.array(table.unit)}
-    columns: dict[str, Any] = {"t": table.t, "x": table.x, "y": table.y, "p": table.p}
-    if table.intensity is not None:
-        columns |= {"intensity": table.intensity, "present": table.present}
-    if table.repaired is not None:
-        columns["repaired"] = table.repaired
-    return {**columns, "markers": np.array(table.markers, np.int64).reshape(-1, 2)}
+def array_in_csv(table: Events | Frames) -> Array:
+    """Return the sensor that a .csv of a table reads as: it holds neither name nor pitch."""
+    if isinstance(table, Events):
+        return around(table.x, table.y)
+    x, y = np.array(_places(table.array)).reshape(-1, 2).T
+    rows, columns = int(y.max()) + 1, int(x.max()) + 1
+    exists = np.zeros((rows, columns), bool)
+    exists[y, x] = True
+    return Array(rows, columns, exists=None if exists.all() else exists)
 
 
-def write_npz(file: BinaryIO, table: Events | Frames, remarks: Remarks) -> None:
-    """Write a .npz."""
-    about = np.array(replace(remarks, array=table.array).to_json())
-    np.savez_compressed(file, about=about, **cast(dict[str, Any], columns_of(table)))
-
-
-def read_npz(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:
-    """Read a .npz of ours, or one with the columns ``t x y p`` or ``values t``."""
-    try:
-        columns = _unpacked(path)
-    except (OSError, FormatError):
-        raise
-    # What numpy and zipfile raise on damage is no closed list: zlib.error, TokenError, struct.error ...
-    except Exception as error:
-        raise FormatError(f"{path}: a .npz that cannot be unpacked ({_line(error)}); write it again") from None
-    return table_of(path, columns, array)
-
-
-def table_of(path: Path, columns: dict[str, NDArray[Any]], array: Array | None) -> tuple[Events | Frames, Remarks]:
-    """Make a table of the columns of a file, which become its own, with the remarks that stand beside them."""
-    columns = {name: frozen(values) for name, values in columns.items()}
-    remarks = Remarks.from_json(f"{path}, array about", str(columns.get("about", "{}")))
-    sensor = array or remarks.array
-    try:
-        if "values" in columns and "t" in columns:
-            unit = str(columns.get("unit", "counts"))
-            return limited(path, Frames(columns["values"], columns["t"], unit=unit, array=sensor)), remarks
-        missing = [name for name in _COLUMNS[:4] if name not in columns]
-        if missing:
-            names = ", ".join(columns) or "nothing"
-            raise FormatError(
-                f"{path}: holds {names}: {missing[0]} is missing; must be t, x, y, p (events) or values, t (pictures)"
-            )
-        t, x, y, p = (columns[name] for name in _COLUMNS[:4])
-        markers = [(int(at), bool(start)) for at, start in columns.get("markers", np.empty((0, 2)))]
-        extra = {name: columns[name] for name in ("intensity", "present", "repaired") if name in columns}
-        return limited(path, Events(t, x, y, p, array=sensor or _around(x, y), markers=markers, **extra)), remarks
-    except (ProblemError, ValueError, TypeError, OverflowError) as error:
-        raise FormatError(f"{path}: {_line(error)}") from None
-
-
-def _unpacked(path: Path) -> dict[str, NDArray[Any]]:
-    """Read the arrays of a .npz that are ours, once all have said how large they are."""
-    columns = {}
-    with zipfile.ZipFile(path) as archive:
-        members = {name.removesuffix(".npy"): name for name in archive.namelist()}
-        wanted = [name for name in _COLUMNS if name in members]
-        total = 0
-        for name in wanted:
-            with archive.open(members[name]) as file:
-                shape, dtype = _described(file)
-                begin = file.tell()
-            place = f"{path}, array {name}"
-            if dtype.hasobject:
-                raise FormatError(f"{place}: holds Python objects; must be numbers or text")
-            size = math.prod(shape) * dtype.itemsize
-            total += size
-            # Python keeps a character in 4 bytes.
-            unpacked(place, size, 4 * DESCRIPTION if name in {"about", "unit"} else UNPACKED)
-            unpacked(place, total)
-            there = archive.getinfo(members[name]).file_size - begin
-            if size != there:
-                raise FormatError(f"{place}: says that it holds {size} bytes ({shape}, {dtype}); there are {there}")
-        for name in wanted:
-            with archive.open(members[name]) as file:
-                columns[name] = np.lib.format.read_array(file, allow_pickle=False)
-    # A column of another name is not read, but stands in the error of what is missing.
-    return columns or {name: np.empty(0) for name in list(members)[:8]}
-
-
-def _described(file: IO[bytes]) -> tuple[tuple[int, ...], np.dtype[Any]]:
-    """Read the shape and the kind that an array says it has."""
-    read = {1: np.lib.format.read_array_header_1_0, 2: np.lib.format.read_array_header_2_0}
-    version = np.lib.format.read_magic(file)
-    if version[0] not in read:
-        raise ValueError(f"version {version[0]} of the description; there are 1 and 2")
-    shape, _, dtype = read[version[0]](file)
-    if any(isinstance(n, bool) or n < 0 for n in shape):
-        raise ValueError(f"shape {shape}")
-    return shape, dtype
-
-
-def write_csv(file: BinaryIO, table: Events | Frames) -> None:
+def write_csv(file: BinaryIO, contents: Contents) -> None:
     """Write a .csv."""
+    table = contents.table
     if isinstance(table, Frames):
         places = _places(table.array)
         names = ",".join(["t_us", *(f"x{x}y{y}" for x, y in places)])
@@ -156,8 +70,19 @@ def write_csv(file: BinaryIO, table: Events | Frames) -> None:
         file.write("\n".join(map(",".join, zip(*(r.tolist() for r in rows), strict=True))).encode() + b"\n")
 
 
-def read_csv(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]:
-    """Read a .csv of events or of pictures."""
+def read_csv(path: Path, array: Array | None) -> Contents:
+    """Read a .csv of events or of pictures.
+
+    Raises
+    ------
+    FormatError : another header, or a value that makes no sense (names line and column)
+    """
+    table = limited(path, _table(path, array))
+    events, frames = (table, None) if isinstance(table, Events) else (None, table)
+    return Contents(path, path.name, "csv", table.array, events=events, frames=frames)
+
+
+def _table(path: Path, array: Array | None) -> Events | Frames:
     raw = path.read_bytes().replace(b"\r\n", b"\n").removeprefix(b"\xef\xbb\xbf")
     head, _, body = raw.partition(b"\n")
     columns = head.count(b",") + 1
@@ -177,11 +102,11 @@ def read_csv(path: Path, array: Array | None) -> tuple[Events | Frames, Remarks]
             raise FormatError(
                 f"{path}, line 1: {shown(','.join(names[4:]))} after p: only intensity and repaired may follow"
             )
-        return limited(path, _csv_events(path, names, body, array)), Remarks()
+        return _csv_events(path, names, body, array)
     repeated = next((name for name, n in Counter(names).items() if n > 1), None)
     if repeated is not None:
         raise FormatError(f"{path}, line 1: column {shown(repeated)} stands there twice")
-    return limited(path, _csv_frames(path, names, body, array)), Remarks()
+    return _csv_frames(path, names, body, array)
 
 
 def _csv_events(path: Path, names: list[str], body: bytes, array: Array | None) -> Events:
@@ -203,7 +128,7 @@ def _csv_events(path: Path, names: list[str], body: bytes, array: Array | None) 
         _within(path, "repaired", repaired, 0, 1)
         extra["repaired"] = repaired.astype(bool)
     try:
-        return Events(t, x, y, p.astype(bool), array=array or _around(x, y), **extra)
+        return Events(t, x, y, p.astype(bool), array=array or around(x, y), **extra)
     except ProblemError as error:
         raise FormatError(f"{path}: {error}") from None
 
@@ -282,17 +207,6 @@ def _within(path: Path, name: str, column: NDArray[Any], low: int, high: int) ->
     if len(wrong):
         k = int(wrong[0])
         raise FormatError(f"{path}, line {k + 2}, column {name}: is {column[k]}; must be {max(0, low)} to {high}")
-
-
-def _around(x: NDArray[Any], y: NDArray[Any]) -> Array:
-    """Return the thesis' array, or a larger one where events lie outside it."""
-    thesis = Array.thesis()
-    if not len(x):
-        return thesis
-    if min(x.min(), y.min()) < 0 or max(x.max(), y.max()) >= 65_535:
-        raise ProblemError("x and y: must lie in 0 to 65534")
-    rows, columns = max(thesis.rows, int(y.max()) + 1), max(thesis.columns, int(x.max()) + 1)
-    return thesis if (rows, columns) == thesis.shape else Array(rows, columns)
 
 
 def _places(array: Array) -> list[tuple[int, int]]:

@@ -1,0 +1,79 @@
+//! A stretch of arrivals, of which the quick ones are stored.
+
+use super::offset::Offset;
+
+/// Of each such part of a stretch the quickest points are stored, us: within it no drift of a quartz changes which are quick ...
+pub(super) const PART_US: i64 = 10_000;
+/// ... so many of them.
+pub(super) const QUICK: usize = 2;
+
+/// Which share of the points may lie below the line.
+const EARLY: f64 = 0.01;
+
+/// Board time us, arrival less board time ns.
+pub(super) type Point = (i64, i64);
+
+/// The quick points of a stretch, and the mean time of all.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Stretch {
+    /// Those of a part stand beside one another where they came in order.
+    pub(super) quick: Vec<Point>,
+    pub(super) points: u64,
+    /// Sum of board times since the first, us.
+    pub(super) sum: i64,
+    pub(super) first: i64,
+    pub(super) last: i64,
+}
+
+impl Stretch {
+    pub(super) fn push(&mut self, point: Point) {
+        if self.points > 0 && point.0 == self.last {
+            // A train of datagrams that could leave at one time is one point: its quickest.
+            if let Some(same) = self.quick.iter_mut().rev().find(|quick| quick.0 == point.0) {
+                same.1 = same.1.min(point.1);
+                return;
+            }
+        } else {
+            if self.points == 0 {
+                (self.first, self.last) = (point.0, point.0);
+            }
+            self.points += 1;
+            self.sum += point.0 - self.first;
+            self.last = self.last.max(point.0);
+        }
+        let part = point.0.div_euclid(PART_US);
+        let (mut rivals, mut slowest) = (0, 0);
+        for (k, quick) in self.quick.iter().enumerate().rev().filter(|(_, quick)| quick.0.div_euclid(PART_US) == part) {
+            if rivals == 0 || quick.1 > self.quick[slowest].1 {
+                slowest = k;
+            }
+            rivals += 1;
+            if rivals == QUICK {
+                break;
+            }
+        }
+        if rivals < QUICK {
+            self.quick.push(point);
+        } else if point.1 < self.quick[slowest].1 {
+            self.quick[slowest] = point;
+        }
+    }
+
+    /// The lowest point.
+    pub(super) fn lowest(&self) -> Option<Point> {
+        self.quick.iter().copied().min_by_key(|quick| quick.1)
+    }
+
+    /// How many points may lie below the line: where so many came that few were kept, as many as can be told.
+    #[allow(clippy::cast_precision_loss)]
+    pub(super) fn early(&self) -> f64 {
+        (EARLY * self.points as f64).min(self.quick.len() as f64 / 2.0)
+    }
+
+    /// Leaves out what lies far above a line.
+    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+    pub(super) fn thin(&mut self, line: Offset) {
+        self.quick.sort_unstable_by_key(|&(t, late)| late + t * 1000 - line.host_ns(t));
+        self.quick.truncate((2.0 * self.early()).ceil() as usize);
+    }
+}

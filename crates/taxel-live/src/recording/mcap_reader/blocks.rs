@@ -1,0 +1,115 @@
+//! The chunks of a file, read one at a time.
+
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::PathBuf;
+
+use mcap::parse_record;
+use mcap::records::{Record, op};
+use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
+
+use crate::recording::{Header, limits};
+use crate::{Error, Result};
+
+/// A chunk, or a run of records outside chunks (as other tools may write them).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Block {
+    pub(super) offset: u64,
+    pub(super) length: u64,
+    pub(super) bare: bool,
+}
+
+/// Where the messages of a file are.
+#[derive(Debug)]
+pub(super) struct Blocks {
+    pub(super) path: PathBuf,
+    pub(super) file: File,
+    pub(super) length: u64,
+    pub(super) places: Vec<Block>,
+}
+
+impl Blocks {
+    /// The header's copy in the first chunk that has one.
+    pub(super) fn header(&self) -> Result<Option<Header>> {
+        let (mut bytes, mut header) = (Vec::new(), None);
+        for block in &self.places {
+            self.records(*block, &mut bytes, |record| {
+                if let Record::Channel(channel) = record {
+                    header = channel.metadata.get("header").and_then(|text| serde_json::from_str(text).ok());
+                }
+                header.is_none()
+            })?;
+            if header.is_some() {
+                break;
+            }
+        }
+        Ok(header)
+    }
+
+    /// Hands out the records of a block until `take` returns false; returns whether the block is sound.
+    pub(super) fn records(
+        &self,
+        block: Block,
+        bytes: &mut Vec<u8>,
+        mut take: impl FnMut(Record<'_>) -> bool,
+    ) -> Result<bool> {
+        let Ok(length) = usize::try_from(block.length) else { return Ok(false) };
+        bytes.resize(length, 0);
+        self.file.read_exact_at(bytes, block.offset).map_err(Error::file(&self.path))?;
+        let options = LinearReaderOptions::default()
+            .with_skip_start_magic(true)
+            .with_skip_end_magic(true)
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(length.max(limits::CHUNK as usize));
+        let mut reader = LinearReader::new_with_options(options);
+        let mut given = 0;
+        while let Some(event) = reader.next_event() {
+            match event {
+                Ok(LinearReadEvent::ReadRequest(wanted)) => {
+                    // At the end no bytes are given: the reader then ends, or returns what is missing.
+                    let more = wanted.min(length - given);
+                    reader.insert(more).copy_from_slice(&bytes[given..given + more]);
+                    reader.notify_read(more);
+                    given += more;
+                }
+                // Other records are not read, so an error in them does not matter.
+                Ok(LinearReadEvent::Record { opcode, .. }) if !matches!(opcode, op::CHANNEL | op::MESSAGE) => {}
+                Ok(LinearReadEvent::Record { data, opcode }) if !texts_fit(opcode, data) => return Ok(false),
+                Ok(LinearReadEvent::Record { data, opcode }) => match parse_record(opcode, data) {
+                    Ok(record) => {
+                        if !take(record) {
+                            return Ok(true);
+                        }
+                    }
+                    Err(_) => return Ok(false),
+                },
+                Err(_) => return Ok(false),
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// Whether the texts of a channel's or a metadata record end within it: the parser asks for their memory before it looks.
+pub(super) fn texts_fit(opcode: u8, data: &[u8]) -> bool {
+    fn text(data: &[u8]) -> Option<&[u8]> {
+        let (length, rest) = data.split_first_chunk::<4>()?;
+        rest.get(u32::from_le_bytes(*length) as usize..)
+    }
+    /// A table of texts by name, of the length that it states.
+    fn table(data: &[u8]) -> Option<()> {
+        let (length, rest) = data.split_first_chunk::<4>()?;
+        let mut pairs = rest.get(..u32::from_le_bytes(*length) as usize)?;
+        while !pairs.is_empty() {
+            pairs = text(text(pairs)?)?;
+        }
+        Some(())
+    }
+    match opcode {
+        // Two numbers of 16 bits, topic, encoding, table.
+        op::CHANNEL => data.get(4..).and_then(text).and_then(text).and_then(table).is_some(),
+        // Name, table.
+        op::METADATA => text(data).and_then(table).is_some(),
+        _ => true,
+    }
+}

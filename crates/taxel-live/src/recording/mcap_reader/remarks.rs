@@ -1,0 +1,125 @@
+//! The small messages of a recording: registers, markers, notes, detections, counts.
+
+use serde_json::Value;
+use taxel_core::Marker;
+use taxel_core::detect::Detection;
+use taxel_core::encode::Zeroing;
+use taxel_core::wire::{self, Registers};
+
+use super::Message;
+use crate::recording::base64::unbase64;
+use crate::recording::{BoardChange, Counts, Note, Topic};
+
+/// All small messages of a recording.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Remarks {
+    /// The board's registers as they were set, by time of the host, ns.
+    pub registers: Vec<(i64, Registers)>,
+    /// Starts and stops, as the board marked them.
+    pub markers: Vec<Marker>,
+    /// Notes of people.
+    pub notes: Vec<Note>,
+    /// Taxels that people zeroed, and when by the host's clock, ns.
+    pub zeroings: Vec<(i64, Zeroing)>,
+    /// Detections, and when they were recorded by the host's clock, ns.
+    pub detections: Vec<(i64, Detection)>,
+    /// The last counts, from before the end.
+    pub counts: Option<Counts>,
+    /// How many datagrams there are, and their bytes.
+    pub datagrams: u64,
+    /// Bytes in them.
+    pub datagram_bytes: u64,
+    /// First and last arrival, ns since 1970.
+    pub arrivals: Option<(i64, i64)>,
+    /// How many pictures there are.
+    pub pictures: u64,
+    /// Resets of the board, and changes of its version of the wire.
+    pub board: Vec<BoardChange>,
+    /// How many lines of a stream there are.
+    pub samples: u64,
+    /// The values that the taxels held when the recording began, ticks by index, 65 535 of a taxel without any event so far; where
+    /// it states them.
+    pub held: Option<Vec<u16>>,
+}
+
+impl Remarks {
+    /// Adds a message; datagrams and pictures are only counted.
+    pub fn take(&mut self, message: &Message<'_>) {
+        match message.topic {
+            Topic::Datagrams => {
+                self.datagrams += 1;
+                self.datagram_bytes += message.data.len() as u64;
+                let (first, last) = self.arrivals.unwrap_or((message.at_ns, message.at_ns));
+                self.arrivals = Some((first.min(message.at_ns), last.max(message.at_ns)));
+            }
+            Topic::Pressure => self.pictures += 1,
+            // A message that does not parse has a sound checksum: another program wrote it, and it is left alone.
+            Topic::Registers => {
+                if let Ok(value) = serde_json::from_slice(message.data) {
+                    self.registers.push((message.at_ns, value));
+                }
+            }
+            Topic::Markers => {
+                if let Ok(value) = serde_json::from_slice::<Value>(message.data)
+                    && let (Some(t), Some(start)) = (value["t_us"].as_i64(), value["start"].as_bool())
+                {
+                    self.markers.push(Marker { t, start });
+                }
+            }
+            Topic::Notes => {
+                if let Ok(value) = serde_json::from_slice::<Value>(message.data)
+                    && let Some(text) = value["message"].as_str()
+                {
+                    let t_us = value["t_us"].as_i64();
+                    if let Some(zeroing) = zeroing(t_us, &value["zeroed"]) {
+                        self.zeroings.push((message.at_ns, zeroing));
+                        return;
+                    }
+                    self.notes.push(Note { at_ns: message.at_ns, t_us, text: text.to_owned() });
+                }
+            }
+            Topic::Detections => {
+                if let Ok(value) = serde_json::from_slice::<Value>(message.data)
+                    && let (Some(label), Some(t), Some(known)) =
+                        (value["label"].as_str(), value["t_us"].as_i64(), value["known_us"].as_i64())
+                {
+                    // JSON has no NaN: a slope that is not known is written as null.
+                    let slope = value["slope"].as_f64().unwrap_or(f64::NAN);
+                    let (label, repaired) = (label.to_owned(), value["repaired"].as_bool().unwrap_or(false));
+                    self.detections.push((message.at_ns, Detection { label, t, known, slope, repaired }));
+                }
+            }
+            Topic::Held => {
+                self.held = held(message.data).or(self.held.take());
+            }
+            Topic::Board => {
+                if let Ok(value) = serde_json::from_slice::<BoardChange>(message.data) {
+                    self.board.push(BoardChange { at_ns: message.at_ns, ..value });
+                }
+            }
+            Topic::Samples => self.samples += 1,
+            Topic::Counts => self.counts = serde_json::from_slice(message.data).ok().or(self.counts.take()),
+        }
+    }
+}
+
+/// The values that the taxels held by such a message, ticks by taxel index; 65 535 of a taxel without any event so far.
+fn held(data: &[u8]) -> Option<Vec<u16>> {
+    let value: Value = serde_json::from_slice(data).ok()?;
+    let ticks = unbase64(value["ticks"].as_str()?)?;
+    Some(ticks.chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect())
+}
+
+/// Gives a decoder the values that the taxels held before the recording's first datagram.
+pub fn begin_with(receiver: &mut wire::Receiver, data: &[u8]) {
+    if let Some(held) = held(data) {
+        receiver.begin_with(held.iter().map(|ticks| (*ticks != u16::MAX).then_some(*ticks)));
+    }
+}
+
+/// The zeroing that a note states; `None` of any other note.
+fn zeroing(t_us: Option<i64>, value: &Value) -> Option<Zeroing> {
+    let whole = |key: &str| value[key].as_u64().and_then(|n| u16::try_from(n).ok());
+    let (t, x, y) = (t_us?, whole("x")?, whole("y")?);
+    Some(Zeroing { t, x, y, rest: value["rest"].as_f64()?, before: value["before"].as_f64() })
+}

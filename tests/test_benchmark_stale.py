@@ -1,0 +1,119 @@
+"""Which results of benchmarks are older than what they measure: that the list is made right, never that it is short."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from taxel.cli.bench import stale_results
+
+ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "benchmarks"))
+import _peer  # noqa: E402  what benchmarks share
+
+BENCHMARK = '''"""How fast is it?"""
+from _shared import often
+from taxel.metrics import distance_of
+
+def run(*, quick):
+    return often(distance_of)
+'''
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A benchmark with a result of this very code, one without a result."""
+    (tmp_path / "results").mkdir()
+    (tmp_path / "fast.py").write_text(BENCHMARK.replace("distance_of", "victor_purpura"))
+    (tmp_path / "other.py").write_text(BENCHMARK.replace("distance_of", "van_rossum"))
+    (tmp_path / "_shared.py").write_text("def often(run):\n    return 3  # times\n")
+    from taxel.report.provenance import installed
+
+    parts = installed(*sorted(tmp_path.glob("*.py"))).parts("fast")
+    assert {"fast", "_shared", "taxel.metrics.victor_purpura"} <= parts.keys()
+    (tmp_path / "results" / "fast.json").write_text(json.dumps({"made_of": parts}))
+    return tmp_path
+
+
+def test_a_result_of_this_code_is_not_stale_and_one_that_is_missing_is(folder: Path) -> None:
+    assert stale_results(folder, ["fast", "other"]) == {"other": ["no result"]}
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "moved"),
+    [
+        ("fast.py", "How fast", "How slow", []),
+        ("_shared.py", "# times", "# rounds", []),
+        ("_shared.py", "3", "4", ["_shared"]),
+        ("fast.py", "quick", "short", ["fast"]),
+        (
+            "fast.py",
+            "victor_purpura",
+            "isi_distance",
+            ["fast", "taxel.metrics.isi_distance", "taxel.metrics.victor_purpura"],
+        ),
+    ],
+)
+def test_a_change_in_what_is_measured_is_named(folder: Path, file: str, old: str, new: str, moved: list[str]) -> None:
+    (folder / file).write_text((folder / file).read_text().replace(old, new))
+    assert stale_results(folder, ["fast"]).get("fast", []) == moved
+
+
+def test_a_result_without_its_sources_is_stale(folder: Path) -> None:
+    (folder / "results" / "fast.json").write_text("{}")
+    assert stale_results(folder, ["fast"]) == {"fast": ["its sources were not recorded"]}
+
+
+PEER = "import json, sys\nprint(json.dumps({'cpu_s': float(sys.argv[1]), 'verdict': 'solved'}))\n"
+
+
+@pytest.fixture
+def peer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A peer that says how long it took, waited for; what is kept is a file of the test's."""
+    monkeypatch.setattr(_peer, "KEPT", tmp_path / "peers.json")
+    monkeypatch.setenv(_peer.PATIENT, "1")
+    (tmp_path / "slow.py").write_text(PEER)
+    return str(tmp_path / "slow.py")
+
+
+def ask(peer: str, seconds: float, *, quick: bool = False) -> dict[str, object]:
+    return _peer.ask(peer, seconds, packages="numpy", limit=900, quick=quick)
+
+
+def test_the_time_of_a_peer_that_needs_minutes_is_kept_and_said_to_be(peer: str) -> None:
+    assert "kept" not in ask(peer, 300.0)
+    again = ask(peer, 300.0)
+    assert again["cpu_s"] == 300.0
+    assert _peer.processor() in str(again["kept"])
+    assert _peer.kept_of({"a": {"slow": again, "ours": {}}}) == {"a, slow": again["kept"]}
+    assert "kept" not in ask(peer, 300.0, quick=True)
+
+
+def test_what_is_quick_is_measured_each_time(peer: str) -> None:
+    ask(peer, 3.0)
+    assert "kept" not in ask(peer, 3.0)
+
+
+def test_a_kept_time_counts_on_its_processor_and_of_its_code_alone(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    ask(peer, 300.0)
+    Path(peer).write_text(PEER + "# a comment\n")
+    assert "kept" in ask(peer, 300.0)
+    with monkeypatch.context() as other:
+        other.setattr(_peer, "processor", lambda: "another model")
+        other.delenv(_peer.PATIENT)
+        assert "kept" not in ask(peer, 300.0)
+    with monkeypatch.context() as other:
+        other.setattr(_peer, "version", lambda package: "0.0")
+        other.delenv(_peer.PATIENT)
+        assert "kept" not in ask(peer, 300.0)
+    Path(peer).write_text(PEER.replace("solved", "infeasible"))
+    assert ask(peer, 300.0)["verdict"] == "infeasible"
+
+
+def test_a_peer_that_is_not_waited_for_is_not_kept(peer: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(_peer.PATIENT)
+    ask(peer, 300.0)
+    assert not _peer.KEPT.exists()
