@@ -18,7 +18,7 @@ pub(super) enum Broadcast {
     Counters(Arc<Map<String, Value>>),
     /// The labels of a recording have changed: for the clients that show it.
     Labels(String),
-    /// What `hello` says has changed.
+    /// The contents of `hello` have changed.
     Hello,
 }
 

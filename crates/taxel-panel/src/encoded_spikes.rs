@@ -11,7 +11,7 @@ use super::time_columns::{SPAN, column_of};
 use taxel_live::Result;
 use taxel_live::pipeline::{Change, UNKNOWN};
 
-/// EncodedSpikes that are told at once at most.
+/// Maximum number of spikes in a message.
 const MOST: usize = 4096;
 
 /// Maximum number of changes converted at a time, which bounds the temporary memory.
@@ -103,7 +103,7 @@ impl EncodedSpikes {
         }
     }
 
-    /// Counts the pending spikes from index `from` on in their columns; of the pending ones the newest are kept.
+    /// Counts the pending spikes from index `from` on in their columns; only the newest stay pending.
     #[allow(clippy::cast_possible_truncation)]
     fn count(&mut self, from: usize) {
         let (rows, trains) = (usize::from(self.array.rows), self.stream.trains().max(1));

@@ -1,4 +1,4 @@
-//! A live source: the copies that the pipeline gives of a board's events, and the state and history made of them.
+//! A live source: copies of a board's events from the pipeline, and the state and the keyframe index made of them.
 
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -32,7 +32,7 @@ use viewport::Viewport;
 const MOST_REFUSALS: usize = 100;
 const REFUSALS_WITHIN: Duration = Duration::from_secs(10);
 
-/// How often a session without other work looks whether its client is alive.
+/// How often a session without other work checks whether its client is alive.
 const IDLE: Duration = Duration::from_secs(1);
 
 struct Session {

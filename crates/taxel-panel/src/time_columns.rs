@@ -49,7 +49,7 @@ struct Block {
     curves: Vec<Curve>,
 }
 
-/// Raster and curves by column of time, kept in blocks; a stretch without events takes no memory.
+/// Raster and curves by column of time, stored in blocks; a stretch without events takes no memory.
 #[derive(Debug, Clone)]
 pub struct TimeColumns {
     rows: usize,

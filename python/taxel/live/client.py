@@ -454,6 +454,7 @@ def _connected(address: str, token: str) -> ClientConnection:
     except ImportError:
         raise ImportError("websockets is not installed: pip install websockets") from None
     try:
+        # Newer versions connect when the context is entered; `PanelClient.close` closes the connection.
         return connect(
             f"ws://{address}/socket",
             origin=Origin(f"http://{address}"),
@@ -461,7 +462,7 @@ def _connected(address: str, token: str) -> ClientConnection:
             compression=None,
             max_size=None,
             proxy=None,
-        )
+        ).__enter__()
     except InvalidHandshake as error:
         raise ProblemError(f"panel at {address}: refuses the connection, perhaps for its token: {error}") from None
 

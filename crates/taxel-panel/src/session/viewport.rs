@@ -427,7 +427,7 @@ impl Viewport {
         let begun = Instant::now();
         let index = hub.folder.index(&name).await.map_err(|error| Refusal::of("name", error))?;
         let labels = read_labels(hub, &name).await;
-        let mut told = vec![opened_message(&name, &index, begun)];
+        let mut answer = vec![opened_message(&name, &index, begun)];
         let taxels = index.header().array.len();
         self.options.watched = self.options.watched.filter(|&taxel| (taxel as usize) < taxels);
         let range = index.range();
@@ -437,12 +437,12 @@ impl Viewport {
             Some((first, _)) => self.seek(first).await?,
             None => self.position = Position::At(None),
         }
-        told.push(hub.labels.message(&name));
-        told.push(self.transport_message());
+        answer.push(hub.labels.message(&name));
+        answer.push(self.transport_message());
         if let Err(refusal) = labels {
-            told.push(messages::warning(refusal.reason));
+            answer.push(messages::warning(refusal.reason));
         }
-        Ok(told)
+        Ok(answer)
     }
 }
 
