@@ -58,7 +58,7 @@ def test_hundreds_of_damaged_archives_are_one_error_each_or_read(tmp_path: Path,
             read(path)
         except FormatError as error:
             refused += 1
-            assert "\n" not in str(error)
+            assert "\n" not in str(error)  # noqa: PT017  most are refused, some are still sound
     assert refused > 300
 
 
